@@ -162,7 +162,7 @@ class LessonPlayer:
         if self.state == "left":
             self._begin(self.number)
         else:
-            self.leave()
+            self.leave(task=True)
 
     def end(self) -> None:
         viewer = self._viewer

@@ -322,12 +322,8 @@ class Window(BaseWindow):
             if first <= _GAP:
                 continue
             k = session.history.at(first - _GAP if first > 2 * _GAP else 0.0)
-            state, speeds = (
-                session.history[k].states[pane.number],
-                session.history[k].states[pane.number].setup.speeds,
-            )
-            if speeds is None or len(speeds) == len(state.positions):
-                costs.ask(pane.number, session.history.time(k), state.positions, speeds=speeds, aside=True)
+            state, time = session.history[k].states[pane.number], session.history.time(k)
+            costs.ask(pane.number, time, state.positions, speeds=state.setup.speeds, aside=True)
 
     def _arrange(self) -> None:
         viewer, session = self.viewer, self.viewer.session

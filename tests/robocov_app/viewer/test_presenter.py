@@ -267,7 +267,7 @@ def test_failing_reviving_and_removing_need_a_robot_that_is_asked() -> None:
 
 def test_undo_says_what_began_anew_and_the_map_has_its_name_again() -> None:
     viewer = viewer_of()
-    viewer.change_robots(1)
+    do(viewer, "more")
     viewer.open_map("square")
     viewer.add_pane()
     assert viewer.map_name == "square"

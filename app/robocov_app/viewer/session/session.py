@@ -447,15 +447,11 @@ class Session:
         if "environment" in changed or scenario.start not in known:
             changed.setdefault("start", None)
         new: Scenario = replace(scenario, **changed)  # type: ignore[arg-type]
-        self.begin(new, _anew(scenario, new))
-
-    def begin(self, scenario: Scenario, words: str) -> None:
-        """Begin another scenario at time 0; undo comes back to this one."""
         self.remake()
-        run = Lockstep(scenario)
+        run = Lockstep(new)
         self.stow()
-        restart = changes.Restart(scenario)
-        self._begin_at(self.document.add(self.head, self._run.step, "begin", "begun anew", restart), run)
+        words, restart = _anew(scenario, new), changes.Restart(new)
+        self._begin_at(self.document.add(self.head, self._run.step, "begin", words, restart), run)
         self.recorded_until = None
         self.revision += 1
 
