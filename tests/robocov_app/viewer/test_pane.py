@@ -218,4 +218,4 @@ def test_robots_that_failed_are_sensed_as_obstacles_are():
     assert len(seen.positions) == seen.neighbours.count == 3
     away = np.hypot(*(seen.obstacle_points - (1.3, 1.5)).T)
     assert away == pytest.approx(0.1, abs=2e-3)
-    assert isinstance(pane.decide(), Decision)
+    assert isinstance(pane.simulation.snapshot.decision, Decision)
