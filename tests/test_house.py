@@ -6,8 +6,10 @@ import ast
 import subprocess
 import sys
 import tomllib
+from graphlib import TopologicalSorter
 from pathlib import Path
 
+import grimp
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -34,6 +36,13 @@ def test_types_are_strict() -> None:
 def test_imports_go_down_only() -> None:
     call = "from importlinter.cli import lint_imports_command as lint; lint([])"
     passes("-c", call)
+
+
+def test_no_two_modules_need_each_other_not_even_for_types() -> None:
+    graph = grimp.build_graph("robocov", "robocov_app")
+    TopologicalSorter(
+        {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
+    ).prepare()
 
 
 @pytest.mark.parametrize("root", ["coverage", "app"])
