@@ -397,7 +397,7 @@ def toolbox() -> dict[str, Tool]:
     tools: list[Tool] = [
         *(Hand(), Polygon(), Wall(), Circle(), Brush()),
         Click("eraser", "Delete", "click an obstacle or a robot to delete it", does=_erase),
-        Click("robot", "Robot", "click where a robot is to join", does=_add),
+        Click("robot", "Join", "click where a robot is to join", does=_add),
         Click("failure", "Failure", fails, does=_fail),
         Ruler(),
     ]

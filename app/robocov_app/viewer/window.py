@@ -354,7 +354,8 @@ class Window(BaseWindow):
         filmed = None if self.film is None else self.film.frames / FILM_FPS
         line = facts(viewer, self.rate, self._steps_rate, filmed)
         waits = self.tour is not None and self._lesson is None
-        hint = "F2 back to the lesson · Esc ends it" if waits else self.hint
+        hint = self.hint if viewer.session.playing else self.hint.replace("Space pause", "Space play")
+        hint = "F2 back to the lesson · Esc ends it" if waits else hint
         draw_status(self.screen, layout.status, theme, layout.scale, line, hint)
         self._spots = []
         if (lesson := self._lesson) is not None and layout.panel[2]:
