@@ -376,7 +376,15 @@ class Study:
                 each.environment.start(name)
             except InputError as error:
                 raise type(error)(f"starts[{k}]: {error}") from None
-        object.__setattr__(self, "teams", self._every_team())
+        names = (*TEAM, *(name for name, usual in UNICYCLES.items() if getattr(self, name) != usual))
+        axes = {name: axis(getattr(self, name), ("team", name), partial(_team_value, name)) for name in names}
+        if self.group:
+            axes[GROUPS] = [json.dumps([dict(each) for each in self.group])]
+        axes |= condition_axes(self.conditions)
+        teams = tuple(dict(zip(axes, row, strict=True)) for row in product(*axes.values()))
+        for team, robots in product(teams, self.robots):
+            conditions_of(team, 0, robots)
+        object.__setattr__(self, "teams", teams)
         for name, value in zip(("sources", "gains"), self._controllers(), strict=True):
             object.__setattr__(self, name, value)
         if len(self) > MOST_RUNS:
@@ -429,19 +437,6 @@ class Study:
             "dt_s": self.dt,
             **{name: getattr(self, name) for name in ("lattice", "cost_hz", "record_hz", "metrics")},
         }
-
-    def _every_team(self) -> tuple[Mapping[str, TeamValue], ...]:
-        names = (*TEAM, *(name for name, usual in UNICYCLES.items() if getattr(self, name) != usual))
-        axes: list[Sequence[TeamValue]] = [
-            axis(getattr(self, name), ("team", name), partial(_team_value, name)) for name in names
-        ]
-        groups = {GROUPS: [json.dumps([dict(each) for each in self.group])]} if self.group else {}
-        more = groups | condition_axes(self.conditions)
-        names = (*names, *more)
-        teams = tuple(dict(zip(names, row, strict=True)) for row in product(*axes, *more.values()))
-        for team, robots in product(teams, self.robots):
-            conditions_of(team, 0, robots)
-        return teams
 
     def _controllers(self) -> tuple[dict[str, Source], dict[str, Gains]]:
         """Return the sources of the users' controllers, and what is tried of each controller."""

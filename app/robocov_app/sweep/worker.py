@@ -72,7 +72,28 @@ def perform(task: Task) -> Outcome:
         enabled = gc.isenabled()
         gc.disable()
         try:
-            return _performed(task)
+            environment, cost = prepared(task)
+            record, effort = measured(task, environment)
+            history = cost_history(record, cost, task.cost_hz)
+            # of all moments: what is kept of them is for people to look at
+            summary = finite(summarise(record, history))
+            path = summary["path_length_m"]
+            figures = {**summary, "path_length_m": sum(path) / len(path)}
+            figures = {name: figures[name] for name in (*FIGURES, TIMED) if name in figures}
+            content = record.to_json(summary, lattice=task.lattice)
+            content |= {"cost_hz": task.cost_hz, "record_hz": task.record_hz}
+            content["controller"] |= source_json(task.source)
+            kept, arrays = record.thinned(task.record_hz), io.BytesIO()
+            np.savez_compressed(arrays, **{name: getattr(kept, name) for name in kept.arrays})
+            files = {
+                "run.json": json_text(content).encode(),
+                "record.npz": arrays.getvalue(),
+                "cost.csv": csv_text(*cost_table(history)).encode(),
+            }
+            if task.metrics:
+                figures |= finite(figures_of(record, history))
+                files[EFFORT] = json_text(effort).encode()
+            return Outcome(files, figures)
         except (Exception, SystemExit) as error:
             message = str(error) if isinstance(error, RobocovError) else f"{type(error).__name__}: {error}"
             return failed(message, traceback.format_exc())
@@ -162,28 +183,3 @@ def prepared(task: Task) -> tuple[Environment, CoverageCost]:
 def _prepared(document: str, name: str, lattice: int) -> tuple[Environment, CoverageCost]:
     environment = from_json(json.loads(document), name)
     return environment, CoverageCost(environment, lattice)
-
-
-def _performed(task: Task) -> Outcome:
-    environment, cost = prepared(task)
-    record, effort = measured(task, environment)
-    history = cost_history(record, cost, task.cost_hz)
-    # of all moments: what is kept of them is for people to look at
-    summary = finite(summarise(record, history))
-    path = summary["path_length_m"]
-    figures = {**summary, "path_length_m": sum(path) / len(path)}
-    figures = {name: figures[name] for name in (*FIGURES, TIMED) if name in figures}
-    content = record.to_json(summary, lattice=task.lattice)
-    content |= {"cost_hz": task.cost_hz, "record_hz": task.record_hz}
-    content["controller"] |= source_json(task.source)
-    kept, arrays = record.thinned(task.record_hz), io.BytesIO()
-    np.savez_compressed(arrays, **{name: getattr(kept, name) for name in kept.arrays})
-    files = {
-        "run.json": json_text(content).encode(),
-        "record.npz": arrays.getvalue(),
-        "cost.csv": csv_text(*cost_table(history)).encode(),
-    }
-    if task.metrics:
-        figures |= finite(figures_of(record, history))
-        files[EFFORT] = json_text(effort).encode()
-    return Outcome(files, figures)
