@@ -101,15 +101,10 @@ def gain_column(name: str) -> str:
 
 
 def row_of(task: Task, entry: Entry) -> dict[str, Any]:
-    return {
-        **{column.name: getattr(task, column.name) for column in _BEFORE},
-        **{gain_column(name): value for name, value in task.gains.items()},
-        **{parameter_column(name): value for name, value in task.team.items()},
-        "duration_s": task.duration,
-        **entry.figures,
-        "run": task.name,
-        "error": entry.error,
-    }
+    row: dict[str, Any] = {column.name: getattr(task, column.name) for column in _BEFORE}
+    row |= {gain_column(name): value for name, value in task.gains.items()}
+    row |= {parameter_column(name): value for name, value in task.team.items()}
+    return {**row, "duration_s": task.duration, **entry.figures, "run": task.name, "error": entry.error}
 
 
 class Table:
