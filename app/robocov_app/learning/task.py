@@ -229,12 +229,8 @@ class ObservationLayout:
         """Slices of the blocks of a row, in their order; only those that it has."""
         counts = {"position": 2, "velocity": 2, "obstacle": 3, "neighbour": 3 * self.neighbours}
         counts |= {"rays": self.rays, "centroid": 2 * self.centroid}
-        ends = accumulate(counts.values())
-        return {
-            name: slice(end - count, end)
-            for (name, count), end in zip(counts.items(), ends, strict=True)
-            if count
-        }
+        ends = zip(counts.items(), accumulate(counts.values()), strict=True)
+        return {name: slice(end - count, end) for (name, count), end in ends if count}
 
     @property
     def size(self) -> int:
