@@ -31,11 +31,18 @@ from robocov_app.toolkit.worker import Line
 
 _REMEMBERED = 4  # maps whose costs a worker keeps; tasks come map by map
 _TIDY = 1000  # steps after which garbage is collected in a long run
-FIGURES = (
-    *("mean_distance_m", "mean_distance_over_run_m", "cost_m3", "uncovered_area_m2", "settled_at_s"),
-    *("contacts", "min_clearance_m", "path_length_m", "stuck_robots"),
-)
-"""Figures of a run in the table, in this order."""
+FIGURES = {
+    "mean_distance_m": ("double", "m", "final mean distance to the nearest robot, (22) by area or ∫φ"),
+    "mean_distance_over_run_m": ("double", "m", "mean of it over the time of the run"),
+    "cost_m3": ("double", "m³", "coverage cost (22) at the end"),
+    "uncovered_area_m2": ("double", "m²", "area cut off from every robot"),
+    "settled_at_s": ("double", "s", "when the team came to rest, null if it did not"),
+    "contacts": ("int64", "", "how often a robot began to touch a wall or another robot"),
+    "min_clearance_m": ("double", "m", "smallest gap between a robot and a wall"),
+    "path_length_m": ("double", "m", "distance travelled, mean over the robots"),
+    "stuck_robots": ("int64", "", "robots at rest away from their goals at the end, null without goals"),
+}
+"""Figures of a run in the table, in this order: kind, unit and meaning."""
 TIMED = "mean_time_s"  # what it holds as well where robots are not equally fast
 EFFORT = "effort.json"  # of runs with metrics: computing time differs each time, so the table has it not
 POSITION, CELL = 20, 5  # bytes that are told of a position, and of a cell of a map
