@@ -255,7 +255,7 @@ def condition_axes(given: Mapping[str, Any]) -> dict[str, list[TeamValue]]:
     for name, values in given.items():
         if name not in CONDITIONS:
             raise ParameterError(f"conditions: {unknown_name('condition', name, CONDITIONS)}")
-        axes[name] = axis(values, ("conditions", name), partial(_condition, name))
+        axes[name] = axis(values, ("conditions", name), partial(_value_of, name))
     return axes
 
 
@@ -270,26 +270,14 @@ def conditions_of(parameters: Mapping[str, TeamValue], seed: int, robots: int) -
     return None if conditions.ideal else conditions
 
 
-def _condition(name: str, value: object, path: Place) -> TeamValue:
-    if name in EVENTS:
-        required(place(path), value, str, 'a text, as in "3@20",')
-        try:
-            return " ".join(str(parsed_entry(EVENTS[name], word)) for word in str(value).split())
-        except ParameterError as error:
-            raise ParameterError(f"{place(path)}: {error}") from None
-    if name == "message_rate" and value in (None, NO_LIMIT):
-        return None
-    given: dict[str, Any] = {"forget_after": 1e6, name: value}
-    return getattr(placed(path, lambda: Conditions(**given)), name)  # type: ignore[no-any-return]
-
-
 MOST_RUNS = 1_000_000
 ALL = "*"  # stands for all starts of a map
 TEAM = ("radius", "max_speed", "max_acceleration", "viscosity", "sensing_range", "communication_range")
 """Parameters of a team that a study may sweep."""
 UNICYCLES = {"kinematics": "point", "track_width": 0.0, "turning_rate": TURNING_RATE}
 """More of them, with defaults: what is as by default a study does not tell."""
-_RANGES = ("sensing_range", "communication_range")  # those that may be without limit
+_UNLIMITED: dict[str, tuple[object, ...]] = {"message_rate": (None, NO_LIMIT)}  # words for no limit
+_UNLIMITED |= dict.fromkeys(("sensing_range", "communication_range"), (None, NO_LIMIT, math.inf))
 _LONGEST_NAME = 100
 _HUGE = 1e300  # what a float can hold, with some to spare
 Swept: TypeAlias = float | Sequence[float | None] | None
@@ -377,7 +365,7 @@ class Study:
             except InputError as error:
                 raise type(error)(f"starts[{k}]: {error}") from None
         names = (*TEAM, *(name for name, usual in UNICYCLES.items() if getattr(self, name) != usual))
-        axes = {name: axis(getattr(self, name), ("team", name), partial(_team_value, name)) for name in names}
+        axes = {name: axis(getattr(self, name), ("team", name), partial(_value_of, name)) for name in names}
         if self.group:
             axes[GROUPS] = [json.dumps([dict(each) for each in self.group])]
         axes |= condition_axes(self.conditions)
@@ -472,13 +460,23 @@ def source_json(source: Source | None) -> dict[str, Any]:
     return ({"source": source.text} if source else {}) | ({"modules": modules} if modules else {})
 
 
-def _team_value(name: str, value: object, path: Place) -> TeamValue:
+def _value_of(name: str, value: object, path: Place) -> TeamValue:
+    """Return a value of the team, or of a condition, as it is meant."""
     if name == "kinematics":
         if value not in KINEMATICS:
             raise ParameterError(f"{place(path)}: {shown(value)}, but {' or '.join(KINEMATICS)} was wanted")
         return str(value)
-    if name in _RANGES and value in (None, NO_LIMIT, math.inf):
+    if name in EVENTS:
+        required(place(path), value, str, 'a text, as in "3@20",')
+        try:
+            return " ".join(str(parsed_entry(EVENTS[name], word)) for word in str(value).split())
+        except ParameterError as error:
+            raise ParameterError(f"{place(path)}: {error}") from None
+    if value in _UNLIMITED.get(name, ()):
         return None
+    if name in LIMITS:
+        given: dict[str, Any] = {"forget_after": 1e6, name: value}
+        return getattr(placed(path, lambda: Conditions(**given)), name)  # type: ignore[no-any-return]
     if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > _HUGE:
         raise ParameterError(f"{place(path)}: {shown(value)}, but a number was wanted")
     one: dict[str, Any] = {name: float(value)}
