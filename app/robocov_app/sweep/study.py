@@ -82,17 +82,15 @@ class Sampling:
         return np.asarray(kind(dimensions, seed=rng).random(self.samples))
 
 
-Choice: TypeAlias = Mapping[str, Value]
-"""A value for every gain of a controller."""
 Wanted: TypeAlias = "Gains | Mapping[str, Any] | Sequence[Mapping[str, Any]]"
 """Accepted forms of a controller's gains in a study; see `Gains.of`."""
 
 
 @dataclass(frozen=True)
 class Gains:
-    """The gains of one controller in a study: choices of all gains, and what was sampled."""
+    """The gains of one controller in a study, and what was sampled."""
 
-    choices: tuple[Choice, ...]
+    choices: tuple[Mapping[str, Value], ...]  # a value for every gain
     ranges: Mapping[str, Range] = field(default_factory=dict)
 
     @classmethod
@@ -136,7 +134,7 @@ def _of_axes(kind: type[Any], axes: Mapping[str, Any], sampling: Sampling | None
         points = sampling.points(len(ranges))
         columns = [each.values(points[:, k]) for k, each in enumerate(ranges.values())]
         samples = list(zip(*columns, strict=True))
-    choices: list[Choice] = [
+    choices = [
         gain_values(with_gains(kind, dict(zip([*lists, *ranges], (*row, *sample), strict=True))))
         for row, sample in product(product(*lists.values()), samples)
     ]
