@@ -10,7 +10,7 @@ from scipy.spatial import Delaunay
 from robocov.controllers import Rapf
 from robocov.mapfile import load_map
 from robocov.simulation import Simulation
-from robocov_app.bench.measure import Case, Row, in_turn
+from robocov_app.bench.measure import Call, Case, Row, in_turn
 
 GOALS = {6: (1.0, 16.0), 50: (0.7, 12.0), 200: (0.5, 9.0), 1000: (0.5, 8.0)}
 """Wanted multiples of the times of the triangulation and of bare physics, by number of robots."""
@@ -31,14 +31,9 @@ def _rows(n: int, quick: bool) -> Iterator[Row]:
     simulation = Simulation(campus, Rapf(), campus.start("uniform").sample(n, seed=0))
     space = _warmed_up(simulation, n)
     rounds = (60 if quick else 300) if n <= 500 else 30 if quick else 100
-    taken = in_turn(
-        {
-            "step": simulation.step,
-            "delaunay": lambda: Delaunay(simulation.positions),
-            "space": lambda: space.step(simulation.dt),
-        },
-        rounds,
-    )
+    calls: dict[str, Call] = {"step": simulation.step, "space": partial(space.step, simulation.dt)}
+    calls["delaunay"] = lambda: Delaunay(simulation.positions)
+    taken = in_turn(calls, rounds)
     step = taken["step"]
     note = f"{simulation.dt / step:.0f} x real time"
     # six robots 60 times as fast as real ones
@@ -56,9 +51,8 @@ def _together(quick: bool) -> Iterator[Row]:
     space = _warmed_up(simulation, n)
     # as often as there are runs: what one call takes is too short for the clock
     bare = [partial(space.step, simulation.dt)] * TOGETHER
-    taken = in_turn(
-        {"step": simulation.step, "space": lambda: [call() for call in bare]}, 60 if quick else 300
-    )
+    calls: dict[str, Call] = {"step": simulation.step, "space": lambda: [call() for call in bare]}
+    taken = in_turn(calls, 60 if quick else 300)
     size, each = {"robots": n, "runs together": TOGETHER}, taken["step"] / TOGETHER
     bare_each = BARE, taken["space"] / TOGETHER, TOGETHER_GOAL
     yield Row("step", "one step of one run", size, each, *bare_each, before=BEFORE[n][1])

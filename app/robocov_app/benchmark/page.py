@@ -1,6 +1,6 @@
 """The page that compares results of the benchmark: tables and Pareto plots for each track."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,6 +37,16 @@ _LETTER, _LINE = 6.0, 13.0  # width of a letter of a label, and height of the la
 _AWAY = 8.0  # pixels of a label from its mark
 _ALIKE = 1.01  # times that values differ at least
 _SPAN = 8.0  # times that values differ from which on their axis is logarithmic
+
+
+class Point(NamedTuple):
+    """An entry in a plot; `rival`: it does not know the whole map."""
+
+    style: CurveStyle
+    label: str
+    x: float
+    gap: float
+    rival: bool
 
 
 def page_of(results: Sequence[Mapping[str, Any]], title: str) -> str:
@@ -86,30 +96,7 @@ def _section(
     head, families = ratings.family_rows(own)
     runs = f"{counted(len(some.rows) + some.failed, 'run')} on {counted(maps, 'map')}"
     team = f"{counted(track.robots, 'robot')}, {track.duration:g} s"
-    rows = [ratings.rating_row(each, knows[each.label]) for each in own]
-    return {
-        "name": name,
-        "title": suite.heading(name),
-        "summary": f"{track.summary.capitalize()}; {team}. {runs}, the same for all entries.",
-        "table": Table("Ratings", ratings.HEAD, rows, frozenset({1})),
-        "families": Table("Median gap by families of maps, %", head, families),
-        "plots": list(_plots(name, own, looks, knows)) if len(own) > 1 else [],
-    }
-
-
-class Point(NamedTuple):
-    """An entry in a plot; `rival`: it does not know the whole map."""
-
-    style: CurveStyle
-    label: str
-    x: float
-    gap: float
-    rival: bool
-
-
-def _plots(
-    name: str, own: Sequence[Rating], looks: Mapping[str, CurveStyle], knows: Mapping[str, str]
-) -> Iterator[Plot]:
+    rows, plots = [ratings.rating_row(each, knows[each.label]) for each in own], []
     for axis, (title, label, of) in AXES.items():
         points = []
         for each in own:
@@ -122,7 +109,15 @@ def _plots(
             words = "; ".join(f"{point.label}: {point.x:.3g}, gap {point.gap:.1f} %" for point in fine)
             sentence = f"Median gap against {label}. {words}."
             svg = inline_svg(pareto_figure(fine, label), f"{name}-{axis}", sentence)
-            yield Plot(f"Gap and {title}", svg)
+            plots.append(Plot(f"Gap and {title}", svg))
+    return {
+        "name": name,
+        "title": suite.heading(name),
+        "summary": f"{track.summary.capitalize()}; {team}. {runs}, the same for all entries.",
+        "table": Table("Ratings", ratings.HEAD, rows, frozenset({1})),
+        "families": Table("Median gap by families of maps, %", head, families),
+        "plots": plots,
+    }
 
 
 @plain_style()

@@ -18,7 +18,6 @@ class Rating:
     """One entry on one track: its runs among those that all entries of the track have."""
 
     label: str
-    controller: str
     track: str
     rows: Sequence[Mapping[str, Any]]  # those that did not fail
     failed: int
@@ -52,18 +51,17 @@ class Rating:
 
 def ratings_of(results: Sequence[Mapping[str, Any]]) -> dict[str, list[Rating]]:
     """Return the ratings by track: of each track over the runs that every result has that has the track."""
-    labels = labels_of(results)
     found: dict[str, list[Rating]] = {}
     for track in suite.TRACKS:
         own = [
             {(row["map"], row["seed"]): row for row in each["rows"] if row["track"] == track}
             for each in results
         ]
-        for result, label, rows in zip(results, labels, own, strict=True):
+        for label, rows in zip(labels_of(results), own, strict=True):
             some = [row for key, row in rows.items() if all(key in other for other in own if other)]
+            fine = [row for row in some if "error" not in row]
             if some:
-                name, fine = result["entry"]["controller"], [row for row in some if "error" not in row]
-                found.setdefault(track, []).append(Rating(label, name, track, fine, len(some) - len(fine)))
+                found.setdefault(track, []).append(Rating(label, track, fine, len(some) - len(fine)))
     return found
 
 

@@ -67,7 +67,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         if seed is not None:
             self._rng, _ = seeding.np_random(seed)
         self.episode = drawn_episode(self.task, self._scenarios, self._rng, options)
-        self.agents = self._working()
+        self.agents = list(compress(self.possible_agents, self.episode.working))
         self._show()
         told = {**self.episode.facts(), "contact_s": 0.0, "map": self.episode.environment.name}
         infos = {agent: dict(told) for agent in self.possible_agents}
@@ -91,7 +91,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
             values[robot] = action
         acting, over = self.agents, episode.cycle + 1 >= self.max_cycles
         outcome = episode.advance(values, last=over)
-        self.agents = self._working()
+        self.agents = list(compress(self.possible_agents, episode.working))
         told = [agent for agent in self.possible_agents if agent in acting or agent in self.agents]
         # who has failed will not come back: for it the episode has ended
         ended = {agent: agent not in self.agents for agent in told}
@@ -107,9 +107,6 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
     def state(self) -> Rows:
         """Return where all robots are and how fast, for critics: see `Episode.state`."""
         return self._present().state()
-
-    def _working(self) -> list[str]:
-        return list(compress(self.possible_agents, self._present().working))
 
     def _of(self, agents: list[str], values: Iterable[_T]) -> dict[str, _T]:
         """Return the values of some of the agents, of one for each robot."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property
 from itertools import accumulate
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
@@ -150,7 +150,7 @@ class Scenarios:
         if not given:
             raise ParameterError("maps: none, but at least one was wanted")
         self._sources = [_source(each, f"maps[{k}]" if several else "maps") for k, each in enumerate(given)]
-        self.cost = lru_cache(_KEPT)(partial(CoverageCost, lattice=lattice))
+        self._lattice, self._costs = lattice, dict[Environment, CoverageCost]()
 
     @property
     def only(self) -> Environment | None:
@@ -160,6 +160,14 @@ class Scenarios:
     def draw(self, rng: np.random.Generator) -> Environment:
         source = self._sources[int(rng.integers(len(self._sources)))]
         return map_of(source, int(rng.integers(SEEDS)))
+
+    def cost(self, environment: Environment) -> CoverageCost:
+        # the last one is the last that was asked for
+        cost = self._costs.pop(environment, None) or CoverageCost(environment, self._lattice)
+        self._costs[environment] = cost
+        if len(self._costs) > _KEPT:
+            del self._costs[next(iter(self._costs))]
+        return cost
 
 
 def map_of(given: object, seed: int) -> Environment:
@@ -229,12 +237,8 @@ class ObservationLayout:
         """Slices of the blocks of a row, in their order; only those that it has."""
         counts = {"position": 2, "velocity": 2, "obstacle": 3, "neighbour": 3 * self.neighbours}
         counts |= {"rays": self.rays, "centroid": 2 * self.centroid}
-        ends = accumulate(counts.values())
-        return {
-            name: slice(end - count, end)
-            for (name, count), end in zip(counts.items(), ends, strict=True)
-            if count
-        }
+        ends = zip(counts.items(), accumulate(counts.values()), strict=True)
+        return {name: slice(end - count, end) for (name, count), end in ends if count}
 
     @property
     def size(self) -> int:

@@ -117,12 +117,12 @@ def save_pictures(
     theme, size = film.colour_theme, film.picture_size()
 
     def curves(kind: str) -> list[Curve]:
-        values = [(run, getattr(run.history, kind)) for run in runs]
-        return [
-            (run.record.label, run.record.controller, run.history.time, value)
-            for run, value in values
-            if value is not None and (kind == "mean_distance" or np.isfinite(value).any())
-        ]
+        found = []
+        for run in runs:
+            value = getattr(run.history, kind)
+            if value is not None and (kind == "mean_distance" or np.isfinite(value).any()):
+                found.append((run.record.label, run.record.controller, run.history.time, value))
+        return found
 
     with progress("pictures", 4, quiet=options.json) as update:
         done = counting(update)

@@ -41,11 +41,20 @@ class Roster(NamedTuple):
 
 
 def load_saved(path: Path) -> list[Saved]:
-    """Return the runs of a comparison, or a single run, by the folder or the JSON file in it."""
+    """Return the runs of a comparison, or a single run, by the folder or the JSON file in it.
+
+    Of a comparison that was killed, those that are there.
+    """
     folder = path.parent if path.name in ("run.json", "comparison.json") and not path.is_dir() else path
     settle(folder)
-    if (folder / "comparison.json").is_file():
-        saved = [_load_run(part) for part in _parts(folder)]
+    if (path := folder / "comparison.json").is_file():
+        content = read_document(path, ComparisonDocument, "robocov-comparison", 1)
+        parts = [folder / name for name in content.folders]
+        if linked := next((part for part in parts if part.is_symlink()), None):
+            raise InputError(f"{linked}: is a link, but a folder in the comparison's own was wanted")
+        saved = [_load_run(part) for part in parts if content.runs or (part / "run.json").is_file()]
+        if not saved:
+            raise InputError(f"{path}: there is no run in it")
         maps = [roster_of(each.record).environment for each in saved]
         for each, found in zip(saved, maps, strict=True):
             if (found.boundary, found.obstacles) != (maps[0].boundary, maps[0].obstacles):
@@ -90,20 +99,6 @@ def folder_names(names: Sequence[str]) -> list[str]:
         number = 1 + sum(alike.fullmatch(other) is not None for other in taken)
         taken.append(stem if number == 1 else f"{stem}-{number}")
     return taken
-
-
-def _parts(folder: Path) -> list[Path]:
-    """Return the folders of a comparison's runs; of one that was killed, those that are there."""
-    path = folder / "comparison.json"
-    content = read_document(path, ComparisonDocument, "robocov-comparison", 1)
-    parts = [folder / name for name in content.folders]
-    if linked := next((part for part in parts if part.is_symlink()), None):
-        raise InputError(f"{linked}: is a link, but a folder in the comparison's own was wanted")
-    if not content.runs:
-        parts = [part for part in parts if (part / "run.json").is_file()]
-    if not parts:
-        raise InputError(f"{path}: there is no run in it")
-    return parts
 
 
 def _load_run(folder: Path) -> Saved:

@@ -144,42 +144,41 @@ class LocalPool(Executor):
 
     def __init__(self, workers: int) -> None:
         super().__init__()
-        self._hands = [_Hand() for _ in range(workers)]
-        self._idle = list(self._hands)  # the last one that came back is the next to go
+        self._workers = [_Worker() for _ in range(workers)]
+        self._idle = list(self._workers)  # the last one that came back is the next to go
         self._threads = ThreadPoolExecutor(max(1, workers))
 
     def __exit__(self, *exception: object) -> None:
-        for hand in self._hands:
-            hand.stop()
+        for worker in self._workers:
+            worker.stop()
         self._threads.shutdown(cancel_futures=True)
-        for hand in self._hands:
-            hand.end()
-            hand.complaints.close()
+        for worker in self._workers:
+            worker.end()
+            worker.complaints.close()
 
     @property
     def most(self) -> int:
-        return len(self._hands) + 1  # one is ready for the first that comes back
+        return len(self._workers) + 1  # one is ready for the first that comes back
 
     def _hand_out(self, task: Task) -> None:
         self._awaited(task, self._threads.submit(self._done, task))
 
     def _done(self, task: Task) -> Outcome | Lost:
-        hand = self._idle.pop()
+        worker = self._idle.pop()
         try:
-            return hand.done(task)
+            return worker.done(task)
         finally:
-            self._idle.append(hand)
+            self._idle.append(worker)
 
 
-class _Hand:
+class _Worker:
     """A process that does tasks; another one is started when it ends."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
         # appended to, so that it can be emptied
         self.complaints = tempfile.TemporaryFile("a+b", buffering=0)  # noqa: SIM115 - the pool closes it
-        self._stopped = False
-        self._starting = threading.Lock()
+        self._stopped, self._starting = False, threading.Lock()
 
     def stop(self) -> None:
         with self._starting:

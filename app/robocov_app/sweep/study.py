@@ -82,17 +82,15 @@ class Sampling:
         return np.asarray(kind(dimensions, seed=rng).random(self.samples))
 
 
-Choice: TypeAlias = Mapping[str, Value]
-"""A value for every gain of a controller."""
 Wanted: TypeAlias = "Gains | Mapping[str, Any] | Sequence[Mapping[str, Any]]"
 """Accepted forms of a controller's gains in a study; see `Gains.of`."""
 
 
 @dataclass(frozen=True)
 class Gains:
-    """The gains of one controller in a study: choices of all gains, and what was sampled."""
+    """The gains of one controller in a study, and what was sampled."""
 
-    choices: tuple[Choice, ...]
+    choices: tuple[Mapping[str, Value], ...]  # a value for every gain
     ranges: Mapping[str, Range] = field(default_factory=dict)
 
     @classmethod
@@ -136,7 +134,7 @@ def _of_axes(kind: type[Any], axes: Mapping[str, Any], sampling: Sampling | None
         points = sampling.points(len(ranges))
         columns = [each.values(points[:, k]) for k, each in enumerate(ranges.values())]
         samples = list(zip(*columns, strict=True))
-    choices: list[Choice] = [
+    choices = [
         gain_values(with_gains(kind, dict(zip([*lists, *ranges], (*row, *sample), strict=True))))
         for row, sample in product(product(*lists.values()), samples)
     ]
@@ -255,7 +253,7 @@ def condition_axes(given: Mapping[str, Any]) -> dict[str, list[TeamValue]]:
     for name, values in given.items():
         if name not in CONDITIONS:
             raise ParameterError(f"conditions: {unknown_name('condition', name, CONDITIONS)}")
-        axes[name] = axis(values, ("conditions", name), partial(_condition, name))
+        axes[name] = axis(values, ("conditions", name), partial(_value_of, name))
     return axes
 
 
@@ -270,26 +268,14 @@ def conditions_of(parameters: Mapping[str, TeamValue], seed: int, robots: int) -
     return None if conditions.ideal else conditions
 
 
-def _condition(name: str, value: object, path: Place) -> TeamValue:
-    if name in EVENTS:
-        required(place(path), value, str, 'a text, as in "3@20",')
-        try:
-            return " ".join(str(parsed_entry(EVENTS[name], word)) for word in str(value).split())
-        except ParameterError as error:
-            raise ParameterError(f"{place(path)}: {error}") from None
-    if name == "message_rate" and value in (None, NO_LIMIT):
-        return None
-    given: dict[str, Any] = {"forget_after": 1e6, name: value}
-    return getattr(placed(path, lambda: Conditions(**given)), name)  # type: ignore[no-any-return]
-
-
 MOST_RUNS = 1_000_000
 ALL = "*"  # stands for all starts of a map
 TEAM = ("radius", "max_speed", "max_acceleration", "viscosity", "sensing_range", "communication_range")
 """Parameters of a team that a study may sweep."""
 UNICYCLES = {"kinematics": "point", "track_width": 0.0, "turning_rate": TURNING_RATE}
 """More of them, with defaults: what is as by default a study does not tell."""
-_RANGES = ("sensing_range", "communication_range")  # those that may be without limit
+_UNLIMITED: dict[str, tuple[object, ...]] = {"message_rate": (None, NO_LIMIT)}  # words for no limit
+_UNLIMITED |= dict.fromkeys(("sensing_range", "communication_range"), (None, NO_LIMIT, math.inf))
 _LONGEST_NAME = 100
 _HUGE = 1e300  # what a float can hold, with some to spare
 Swept: TypeAlias = float | Sequence[float | None] | None
@@ -376,7 +362,15 @@ class Study:
                 each.environment.start(name)
             except InputError as error:
                 raise type(error)(f"starts[{k}]: {error}") from None
-        object.__setattr__(self, "teams", self._every_team())
+        names = (*TEAM, *(name for name, usual in UNICYCLES.items() if getattr(self, name) != usual))
+        axes = {name: axis(getattr(self, name), ("team", name), partial(_value_of, name)) for name in names}
+        if self.group:
+            axes[GROUPS] = [json.dumps([dict(each) for each in self.group])]
+        axes |= condition_axes(self.conditions)
+        teams = tuple(dict(zip(axes, row, strict=True)) for row in product(*axes.values()))
+        for team, robots in product(teams, self.robots):
+            conditions_of(team, 0, robots)
+        object.__setattr__(self, "teams", teams)
         for name, value in zip(("sources", "gains"), self._controllers(), strict=True):
             object.__setattr__(self, name, value)
         if len(self) > MOST_RUNS:
@@ -430,19 +424,6 @@ class Study:
             **{name: getattr(self, name) for name in ("lattice", "cost_hz", "record_hz", "metrics")},
         }
 
-    def _every_team(self) -> tuple[Mapping[str, TeamValue], ...]:
-        names = (*TEAM, *(name for name, usual in UNICYCLES.items() if getattr(self, name) != usual))
-        axes: list[Sequence[TeamValue]] = [
-            axis(getattr(self, name), ("team", name), partial(_team_value, name)) for name in names
-        ]
-        groups = {GROUPS: [json.dumps([dict(each) for each in self.group])]} if self.group else {}
-        more = groups | condition_axes(self.conditions)
-        names = (*names, *more)
-        teams = tuple(dict(zip(names, row, strict=True)) for row in product(*axes, *more.values()))
-        for team, robots in product(teams, self.robots):
-            conditions_of(team, 0, robots)
-        return teams
-
     def _controllers(self) -> tuple[dict[str, Source], dict[str, Gains]]:
         """Return the sources of the users' controllers, and what is tried of each controller."""
         for name in self.gains:
@@ -477,13 +458,23 @@ def source_json(source: Source | None) -> dict[str, Any]:
     return ({"source": source.text} if source else {}) | ({"modules": modules} if modules else {})
 
 
-def _team_value(name: str, value: object, path: Place) -> TeamValue:
+def _value_of(name: str, value: object, path: Place) -> TeamValue:
+    """Return a value of the team, or of a condition, as it is meant."""
     if name == "kinematics":
         if value not in KINEMATICS:
             raise ParameterError(f"{place(path)}: {shown(value)}, but {' or '.join(KINEMATICS)} was wanted")
         return str(value)
-    if name in _RANGES and value in (None, NO_LIMIT, math.inf):
+    if name in EVENTS:
+        required(place(path), value, str, 'a text, as in "3@20",')
+        try:
+            return " ".join(str(parsed_entry(EVENTS[name], word)) for word in str(value).split())
+        except ParameterError as error:
+            raise ParameterError(f"{place(path)}: {error}") from None
+    if value in _UNLIMITED.get(name, ()):
         return None
+    if name in LIMITS:
+        given: dict[str, Any] = {"forget_after": 1e6, name: value}
+        return getattr(placed(path, lambda: Conditions(**given)), name)  # type: ignore[no-any-return]
     if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > _HUGE:
         raise ParameterError(f"{place(path)}: {shown(value)}, but a number was wanted")
     one: dict[str, Any] = {name: float(value)}

@@ -41,19 +41,7 @@ _BEFORE = (
     Column("seed", "int64", "", "seed of the starting positions"),
 )
 _DURATION = Column("duration_s", "double", "s", "simulated time")
-_FIGURES = (
-    Column("mean_distance_m", "double", "m", "final mean distance to the nearest robot, (22) by area or ∫φ"),
-    Column("mean_distance_over_run_m", "double", "m", "mean of it over the time of the run"),
-    Column("cost_m3", "double", "m³", "coverage cost (22) at the end"),
-    Column("uncovered_area_m2", "double", "m²", "area cut off from every robot"),
-    Column("settled_at_s", "double", "s", "when the team came to rest, null if it did not"),
-    Column("contacts", "int64", "", "how often a robot began to touch a wall or another robot"),
-    Column("min_clearance_m", "double", "m", "smallest gap between a robot and a wall"),
-    Column("path_length_m", "double", "m", "distance travelled, mean over the robots"),
-    Column(
-        "stuck_robots", "int64", "", "robots at rest away from their goals at the end, null without goals"
-    ),
-)
+_FIGURES = tuple(Column(name, *facts) for name, facts in FIGURES.items())
 _AFTER = (
     Column("run", "string", "", "the run's folder in runs/"),
     Column("error", "string", "", "why the run failed, null if it did not"),
@@ -70,7 +58,6 @@ _METRICS = (
     Column("robot_clearance_m", "double", "m", "smallest gap between two robots, null where there is one"),
     Column("near_final_s", "double", "s", "from when on the mean distance was within 5 % of that of the end"),
 )
-assert tuple(column.name for column in _FIGURES) == FIGURES
 
 
 def columns_of(study: Study) -> tuple[Column, ...]:
@@ -101,15 +88,10 @@ def gain_column(name: str) -> str:
 
 
 def row_of(task: Task, entry: Entry) -> dict[str, Any]:
-    return {
-        **{column.name: getattr(task, column.name) for column in _BEFORE},
-        **{gain_column(name): value for name, value in task.gains.items()},
-        **{parameter_column(name): value for name, value in task.team.items()},
-        "duration_s": task.duration,
-        **entry.figures,
-        "run": task.name,
-        "error": entry.error,
-    }
+    row: dict[str, Any] = {column.name: getattr(task, column.name) for column in _BEFORE}
+    row |= {gain_column(name): value for name, value in task.gains.items()}
+    row |= {parameter_column(name): value for name, value in task.team.items()}
+    return {**row, "duration_s": task.duration, **entry.figures, "run": task.name, "error": entry.error}
 
 
 class Table:

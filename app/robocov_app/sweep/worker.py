@@ -31,11 +31,18 @@ from robocov_app.toolkit.worker import Line
 
 _REMEMBERED = 4  # maps whose costs a worker keeps; tasks come map by map
 _TIDY = 1000  # steps after which garbage is collected in a long run
-FIGURES = (
-    *("mean_distance_m", "mean_distance_over_run_m", "cost_m3", "uncovered_area_m2", "settled_at_s"),
-    *("contacts", "min_clearance_m", "path_length_m", "stuck_robots"),
-)
-"""Figures of a run in the table, in this order."""
+FIGURES = {
+    "mean_distance_m": ("double", "m", "final mean distance to the nearest robot, (22) by area or ∫φ"),
+    "mean_distance_over_run_m": ("double", "m", "mean of it over the time of the run"),
+    "cost_m3": ("double", "m³", "coverage cost (22) at the end"),
+    "uncovered_area_m2": ("double", "m²", "area cut off from every robot"),
+    "settled_at_s": ("double", "s", "when the team came to rest, null if it did not"),
+    "contacts": ("int64", "", "how often a robot began to touch a wall or another robot"),
+    "min_clearance_m": ("double", "m", "smallest gap between a robot and a wall"),
+    "path_length_m": ("double", "m", "distance travelled, mean over the robots"),
+    "stuck_robots": ("int64", "", "robots at rest away from their goals at the end, null without goals"),
+}
+"""Figures of a run in the table, in this order: kind, unit and meaning."""
 TIMED = "mean_time_s"  # what it holds as well where robots are not equally fast
 EFFORT = "effort.json"  # of runs with metrics: computing time differs each time, so the table has it not
 POSITION, CELL = 20, 5  # bytes that are told of a position, and of a cell of a map
@@ -72,7 +79,28 @@ def perform(task: Task) -> Outcome:
         enabled = gc.isenabled()
         gc.disable()
         try:
-            return _performed(task)
+            environment, cost = prepared(task)
+            record, effort = measured(task, environment)
+            history = cost_history(record, cost, task.cost_hz)
+            # of all moments: what is kept of them is for people to look at
+            summary = finite(summarise(record, history))
+            path = summary["path_length_m"]
+            figures = {**summary, "path_length_m": sum(path) / len(path)}
+            figures = {name: figures[name] for name in (*FIGURES, TIMED) if name in figures}
+            content = record.to_json(summary, lattice=task.lattice)
+            content |= {"cost_hz": task.cost_hz, "record_hz": task.record_hz}
+            content["controller"] |= source_json(task.source)
+            kept, arrays = record.thinned(task.record_hz), io.BytesIO()
+            np.savez_compressed(arrays, **{name: getattr(kept, name) for name in kept.arrays})
+            files = {
+                "run.json": json_text(content).encode(),
+                "record.npz": arrays.getvalue(),
+                "cost.csv": csv_text(*cost_table(history)).encode(),
+            }
+            if task.metrics:
+                figures |= finite(figures_of(record, history))
+                files[EFFORT] = json_text(effort).encode()
+            return Outcome(files, figures)
         except (Exception, SystemExit) as error:
             message = str(error) if isinstance(error, RobocovError) else f"{type(error).__name__}: {error}"
             return failed(message, traceback.format_exc())
@@ -162,28 +190,3 @@ def prepared(task: Task) -> tuple[Environment, CoverageCost]:
 def _prepared(document: str, name: str, lattice: int) -> tuple[Environment, CoverageCost]:
     environment = from_json(json.loads(document), name)
     return environment, CoverageCost(environment, lattice)
-
-
-def _performed(task: Task) -> Outcome:
-    environment, cost = prepared(task)
-    record, effort = measured(task, environment)
-    history = cost_history(record, cost, task.cost_hz)
-    # of all moments: what is kept of them is for people to look at
-    summary = finite(summarise(record, history))
-    path = summary["path_length_m"]
-    figures = {**summary, "path_length_m": sum(path) / len(path)}
-    figures = {name: figures[name] for name in (*FIGURES, TIMED) if name in figures}
-    content = record.to_json(summary, lattice=task.lattice)
-    content |= {"cost_hz": task.cost_hz, "record_hz": task.record_hz}
-    content["controller"] |= source_json(task.source)
-    kept, arrays = record.thinned(task.record_hz), io.BytesIO()
-    np.savez_compressed(arrays, **{name: getattr(kept, name) for name in kept.arrays})
-    files = {
-        "run.json": json_text(content).encode(),
-        "record.npz": arrays.getvalue(),
-        "cost.csv": csv_text(*cost_table(history)).encode(),
-    }
-    if task.metrics:
-        figures |= finite(figures_of(record, history))
-        files[EFFORT] = json_text(effort).encode()
-    return Outcome(files, figures)

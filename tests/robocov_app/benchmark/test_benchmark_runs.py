@@ -240,7 +240,7 @@ def test_bad_input(
 @given(st.lists(st.tuples(st.sampled_from([1.0, 2.0, 5.0, 9.0]), st.booleans()), min_size=1, max_size=12))
 def test_the_median_of_rest_is_kaplan_and_meiers(runs: list[tuple[float, bool]]) -> None:
     rows = [{"settled_at_s": time if rested else None} for time, rested in runs]
-    share, median = ratings.Rating("", "", "ideal", rows, 0).at_rest()
+    share, median = ratings.Rating("", "ideal", rows, 0).at_rest()
     # all that did not rest are censored at the end, so the curve is the plain share of those still moving
     times = sorted(row["settled_at_s"] for row in rows if row["settled_at_s"] is not None)
     wanted = next(

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import pickle
 import subprocess
 import sys
 from functools import partial
@@ -80,6 +81,11 @@ def test_many_at_once_are_as_one_at_a_time() -> None:
         for cycle, action in enumerate(actions):
             rows, reward, *_ = alone.step(action[k])
             assert np.array_equal(rows, together[cycle + 1][k]) and reward == rewards[cycle][k]
+
+
+def test_one_that_has_not_begun_can_be_sent_to_another_process() -> None:
+    env = pickle.loads(pickle.dumps(CoverageEnv(**SMALL)))
+    assert np.array_equal(env.reset(seed=3)[0], CoverageEnv(**SMALL).reset(seed=3)[0])
 
 
 def test_it_ends_when_nobody_is_left() -> None:

@@ -59,7 +59,7 @@ def test_figures_are_those_of_all_moments_not_of_those_that_are_kept(tmp_path: P
     history = cost_history(whole, CoverageCost(ROOM, task.lattice), task.cost_hz)
     summary = summarise(whole, history)
     outcome = perform(task)
-    assert tuple(outcome.figures) == FIGURES
+    assert list(outcome.figures) == list(FIGURES)
     assert outcome.figures == {
         **{name: summary[name] for name in FIGURES},
         "path_length_m": sum(summary["path_length_m"]) / 5,
