@@ -39,8 +39,7 @@ _NAMES = ("name", "kind", "id")  # properties of a feature that name its shapes;
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
     file = JsonFile(path)
-    document, where = file.document, file.where
-    shapes = Shapes(where, options)
+    document, shapes = file.document, Shapes(file.where, options)
     found = _Found(file, shapes)
     found.read()
     units, origin = document.get("units"), document.get("origin")
@@ -51,15 +50,8 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         if not good or not (abs(origin[0]) <= 360.0 and abs(origin[1]) <= 90.0):
             raise file.refused(("origin",), origin, "longitude and latitude in degrees were")
         origin = float(origin[0]), float(origin[1])
-    figures, shapes.notes = in_metres(
-        found.figures,
-        replace(options, units=options.units or units),
-        where,
-        crs=found.crs,
-        globe=True,
-        origin=origin,
-    )
-    shapes.add_all(figures)
+    shapes.options = replace(options, units=options.units or units)
+    shapes.add_all(in_metres(found.figures, shapes, found.crs, globe=True, origin=origin))
     named, text = document.get("name"), document.get("description")
     name = one_line(named if isinstance(named, str) and named.strip() else path.stem)[:80]
     text = one_line(text)[:1000] if isinstance(text, str) else "Imported from GeoJSON."

@@ -62,8 +62,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         origin = (float(west + east) / 2, float(south + north) / 2)
         corners = np.array([[west, south], [east, south], [east, north], [west, north]])
         figures.append(Figure("polygon", (corners,), (BOUNDARY,), "bounds"))
-    figures, shapes.notes = in_metres(figures, options, where, crs=DEGREES, origin=origin)
-    shapes.add_all(figures)
+    shapes.add_all(in_metres(figures, shapes, DEGREES, origin=origin))
     if extract.gates:
         shapes.notes.append(f"{counted(extract.gates, 'gate')} taken as closed")
     text = "Imported from OpenStreetMap, © OpenStreetMap contributors."

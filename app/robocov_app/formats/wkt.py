@@ -215,8 +215,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     parsed = WktText(text, where, shapes)
     figures = parsed.figures()
     crs = f"EPSG:{parsed.srid}" if parsed.srid else None
-    figures, shapes.notes = in_metres(figures, options, where, crs=crs)
-    shapes.add_all(figures)
+    shapes.add_all(in_metres(figures, shapes, crs))
     return foreign_map(shapes, name_of_map(path), "Imported from WKT.", solid=False, accessible=True)
 
 
