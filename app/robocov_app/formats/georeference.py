@@ -28,13 +28,8 @@ _EARTH = 6_371_000.0  # mean radius in metres, to tell degrees from metres; noth
 
 
 def in_metres(
-    figures: Sequence[Figure],
-    shapes: Shapes,
-    crs: str | None,
-    *,
-    globe: bool = False,
-    origin: Point | None = None,
-) -> Sequence[Figure]:
+    figures: list[Figure], shapes: Shapes, crs: str | None, globe: bool = False, origin: Point | None = None
+) -> list[Figure]:
     """Return figures with coordinates in metres; the notes of `shapes` say what was done to them.
 
     Options: ``units`` overrules the file; ``scale`` is metres a unit where it says nothing. `crs`: as

@@ -7,6 +7,7 @@ N. R. Sturtevant, Benchmarks for grid-based pathfinding, IEEE Transactions on Co
 and AI in Games 4 (2012), 144-148.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -109,4 +110,5 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
         part.write_bytes(head.encode("ascii") + letters.tobytes())
     x, y = grid.origin
     place = f"the cell size, {grid.cell:g} m, and the lower left corner, [{x:g}, {y:g}]"
-    return grid_report("movingai", (path,), environment, grid, free, dropped=(place,))
+    report = grid_report("movingai", (path,), environment, grid, free)
+    return replace(report, dropped=(place, *report.dropped))

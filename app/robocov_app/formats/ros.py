@@ -19,6 +19,7 @@ that planners which take the unknown for passable stay inside.
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -230,7 +231,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
             f"negate: 0\noccupied_thresh: {_OCCUPIED}\nfree_thresh: {_FREE}\n",
             encoding="utf-8",
         )
-    return grid_report("ros", (path, image), environment, grid, free, notes=notes)
+    return replace(grid_report("ros", (path, image), environment, grid, free), notes=notes)
 
 
 def _quoted(name: str, path: Path) -> str:

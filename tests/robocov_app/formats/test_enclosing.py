@@ -37,7 +37,7 @@ def shapes(*areas: Any, lines: Any = (), points: Any = (), **options: Any) -> Sh
 
 
 def taken(found: Shapes, solid: bool = True) -> ForeignMap:
-    return foreign_map(found, name="plan", description="", solid=solid)
+    return foreign_map(found, name="plan", text="", solid=solid)
 
 
 def test_the_largest_outline_that_holds_the_rest_is_the_boundary() -> None:

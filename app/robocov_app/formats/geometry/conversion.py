@@ -487,14 +487,10 @@ def compare(foreign: ForeignMap, environment: Environment, report: ImportReport)
     before, after = foreign.free, environment.free
     before = before if before.is_valid else made_valid(before)
     everything = [before, after, environment.region.polygon, foreign.boundary or before]
-    return Comparison(
-        before,
-        after,
-        lost=_changed(before, after, report.tolerance),
-        opened=_changed(after, before, report.tolerance),
-        region=shapely.GeometryCollection(everything).convex_hull,
-        gap=env.narrowest_gap(after) if report.vertices_kept <= _MOST_VERTICES else None,
-    )
+    lost, opened = _changed(before, after, report.tolerance), _changed(after, before, report.tolerance)
+    region = shapely.GeometryCollection(everything).convex_hull
+    gap = env.narrowest_gap(after) if report.vertices_kept <= _MOST_VERTICES else None
+    return Comparison(before, after, lost, opened, region, gap)
 
 
 def _changed(first: BaseGeometry, second: BaseGeometry, tolerance: float) -> MultiPolygon:

@@ -308,7 +308,7 @@ class _Enclosure(NamedTuple):
 def foreign_map(
     shapes: Shapes,
     name: str,
-    description: str,
+    text: str,
     *,
     solid: bool,
     accessible: bool = False,
@@ -398,7 +398,7 @@ def foreign_map(
     straight = (wall for line in walls if (wall := line.wall) is not None)
     return ForeignMap(
         name=name,
-        description=description,
+        description=text,
         free=free,
         boundary=outer,
         vertices_read=shapes.vertices,

@@ -298,16 +298,10 @@ class _Check:
     """
 
     def __init__(
-        self,
-        outline: Outline,
-        drawing: Rings,
-        allowed: Array,
-        tolerance: float,
-        width: float,
-        found: Counter[str],
+        self, outline: Outline, drawing: Rings, allowed: Array, most: float, width: float, found: Counter[str]
     ) -> None:
         self.outline, self.drawing, self.allowed = outline, drawing, allowed
-        self.tolerance, self.width, self.found = tolerance, width, found
+        self.tolerance, self.width, self.found = most, width, found
         order, ring = np.argsort(drawing.source, kind="stable"), outline.ring
         place = np.searchsorted(drawing.source[order], np.arange(len(ring)), side="right") - 1
         # before the first of a ring comes its last
