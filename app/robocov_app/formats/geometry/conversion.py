@@ -18,17 +18,10 @@ from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
 from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.formats.base import ForeignMap, ImportReport, Options, Primitive, square_metres
-from robocov_app.formats.geometry.polygons import (
-    CRUMB,
-    bounded,
-    filled,
-    made_valid,
-    polygons_of,
-    rounded,
-    sides_of,
-)
+from robocov_app.formats.geometry.polygons import bounded, filled, made_valid, polygons_of, rounded, sides_of
 from robocov_app.formats.geometry.simplify import rays, sharpened, simplified
 
+_CRUMB = 1e-4  # obstacles and parts that are smaller, in m², come of rounding
 DEFAULT_TOLERANCE = 0.02  # by how much walls of vector formats may move, in metres
 # coordinates are rounded to a tenth of a millimetre, or to a hundredth of a cell if that is finer
 _GRID = 1e-4
@@ -207,7 +200,7 @@ class _Shaper:
         if outer is not None and not shapely.covers(outer, free):
             inside = shapely.intersection(free, outer)
             lost = free.area - inside.area
-            if lost > CRUMB:
+            if lost > _CRUMB:
                 self.dropped.append(f"{square_metres(lost, 3)} of free space outside the boundary")
             free = inside
         valid = polygons_of(free)
@@ -220,7 +213,7 @@ class _Shaper:
         drop, note = self.dropped.append, self.notes.append
         area = shapely.area(parts)
         if shaping.keep == "all":
-            stays = area >= max(self.specks, min(CRUMB, area[0]))
+            stays = area >= max(self.specks, min(_CRUMB, area[0]))
         elif shaping.inside is not None:
             distance = shapely.distance(parts, shapely.Point(shaping.inside))
             nearest = int(np.argmin(distance))
@@ -263,7 +256,7 @@ class _Shaper:
 
     def _without_specks(self, parts: list[Polygon]) -> list[Polygon]:
         cell, least = self.foreign.cell, self.specks
-        crumb = CRUMB if cell is None else min(CRUMB, cell * cell / 2)
+        crumb = _CRUMB if cell is None else min(_CRUMB, cell * cell / 2)
         drop, note = self.dropped.append, self.notes.append
         result, specks, crumbs, tiny = [], [], [], 0
         for part in parts:

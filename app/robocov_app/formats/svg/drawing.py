@@ -403,24 +403,11 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     boundary = np.asarray(environment.boundary, dtype=float)
     margin = _MARGIN * float(np.ptp(boundary, axis=0).max())
     low, high = boundary.min(axis=0) - margin, boundary.max(axis=0) + margin
-    with written(path) as part:
-        part.write_text(_text(environment, pen, low, high), encoding="utf-8")
-    written_boundary = Polygon([(pen.rounded(x), pen.rounded(y)) for x, y in environment.boundary])
-    obstacles = [with_numbers(obstacle, pen.rounded).polygon for obstacle in environment.obstacles]
-    area = free_area(written_boundary, obstacles)
-    notes = [f"1 mm is {scale:g} m: {(high - low)[0] / scale:.6g} x {(high - low)[1] / scale:.6g} mm"]
-    notes += [] if options.scale is None else [f"to import it again: --scale {scale:g}"]
-    dropped = not_held(environment, names=False)
-    return ExportReport("svg", (path,), environment.free_area, area, dropped, tuple(notes))
-
-
-def _text(environment: Environment, pen: _Pen, low: Array, high: Array) -> str:
-    """Return the drawing; `low` and `high`, (2,) m, are corners of the page."""
     x, y = pen.length(low[0]), pen.length(-high[1])
     width, height = pen.length(high[0] - low[0]), pen.length(high[1] - low[1])
     # where the corner is that the box gives with its decimals
-    left, bottom = float(x) * pen.scale, -(float(y) + float(height)) * pen.scale
-    return _PAGE.format(
+    left, bottom = float(x) * scale, -(float(y) + float(height)) * scale
+    page = _PAGE.format(
         size=f'width="{width}mm" height="{height}mm"',
         box=f'viewBox="{x} {y} {width} {height}" data-origin="{left!r} {bottom!r}"',
         title=_plain(environment.name),
@@ -430,6 +417,15 @@ def _text(environment: Environment, pen: _Pen, low: Array, high: Array) -> str:
         boundary=pen.ring(environment.boundary),
         obstacles="".join(f"{pen.shape(each)}\n" for each in environment.obstacles),
     )
+    with written(path) as part:
+        part.write_text(page, encoding="utf-8")
+    written_boundary = Polygon([(pen.rounded(x), pen.rounded(y)) for x, y in environment.boundary])
+    obstacles = [with_numbers(obstacle, pen.rounded).polygon for obstacle in environment.obstacles]
+    area = free_area(written_boundary, obstacles)
+    notes = [f"1 mm is {scale:g} m: {(high - low)[0] / scale:.6g} x {(high - low)[1] / scale:.6g} mm"]
+    notes += [] if options.scale is None else [f"to import it again: --scale {scale:g}"]
+    dropped = not_held(environment, names=False)
+    return ExportReport("svg", (path,), environment.free_area, area, dropped, tuple(notes))
 
 
 # a window shows all of it, however large it is
