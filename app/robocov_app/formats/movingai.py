@@ -11,7 +11,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robocov.environment import Environment
 from robocov.errors import MapError, one_line, shown
@@ -40,7 +39,16 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     table[list(_SOLID)] = BLOCKED
     table[ord("T")] = FREE if options.trees == "free" else BLOCKED
     table[ord("W")] = FREE if options.water == "free" else BLOCKED
-    letters = _letters(body, columns, rows, line, where)
+    lines = body.replace(b"\r\n", b"\n").split(b"\n", rows)
+    for k in range(rows):
+        found = len(lines[k].rstrip(b" \t\r")) if k < len(lines) else 0
+        if found != columns:
+            what = f"{found} letters" if k < len(lines) and (found or k < len(lines) - 1) else "end of file"
+            raise MapError(f"{where}: line {line + k}: {what}, but {columns} letters were wanted")
+    if len(lines) > rows and lines[rows].strip():
+        raise MapError(f"{where}: line {line + rows}: more than {rows} rows, but so many were wanted")
+    joined = b"".join(lines[k].rstrip(b" \t\r") for k in range(rows))
+    letters = np.frombuffer(joined, np.uint8).reshape(rows, columns)
     cells = table[letters]
     bad = cells == _BAD
     if bad.any():
@@ -84,19 +92,6 @@ def _header(data: bytes, where: str) -> tuple[int, int, bytes, int]:
             wanted = "type octile, height N, width N or map was wanted"
             raise MapError(f"{place}: {shown(' '.join(words))}, but {wanted}")
     raise MapError(f"{where}: no line map, but one after type, height and width was wanted")
-
-
-def _letters(body: bytes, columns: int, rows: int, line: int, where: str) -> NDArray[np.uint8]:
-    lines = body.replace(b"\r\n", b"\n").split(b"\n", rows)
-    for k in range(rows):
-        found = len(lines[k].rstrip(b" \t\r")) if k < len(lines) else 0
-        if found != columns:
-            what = f"{found} letters" if k < len(lines) and (found or k < len(lines) - 1) else "end of file"
-            raise MapError(f"{where}: line {line + k}: {what}, but {columns} letters were wanted")
-    if len(lines) > rows and lines[rows].strip():
-        raise MapError(f"{where}: line {line + rows}: more than {rows} rows, but so many were wanted")
-    joined = b"".join(lines[k].rstrip(b" \t\r") for k in range(rows))
-    return np.frombuffer(joined, np.uint8).reshape(rows, columns)
 
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:

@@ -185,7 +185,12 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     _, image = files_of(path, options)
     if image == path:
         raise OutputError(f"{one_line(path)}: the name of the picture, but one for the YAML was wanted")
-    text_name = _quoted(image.name, path)
+    try:
+        image.name.encode()
+    except UnicodeEncodeError:
+        raise OutputError(f"{one_line(path)}: {shown(image.name)}: no name that UTF-8 can hold") from None
+    plain = re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", image.name)
+    text_name = image.name if plain else json.dumps(image.name)
     grid = grid_over(environment, options.cell)
     free = free_cells(environment, grid)
     # a wall of one cell all around what is free
@@ -232,11 +237,3 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
             encoding="utf-8",
         )
     return replace(grid_report("ros", (path, image), environment, grid, free), notes=notes)
-
-
-def _quoted(name: str, path: Path) -> str:
-    try:
-        name.encode()
-    except UnicodeEncodeError:
-        raise OutputError(f"{one_line(path)}: {shown(name)}: no name that UTF-8 can hold") from None
-    return name if re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", name) else json.dumps(name)

@@ -29,12 +29,11 @@ from robocov_app.formats.geometry.polygons import DIGITS, decimal, on_grid, ring
 from robocov_app.formats.geometry.shapes import Figure, Shapes, foreign_map
 from robocov_app.formats.georeference import in_metres
 
+# the geometries that are read
 KINDS = (
     "POINT", "LINESTRING", "LINEARRING", "POLYGON", "TRIANGLE", "MULTIPOINT", "MULTILINESTRING",
     "MULTIPOLYGON", "POLYHEDRALSURFACE", "TIN", "GEOMETRYCOLLECTION",
 )  # fmt: skip
-"""The geometries that are read."""
-
 # those that are known and not read
 CURVED = ("CIRCULARSTRING", "COMPOUNDCURVE", "CURVEPOLYGON", "MULTICURVE", "MULTISURFACE", "CURVE", "SURFACE")
 _SPACE = re.compile(r"\s*")

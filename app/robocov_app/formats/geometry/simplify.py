@@ -25,14 +25,11 @@ from robocov.arrays import Array, BoolArray, IntArray, beginnings, ranges
 from robocov.errors import counted
 from robocov_app.formats.geometry.raster import NECK
 
+# by so much of it the area of an outline may change, of an obstacle or a free part; and that of all that is free
 KEPT_OUTLINE, KEPT_AREA = 0.1, 0.02
-"""By so much of it the area of an outline may change, of an obstacle or a part of the free space; and the
-free area as a whole."""
-
 _BLOCKS = 16  # a thing of fewer cells stays as it is: what it is like, its cells say best
-# how often the tolerance is halved around a place before everything stays there; the rounds after which all
-# of a wall stays where something is wrong, and after which everything stays everywhere, as it does after so
-# many times the vertices
+# halvings of the tolerance around a place until everything stays there; rounds until all of a wall that is
+# wrong stays, and until everything does everywhere, as it does after so many times the vertices
 _HALVINGS, _PATIENCE, _ROUNDS, _WORK = 3, 24, 60, 1_000_000
 # from this tolerance on, in cells, stairs are drawn as lines; and one through fewer middles says little
 _MIDDLES, _FEW = 0.75, 3
@@ -40,8 +37,7 @@ _UNBALANCED = 0.02  # from this part of it on, the area that a ring lost is give
 # of a thing with the area of a square of so many tolerances and more, all of the tolerance is left out; of
 # smaller ones less is, but always so much, in cells
 _SIZES, _FINEST = 16, 0.4
-# lines whose cosine of the angle between them is smaller are at right angles; whose sine is smaller, meet
-# nowhere in particular
+# of the angle between lines: the cosine up to which it is right, the sine up to which they meet nowhere
 _RIGHT, _SQUARE = 1e-5, 0.2
 # in tolerances: what counts as a short edge, and how far from the corner its run may be; and the sine of the
 # angle below which two walls count as parallel
