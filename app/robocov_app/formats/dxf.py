@@ -2,7 +2,7 @@
 
 Closed outlines (polylines, circles, ellipses, closed splines, filled quadrilaterals) are solid, but for the
 boundary; lines, arcs and open polylines are walls as wide as they are drawn, or as the option ``thickness``.
-Names are those of layers and blocks: see `shapes.foreign_map`. Blocks are carried out wherever they are
+Names are those of layers and blocks: see `Shapes.foreign_map`. Blocks are carried out wherever they are
 inserted. Layers that are off or frozen, texts, dimensions and what has a third dimension are left out; so are
 hatches without the option ``hatches``. Curves become lines that stay within a millimetre. The option
 ``scale`` overrules the unit of the header; one of them is needed.
@@ -26,7 +26,7 @@ from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.curves import MOST_POINTS, TOLERANCE, sampled
-from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
+from robocov_app.formats.geometry.shapes import Line, Shapes
 
 MOST_LINES = 8_000_000  # of text: a line of the drawing takes about 24, a vertex 4
 MOST_ENTITIES = 50_000  # in the file, on any layer: ezdxf takes an eighth of a millisecond and 5 kB for each
@@ -295,7 +295,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     DxfDrawing(document, shapes, scale).draw()
     shapes.join_lines()
     files.require_shapes(len(shapes.lines) + len(shapes.outlines), where)
-    return foreign_map(shapes, files.name_of_map(path), "Imported from DXF.", solid=True)
+    return shapes.foreign_map(files.name_of_map(path), "Imported from DXF.", solid=True)
 
 
 def _document(path: Path, where: str) -> Any:

@@ -1,6 +1,6 @@
 """GeoJSON (RFC 7946), in degrees or metres.
 
-What polygons and lines are is found out as in `shapes.foreign_map`; the properties ``name``, ``kind`` and
+What polygons and lines are is found out as in `Shapes.foreign_map`; the properties ``name``, ``kind`` and
 ``id`` of a feature name its shapes. Coordinates are longitude and latitude (RFC 7946, section 4) and are
 projected to metres, if that makes a map of at most 10 km; else they are metres. The member ``crs`` of the
 older standard is obeyed, as is a member ``units`` (``metres`` or ``degrees``), which `robocov export` writes;
@@ -28,7 +28,7 @@ from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, Writ
 from robocov_app.formats.files import JsonFile, is_number
 from robocov_app.formats.geometry.cells import not_held
 from robocov_app.formats.geometry.polygons import DIGITS, free_area, on_grid
-from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes, foreign_map
+from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes
 from robocov_app.formats.georeference import LocalPlane, in_metres
 
 _PLURAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
@@ -55,7 +55,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     named, text = document.get("name"), document.get("description")
     name = one_line(named if isinstance(named, str) and named.strip() else path.stem)[:80]
     text = one_line(text)[:1000] if isinstance(text, str) else "Imported from GeoJSON."
-    return foreign_map(shapes, name or "map", text, solid=False)
+    return shapes.foreign_map(name or "map", text, solid=False)
 
 
 class _Found:

@@ -25,7 +25,7 @@ from robocov.arrays import Array, BoolArray, IntArray, beginnings, ranges
 from robocov.errors import counted
 from robocov_app.formats.geometry.raster import NECK
 
-# by so much of it the area of an outline may change, of an obstacle or a free part; and that of all that is free
+# by so much of it the area of an outline, of an obstacle or a free part, may change; and of all that is free
 KEPT_OUTLINE, KEPT_AREA = 0.1, 0.02
 _BLOCKS = 16  # a thing of fewer cells stays as it is: what it is like, its cells say best
 # halvings of the tolerance around a place until everything stays there; rounds until all of a wall that is

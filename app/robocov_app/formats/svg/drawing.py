@@ -1,6 +1,6 @@
 """SVG drawings, read (filled shapes are areas, unfilled strokes are walls) and written (at true scale).
 
-Filled shapes are areas, by their fill rule: solid, but for the boundary (see `shapes.foreign_map`; names are
+Filled shapes are areas, by their fill rule: solid, but for the boundary (see `Shapes.foreign_map`; names are
 ids, classes and the labels of Inkscape's layers, of the shape and the groups around it). Shapes that are only
 stroked are walls as wide as the stroke, or as the option ``thickness``, cut where they turn more sharply than
 their mitre limit. Colours mean nothing. What is hidden, text and pictures are left out.
@@ -34,7 +34,7 @@ from robocov_app.formats.geometry.conversion import with_numbers
 from robocov_app.formats.geometry.curves import TOLERANCE, arc
 from robocov_app.formats.geometry.frames import moved
 from robocov_app.formats.geometry.polygons import Rule, decimal, free_area
-from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
+from robocov_app.formats.geometry.shapes import Line, Shapes
 from robocov_app.formats.svg import path as paths
 from robocov_app.formats.svg.path import affine, composed, length, numbers, stretch
 from robocov_app.formats.xml_tree import DEEPEST, MOST_ELEMENTS, Element, read_xml_tree
@@ -75,7 +75,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     texts = {each.tag: one_line(" ".join(each.text.split())) for each in root.children if each.text.strip()}
     name = texts.get("title", "")[:80] or name_of_map(path)
     text = texts.get("desc", "")[:1000] or "Imported from SVG."
-    return foreign_map(shapes, name, text, solid=True)
+    return shapes.foreign_map(name, text, solid=True)
 
 
 def _page(given: dict[str, str], scale: float | None) -> tuple[Array, float, float]:
