@@ -149,7 +149,7 @@ class Shapes:
         self.join_lines()
 
     def add(self, figure: Figure) -> None:
-        """Add a geometry whose coordinates are metres. Raises MapError as `add_outline`."""
+        """Add a geometry whose coordinates are metres; MapError where one is out of range."""
         if not self.wants(figure.labels):
             return
         if figure.kind == "point":
