@@ -93,8 +93,8 @@ def _picture(world: _Node, path: Path, shapes: Shapes) -> BoolArray:
             name = shown(source["name"].value)
             raise MapError(f"{source.at}: {name}, which IR-SIM generates, but a picture was wanted")
         source = source["path"]
-    anywhere = shapes.options.anywhere
-    file = files.named_file(path, source.text(), "picture", source.at, shapes.notes, anywhere=anywhere)
+    notes, anywhere = shapes.notes, shapes.options.anywhere
+    file = files.named_file(path, source.text(), "picture", source.at, notes, anywhere)
     picture = read_picture(file, one_line(file))
     every = int(step.number(1.0))
     if every < 1:

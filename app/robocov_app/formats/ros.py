@@ -74,7 +74,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         raise MapError(f"{where}: free_thresh, occupied_thresh: {free:g}, {occupied:g}, but {wanted}")
     repaired: list[str] = []
     name, at = _text(given, "image", where), f"{where}: image"
-    image = files.named_file(path, name, "picture", at, repaired, anywhere=options.anywhere)
+    image = files.named_file(path, name, "picture", at, repaired, options.anywhere)
     picture = read_picture(image, one_line(image))
     threshold = 0.5 if options.threshold is None else options.threshold
     notes = [f"{one_line(key)}: no key of map_server, not looked at" for key in given if key not in _KNOWN]

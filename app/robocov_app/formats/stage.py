@@ -132,7 +132,7 @@ class _World:
 
     def _named(self, name: str, what: str, at: str) -> Path:
         notes, anywhere = self.shapes.notes, self.shapes.options.anywhere
-        return files.named_file(self.path, name, what, at, notes, anywhere=anywhere)
+        return files.named_file(self.path, name, what, at, notes, anywhere)
 
     def _split(self, path: Path, depth: int) -> None:
         """Add the tokens of a file, and of those that it includes."""

@@ -128,10 +128,8 @@ class _Map:
             first = _whole(tileset, "firstgid", 1)
             source = tileset.attributes.get("source")
             if source is not None:
-                at, notes = f"{tileset.where}:{tileset.line}", self.shapes.notes
-                file = files.named_file(
-                    self.path, source, "tileset", at, notes, anywhere=self.options.anywhere
-                )
+                at, anywhere = f"{tileset.where}:{tileset.line}", self.options.anywhere
+                file = files.named_file(self.path, source, "tileset", at, self.shapes.notes, anywhere)
                 tileset = read_xml_tree(file, "tileset", "TSX")
             size = np.array([_number(tileset, name) for name in ("tilewidth", "tileheight")])
             drawn = tileset.child("tileoffset")

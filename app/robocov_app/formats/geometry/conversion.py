@@ -364,7 +364,7 @@ class _Shaper:
         tolerance all along the outline, and the primitives have fewer points. Those of several primitives
         stay, or all of them, where a robot would have more than so many `places`, apart from each other.
         """
-        hair = 10.0**-self.digits
+        slack = tolerance + 10.0**-self.digits
         rounded = {
             with_numbers(each, lambda value: round(value, self.digits) + 0.0): each
             for each in self.foreign.primitives
@@ -381,13 +381,13 @@ class _Shaper:
         tree = STRtree(piece)
         made: list[set[int]] = []
         for part in solid:
-            found = np.sort(tree.query(part.buffer(2 * (tolerance + hair)), "covers"))
+            found = np.sort(tree.query(part.buffer(2 * slack), "covers"))
             own = set(source[found].tolist())
             union = shapely.union_all(piece[found])
             same = (
                 sum(len(_points(usable[k])) for k in own) < shapely.get_num_coordinates(part)
-                and union.buffer(2 * (tolerance + hair)).covers(part)
-                and shapely.symmetric_difference(part, union).area <= (tolerance + hair) * part.length
+                and union.buffer(2 * slack).covers(part)
+                and shapely.symmetric_difference(part, union).area <= slack * part.length
             )
             made.append(own if same else set())
         # several may have a gap among them that was filled
