@@ -20,7 +20,7 @@ from robocov.errors import one_line, shown
 from robocov.mapfile.models import LARGEST
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
-from robocov_app.formats.geometry.shapes import Shapes, foreign_map
+from robocov_app.formats.geometry.shapes import Shapes
 from robocov_app.formats.xml_tree import Element, read_xml_tree
 
 MOST_PLACED = 4_000  # entities that a file places in a grid or at one place
@@ -42,7 +42,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         elif (body := child.child("body")) is not None:
             position = body.numbers("position", count=3, default="0,0,0")
             _place(child, position, body.numbers("orientation", count=3, default="0,0,0"), shapes)
-    return foreign_map(shapes, path.stem, "An arena of ARGoS, imported.", solid=True, world=world)
+    return shapes.foreign_map(path.stem, "An arena of ARGoS, imported.", solid=True, world=world)
 
 
 def _distribute(element: Element, shapes: Shapes) -> None:

@@ -2,7 +2,7 @@
 
 Closed outlines (polylines, circles, ellipses, closed splines, filled quadrilaterals) are solid, but for the
 boundary; lines, arcs and open polylines are walls as wide as they are drawn, or as the option ``thickness``.
-Names are those of layers and blocks: see `shapes.foreign_map`. Blocks are carried out wherever they are
+Names are those of layers and blocks: see `Shapes.foreign_map`. Blocks are carried out wherever they are
 inserted. Layers that are off or frozen, texts, dimensions and what has a third dimension are left out; so are
 hatches without the option ``hatches``. Curves become lines that stay within a millimetre. The option
 ``scale`` overrules the unit of the header; one of them is needed.
@@ -26,19 +26,18 @@ from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.curves import MOST_POINTS, TOLERANCE, sampled
-from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
+from robocov_app.formats.geometry.shapes import Line, Shapes
 
 MOST_LINES = 8_000_000  # of text: a line of the drawing takes about 24, a vertex 4
 MOST_ENTITIES = 50_000  # in the file, on any layer: ezdxf takes an eighth of a millisecond and 5 kB for each
 MOST_DRAWN = 200_000  # that are drawn, blocks and all
+# units of the header's $INSUNITS, with their metres
 UNITS = {
     1: ("inches", 0.0254), 2: ("feet", 0.3048), 3: ("miles", 1609.344), 4: ("millimetres", 0.001),
     5: ("centimetres", 0.01), 6: ("metres", 1.0), 7: ("kilometres", 1000.0), 9: ("mils", 2.54e-5),
     10: ("yards", 0.9144), 13: ("micrometres", 1e-6), 14: ("decimetres", 0.1), 15: ("decametres", 10.0),
     16: ("hectometres", 100.0), 21: ("US survey feet", 1200 / 3937),
 }  # fmt: skip
-"""Units of the header's $INSUNITS, with their metres."""
-
 BINARY = b"AutoCAD Binary DXF"
 TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION\b")
 _ENTITY = re.compile(rb"\n[ \t]*0[ \t]*\r?\n[ \t]*[A-Z]")
@@ -282,7 +281,6 @@ class DxfDrawing:
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = one_line(path)
-    _check(path, where)
     document = _document(path, where)
     code = document.header.get("$INSUNITS", 0)
     if options.scale is not None:
@@ -297,10 +295,11 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     DxfDrawing(document, shapes, scale).draw()
     shapes.join_lines()
     files.require_shapes(len(shapes.lines) + len(shapes.outlines), where)
-    return foreign_map(shapes, files.name_of_map(path), "Imported from DXF.", solid=True)
+    return shapes.foreign_map(files.name_of_map(path), "Imported from DXF.", solid=True)
 
 
-def _check(path: Path, where: str) -> None:
+def _document(path: Path, where: str) -> Any:
+    """Return the drawing as ezdxf has it, recovered where it has faults; what takes long is refused."""
     content = files.content(path, files.MAX_TEXT_BYTES)
     if not content.startswith(BINARY):
         if not TEXT.match(content):
@@ -311,10 +310,6 @@ def _check(path: Path, where: str) -> None:
         files.require_vertices(sum(1 for _ in points), where)
     if (lines := content.count(b"\n")) > MOST_LINES:
         raise MapError(f"{where}: {lines} lines, but at most {MOST_LINES} were wanted")
-
-
-def _document(path: Path, where: str) -> Any:
-    """Return the drawing as ezdxf has it; one with faults as far as it can be recovered."""
     try:
         ezdxf, recover = extra("ezdxf", "dxf"), extra("ezdxf.recover", "dxf")
     except RobocovError as error:

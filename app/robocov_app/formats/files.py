@@ -107,9 +107,7 @@ def name_of_map(path: Path) -> str:
 _LONG = 400  # longest name of a file, in characters
 
 
-def named_file(
-    path: Path, name: str, what: str, at: str, notes: list[str], *, anywhere: bool = False
-) -> Path:
+def named_file(path: Path, name: str, what: str, at: str, notes: list[str], anywhere: bool) -> Path:
     """Return the file that the one at `path` names, a `what`, at the place `at`.
 
     It must be in the file's folder or below, unless it may be `anywhere`. Programs write where it was when it

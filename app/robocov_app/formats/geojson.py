@@ -1,6 +1,6 @@
 """GeoJSON (RFC 7946), in degrees or metres.
 
-What polygons and lines are is found out as in `shapes.foreign_map`; the properties ``name``, ``kind`` and
+What polygons and lines are is found out as in `Shapes.foreign_map`; the properties ``name``, ``kind`` and
 ``id`` of a feature name its shapes. Coordinates are longitude and latitude (RFC 7946, section 4) and are
 projected to metres, if that makes a map of at most 10 km; else they are metres. The member ``crs`` of the
 older standard is obeyed, as is a member ``units`` (``metres`` or ``degrees``), which `robocov export` writes;
@@ -28,7 +28,7 @@ from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, Writ
 from robocov_app.formats.files import JsonFile, is_number
 from robocov_app.formats.geometry.cells import not_held
 from robocov_app.formats.geometry.polygons import DIGITS, free_area, on_grid
-from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes, foreign_map
+from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes
 from robocov_app.formats.georeference import LocalPlane, in_metres
 
 _PLURAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
@@ -39,8 +39,7 @@ _NAMES = ("name", "kind", "id")  # properties of a feature that name its shapes;
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
     file = JsonFile(path)
-    document, where = file.document, file.where
-    shapes = Shapes(where, options)
+    document, shapes = file.document, Shapes(file.where, options)
     found = _Found(file, shapes)
     found.read()
     units, origin = document.get("units"), document.get("origin")
@@ -51,19 +50,12 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         if not good or not (abs(origin[0]) <= 360.0 and abs(origin[1]) <= 90.0):
             raise file.refused(("origin",), origin, "longitude and latitude in degrees were")
         origin = float(origin[0]), float(origin[1])
-    figures, shapes.notes = in_metres(
-        found.figures,
-        replace(options, units=options.units or units),
-        where,
-        crs=found.crs,
-        globe=True,
-        origin=origin,
-    )
-    shapes.add_all(figures)
+    shapes.options = replace(options, units=options.units or units)
+    shapes.add_all(in_metres(found.figures, shapes, found.crs, globe=True, origin=origin))
     named, text = document.get("name"), document.get("description")
     name = one_line(named if isinstance(named, str) and named.strip() else path.stem)[:80]
     text = one_line(text)[:1000] if isinstance(text, str) else "Imported from GeoJSON."
-    return foreign_map(shapes, name or "map", text, solid=False)
+    return shapes.foreign_map(name or "map", text, solid=False)
 
 
 class _Found:

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from robocov.arrays import Array
+from robocov.environment import Point
 from robocov.errors import MapError, RobocovError, shown
 from robocov.extras import extra
 from robocov.mapfile.models import LARGEST
-from robocov_app.formats.base import ReadOptions
 from robocov_app.formats.files import require_shapes
-from robocov_app.formats.geometry.shapes import Figure
+from robocov_app.formats.geometry.shapes import Figure, Shapes
 
 DEGREES = "OGC:CRS84"  # longitude and latitude on WGS 84, as of all GeoJSON (RFC 7946, section 4)
 _IN_DEGREES = (DEGREES, "EPSG:4326")
@@ -28,33 +28,27 @@ _EARTH = 6_371_000.0  # mean radius in metres, to tell degrees from metres; noth
 
 
 def in_metres(
-    figures: Sequence[Figure],
-    options: ReadOptions,
-    where: str,
-    *,
-    crs: str | None = None,
-    globe: bool = False,
-    origin: tuple[float, float] | None = None,
-) -> tuple[list[Figure], list[str]]:
-    """Return figures with coordinates in metres, and what was done to them, in words.
+    figures: list[Figure], shapes: Shapes, crs: str | None, globe: bool = False, origin: Point | None = None
+) -> list[Figure]:
+    """Return figures with coordinates in metres; the notes of `shapes` say what was done to them.
 
-    `options`: ``units`` overrules the file; ``scale`` is metres a unit where it says nothing. `crs`: of the
-    file, as ``EPSG:25832`` or an OGC URN. `globe`: coordinates without one are degrees where that makes a map
-    of at most 10 km. `origin`: longitude and latitude of [0, 0] m, by default of the middle.
+    Options: ``units`` overrules the file; ``scale`` is metres a unit where it says nothing. `crs`: as
+    ``EPSG:25832`` or an OGC URN. `globe`: coordinates without one are degrees where that makes a map of at
+    most 10 km. `origin`: longitude and latitude of [0, 0] m, by default of the middle.
     """
     if not figures:
-        return [], []
+        return figures
+    where, scale, units = shapes.where, shapes.options.scale, shapes.options.units
     require_shapes(sum(figure.kind != "point" for figure in figures), where)
-    if options.units == "metres" or (crs is None and options.units is None and not _on_globe(figures, globe)):
-        scale = 1.0 if options.scale is None else options.scale
-        notes = [] if scale == 1.0 else [f"a unit is {scale:g} m"]
-        if globe and options.units is None:
-            notes.append("coordinates taken as metres: as degrees the map would be larger than 10 km")
-        if crs is not None:
-            notes.append(f"coordinates of {crs} taken as they are")
-        return _with_points(figures, _points(figures) * scale), notes
-    name = DEGREES if options.units == "degrees" or crs is None else _authority(crs, where)
-    return _projected(figures, name, where, origin)
+    if units == "degrees" or (units is None and (crs is not None or _on_globe(figures, globe))):
+        name = DEGREES if units == "degrees" or crs is None else _authority(crs, where)
+        return _projected(figures, name, shapes, origin)
+    shapes.notes += [] if scale in (None, 1.0) else [f"a unit is {scale:g} m"]
+    if globe and units is None:
+        shapes.notes.append("coordinates taken as metres: as degrees the map would be larger than 10 km")
+    if crs is not None:
+        shapes.notes.append(f"coordinates of {crs} taken as they are")
+    return _with_points(figures, _points(figures) * (1.0 if scale is None else scale))
 
 
 def _points(figures: Sequence[Figure]) -> Array:
@@ -92,10 +86,9 @@ def _authority(crs: str, where: str) -> str:
     return f"{match[1].upper()}:{match[2].upper()}"
 
 
-def _projected(
-    figures: Sequence[Figure], name: str, where: str, origin: tuple[float, float] | None
-) -> tuple[list[Figure], list[str]]:
+def _projected(figures: Sequence[Figure], name: str, shapes: Shapes, origin: Point | None) -> list[Figure]:
     """Return figures in metres east and north of a place, by the azimuthal equidistant projection."""
+    where, system = shapes.where, "degrees" if name in _IN_DEGREES else name
     try:
         pyproj = extra("pyproj", "geo")
     except RobocovError as error:
@@ -104,8 +97,8 @@ def _projected(
     points = _points(figures)
     if name not in _IN_DEGREES:
         try:
-            system = pyproj.CRS.from_authority(*name.split(":"))
-            to_globe = pyproj.Transformer.from_crs(system, DEGREES, always_xy=True)
+            authority = pyproj.CRS.from_authority(*name.split(":"))
+            to_globe = pyproj.Transformer.from_crs(authority, DEGREES, always_xy=True)
         except pyproj.exceptions.ProjError:
             raise MapError(f"{where}: reference system {name} is unknown ({_AS_THEY_ARE})") from None
         points = np.column_stack(to_globe.transform(*points.T))
@@ -119,11 +112,9 @@ def _projected(
     longitude, latitude = origin or (float(middle[0]), float(middle[1]))
     points = LocalPlane(pyproj, longitude, latitude).metres(points)
     longitude = (longitude + 180.0) % 360.0 - 180.0
-    words = (
-        f"{'degrees' if name in _IN_DEGREES else name} projected to metres about longitude {longitude:.5f}, "
-        f"latitude {latitude:.5f} (azimuthal equidistant)"
-    )
-    return _with_points(figures, points), [words]
+    about = f"about longitude {longitude:.5f}, latitude {latitude:.5f} (azimuthal equidistant)"
+    shapes.notes.append(f"{system} projected to metres {about}")
+    return _with_points(figures, points)
 
 
 class LocalPlane:

@@ -27,7 +27,7 @@ from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
 from robocov_app.formats.geometry.raster import free_area, vertices_of
-from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
+from robocov_app.formats.geometry.shapes import Line, Shapes
 from robocov_app.formats.picture import read_picture
 
 MOST_OBJECTS = 4_000  # robots and obstacles of a world
@@ -82,7 +82,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         words = "with kinematics taken as standing where the file has them"
         shapes.notes.append(f"{counted(moving, 'obstacle')} {words}")
     name = world["name"].text() or path.stem
-    return foreign_map(shapes, name, "A world of IR-SIM, imported.", solid=True, world=free)
+    return shapes.foreign_map(name, "A world of IR-SIM, imported.", solid=True, world=free)
 
 
 def _picture(world: _Node, path: Path, shapes: Shapes) -> BoolArray:
@@ -93,8 +93,8 @@ def _picture(world: _Node, path: Path, shapes: Shapes) -> BoolArray:
             name = shown(source["name"].value)
             raise MapError(f"{source.at}: {name}, which IR-SIM generates, but a picture was wanted")
         source = source["path"]
-    anywhere = shapes.options.anywhere
-    file = files.named_file(path, source.text(), "picture", source.at, shapes.notes, anywhere=anywhere)
+    notes, anywhere = shapes.notes, shapes.options.anywhere
+    file = files.named_file(path, source.text(), "picture", source.at, notes, anywhere)
     picture = read_picture(file, one_line(file))
     every = int(step.number(1.0))
     if every < 1:

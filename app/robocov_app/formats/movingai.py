@@ -7,10 +7,10 @@ N. R. Sturtevant, Benchmarks for grid-based pathfinding, IEEE Transactions on Co
 and AI in Games 4 (2012), 144-148.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robocov.environment import Environment
 from robocov.errors import MapError, one_line, shown
@@ -39,7 +39,16 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     table[list(_SOLID)] = BLOCKED
     table[ord("T")] = FREE if options.trees == "free" else BLOCKED
     table[ord("W")] = FREE if options.water == "free" else BLOCKED
-    letters = _letters(body, columns, rows, line, where)
+    lines = body.replace(b"\r\n", b"\n").split(b"\n", rows)
+    for k in range(rows):
+        found = len(lines[k].rstrip(b" \t\r")) if k < len(lines) else 0
+        if found != columns:
+            what = f"{found} letters" if k < len(lines) and (found or k < len(lines) - 1) else "end of file"
+            raise MapError(f"{where}: line {line + k}: {what}, but {columns} letters were wanted")
+    if len(lines) > rows and lines[rows].strip():
+        raise MapError(f"{where}: line {line + rows}: more than {rows} rows, but so many were wanted")
+    joined = b"".join(lines[k].rstrip(b" \t\r") for k in range(rows))
+    letters = np.frombuffer(joined, np.uint8).reshape(rows, columns)
     cells = table[letters]
     bad = cells == _BAD
     if bad.any():
@@ -85,19 +94,6 @@ def _header(data: bytes, where: str) -> tuple[int, int, bytes, int]:
     raise MapError(f"{where}: no line map, but one after type, height and width was wanted")
 
 
-def _letters(body: bytes, columns: int, rows: int, line: int, where: str) -> NDArray[np.uint8]:
-    lines = body.replace(b"\r\n", b"\n").split(b"\n", rows)
-    for k in range(rows):
-        found = len(lines[k].rstrip(b" \t\r")) if k < len(lines) else 0
-        if found != columns:
-            what = f"{found} letters" if k < len(lines) and (found or k < len(lines) - 1) else "end of file"
-            raise MapError(f"{where}: line {line + k}: {what}, but {columns} letters were wanted")
-    if len(lines) > rows and lines[rows].strip():
-        raise MapError(f"{where}: line {line + rows}: more than {rows} rows, but so many were wanted")
-    joined = b"".join(lines[k].rstrip(b" \t\r") for k in range(rows))
-    return np.frombuffer(joined, np.uint8).reshape(rows, columns)
-
-
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     grid = grid_over(environment, options.cell)
     free = free_cells(environment, grid)
@@ -109,4 +105,5 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
         part.write_bytes(head.encode("ascii") + letters.tobytes())
     x, y = grid.origin
     place = f"the cell size, {grid.cell:g} m, and the lower left corner, [{x:g}, {y:g}]"
-    return grid_report("movingai", (path,), environment, grid, free, dropped=(place,))
+    report = grid_report("movingai", (path,), environment, grid, free)
+    return replace(report, dropped=(place, *report.dropped))

@@ -21,7 +21,7 @@ from robocov.arrays import Array
 from robocov.errors import MapError, counted, one_line
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
-from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes, foreign_map
+from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes
 from robocov_app.formats.georeference import DEGREES, in_metres
 
 ROOT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?xml[^>]*\?>\s*)?(?:<!--.*?-->\s*)*<osm[\s>]", re.DOTALL)
@@ -62,12 +62,11 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         origin = (float(west + east) / 2, float(south + north) / 2)
         corners = np.array([[west, south], [east, south], [east, north], [west, north]])
         figures.append(Figure("polygon", (corners,), (BOUNDARY,), "bounds"))
-    figures, shapes.notes = in_metres(figures, options, where, crs=DEGREES, origin=origin)
-    shapes.add_all(figures)
+    shapes.add_all(in_metres(figures, shapes, DEGREES, origin=origin))
     if extract.gates:
         shapes.notes.append(f"{counted(extract.gates, 'gate')} taken as closed")
     text = "Imported from OpenStreetMap, © OpenStreetMap contributors."
-    return foreign_map(shapes, files.name_of_map(path), text, solid=True)
+    return shapes.foreign_map(files.name_of_map(path), text, solid=True)
 
 
 class _Extract:

@@ -101,11 +101,7 @@ def plot_import(
 
 
 def _laid_out(
-    theme: Theme,
-    bounds: Box,
-    captions: Sequence[tuple[str, str]],
-    handles: Sequence[Artist],
-    lines: Sequence[str],
+    theme: Theme, bounds: Box, captions: Sequence[tuple[str, str]], handles: list[Artist], told: Sequence[str]
 ) -> tuple[Page, list[tuple[Box, float]], list[str]]:
     """Return a page, the boxes of two arenas on it with the room above each, and the lines below."""
     page = Page((_WIDTH, _WIDTH), theme, _SCALE)
@@ -122,7 +118,7 @@ def _laid_out(
     high = min(wide / aspect, _HEIGHT / rows)
     slot = min(max(high * aspect, words), (width - page.margin) / columns - page.margin)
     left = (width - columns * slot - (columns - 1) * page.margin) / 2
-    said = _wrapped(page, lines, width - left - page.margin)
+    said = _wrapped(page, told, width - left - page.margin)
     below = page.footer_height(handles) + (_LINE * len(said) + 14) * s
     tall = _TOP * s + rows * (_ABOVE * s + high) + (rows - 1) * 14 * s + below
     page = Page((int(width), int(max(tall, 320))), theme, _SCALE)

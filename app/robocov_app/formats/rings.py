@@ -15,7 +15,7 @@ from robocov.arrays import Array
 from robocov.errors import JsonPath as Steps
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.files import JsonFile, name_of_map, require_shapes
-from robocov_app.formats.geometry.shapes import Shapes, foreign_map
+from robocov_app.formats.geometry.shapes import Shapes
 
 _LISTS = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[\s*(?:\[\s*){0,3}-?[\d.]")
 _FLAT = re.compile(rb'"vertices"\s*:\s*\[\s*-?[\d.]')
@@ -34,7 +34,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     for number, rings in enumerate(polygons, start=1):
         shapes.add_outline([ring * scale for ring in rings], at=f"polygon {number}")
     shapes.notes = [f"a unit is {scale:g} m" + ("" if options.scale else " (the file says none; --scale)")]
-    return foreign_map(shapes, name_of_map(path), "Imported from rings.", solid=False, accessible=True)
+    return shapes.foreign_map(name_of_map(path), "Imported from rings.", solid=False, overlap=True)
 
 
 def _polygons(file: JsonFile, shapes: Shapes) -> list[list[Array]]:

@@ -19,6 +19,7 @@ that planners which take the unknown for passable stay inside.
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +74,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         raise MapError(f"{where}: free_thresh, occupied_thresh: {free:g}, {occupied:g}, but {wanted}")
     repaired: list[str] = []
     name, at = _text(given, "image", where), f"{where}: image"
-    image = files.named_file(path, name, "picture", at, repaired, anywhere=options.anywhere)
+    image = files.named_file(path, name, "picture", at, repaired, options.anywhere)
     picture = read_picture(image, one_line(image))
     threshold = 0.5 if options.threshold is None else options.threshold
     notes = [f"{one_line(key)}: no key of map_server, not looked at" for key in given if key not in _KNOWN]
@@ -184,7 +185,12 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     _, image = files_of(path, options)
     if image == path:
         raise OutputError(f"{one_line(path)}: the name of the picture, but one for the YAML was wanted")
-    text_name = _quoted(image.name, path)
+    try:
+        image.name.encode()
+    except UnicodeEncodeError:
+        raise OutputError(f"{one_line(path)}: {shown(image.name)}: no name that UTF-8 can hold") from None
+    plain = re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", image.name)
+    text_name = image.name if plain else json.dumps(image.name)
     grid = grid_over(environment, options.cell)
     free = free_cells(environment, grid)
     # a wall of one cell all around what is free
@@ -230,12 +236,4 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
             f"negate: 0\noccupied_thresh: {_OCCUPIED}\nfree_thresh: {_FREE}\n",
             encoding="utf-8",
         )
-    return grid_report("ros", (path, image), environment, grid, free, notes=notes)
-
-
-def _quoted(name: str, path: Path) -> str:
-    try:
-        name.encode()
-    except UnicodeEncodeError:
-        raise OutputError(f"{one_line(path)}: {shown(name)}: no name that UTF-8 can hold") from None
-    return name if re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", name) else json.dumps(name)
+    return replace(grid_report("ros", (path, image), environment, grid, free), notes=notes)

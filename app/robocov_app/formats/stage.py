@@ -33,7 +33,7 @@ from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
 from robocov_app.formats.geometry.polygons import polygons_of
 from robocov_app.formats.geometry.raster import free_area, vertices_of
-from robocov_app.formats.geometry.shapes import Outline, Shapes, foreign_map, surrounding
+from robocov_app.formats.geometry.shapes import Outline, Shapes
 from robocov_app.formats.picture import read_picture
 
 MAX_BYTES = 5_000_000  # largest file of a world, in bytes
@@ -106,12 +106,12 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
             shapes.outlines.append(Outline(dark, room.labels))
     free = None if main is None else main.free
     if free is None and shapes.outlines:
-        found = surrounding(shapes)
+        found = shapes.surrounding()
         free = found.area
         shapes.notes.append(f"the boundary is {found.words}")
     shapes.cell = max((room.cell for room in rooms if room.cell is not None), default=None)
     name = world.root.text("name") or path.stem
-    return foreign_map(shapes, name, "A world of Stage, imported.", solid=True, world=free)
+    return shapes.foreign_map(name, "A world of Stage, imported.", solid=True, world=free)
 
 
 class _World:
@@ -132,7 +132,7 @@ class _World:
 
     def _named(self, name: str, what: str, at: str) -> Path:
         notes, anywhere = self.shapes.notes, self.shapes.options.anywhere
-        return files.named_file(self.path, name, what, at, notes, anywhere=anywhere)
+        return files.named_file(self.path, name, what, at, notes, anywhere)
 
     def _split(self, path: Path, depth: int) -> None:
         """Add the tokens of a file, and of those that it includes."""

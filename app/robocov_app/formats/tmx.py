@@ -28,7 +28,7 @@ from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import frame, moved
 from robocov_app.formats.geometry.raster import free_area, vertices_of
-from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
+from robocov_app.formats.geometry.shapes import Line, Shapes
 from robocov_app.formats.xml_tree import Element, read_xml_tree
 
 MOST_TILES, MOST_READ = 4_000_000, 16_000_000  # of a map, and of all its layers together
@@ -117,7 +117,7 @@ class _Map:
         world = free_area(~solid, (width, height), (0.0, 0.0), where)
         shapes.count(vertices_of(world))
         shapes.cell = max(width, height) if solid.any() else None
-        return foreign_map(shapes, self.path.stem, "A map of Tiled, imported.", solid=True, world=world)
+        return shapes.foreign_map(self.path.stem, "A map of Tiled, imported.", solid=True, world=world)
 
     def _tiles(self) -> dict[int, _Tile]:
         """Return the tiles that are solid, by their global IDs."""
@@ -128,10 +128,8 @@ class _Map:
             first = _whole(tileset, "firstgid", 1)
             source = tileset.attributes.get("source")
             if source is not None:
-                at, notes = f"{tileset.where}:{tileset.line}", self.shapes.notes
-                file = files.named_file(
-                    self.path, source, "tileset", at, notes, anywhere=self.options.anywhere
-                )
+                at, anywhere = f"{tileset.where}:{tileset.line}", self.options.anywhere
+                file = files.named_file(self.path, source, "tileset", at, self.shapes.notes, anywhere)
                 tileset = read_xml_tree(file, "tileset", "TSX")
             size = np.array([_number(tileset, name) for name in ("tilewidth", "tileheight")])
             drawn = tileset.child("tileoffset")

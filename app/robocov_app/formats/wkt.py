@@ -5,7 +5,7 @@ The grammar is that of OGC 06-103r4, section 7, with the prefix ``SRID=...;`` of
 Polygons are free space, all of them together, and their holes are obstacles: JuPedSim's accessible areas.
 Only where all other polygons lie wholly in one, to which they would add nothing, they are obstacles in it;
 where there are only lines they are walls. The option ``outlines`` says it otherwise; see
-`shapes.foreign_map`. Coordinates are metres, unless a prefix ``SRID=...;`` names another system.
+`Shapes.foreign_map`. Coordinates are metres, unless a prefix ``SRID=...;`` names another system.
 """
 
 import re
@@ -26,15 +26,14 @@ from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, Writ
 from robocov_app.formats.files import MAX_DEPTH, name_of_map, read_text
 from robocov_app.formats.geometry.cells import not_held
 from robocov_app.formats.geometry.polygons import DIGITS, decimal, on_grid, rings
-from robocov_app.formats.geometry.shapes import Figure, Shapes, foreign_map
+from robocov_app.formats.geometry.shapes import Figure, Shapes
 from robocov_app.formats.georeference import in_metres
 
+# the geometries that are read
 KINDS = (
     "POINT", "LINESTRING", "LINEARRING", "POLYGON", "TRIANGLE", "MULTIPOINT", "MULTILINESTRING",
     "MULTIPOLYGON", "POLYHEDRALSURFACE", "TIN", "GEOMETRYCOLLECTION",
 )  # fmt: skip
-"""The geometries that are read."""
-
 # those that are known and not read
 CURVED = ("CIRCULARSTRING", "COMPOUNDCURVE", "CURVEPOLYGON", "MULTICURVE", "MULTISURFACE", "CURVE", "SURFACE")
 _SPACE = re.compile(r"\s*")
@@ -215,9 +214,8 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     parsed = WktText(text, where, shapes)
     figures = parsed.figures()
     crs = f"EPSG:{parsed.srid}" if parsed.srid else None
-    figures, shapes.notes = in_metres(figures, options, where, crs=crs)
-    shapes.add_all(figures)
-    return foreign_map(shapes, name_of_map(path), "Imported from WKT.", solid=False, accessible=True)
+    shapes.add_all(in_metres(figures, shapes, crs))
+    return shapes.foreign_map(name_of_map(path), "Imported from WKT.", solid=False, overlap=True)
 
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:

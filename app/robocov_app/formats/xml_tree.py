@@ -19,10 +19,9 @@ MOST_ELEMENTS = 100_000  # in a file, and drawn of it where parts are used again
 MOST_ATTRIBUTES = 1_000_000
 DEEPEST = 100  # deepest nesting of elements and uses; drawing programs stay below 30
 _SVG = "http://www.w3.org/2000/svg"
+# most characters that entities and default attributes may add to a file: those of drawing programs stand for
+# names of namespaces
 _EXPANDED = 1_000_000
-"""Most characters that entities and default attributes may add to a file: those of drawing programs stand
-for names of namespaces."""
-
 _LONGEST_NAMESPACE, _MOST_DECLARATIONS = 1000, 1000
 
 

@@ -14,7 +14,7 @@ from vector_files import square
 from robocov.errors import MapError, ParameterError
 from robocov_app.formats import ForeignMap, ReadOptions
 from robocov_app.formats.files import MAX_VERTICES
-from robocov_app.formats.geometry.shapes import Figure, Line, Shapes, foreign_map
+from robocov_app.formats.geometry.shapes import Figure, Line, Shapes
 
 HALL = square(0, 0, 20, 10)
 
@@ -37,7 +37,7 @@ def shapes(*areas: Any, lines: Any = (), points: Any = (), **options: Any) -> Sh
 
 
 def taken(found: Shapes, solid: bool = True) -> ForeignMap:
-    return foreign_map(found, name="plan", description="", solid=solid)
+    return found.foreign_map(name="plan", text="", solid=solid)
 
 
 def test_the_largest_outline_that_holds_the_rest_is_the_boundary() -> None:

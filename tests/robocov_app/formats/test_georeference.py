@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from robocov.errors import MapError
 from robocov_app.formats import ReadOptions
-from robocov_app.formats.geometry.shapes import Figure
+from robocov_app.formats.geometry.shapes import Figure, Shapes
 from robocov_app.formats.georeference import in_metres
 
 PLAIN = ReadOptions()
@@ -19,8 +19,10 @@ _GLOBE = pyproj.Geod(ellps="WGS84")
 
 
 def moved(points: Any, options: ReadOptions = PLAIN, **given: Any) -> tuple[np.ndarray, list[str]]:
-    figures, notes = in_metres([Figure("line", (np.array(points, dtype=float),))], options, "plan", **given)
-    return figures[0].rings[0], notes
+    shapes = Shapes("plan", options)
+    given = {"crs": None, **given}
+    (figure,) = in_metres([Figure("line", (np.array(points, dtype=float),))], shapes, **given)
+    return figure.rings[0], shapes.notes
 
 
 @settings(max_examples=100)
@@ -110,7 +112,7 @@ def test_figures_keep_their_rings() -> None:
         Figure("polygon", (np.zeros((4, 2)), np.ones((3, 2))), ("hall",), "geometry 1"),
         Figure("point", (np.full((1, 2), 5.0),)),
     ]
-    scaled, _ = in_metres(figures, ReadOptions(scale=2.0), "plan")
+    scaled = in_metres(figures, Shapes("plan", ReadOptions(scale=2.0)), None)
     assert [[len(ring) for ring in figure.rings] for figure in scaled] == [[4, 3], [1]]
     assert (scaled[0].rings[1] == 2.0).all()
     assert (scaled[0].labels, scaled[0].at, scaled[1].rings[0].tolist()) == (
@@ -118,4 +120,5 @@ def test_figures_keep_their_rings() -> None:
         "geometry 1",
         [[10.0, 10.0]],
     )
-    assert in_metres([], ReadOptions(units="degrees"), "plan", globe=True) == ([], [])
+    nothing = Shapes("plan", ReadOptions(units="degrees"))
+    assert (in_metres([], nothing, None, globe=True), nothing.notes) == ([], [])

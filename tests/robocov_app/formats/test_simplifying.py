@@ -11,12 +11,9 @@ from robocov_app.formats.geometry.conversion import rooms
 from robocov_app.formats.geometry.raster import traced
 from robocov_app.formats.geometry.simplify import (
     KEPT_OUTLINE,
+    Outline,
     closed_gaps,
-    drawn,
-    outline_of,
-    polygons_from,
     simplified,
-    with_necks,
 )
 
 CELL = 0.05
@@ -170,21 +167,21 @@ def test_in_any_cave_walls_stay_near_and_robots_pass(cave: tuple[int, float, int
 def test_the_parts_of_it_are_what_they_say(cave: tuple[int, float, int, float]) -> None:
     seed, share, smooth, _ = cave
     cells = traced(blobs(seed, share, smooth), "grid")
-    outline = outline_of(list(cells.geoms), 1.0)
+    outline = Outline(list(cells.geoms), 1.0)
     assert outline.areas.sum() == pytest.approx(cells.area, abs=0.01 * outline.neck.sum() + 1e-9)
     everything = np.zeros(len(outline.points))
     nothing = np.zeros(len(outline.points), dtype=bool)
     # without any tolerance the very same outline comes back, necks and all
-    back = polygons_from(outline, with_necks(outline, drawn(outline, everything, nothing)))
+    back = outline.polygons(outline.with_necks(outline.drawn(everything, nothing)))
     assert shapely.equals_exact(back.normalize(), cells.normalize(), 1e-9)
 
 
 def test_what_must_stay_does() -> None:
     angle = np.linspace(0, 2 * np.pi, 100, endpoint=False)
-    outline = outline_of([Polygon(np.column_stack([np.cos(angle), np.sin(angle)]))], None)
+    outline = Outline([Polygon(np.column_stack([np.cos(angle), np.sin(angle)]))], None)
     fixed = np.zeros(100, dtype=bool)
     fixed[[7, 33, 90]] = True
-    source = set(drawn(outline, np.full(100, 0.5), fixed).source)
+    source = set(outline.drawn(np.full(100, 0.5), fixed).source)
     assert {7.0, 33.0, 90.0} <= source
     assert len(source) <= 12
 
@@ -242,7 +239,7 @@ def test_cells_need_not_be_square(sides: tuple[float, float]) -> None:
     cells = affinity.scale(traced(free, "grid"), *sides, origin=(0, 0))
     turned = affinity.rotate(cells, 20, origin=(0, 0))
     for shape, turn in ((cells, 0), (turned, 20)):
-        outline = outline_of(list(shape.geoms), max(sides))
+        outline = Outline(list(shape.geoms), max(sides))
         wanted = affinity.rotate(shapely.Point(5 * sides[0], 5 * sides[1]), turn, origin=(0, 0))
         assert outline.neck.sum() == 2
         assert outline.points[outline.neck] == pytest.approx(np.repeat([wanted.coords[0]], 2, axis=0))

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -171,15 +171,8 @@ def not_held(environment: Environment, *, names: bool = True) -> tuple[str, ...]
 
 
 def grid_report(
-    name: str,
-    files: tuple[Path, ...],
-    environment: Environment,
-    grid: Grid,
-    free: BoolArray,
-    *,
-    dropped: tuple[str, ...] = (),
-    notes: tuple[str, ...] = (),
+    name: str, files: tuple[Path, ...], environment: Environment, grid: Grid, free: BoolArray
 ) -> ExportReport:
     area = float(np.count_nonzero(free)) * grid.cell**2
-    dropped, lost = (*dropped, *not_held(environment)), lost_passages(environment, grid, free)
-    return ExportReport(name, files, environment.free_area, area, dropped, notes, lost)
+    report = ExportReport(name, files, environment.free_area, area, not_held(environment))
+    return replace(report, warnings=lost_passages(environment, grid, free))

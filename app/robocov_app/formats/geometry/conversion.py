@@ -18,17 +18,10 @@ from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
 from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.formats.base import ForeignMap, ImportReport, Options, Primitive, square_metres
-from robocov_app.formats.geometry.polygons import (
-    CRUMB,
-    bounded,
-    filled,
-    made_valid,
-    polygons_of,
-    rounded,
-    sides_of,
-)
+from robocov_app.formats.geometry.polygons import bounded, filled, made_valid, polygons_of, rounded, sides_of
 from robocov_app.formats.geometry.simplify import rays, sharpened, simplified
 
+_CRUMB = 1e-4  # obstacles and parts that are smaller, in m², come of rounding
 DEFAULT_TOLERANCE = 0.02  # by how much walls of vector formats may move, in metres
 # coordinates are rounded to a tenth of a millimetre, or to a hundredth of a cell if that is finer
 _GRID = 1e-4
@@ -207,7 +200,7 @@ class _Shaper:
         if outer is not None and not shapely.covers(outer, free):
             inside = shapely.intersection(free, outer)
             lost = free.area - inside.area
-            if lost > CRUMB:
+            if lost > _CRUMB:
                 self.dropped.append(f"{square_metres(lost, 3)} of free space outside the boundary")
             free = inside
         valid = polygons_of(free)
@@ -220,7 +213,7 @@ class _Shaper:
         drop, note = self.dropped.append, self.notes.append
         area = shapely.area(parts)
         if shaping.keep == "all":
-            stays = area >= max(self.specks, min(CRUMB, area[0]))
+            stays = area >= max(self.specks, min(_CRUMB, area[0]))
         elif shaping.inside is not None:
             distance = shapely.distance(parts, shapely.Point(shaping.inside))
             nearest = int(np.argmin(distance))
@@ -263,7 +256,7 @@ class _Shaper:
 
     def _without_specks(self, parts: list[Polygon]) -> list[Polygon]:
         cell, least = self.foreign.cell, self.specks
-        crumb = CRUMB if cell is None else min(CRUMB, cell * cell / 2)
+        crumb = _CRUMB if cell is None else min(_CRUMB, cell * cell / 2)
         drop, note = self.dropped.append, self.notes.append
         result, specks, crumbs, tiny = [], [], [], 0
         for part in parts:
@@ -371,7 +364,7 @@ class _Shaper:
         tolerance all along the outline, and the primitives have fewer points. Those of several primitives
         stay, or all of them, where a robot would have more than so many `places`, apart from each other.
         """
-        hair = 10.0**-self.digits
+        slack = tolerance + 10.0**-self.digits
         rounded = {
             with_numbers(each, lambda value: round(value, self.digits) + 0.0): each
             for each in self.foreign.primitives
@@ -388,13 +381,13 @@ class _Shaper:
         tree = STRtree(piece)
         made: list[set[int]] = []
         for part in solid:
-            found = np.sort(tree.query(part.buffer(2 * (tolerance + hair)), "covers"))
+            found = np.sort(tree.query(part.buffer(2 * slack), "covers"))
             own = set(source[found].tolist())
             union = shapely.union_all(piece[found])
             same = (
                 sum(len(_points(usable[k])) for k in own) < shapely.get_num_coordinates(part)
-                and union.buffer(2 * (tolerance + hair)).covers(part)
-                and shapely.symmetric_difference(part, union).area <= (tolerance + hair) * part.length
+                and union.buffer(2 * slack).covers(part)
+                and shapely.symmetric_difference(part, union).area <= slack * part.length
             )
             made.append(own if same else set())
         # several may have a gap among them that was filled
@@ -487,14 +480,10 @@ def compare(foreign: ForeignMap, environment: Environment, report: ImportReport)
     before, after = foreign.free, environment.free
     before = before if before.is_valid else made_valid(before)
     everything = [before, after, environment.region.polygon, foreign.boundary or before]
-    return Comparison(
-        before,
-        after,
-        lost=_changed(before, after, report.tolerance),
-        opened=_changed(after, before, report.tolerance),
-        region=shapely.GeometryCollection(everything).convex_hull,
-        gap=env.narrowest_gap(after) if report.vertices_kept <= _MOST_VERTICES else None,
-    )
+    lost, opened = _changed(before, after, report.tolerance), _changed(after, before, report.tolerance)
+    region = shapely.GeometryCollection(everything).convex_hull
+    gap = env.narrowest_gap(after) if report.vertices_kept <= _MOST_VERTICES else None
+    return Comparison(before, after, lost, opened, region, gap)
 
 
 def _changed(first: BaseGeometry, second: BaseGeometry, tolerance: float) -> MultiPolygon:

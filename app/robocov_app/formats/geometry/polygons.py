@@ -17,11 +17,9 @@ from robocov.errors import MapError
 # the first ring with the others as holes, or what SVG calls ``fill-rule``
 Rule: TypeAlias = Literal["holes", "evenodd", "nonzero"]
 DIGITS = 6  # decimals of metres by default: the free space is known to a micrometre
+# edges may cross each other so often in a file, those of all its shapes together. A ring of some kB can cross
+# itself millions of times, and to find all of these places takes minutes and gigabytes.
 MAX_CROSSINGS = 30_000
-"""Edges may cross each other so often in a file, those of all its shapes together. A ring of some kB can
-cross itself millions of times, and to find all of these places takes minutes and gigabytes."""
-
-CRUMB = 1e-4  # obstacles and parts that are smaller, in m², come of rounding
 _FEW = 12  # so few edges are compared each with each, which is quicker than a tree of them
 _RAYS = 500_000  # so many pairs of a ray and an edge are looked at together, which bounds the memory
 # edges that are looked at for an estimate, and so many at once; pairs of edges that are compared for it at

@@ -21,6 +21,12 @@ from robocov_app.formats.geometry.polygons import Crossings, Rule, enclosed, pol
 
 Kind: TypeAlias = Literal["polygon", "line", "point"]
 THICKNESS = 0.1  # width of walls that are drawn as lines without one, in metres
+BOUNDARY = "boundary"  # a shape of this name, id, class or layer is the boundary
+AROUND = 1.0  # room left around the shapes where none of them is the boundary, in metres
+# a boundary holds more than this part of the other shapes; walls that are one leave so much of it open
+_MOST = 0.5
+# shapes that are farther from each other, in metres, are of no map: unions of such take seconds
+_FARTHEST_PARTS = 10.0 * LARGEST
 _SHOWN = 20  # names that are listed where one is wrong
 _DIGITS = 9
 
@@ -87,6 +93,15 @@ class Line:
         return WallObstacle(tuple((x, y) for x, y in points.tolist()), self.width, name_of(self.labels))
 
 
+class _Enclosure(NamedTuple):
+    """A boundary that was found: its area with whatever holes it has, and the shapes that made it."""
+
+    area: MultiPolygon
+    words: str
+    outlines: frozenset[Outline] = frozenset()
+    lines: frozenset[Line] = frozenset()
+
+
 class Shapes:
     """Shapes that a reader has found in the file `where`: checked, counted, chosen by name.
 
@@ -134,7 +149,7 @@ class Shapes:
         self.join_lines()
 
     def add(self, figure: Figure) -> None:
-        """Add a geometry whose coordinates are metres. Raises MapError as `add_outline`."""
+        """Add a geometry whose coordinates are metres; MapError where one is out of range."""
         if not self.wants(figure.labels):
             return
         if figure.kind == "point":
@@ -274,6 +289,157 @@ class Shapes:
                 )
         return [np.round(ring, _DIGITS) + 0.0 for ring in rings]
 
+    def foreign_map(
+        self, name: str, text: str, *, solid: bool, overlap: bool = False, world: MultiPolygon | None = None
+    ) -> ForeignMap:
+        """Return the map that the shapes of a file stand for.
+
+        Closed outlines are either *free space*, all of them together; or they are *solid*, but for one which
+        is the boundary. Lines and pillars are obstacles in both. The boundary is, in this order,
+
+        1. the shape whose name, id, class or layer the option ``boundary`` gives, or that is called so; lines
+           of that name are one when they enclose an area; outlines around it are frames, and left out;
+        2. the largest closed outline, if it is the only shape, or more than half of the others lie in it;
+        3. the outer edge of the walls, if they close and what they enclose is mostly open;
+        4. a rectangle around everything, at the distance of the option ``around``.
+
+        `solid`: what closed outlines are unless the option ``outlines`` says it: True is solid; False is
+        free, but solid where 1 or 2 (of outlines alone) finds a boundary of others, or where there are only
+        lines. `overlap`: outlines may overlap and are all free, as JuPedSim's accessible areas: then 2 holds
+        only where all others lie wholly in the largest. `world`, m: what is free before the shapes stand in
+        it, where the format says so. Raises MapError when there are no shapes, the boundary has no area, or
+        they cross too often; ParameterError when a name in the options is none of the file's.
+        """
+        self.require_known_names()
+        if world is None and not self.outlines and not self.lines:
+            dropped = f" ({'; '.join(self.dropped)} left out)" if self.dropped else ""
+            raise MapError(f"{self.where}: no closed outline and no line{dropped}, but a drawing was wanted")
+        everything = [*self.areas, *self.paths, *([] if world is None else [world])]
+        # one of many parts may be a map, if they are not all too far from each other
+        _require_size(shapely.total_bounds(everything), self.where, _FARTHEST_PARTS)
+        # nor may they cross each other so often that what is free among them cannot be computed
+        Crossings(self.where).add([*shapely.get_rings(shapely.get_parts(self.areas)), *self.paths])
+        asked = self.options.outlines
+        boundary = self._named() if world is None else _Enclosure(world, "")
+        if boundary is None and asked != "free":
+            boundary = self._largest(solid or asked == "solid", wholly=overlap and asked is None)
+        if asked is not None:
+            solid = asked == "solid"
+        elif not solid:
+            others = boundary is not None and len(self.outlines) > len(boundary.outlines)
+            solid = not self.outlines or others
+        if solid:
+            boundary = boundary or self.surrounding()
+            area = boundary.area
+        else:
+            area = _together([o.area for o in self.outlines if not boundary or o not in boundary.outlines])
+            if area.is_empty and boundary is not None:
+                area = boundary.area
+        if area.is_empty:
+            raise MapError(f"{self.where}: no closed outline, but one that encloses free space was wanted")
+        _require_size(area.geoms[0].bounds, self.where)
+        used = boundary or _Enclosure(area, "")
+        inner = [outline for outline in self.outlines if solid and outline not in used.outlines]
+        walls = [line for line in self.lines if line not in used.lines]
+        blocks = np.array([outline.area for outline in inner], dtype=object)
+        shapely.prepare(area)
+        around = shapely.covered_by(area, blocks)
+        solids = [*blocks[~around], *(line.solid for line in walls), *(each.polygon for each in self.pillars)]
+        if outside := int((~shapely.intersects(area, solids)).sum() + around.sum()):
+            self.leave_out("shape", "outside of the boundary", outside)
+        free = polygons_of(shapely.difference(area, united(solids), grid_size=GRID)) if solids else area
+        # what is free of a grid has its own outline
+        plain = world is None or (len(world.geoms) == 1 and not world.geoms[0].interiors)
+        if boundary is not None and (solid or boundary.area is not area) and plain:
+            outer = Polygon(boundary.area.geoms[0].exterior)
+        elif (walls or self.pillars) and len(area.geoms) == len(free.geoms) == 1:
+            # walls that begin at the edge are no part of it
+            outer = Polygon(area.geoms[0].exterior)
+        else:
+            outer = None
+        notes = [*self.notes]
+        if boundary and boundary.words and solid:
+            notes.append(f"the boundary is {boundary.words}")
+        many = counted(int((~around).sum()), "closed outline")
+        if not around.all() and (
+            boundary is None or boundary.words
+        ):  # else the format says what all of it is
+            notes.append(f"{many} taken as solid (--outlines free: as free space)")
+        elif not solid and len(self.outlines) > 1:
+            many = counted(len(self.outlines), "closed outline")
+            notes.append(f"{many} taken as free space (--outlines solid: as obstacles)")
+        if walls:
+            narrow, wide = (f"{most(line.width for line in walls):.3g}" for most in (min, max))
+            span = narrow if narrow == wide else f"{narrow} to {wide}"
+            notes.append(f"{counted(len(walls), 'line')} taken as walls, {span} m wide (--thickness)")
+        if self.pillars:
+            notes.append(f"{counted(len(self.pillars), 'point')} taken as pillars")
+        circles = (outline.circle for outline in inner if outline.circle is not None)
+        straight = (wall for line in walls if (wall := line.wall) is not None)
+        return ForeignMap(
+            name=name,
+            description=text,
+            free=free,
+            boundary=outer,
+            vertices_read=self.vertices,
+            cell=self.cell,
+            primitives=(*circles, *straight, *self.pillars),
+            robots=tuple(self.robots),
+            repaired=self.repaired,
+            dropped=self.dropped,
+            notes=tuple(notes),
+        )
+
+    def surrounding(self) -> _Enclosure:
+        """Return what the shapes enclose as walls, else a rectangle around them."""
+        solids = [*self.areas, *(line.solid for line in self.lines)]
+        solid = _together(solids)
+        fills = [Polygon(part.exterior) for part in solid.geoms]
+        if fills:  # else what there is is thinner than the grid
+            k = int(np.argmax([fill.area for fill in fills]))
+            fill, area = fills[k], fills[k].area
+            if solid.geoms[k].area <= (1.0 - _MOST) * area and _holds(fill, list(solid.geoms)):
+                return _Enclosure(MultiPolygon([fill]), f"the outer edge of the walls, around {area:.4g} m²")
+        around = AROUND if self.options.around is None else self.options.around
+        x, y, right, top = shapely.total_bounds(solids)
+        box = shapely.box(x - around, y - around, right + around, top + around)
+        words = f"a rectangle {around:g} m around everything (--around): no shape holds the others"
+        return _Enclosure(MultiPolygon([box]), words)
+
+    def _named(self) -> _Enclosure | None:
+        wanted = self.options.boundary
+        key = (wanted or BOUNDARY).casefold()
+        outlines = frozenset(o for o in self.outlines if key in map(str.casefold, o.labels))
+        lines = frozenset(line for line in self.lines if key in map(str.casefold, line.labels))
+        noded = shapely.union_all([LineString(line.points) for line in lines])
+        rooms = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
+        area = _together([*(o.area for o in outlines), shapely.union_all(rooms)])
+        if not area.is_empty:
+            return _Enclosure(area, f"what is called {shown(wanted or BOUNDARY)}", outlines, lines)
+        if wanted is not None:
+            what = f"boundary {shown(wanted)}: encloses no area, but a closed outline was wanted"
+            raise MapError(f"{self.where}: {what}")
+        return None
+
+    def _largest(self, solid: bool, *, wholly: bool) -> _Enclosure | None:
+        """Return the largest closed outline if most others lie in it, or all wholly; if solid, lines too."""
+        if not self.outlines:
+            return None
+        outline = max(self.outlines, key=_filled)
+        inner = [area for area in self.areas if area is not outline.area]
+        if solid:
+            inner += [*self.paths, *(pillar.polygon for pillar in self.pillars)]
+            # walls as one shape have rooms as holes
+            if outline.area.area < _MOST * _filled(outline):
+                return None
+        if inner and not (
+            shapely.covers(outline.area, inner).all() if wholly else _holds(outline.area, inner)
+        ):
+            return None
+        called = f", {shown(outline.labels[0])}," if outline.labels else ""
+        words = f"the largest closed outline{called} of {_filled(outline):.4g} m²"
+        return _Enclosure(outline.area, words if inner else "the only closed outline", frozenset([outline]))
+
 
 def _many(count: int, thing: str) -> str:
     """Return how many things there are, also of nouns in y and x."""
@@ -288,129 +454,6 @@ def name_of(labels: Sequence[str]) -> str | None:
     return next(names, None) or None
 
 
-BOUNDARY = "boundary"  # a shape of this name, id, class or layer is the boundary
-AROUND = 1.0  # room left around the shapes where none of them is the boundary, in metres
-# a boundary holds more than this part of the other shapes; walls that are one leave so much of it open
-_MOST = 0.5
-# shapes that are farther from each other, in metres, are of no map: unions of such take seconds
-_FARTHEST_PARTS = 10.0 * LARGEST
-
-
-class _Enclosure(NamedTuple):
-    """A boundary that was found: its area with whatever holes it has, and the shapes that made it."""
-
-    area: MultiPolygon
-    words: str
-    outlines: frozenset[Outline] = frozenset()
-    lines: frozenset[Line] = frozenset()
-
-
-def foreign_map(
-    shapes: Shapes,
-    name: str,
-    description: str,
-    *,
-    solid: bool,
-    accessible: bool = False,
-    world: MultiPolygon | None = None,
-) -> ForeignMap:
-    """Return the map that the shapes of a file stand for.
-
-    Closed outlines are either *free space*, all of them together; or they are *solid*, but for one which is
-    the boundary. Lines and pillars are obstacles in both. The boundary is, in this order,
-
-    1. the shape whose name, id, class or layer the option ``boundary`` gives, else the one called "boundary";
-       lines of that name are one when they enclose an area; outlines around it are frames, and left out;
-    2. the largest closed outline, if it is the only shape, or more than half of the others lie in it;
-    3. the outer edge of the walls, if they close and what they enclose is mostly open;
-    4. a rectangle around everything, at the distance of the option ``around``.
-
-    `solid`: what closed outlines are unless the option ``outlines`` says it: True is solid; False is free,
-    but solid where 1 or 2 (of outlines alone) finds a boundary of others, or where there are only lines.
-    `accessible`: outlines may overlap and are all free, as JuPedSim's accessible area: then 2 holds only
-    where all others lie wholly in the largest. `world`, m: what is free before the shapes stand in it, where
-    the format says so. Raises MapError when there are no shapes, the boundary has no area, or they cross too
-    often; ParameterError when a name in the options is none of the file's.
-    """
-    shapes.require_known_names()
-    if world is None and not shapes.outlines and not shapes.lines:
-        dropped = f" ({'; '.join(shapes.dropped)} left out)" if shapes.dropped else ""
-        raise MapError(f"{shapes.where}: no closed outline and no line{dropped}, but a drawing was wanted")
-    everything = [*shapes.areas, *shapes.paths, *([] if world is None else [world])]
-    # one of many parts may be a map, if they are not all too far from each other
-    _require_size(shapely.total_bounds(everything), shapes.where, _FARTHEST_PARTS)
-    # nor may they cross each other so often that what is free among them cannot be computed
-    Crossings(shapes.where).add([*shapely.get_rings(shapely.get_parts(shapes.areas)), *shapes.paths])
-    asked = shapes.options.outlines
-    boundary = _named(shapes) if world is None else _Enclosure(world, "")
-    if boundary is None and asked != "free":
-        boundary = _largest(shapes, solid or asked == "solid", wholly=accessible and asked is None)
-    if asked is not None:
-        solid = asked == "solid"
-    elif not solid:
-        others = boundary is not None and len(shapes.outlines) > len(boundary.outlines)
-        solid = not shapes.outlines or others
-    if solid:
-        boundary = boundary or surrounding(shapes)
-        area = boundary.area
-    else:
-        area = _together([o.area for o in shapes.outlines if not boundary or o not in boundary.outlines])
-        if area.is_empty and boundary is not None:
-            area = boundary.area
-    if area.is_empty:
-        raise MapError(f"{shapes.where}: no closed outline, but one that encloses free space was wanted")
-    _require_size(area.geoms[0].bounds, shapes.where)
-    used = boundary or _Enclosure(area, "")
-    inner = [outline for outline in shapes.outlines if solid and outline not in used.outlines]
-    walls = [line for line in shapes.lines if line not in used.lines]
-    blocks = np.array([outline.area for outline in inner], dtype=object)
-    shapely.prepare(area)
-    around = shapely.covered_by(area, blocks)
-    solids = [*blocks[~around], *(line.solid for line in walls), *(each.polygon for each in shapes.pillars)]
-    if outside := int((~shapely.intersects(area, solids)).sum() + around.sum()):
-        shapes.leave_out("shape", "outside of the boundary", outside)
-    free = polygons_of(shapely.difference(area, united(solids), grid_size=GRID)) if solids else area
-    # what is free of a grid has its own outline
-    plain = world is None or (len(world.geoms) == 1 and not world.geoms[0].interiors)
-    if boundary is not None and (solid or boundary.area is not area) and plain:
-        outer = Polygon(boundary.area.geoms[0].exterior)
-    elif (walls or shapes.pillars) and len(area.geoms) == len(free.geoms) == 1:
-        # walls that begin at the edge are no part of it
-        outer = Polygon(area.geoms[0].exterior)
-    else:
-        outer = None
-    notes = [*shapes.notes]
-    if boundary and boundary.words and solid:
-        notes.append(f"the boundary is {boundary.words}")
-    many = counted(int((~around).sum()), "closed outline")
-    if not around.all() and (boundary is None or boundary.words):  # else the format says what all of it is
-        notes.append(f"{many} taken as solid (--outlines free: as free space)")
-    elif not solid and len(shapes.outlines) > 1:
-        many = counted(len(shapes.outlines), "closed outline")
-        notes.append(f"{many} taken as free space (--outlines solid: as obstacles)")
-    if walls:
-        narrow, wide = (f"{most(line.width for line in walls):.3g}" for most in (min, max))
-        span = narrow if narrow == wide else f"{narrow} to {wide}"
-        notes.append(f"{counted(len(walls), 'line')} taken as walls, {span} m wide (--thickness)")
-    if shapes.pillars:
-        notes.append(f"{counted(len(shapes.pillars), 'point')} taken as pillars")
-    circles = (outline.circle for outline in inner if outline.circle is not None)
-    straight = (wall for line in walls if (wall := line.wall) is not None)
-    return ForeignMap(
-        name=name,
-        description=description,
-        free=free,
-        boundary=outer,
-        vertices_read=shapes.vertices,
-        cell=shapes.cell,
-        primitives=(*circles, *straight, *shapes.pillars),
-        robots=tuple(shapes.robots),
-        repaired=shapes.repaired,
-        dropped=shapes.dropped,
-        notes=tuple(notes),
-    )
-
-
 def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) -> None:
     x, y, right, top = bounds
     if max(right - x, top - y) > most:
@@ -418,59 +461,8 @@ def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) ->
         raise MapError(f"{where}: {right - x:.6g} x {top - y:.6g} m, but {wanted}")
 
 
-def _named(shapes: Shapes) -> _Enclosure | None:
-    wanted = shapes.options.boundary
-    key = (wanted or BOUNDARY).casefold()
-    outlines = frozenset(o for o in shapes.outlines if key in map(str.casefold, o.labels))
-    lines = frozenset(line for line in shapes.lines if key in map(str.casefold, line.labels))
-    noded = shapely.union_all([LineString(line.points) for line in lines])
-    rooms = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
-    area = _together([*(o.area for o in outlines), shapely.union_all(rooms)])
-    if not area.is_empty:
-        return _Enclosure(area, f"what is called {shown(wanted or BOUNDARY)}", outlines, lines)
-    if wanted is not None:
-        what = f"boundary {shown(wanted)}: encloses no area, but a closed outline was wanted"
-        raise MapError(f"{shapes.where}: {what}")
-    return None
-
-
-def _largest(shapes: Shapes, solid: bool, *, wholly: bool) -> _Enclosure | None:
-    """Return the largest closed outline if most others lie in it, or all wholly; if solid, lines too."""
-    if not shapes.outlines:
-        return None
-    outline = max(shapes.outlines, key=_filled)
-    inner = [area for area in shapes.areas if area is not outline.area]
-    if solid:
-        inner += [*shapes.paths, *(pillar.polygon for pillar in shapes.pillars)]
-        # walls as one shape have rooms as holes
-        if outline.area.area < _MOST * _filled(outline):
-            return None
-    if inner and not (shapely.covers(outline.area, inner).all() if wholly else _holds(outline.area, inner)):
-        return None
-    called = f", {shown(outline.labels[0])}," if outline.labels else ""
-    words = f"the largest closed outline{called} of {_filled(outline):.4g} m²"
-    return _Enclosure(outline.area, words if inner else "the only closed outline", frozenset([outline]))
-
-
 def _filled(outline: Outline) -> float:
     return float(sum(Polygon(part.exterior).area for part in outline.area.geoms))
-
-
-def surrounding(shapes: Shapes) -> _Enclosure:
-    """Return what the shapes enclose as walls, else a rectangle around them."""
-    solids = [*shapes.areas, *(line.solid for line in shapes.lines)]
-    solid = _together(solids)
-    fills = [Polygon(part.exterior) for part in solid.geoms]
-    if fills:  # else what there is is thinner than the grid
-        k = int(np.argmax([fill.area for fill in fills]))
-        fill, area = fills[k], fills[k].area
-        if solid.geoms[k].area <= (1.0 - _MOST) * area and _holds(fill, list(solid.geoms)):
-            return _Enclosure(MultiPolygon([fill]), f"the outer edge of the walls, around {area:.4g} m²")
-    around = AROUND if shapes.options.around is None else shapes.options.around
-    x, y, right, top = shapely.total_bounds(solids)
-    box = shapely.box(x - around, y - around, right + around, top + around)
-    words = f"a rectangle {around:g} m around everything (--around): no shape holds the others"
-    return _Enclosure(MultiPolygon([box]), words)
 
 
 def _holds(outer: BaseGeometry, inner: Sequence[BaseGeometry]) -> bool:

@@ -25,14 +25,11 @@ from robocov.arrays import Array, BoolArray, IntArray, beginnings, ranges
 from robocov.errors import counted
 from robocov_app.formats.geometry.raster import NECK
 
+# by so much of it the area of an outline, of an obstacle or a free part, may change; and of all that is free
 KEPT_OUTLINE, KEPT_AREA = 0.1, 0.02
-"""By so much of it the area of an outline may change, of an obstacle or a part of the free space; and the
-free area as a whole."""
-
 _BLOCKS = 16  # a thing of fewer cells stays as it is: what it is like, its cells say best
-# how often the tolerance is halved around a place before everything stays there; the rounds after which all
-# of a wall stays where something is wrong, and after which everything stays everywhere, as it does after so
-# many times the vertices
+# halvings of the tolerance around a place until everything stays there; rounds until all of a wall that is
+# wrong stays, and until everything does everywhere, as it does after so many times the vertices
 _HALVINGS, _PATIENCE, _ROUNDS, _WORK = 3, 24, 60, 1_000_000
 # from this tolerance on, in cells, stairs are drawn as lines; and one through fewer middles says little
 _MIDDLES, _FEW = 0.75, 3
@@ -40,8 +37,7 @@ _UNBALANCED = 0.02  # from this part of it on, the area that a ring lost is give
 # of a thing with the area of a square of so many tolerances and more, all of the tolerance is left out; of
 # smaller ones less is, but always so much, in cells
 _SIZES, _FINEST = 16, 0.4
-# lines whose cosine of the angle between them is smaller are at right angles; whose sine is smaller, meet
-# nowhere in particular
+# of the angle between lines: the cosine up to which it is right, the sine up to which they meet nowhere
 _RIGHT, _SQUARE = 1e-5, 0.2
 # in tolerances: what counts as a short edge, and how far from the corner its run may be; and the sine of the
 # angle below which two walls count as parallel
@@ -100,17 +96,145 @@ class Rings:
         """Of the sides, (k, 2, 2) m."""
         return np.stack([self.points, self.points[self.after]], axis=1)
 
+    def _extremes(self) -> BoolArray:
+        """Return which vertices stay whatever the tolerance: in each ring two far from each other."""
+        middle = np.add.reduceat(self.points, self.begin, axis=0) / self.size[:, None]
+        stays = np.zeros(len(self.points), dtype=bool)
+        for _ in range(2):
+            away = np.hypot(*(self.points - middle[self.ring]).T)
+            # to a millionth, so that rounding does not choose among equals
+            far = np.lexsort((-np.round(away / away.max(), 6), self.ring))[self.begin]
+            stays[far] = True
+            middle = self.points[far]
+        return stays
+
+    def _kept(self, allowed: Array, stays: BoolArray, most: Array) -> tuple[IntArray, IntArray]:
+        """Return which vertices are kept: those that stay, and all but `most` (r,) m of a ring."""
+        begin, count = self.begin, self.size
+        changes = allowed != allowed[self.after]
+        stays |= changes
+        stays[self.after[changes]] = True
+        # each ring from its first vertex that stays, round to that one again
+        first = np.minimum.reduceat(np.where(stays, np.arange(len(stays)), len(stays)), begin)
+        ring = np.arange(len(begin)).repeat(count + 1)
+        step = ranges(np.zeros_like(count), count + 1)
+        vertex = begin[ring] + (first[ring] - begin[ring] + step) % count[ring]
+        inner = stays[vertex] & (step > 0) & (step < count[ring])
+        # a vertex that stays ends one line and begins the next
+        twice = np.arange(len(vertex)).repeat(1 + inner)
+        line = (np.cumsum(inner | (step == 0)) - 1)[twice]
+        line[:-1] -= twice[:-1] == twice[1:]
+        vertex = vertex[twice]
+        # all of a line between its ends has one tolerance
+        second = vertex[beginnings(line) + 1]
+        within = np.minimum(allowed[second], most[self.ring[second]])
+        lines = shapely.linestrings(np.column_stack([self.points[vertex], vertex]), indices=line)
+        simple = shapely.simplify(lines, within, preserve_topology=False)
+        kept, line = shapely.get_coordinates(simple, include_z=True, return_index=True)
+        kept = kept[np.append(line[1:] == line[:-1], False), 2].astype(np.intp)
+        return kept, np.searchsorted(self.ring[kept], np.arange(len(begin)))
+
 
 class Outline(Rings):
-    """All vertices of polygons; `owner`: the polygon of each ring, whose outer one comes first.
+    """All vertices of polygons; `owner`, (r,): the polygon of each ring, whose outer one comes first.
 
-    `neck`, (k,): where the vertex stands for a neck of `raster`. `cell`, m: the longer side of the cells
-    that it is the outline of.
+    `cell`, m: the longer side of the cells that it is the outline of, if any: then without their necks, and
+    `neck`, (k,), is where a vertex stands for one.
     """
 
-    owner: IntArray
-    neck: BoolArray
-    cell: float | None
+    def __init__(self, polygons: list[Polygon], cell: float | None) -> None:
+        lines, owner = shapely.get_rings(polygons, return_index=True)
+        points, ring = shapely.get_coordinates(lines, return_index=True)
+        closing = np.append(ring[1:] != ring[:-1], True)
+        points, ring = points[~closing], ring[~closing]
+        begin, source = np.searchsorted(ring, np.arange(len(lines))), np.arange(len(points), dtype=float)
+        neck = np.zeros(len(points), dtype=bool)
+        if cell is not None:
+            # the two ends of a neck, a short side between two at right angles, become the corner between them
+            rings = Rings(points, begin, source)
+            before, length = rings.before, rings.lengths
+            along = rings.sides[before] / np.maximum(length[before], 1e-300)[:, None]
+            neck = np.abs(_dot(along, along[rings.after[rings.after]])) < _RIGHT
+            neck &= length < np.minimum(length[before], length[rings.after])
+            neck &= length < 1.001 * np.sqrt(2) * NECK * cell
+            points = np.where(neck[:, None], points + _dot(rings.sides, along)[:, None] * along, points)
+            keep = ~neck[before]
+            points, neck, ring, source = points[keep], neck[keep], ring[keep], source[: keep.sum()]
+            begin = np.searchsorted(ring, np.arange(len(lines)))
+        super().__init__(points, begin, source)
+        self.owner, self.neck, self.cell = owner, neck, cell
+
+    def drawn(self, tolerance: Array, fixed: BoolArray) -> Rings:
+        """Return the outline with what is within the tolerance of each vertex, (k,) m, left out.
+
+        Where that is 0 vertices stay, and where they are `fixed`, (k,), or the middles that stand for them.
+        """
+        path = self._without_stairs(tolerance)
+        allowed = tolerance[path.vertex]
+        stays = fixed[path.vertex] | ((path.source != path.vertex) & fixed[self.after[path.vertex]])
+        stays |= path._extremes() | (allowed == 0.0) | (np.arange(len(allowed)) % _LONGEST == 0)
+        # small things have few corners to lose
+        finest = 0.0 if self.cell is None else _FINEST * self.cell
+        most = np.maximum(np.sqrt(np.abs(self.areas)) / _SIZES, finest)
+        kept, begin = path._kept(allowed, stays, most)
+        drawing = Rings(path.points[kept], begin, path.source[kept])
+        return drawing if self.cell is None else _fitted(path, kept, drawing, allowed[kept])
+
+    def _without_stairs(self, tolerance: Array) -> Rings:
+        """Return the vertices, stairs drawn by the middles of their short sides."""
+        points, after, cell = self.points, self.after, self.cell
+        if cell is None:
+            return self
+        turn = np.sign(np.round(_cross(self.sides[self.before], self.sides) / cell**2, 6))
+        wide = tolerance >= _MIDDLES * cell
+        short = self.lengths <= cell * (1 + 1e-6)
+        step = short & (turn * turn[after] < 0) & wide & wide[after]
+        keep = np.column_stack([~(step | step[self.before]), step]).ravel()
+        return Rings(
+            np.stack([points, (points + points[after]) / 2], axis=1).reshape(-1, 2)[keep],
+            np.append(0, np.cumsum(keep))[2 * self.begin],
+            np.column_stack([self.source, self.source + 0.5]).ravel()[keep],
+        )
+
+    def balanced(self, drawing: Rings, tolerance: Array) -> Rings:
+        """Return `drawing` with rings of the area that they had, where they lost or won much of it.
+
+        All sides of one move by the same distance, of at most half the tolerance. Small round things need it:
+        with few corners, each on their rim, they get smaller.
+        """
+        points, was, now = drawing.points, self.areas, drawing.areas
+        some = (np.abs(now - was) > _UNBALANCED * np.abs(was)) & (2 * now * np.sign(was) > np.abs(was))
+        if not some.any():
+            return drawing
+        side, length = drawing.sides, drawing.lengths
+        # to the right of a side is the outside of a ring that runs counter-clockwise
+        normal = np.column_stack([side[:, 1], -side[:, 0]]) / np.maximum(length, 1e-300)[:, None]
+        around = np.maximum(np.add.reduceat(length, drawing.begin), 1e-300)
+        allowed = tolerance[drawing.vertex] / 2
+        distance = np.clip(np.where(some, (was - now) / around, 0.0)[drawing.ring], -allowed, allowed)
+        both = normal + normal[drawing.before]
+        # a corner moves further than its sides, a sharp one up to twice as far
+        part = distance / np.maximum(_dot(both, both) / 2, 0.5)
+        return Rings(points + part[:, None] * both, drawing.begin, drawing.source)
+
+    def with_necks(self, drawing: Rings) -> Rings:
+        """Return `drawing` with the self's necks again; the source of each vertex is its vertex."""
+        points = drawing.points
+        neck = self.neck[drawing.vertex] & (drawing.source == drawing.vertex)
+        if self.cell is None or not neck.any():
+            return Rings(points, drawing.begin, np.arange(len(points), dtype=float))
+        twice = np.arange(len(points)).repeat(1 + neck)
+        second = np.append(False, twice[1:] == twice[:-1])
+        towards = np.where(second, drawing.after[twice], drawing.before[twice])
+        way = points[towards] - points[twice]
+        length = np.maximum(np.hypot(*way.T), 1e-300)
+        part = np.where(neck[twice], np.minimum(NECK * self.cell / length, 0.4), 0.0)
+        begin = np.searchsorted(twice, drawing.begin)
+        return Rings(points[twice] + part[:, None] * way, begin, twice.astype(float))
+
+    def polygons(self, drawing: Rings) -> MultiPolygon:
+        rings = shapely.linearrings(drawing.points, indices=drawing.ring)
+        return MultiPolygon(list(shapely.polygons(rings, indices=self.owner)))
 
 
 def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius: float) -> Simplified:
@@ -120,14 +244,14 @@ def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius:
     """
     if tolerance == 0.0 or free.is_empty:
         return Simplified(free, 0.0)
-    outline = outline_of(list(free.geoms), cell)
+    outline = Outline(list(free.geoms), cell)
     allowed = np.full(len(outline.points), tolerance)
     if cell is not None:
         allowed[(np.abs(outline.areas) < _BLOCKS * cell * cell)[outline.ring]] = 0.0
     fixed = np.zeros(len(outline.points), dtype=bool)
     found: Counter[str] = Counter()
     for attempt in range(min(_ROUNDS, 1 + _WORK // len(allowed))):
-        drawing = balanced(outline, drawn(outline, allowed, fixed), allowed)
+        drawing = outline.balanced(outline.drawn(allowed, fixed), allowed)
         check = _Check(outline, drawing, allowed, tolerance, 2 * radius, found)
         wrong, far = check.misdrawn()
         parts = None
@@ -170,16 +294,10 @@ class _Check:
     """
 
     def __init__(
-        self,
-        outline: Outline,
-        drawing: Rings,
-        allowed: Array,
-        tolerance: float,
-        width: float,
-        found: Counter[str],
+        self, outline: Outline, drawing: Rings, allowed: Array, most: float, width: float, found: Counter[str]
     ) -> None:
         self.outline, self.drawing, self.allowed = outline, drawing, allowed
-        self.tolerance, self.width, self.found = tolerance, width, found
+        self.tolerance, self.width, self.found = most, width, found
         order, ring = np.argsort(drawing.source, kind="stable"), outline.ring
         place = np.searchsorted(drawing.source[order], np.arange(len(ring)), side="right") - 1
         # before the first of a ring comes its last
@@ -212,8 +330,8 @@ class _Check:
         return wrong, far
 
     def met(self) -> tuple[MultiPolygon, BoolArray]:
-        outline, drawing, allowed = self.outline, with_necks(self.outline, self.drawing), self.allowed
-        parts = polygons_from(outline, drawing)
+        outline, drawing, allowed = self.outline, self.outline.with_necks(self.drawing), self.allowed
+        parts = outline.polygons(drawing)
         if parts.is_valid:
             return parts, np.zeros(len(outline.points), dtype=bool)
         after, sides = drawing.after, shapely.linestrings(drawing.ends)
@@ -251,80 +369,6 @@ class _Check:
             wrong[near if len(near) else loose] = True
         self.found["narrow place"] += len(closed[0])
         return wrong
-
-
-def outline_of(polygons: list[Polygon], cell: float | None) -> Outline:
-    """Return the rings of polygons; if they are the outline of cells, without its necks."""
-    lines, owner = shapely.get_rings(polygons, return_index=True)
-    points, ring = shapely.get_coordinates(lines, return_index=True)
-    closing = np.append(ring[1:] != ring[:-1], True)
-    points, ring = points[~closing], ring[~closing]
-    begin, source = np.searchsorted(ring, np.arange(len(lines))), np.arange(len(points), dtype=float)
-    neck = np.zeros(len(points), dtype=bool)
-    if cell is not None:
-        # the two ends of a neck, a short side between two at right angles, become the corner between them
-        rings = Rings(points, begin, source)
-        before, length = rings.before, rings.lengths
-        along = rings.sides[before] / np.maximum(length[before], 1e-300)[:, None]
-        neck = np.abs(_dot(along, along[rings.after[rings.after]])) < _RIGHT
-        neck &= length < np.minimum(length[before], length[rings.after])
-        neck &= length < 1.001 * np.sqrt(2) * NECK * cell
-        points = np.where(neck[:, None], points + _dot(rings.sides, along)[:, None] * along, points)
-        keep = ~neck[before]
-        points, neck, ring, source = points[keep], neck[keep], ring[keep], source[: keep.sum()]
-        begin = np.searchsorted(ring, np.arange(len(lines)))
-    outline = Outline(points, begin, source)
-    outline.owner, outline.neck, outline.cell = np.asarray(owner), neck, cell
-    return outline
-
-
-def polygons_from(outline: Outline, drawing: Rings) -> MultiPolygon:
-    rings = shapely.linearrings(drawing.points, indices=drawing.ring)
-    return MultiPolygon(list(shapely.polygons(rings, indices=outline.owner)))
-
-
-def drawn(outline: Outline, tolerance: Array, fixed: BoolArray) -> Rings:
-    """Return `outline` with what is within the tolerance of each vertex, (k,) m, left out.
-
-    Where that is 0 vertices stay, and where they are `fixed`, (k,), or the middles that stand for them.
-    """
-    path = _without_stairs(outline, tolerance)
-    allowed = tolerance[path.vertex]
-    stays = fixed[path.vertex] | ((path.source != path.vertex) & fixed[outline.after[path.vertex]])
-    stays |= _extremes(path) | (allowed == 0.0) | (np.arange(len(allowed)) % _LONGEST == 0)
-    # small things have few corners to lose
-    finest = 0.0 if outline.cell is None else _FINEST * outline.cell
-    most = np.maximum(np.sqrt(np.abs(outline.areas)) / _SIZES, finest)
-    kept, begin = _kept(path, allowed, stays, most)
-    drawing = Rings(path.points[kept], begin, path.source[kept])
-    return drawing if outline.cell is None else _fitted(path, kept, drawing, allowed[kept])
-
-
-def _kept(path: Rings, allowed: Array, stays: BoolArray, most: Array) -> tuple[IntArray, IntArray]:
-    """Return which vertices of `path` are kept: those that stay, and all but `most` (r,) m of a ring."""
-    begin, count = path.begin, path.size
-    changes = allowed != allowed[path.after]
-    stays |= changes
-    stays[path.after[changes]] = True
-    # each ring from its first vertex that stays, round to that one again
-    first = np.minimum.reduceat(np.where(stays, np.arange(len(stays)), len(stays)), begin)
-    ring = np.arange(len(begin)).repeat(count + 1)
-    step = ranges(np.zeros_like(count), count + 1)
-    vertex = begin[ring] + (first[ring] - begin[ring] + step) % count[ring]
-    inner = stays[vertex] & (step > 0) & (step < count[ring])
-    # a vertex that stays ends one line and begins the next
-    twice = np.arange(len(vertex)).repeat(1 + inner)
-    line = (np.cumsum(inner | (step == 0)) - 1)[twice]
-    line[:-1] -= twice[:-1] == twice[1:]
-    vertex = vertex[twice]
-    # all of a line between its ends has one tolerance
-    second = vertex[beginnings(line) + 1]
-    within = np.minimum(allowed[second], most[path.ring[second]])
-    lines = shapely.linestrings(np.column_stack([path.points[vertex], vertex]), indices=line)
-    simple = shapely.simplify(lines, within, preserve_topology=False)
-    kept, line = shapely.get_coordinates(simple, include_z=True, return_index=True)
-    kept = kept[np.append(line[1:] == line[:-1], False), 2].astype(np.intp)
-    return kept, np.searchsorted(path.ring[kept], np.arange(len(begin)))
 
 
 def _fitted(path: Rings, kept: IntArray, drawing: Rings, allowed: Array) -> Rings:
@@ -382,74 +426,6 @@ def _stairs(path: Rings, kept: IntArray, drawing: Rings) -> tuple[BoolArray, Arr
     angle = np.arctan2(2 * mean(x * y), mean(x * x) - mean(y * y)) / 2
     along = np.column_stack([np.cos(angle), np.sin(angle)])
     return (number >= _FEW) & (2 * number >= length), drawing.points + centre, along
-
-
-def with_necks(outline: Outline, drawing: Rings) -> Rings:
-    """Return `drawing` with the outline's necks again; the source of each vertex is its vertex."""
-    points = drawing.points
-    neck = outline.neck[drawing.vertex] & (drawing.source == drawing.vertex)
-    if outline.cell is None or not neck.any():
-        return Rings(points, drawing.begin, np.arange(len(points), dtype=float))
-    twice = np.arange(len(points)).repeat(1 + neck)
-    second = np.append(False, twice[1:] == twice[:-1])
-    towards = np.where(second, drawing.after[twice], drawing.before[twice])
-    way = points[towards] - points[twice]
-    length = np.maximum(np.hypot(*way.T), 1e-300)
-    part = np.where(neck[twice], np.minimum(NECK * outline.cell / length, 0.4), 0.0)
-    begin = np.searchsorted(twice, drawing.begin)
-    return Rings(points[twice] + part[:, None] * way, begin, twice.astype(float))
-
-
-def balanced(outline: Outline, drawing: Rings, tolerance: Array) -> Rings:
-    """Return `drawing` with rings of the area that they had, where they lost or won much of it.
-
-    All sides of one move by the same distance, of at most half the tolerance. Small round things need it:
-    with few corners, each on their rim, they get smaller.
-    """
-    points, was, now = drawing.points, outline.areas, drawing.areas
-    some = (np.abs(now - was) > _UNBALANCED * np.abs(was)) & (2 * now * np.sign(was) > np.abs(was))
-    if not some.any():
-        return drawing
-    side, length = drawing.sides, drawing.lengths
-    # to the right of a side is the outside of a ring that runs counter-clockwise
-    normal = np.column_stack([side[:, 1], -side[:, 0]]) / np.maximum(length, 1e-300)[:, None]
-    around = np.maximum(np.add.reduceat(length, drawing.begin), 1e-300)
-    allowed = tolerance[drawing.vertex] / 2
-    distance = np.clip(np.where(some, (was - now) / around, 0.0)[drawing.ring], -allowed, allowed)
-    both = normal + normal[drawing.before]
-    # a corner moves further than its sides, a sharp one up to twice as far
-    part = distance / np.maximum(_dot(both, both) / 2, 0.5)
-    return Rings(points + part[:, None] * both, drawing.begin, drawing.source)
-
-
-def _without_stairs(outline: Outline, tolerance: Array) -> Rings:
-    """Return the vertices of `outline`, stairs drawn by the middles of their short sides."""
-    points, after, cell = outline.points, outline.after, outline.cell
-    if cell is None:
-        return outline
-    turn = np.sign(np.round(_cross(outline.sides[outline.before], outline.sides) / cell**2, 6))
-    wide = tolerance >= _MIDDLES * cell
-    short = outline.lengths <= cell * (1 + 1e-6)
-    step = short & (turn * turn[after] < 0) & wide & wide[after]
-    keep = np.column_stack([~(step | step[outline.before]), step]).ravel()
-    return Rings(
-        np.stack([points, (points + points[after]) / 2], axis=1).reshape(-1, 2)[keep],
-        np.append(0, np.cumsum(keep))[2 * outline.begin],
-        np.column_stack([outline.source, outline.source + 0.5]).ravel()[keep],
-    )
-
-
-def _extremes(rings: Rings) -> BoolArray:
-    """Return which vertices stay whatever the tolerance: in each ring two that are far from each other."""
-    middle = np.add.reduceat(rings.points, rings.begin, axis=0) / rings.size[:, None]
-    stays = np.zeros(len(rings.points), dtype=bool)
-    for _ in range(2):
-        away = np.hypot(*(rings.points - middle[rings.ring]).T)
-        # to a millionth, so that rounding does not choose among equals
-        far = np.lexsort((-np.round(away / away.max(), 6), rings.ring))[rings.begin]
-        stays[far] = True
-        middle = rings.points[far]
-    return stays
 
 
 def _meeting(a: Array, u: Array, b: Array, v: Array) -> tuple[Array, Array]:

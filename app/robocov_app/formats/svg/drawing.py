@@ -1,6 +1,6 @@
 """SVG drawings, read (filled shapes are areas, unfilled strokes are walls) and written (at true scale).
 
-Filled shapes are areas, by their fill rule: solid, but for the boundary (see `shapes.foreign_map`; names are
+Filled shapes are areas, by their fill rule: solid, but for the boundary (see `Shapes.foreign_map`; names are
 ids, classes and the labels of Inkscape's layers, of the shape and the groups around it). Shapes that are only
 stroked are walls as wide as the stroke, or as the option ``thickness``, cut where they turn more sharply than
 their mitre limit. Colours mean nothing. What is hidden, text and pictures are left out.
@@ -34,7 +34,7 @@ from robocov_app.formats.geometry.conversion import with_numbers
 from robocov_app.formats.geometry.curves import TOLERANCE, arc
 from robocov_app.formats.geometry.frames import moved
 from robocov_app.formats.geometry.polygons import Rule, decimal, free_area
-from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
+from robocov_app.formats.geometry.shapes import Line, Shapes
 from robocov_app.formats.svg import path as paths
 from robocov_app.formats.svg.path import affine, composed, length, numbers, stretch
 from robocov_app.formats.xml_tree import DEEPEST, MOST_ELEMENTS, Element, read_xml_tree
@@ -75,7 +75,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     texts = {each.tag: one_line(" ".join(each.text.split())) for each in root.children if each.text.strip()}
     name = texts.get("title", "")[:80] or name_of_map(path)
     text = texts.get("desc", "")[:1000] or "Imported from SVG."
-    return foreign_map(shapes, name, text, solid=True)
+    return shapes.foreign_map(name, text, solid=True)
 
 
 def _page(given: dict[str, str], scale: float | None) -> tuple[Array, float, float]:
@@ -403,24 +403,11 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     boundary = np.asarray(environment.boundary, dtype=float)
     margin = _MARGIN * float(np.ptp(boundary, axis=0).max())
     low, high = boundary.min(axis=0) - margin, boundary.max(axis=0) + margin
-    with written(path) as part:
-        part.write_text(_text(environment, pen, low, high), encoding="utf-8")
-    written_boundary = Polygon([(pen.rounded(x), pen.rounded(y)) for x, y in environment.boundary])
-    obstacles = [with_numbers(obstacle, pen.rounded).polygon for obstacle in environment.obstacles]
-    area = free_area(written_boundary, obstacles)
-    notes = [f"1 mm is {scale:g} m: {(high - low)[0] / scale:.6g} x {(high - low)[1] / scale:.6g} mm"]
-    notes += [] if options.scale is None else [f"to import it again: --scale {scale:g}"]
-    dropped = not_held(environment, names=False)
-    return ExportReport("svg", (path,), environment.free_area, area, dropped, tuple(notes))
-
-
-def _text(environment: Environment, pen: _Pen, low: Array, high: Array) -> str:
-    """Return the drawing; `low` and `high`, (2,) m, are corners of the page."""
     x, y = pen.length(low[0]), pen.length(-high[1])
     width, height = pen.length(high[0] - low[0]), pen.length(high[1] - low[1])
     # where the corner is that the box gives with its decimals
-    left, bottom = float(x) * pen.scale, -(float(y) + float(height)) * pen.scale
-    return _PAGE.format(
+    left, bottom = float(x) * scale, -(float(y) + float(height)) * scale
+    page = _PAGE.format(
         size=f'width="{width}mm" height="{height}mm"',
         box=f'viewBox="{x} {y} {width} {height}" data-origin="{left!r} {bottom!r}"',
         title=_plain(environment.name),
@@ -430,6 +417,15 @@ def _text(environment: Environment, pen: _Pen, low: Array, high: Array) -> str:
         boundary=pen.ring(environment.boundary),
         obstacles="".join(f"{pen.shape(each)}\n" for each in environment.obstacles),
     )
+    with written(path) as part:
+        part.write_text(page, encoding="utf-8")
+    written_boundary = Polygon([(pen.rounded(x), pen.rounded(y)) for x, y in environment.boundary])
+    obstacles = [with_numbers(obstacle, pen.rounded).polygon for obstacle in environment.obstacles]
+    area = free_area(written_boundary, obstacles)
+    notes = [f"1 mm is {scale:g} m: {(high - low)[0] / scale:.6g} x {(high - low)[1] / scale:.6g} mm"]
+    notes += [] if options.scale is None else [f"to import it again: --scale {scale:g}"]
+    dropped = not_held(environment, names=False)
+    return ExportReport("svg", (path,), environment.free_area, area, dropped, tuple(notes))
 
 
 # a window shows all of it, however large it is

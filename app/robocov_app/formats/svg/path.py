@@ -297,14 +297,13 @@ class _Pen:
 
 
 Style: TypeAlias = Mapping[str, str]  # properties by name, as they are written
+# attributes that elements inherit from groups, with their defaults (SVG 2, section 13)
 INHERITED = {
     "fill": "black", "fill-opacity": "1", "fill-rule": "nonzero",
     "stroke": "none", "stroke-opacity": "1", "stroke-width": "1", "stroke-dasharray": "none",
     "stroke-linecap": "butt", "stroke-linejoin": "miter", "stroke-miterlimit": "4",
     "visibility": "visible",
 }  # fmt: skip
-"""Attributes that elements inherit from groups, with their defaults (SVG 2, section 13)."""
-
 _PROPERTIES = (*INHERITED, "display", "opacity", "transform", "clip-path", "mask")
 _SELECTOR = re.compile(r"(\*|[A-Za-z][\w-]*)?((?:[.#][\w-]+)*)")
 _IMPORTANT = re.compile(r"!\s*important\s*$", re.IGNORECASE)
