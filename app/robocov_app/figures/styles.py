@@ -56,8 +56,12 @@ def curve_styles(controllers: Iterable[str]) -> dict[str, CurveStyle]:
 
 def styles_of(controllers: Sequence[str]) -> list[CurveStyle]:
     """Return a style for each curve: another colour, dashes and mark for each of a controller's variants."""
+    count = len(VARIANTS)
+    # after all colours once more with the next look each: 25 that differ
+    free = itertools.cycle(
+        CurveStyle(f"other-{k}", *VARIANTS[(k + turn) % count]) for turn in range(count) for k in range(count)
+    )
     spare = [CurveStyle(f"other-{k}", *look) for k, look in enumerate(VARIANTS)]
-    free = itertools.cycle(spare)
     first = {
         name: CurveStyle(name, *_KNOWN[name]) if name in _KNOWN else next(free)
         for name in dict.fromkeys(controllers)

@@ -238,7 +238,9 @@ def test_a_page_knows_its_own(tmp_path) -> None:
 def test_marks_are_those_of_the_plots() -> None:
     from robocov_app.figures.styles import curve_styles
 
-    assert {style.mark for style in curve_styles(["rapf", "rpf", "lloyd", *"abcde"]).values()} == MARKS.keys()
+    styles = curve_styles(["rapf", "rpf", "lloyd", *"abcdefghijklmnop"]).values()
+    assert {style.mark for style in styles} == MARKS.keys()
+    assert len({(style.name, style.mark) for style in styles}) == len(styles)
 
 
 @pytest.mark.slow
