@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import chain, count
 
 import numpy as np
 import shapely
@@ -19,7 +20,6 @@ from robocov_app.editor.model.selection import Change, Selection, replace_obstac
 from robocov_app.editor.model.sketch import Sketch
 
 SHORTEST = 0.02  # metres below which what is drawn is taken for a slip of the hand
-_LONGEST_TEXT = 10_000
 
 
 def drawn(sketch: Sketch, shape: Obstacle) -> Change:
@@ -89,28 +89,22 @@ def added(
 
 def free_name(sketch: Sketch, name: str) -> str:
     """Return a name for a start that no start has yet: this one, or with a number after it: "start 2"."""
-    taken, stem, count = dict(sketch.starts), re.sub(r" \d+$", "", name), 2
-    while name in taken:
-        name = f"{stem} {count}"
-        count += 1
-    return name
+    stem = re.sub(r" \d+$", "", name)
+    names = chain([name], (f"{stem} {k}" for k in count(2)))
+    return next(each for each in names if each not in dict(sketch.starts))
 
 
 def label_of(name: str) -> str:
-    name = _encodable(" ".join(name.split()))
-    require(len(name) <= LONGEST_LABEL, f"a name has at most {LONGEST_LABEL} characters")
+    name = text_of(" ".join(name.split()), "a name", LONGEST_LABEL)
     require(all(ord(char) >= 32 and ord(char) != 127 for char in name), "a name is text on one line")
     return name
 
 
-def text_of(text: str, what: str) -> str:
-    require(len(text) <= _LONGEST_TEXT, f"{what} has at most {_LONGEST_TEXT} characters")
-    return _encodable(text.strip())
-
-
-def _encodable(text: str) -> str:
-    """Return text without halves of characters, which no file could hold."""
-    return text.encode("utf-8", "ignore").decode("utf-8")
+def text_of(text: str, what: str, most: int = 10_000) -> str:
+    """Return text as maps can have it: without halves of characters, which no file could hold."""
+    text = text.encode("utf-8", "ignore").decode("utf-8")
+    require(len(text) <= most, f"{what} has at most {most} characters")
+    return text.strip()
 
 
 def _outline(points: Sequence[Point], what: str) -> Ring:

@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from shapely import LineString
 
 from robocov.arrays import Array
 from robocov.environment import ObstaclePath, Point
@@ -131,8 +130,8 @@ def _with_paths(sketch: Sketch, selection: Selection, paths: Mapping[int, Any], 
 
 
 def _put(sketch: Sketch, key: int, path: ObstaclePath, words: str) -> Change:
-    if np.ptp(path.points, axis=0).max() < SMALLEST or LineString(path.points).length < SMALLEST:
-        raise MapError("the way points lie in one place: click somewhere else")
+    extent = np.ptp(path.points, axis=0).max()
+    require(extent >= SMALLEST, "the way points lie in one place: click somewhere else")
     after = sketch.with_things({key: replace(sketch.item(key).shape, path=path)})
     return Change(after, Selection.of(key), f"{sketch.display_name(key)}: {words}")
 
