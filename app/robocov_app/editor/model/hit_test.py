@@ -66,8 +66,7 @@ def in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) -> Sele
     if touched:
         places = sketch.tree.query(box, predicate="intersects")
     else:
-        corners = _inside(shapely.bounds(sketch.geometries), a, b)
-        places = np.flatnonzero(corners.reshape(-1, 2).all(axis=1))
+        places = np.flatnonzero(_inside(shapely.bounds(sketch.geometries), a, b).reshape(-1, 2).all(axis=1))
     items = [sketch.obstacles[k] for k in places.tolist()]
     starts = []
     for name, spec in sketch.starts:
