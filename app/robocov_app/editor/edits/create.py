@@ -142,7 +142,6 @@ def door_width(width: float) -> float:
 
 
 def door_opened(sketch: Sketch, key: int, point: Point, width: float) -> Change:
-    """Open a door of a width, m, its middle as near to a point as the wall allows."""
     line = _line(sketch, key)
     if door_width(width) > line.length - SMALLEST:
         raise MapError(f"the {sketch.display_name(key)} is not longer than a door of {width:g} m")

@@ -17,7 +17,6 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 
 def deleted(sketch: Sketch, selection: Selection) -> Change:
-    """Delete what is selected; of single vertices, what `vertices.deleted` deletes."""
     require(selection, "select something first")
     after = sketch.without(selection.items | selection.starts)
     after = replace(after, boundary=None if selection.boundary else sketch.boundary)
@@ -99,12 +98,10 @@ def titled(sketch: Sketch, name: str | None = None, description: str | None = No
 
 
 def widened(sketch: Sketch, selection: Selection, width: float) -> Change:
-    """Give the selected walls another width, m."""
     return _sized(sketch, selection, WallObstacle, "width", width, "select walls first", "made {:g} m wide")
 
 
 def sized(sketch: Sketch, selection: Selection, radius: float) -> Change:
-    """Give the selected circles and discs another radius, m."""
     missing, kinds = "select circles first, or starts that are discs", (CircleObstacle, DiscStart)
     return _sized(sketch, selection, kinds, "radius", radius, missing, "given a radius of {:g} m")
 
@@ -151,7 +148,6 @@ def made_polygons(sketch: Sketch, selection: Selection) -> Change:
 
 
 def made_boundary(sketch: Sketch, selection: Selection) -> Change:
-    """Make the outline of the one selected polygon the boundary, in place of the obstacle."""
     shapes = [sketch.item(key).shape for key in selection.items]
     if len(shapes) != 1 or not isinstance(shapes[0], PolygonObstacle):
         raise MapError("select one polygon: its outline becomes the boundary")

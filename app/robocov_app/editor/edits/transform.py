@@ -279,7 +279,6 @@ def _level(box: Box, side: Side) -> float:
 
 
 def _copied(sketch: Sketch, whole: Selection, affine: Affine) -> tuple[Sketch, Selection]:
-    """Return the sketch with copies of whole obstacles and starts at other places, and what they are."""
     shapes = [(affine.thing(item.shape), item.note) for item in whole.items_in(sketch)]
     return added(sketch, shapes, [(n, affine.thing(spec)) for n, spec in sketch.starts if n in whole.starts])
 

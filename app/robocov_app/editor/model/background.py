@@ -85,7 +85,6 @@ def to_scale(background: Background, a: Point, b: Point, metres: float) -> Backg
 
 
 def levelled(background: Background, a: Point, b: Point) -> Background:
-    """Return the picture turned about `a` so that the line to `b` becomes level or upright."""
     _require_apart(background, a, b)
     return turned(background, angle_to_level(a, b), a)
 

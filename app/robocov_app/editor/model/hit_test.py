@@ -41,7 +41,6 @@ def obstacles_at(sketch: Sketch, point: Point, reach: float) -> list[int]:
 
 
 def edge_at(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner]) -> Edge | None:
-    """Return the nearest place on an edge of some things within `reach` metres; None if there is none."""
     best, nearest = reach, None
     wanted = list(owners)
     if len(wanted) > 8:  # of many obstacles, only those that may have something within reach

@@ -263,7 +263,6 @@ def snapped_move(points: Sequence[Point], dx: float, dy: float, targets: Targets
 
 
 def snapped_angle(degrees: float, step: float = 15.0, reach: float = 3.0) -> float:
-    """Return the nearest multiple of `step` degrees if that is within `reach`, else the angle itself."""
     nearest = step * round(degrees / step)
     return nearest + 0.0 if abs(nearest - degrees) <= reach else degrees
 
