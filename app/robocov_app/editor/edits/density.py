@@ -56,9 +56,8 @@ def area_added(
 def areas_made(sketch: Sketch, selection: Selection, weight: float) -> Change:
     chosen = [item.shape for item in selection.items_in(sketch)]
     shapes = [shape for shape in chosen if isinstance(shape, PolygonObstacle)]
-    require(
-        len(shapes) == len(chosen) > 0, "select polygons first: they become areas that count more, or less"
-    )
+    all_are = len(shapes) == len(chosen) > 0
+    require(all_are, "select polygons first: they become areas that count more, or less")
     after = sketch.without(selection.items)
     for shape in shapes:
         after = area_added(after, shape.vertices, weight, shape.holes, shape.name).sketch
