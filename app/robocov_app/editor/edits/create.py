@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import chain, count
 
 import numpy as np
@@ -66,13 +67,12 @@ def points_start_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
     return _start_added(sketch, env.PointsStart(places))
 
 
-def anywhere_added(sketch: Sketch) -> Change:
-    return _start_added(sketch, env.UniformStart())
-
-
 def _start_added(sketch: Sketch, spec: StartSpec) -> Change:
     name = free_name(sketch, "start")
     return Change(sketch.with_things({name: spec}), Selection.of(name), f"start “{name}” added")
+
+
+anywhere_added = partial(_start_added, spec=env.UniformStart())
 
 
 def added(

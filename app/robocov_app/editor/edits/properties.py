@@ -1,6 +1,7 @@
 """Edits of what things are: deleted, named, noted, sized, ordered, grouped, locked, hidden."""
 
 from dataclasses import replace
+from functools import partial
 from itertools import count
 from typing import Any
 
@@ -61,15 +62,6 @@ def ungrouped(sketch: Sketch, selection: Selection) -> Change:
     return _marked(sketch, Selection.of(*keys), "ungrouped", group="")
 
 
-def locked(sketch: Sketch, selection: Selection) -> Change:
-    return _marked(sketch, selection, "locked", locked=True)
-
-
-def hidden(sketch: Sketch, selection: Selection) -> Change:
-    """Hide obstacles in the editor; robots meet them all the same."""
-    return _marked(sketch, selection, "hidden", hidden=True)
-
-
 def released(sketch: Sketch) -> Change:
     """Unlock and show all obstacles; those that were locked or hidden are selected then."""
     keys = [item.key for item in sketch.obstacles if not item.takeable]
@@ -84,6 +76,10 @@ def _marked(sketch: Sketch, selection: Selection, words: str, **marks: Any) -> C
     words = f"{Selection(items=selection.items).words(sketch)} {words}"
     left = replace(selection, items=frozenset()) if True in marks.values() else selection
     return Change(replace(sketch, obstacles=items), left, words)
+
+
+locked = partial(_marked, words="locked", locked=True)  # the mouse cannot take them
+hidden = partial(_marked, words="hidden", hidden=True)  # in the editor; robots meet them all the same
 
 
 def titled(sketch: Sketch, name: str | None = None, description: str | None = None) -> Change:

@@ -221,6 +221,7 @@ class RectangleTool(DrawTool):
     hint = "drag from corner to corner, or click both; type 3 x 2 for metres; Shift makes a square"
     most, drags = 2, True
     make = staticmethod(create.rectangle_drawn)
+    end_for = DrawTool._far_corner
 
     def placed(self, event: PointerEvent) -> Point:
         if not event.shift or not self.points:
@@ -228,9 +229,6 @@ class RectangleTool(DrawTool):
         (x, y), (to_x, to_y) = self.points[0], event.point
         side = max(abs(to_x - x), abs(to_y - y))
         return x + copysign(side, to_x - x), y + copysign(side, to_y - y)
-
-    def end_for(self, text: str) -> Point:
-        return self._far_corner(text)
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         (ax, ay), (bx, by) = points
