@@ -18,7 +18,6 @@ from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
 
 Feature: TypeAlias = Gaussian | WeightedArea
-
 LIGHTEST = 1e-6  # smallest weight of a hot spot, and of every place where there is none
 
 

@@ -27,7 +27,6 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 _STRAIGHT = math.radians(0.1)  # a corner that turns by less has nothing to be cut off
 _MOST_SEGMENTS = 256
 _STEPS = 12  # tolerances that are tried, each half of the one before, until nothing crosses
-
 _Cut: TypeAlias = Callable[[float], tuple[float, int]]  # length and segments for the angle of a turn
 _SAME = 1e-4  # ends of walls that are closer, in metres, are one point
 

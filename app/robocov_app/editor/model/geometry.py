@@ -15,10 +15,8 @@ from robocov.mapfile.models import FARTHEST, SMALLEST
 from robocov_app.editor.model import require
 
 Box: TypeAlias = tuple[float, float, float, float]  # smallest x, smallest y, largest x, largest y, m
-
 ANGLE = 15.0  # degrees: with Shift, lines are drawn at multiples of this
 DECIMALS = 4  # digits after the decimal point of what the editor writes: a tenth of a millimetre
-
 distance = math.dist
 
 

@@ -19,7 +19,6 @@ SAME = 1e-9  # metres below which nothing has moved
 FEW_POINTS = 60  # points of what is moved that may snap; of more, a choice of them
 NEAR = 0.6  # part of a finger's width within which something is taken hold of
 ON_EDGE = 1e-5  # metres within which a point lies on an edge
-
 # over scale handles, by their sides
 _CURSORS = {(1, 0): "sideways", (0, 1): "updown", (1, 1): "rising", (-1, 1): "falling"}
 _CURSORS |= {(-x, -y): shape for (x, y), shape in _CURSORS.items()}

@@ -15,7 +15,6 @@ from robocov_app.editor.tools.snapping import SNAPS, Dragged, Guide, Snap, Snapp
 from robocov_app.render.surface_cache import Latest
 
 Kind: TypeAlias = Literal["vertex", "scale", "turn"]
-
 BESIDE = 11.0  # pixels at scale 1 between what is selected and the box around it
 KNOB = 24.0  # pixels at scale 1 that the knob is above the box
 SNAPS_WITHIN = 0.6  # part of a finger's width: a line that is far off is not to beat the grid
