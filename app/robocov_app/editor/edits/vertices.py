@@ -69,8 +69,8 @@ def inserted(sketch: Sketch, edge: Edge) -> Change:
     require(0 <= edge.index < counts.get(edge.ring, 0), "there is no such edge any more")
     rings[edge.ring].insert(edge.index + 1, point_near(edge.point))
     new = Selection(vertices=frozenset({Vertex(edge.of, edge.ring, edge.index + 1)}))
-    words = f"vertex inserted in {sketch.display_name(edge.of)}"
-    return Change(sketch.with_rings(edge.of, rings), new, words)
+    after = sketch.with_rings(edge.of, rings)
+    return Change(after, new, f"vertex inserted in {sketch.display_name(edge.of)}")
 
 
 def deleted(sketch: Sketch, selection: Selection) -> Change:

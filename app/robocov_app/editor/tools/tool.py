@@ -175,22 +175,19 @@ class Workspace:
 class Tool:
     """A tool that does nothing; the others are like it."""
 
-    name = ""
+    name = title = ""  # the title is the name where there is no other
     hint = ""  # what to do next
     snaps = True  # whether the point that it gets has snapped to something
     takes_numbers = True  # whether numbers can be typed while it is `busy`
     begins_typed = False  # whether they can be typed before, too
 
     def __init__(self) -> None:
+        self.title = self.title or self.name.capitalize()
         self.guides: tuple[Guide, ...] = ()
         self.begun: PointerEvent | None = None  # where the button was pressed that is held down
         self.clicked: list[Point] = []  # m; points of something that is half done
         self.at: Point = (0.0, 0.0)  # m; where the cursor is
         self.change: Change | None = None  # what letting go of the mouse would make
-
-    @property
-    def title(self) -> str:
-        return self.name.capitalize()
 
     @property
     def busy(self) -> bool:
