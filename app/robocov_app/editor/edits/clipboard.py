@@ -25,8 +25,8 @@ def copied(sketch: Sketch, selection: Selection) -> str:
         obstacles=tuple(selection.items_in(sketch)),
         starts=tuple((name, spec) for name, spec in sketch.starts if name in selection.starts),
     )
-    if part.boundary is None and not part.obstacles and not part.starts:
-        raise MapError("select obstacles, starts or the boundary to copy")
+    anything = part.boundary is not None or part.obstacles or part.starts
+    require(anything, "select obstacles, starts or the boundary to copy")
     return dump_document({**draft_document(part), "format": FORMAT})
 
 

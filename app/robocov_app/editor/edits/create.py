@@ -3,6 +3,8 @@
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import chain, count
 
 import numpy as np
 import shapely
@@ -19,7 +21,6 @@ from robocov_app.editor.model.selection import Change, Selection, replace_obstac
 from robocov_app.editor.model.sketch import Sketch
 
 SHORTEST = 0.02  # metres below which what is drawn is taken for a slip of the hand
-_LONGEST_TEXT = 10_000
 
 
 def drawn(sketch: Sketch, shape: Obstacle) -> Change:
@@ -66,13 +67,12 @@ def points_start_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
     return _start_added(sketch, env.PointsStart(places))
 
 
-def anywhere_added(sketch: Sketch) -> Change:
-    return _start_added(sketch, env.UniformStart())
-
-
 def _start_added(sketch: Sketch, spec: StartSpec) -> Change:
     name = free_name(sketch, "start")
     return Change(sketch.with_things({name: spec}), Selection.of(name), f"start “{name}” added")
+
+
+anywhere_added = partial(_start_added, spec=env.UniformStart())
 
 
 def added(
@@ -89,28 +89,22 @@ def added(
 
 def free_name(sketch: Sketch, name: str) -> str:
     """Return a name for a start that no start has yet: this one, or with a number after it: "start 2"."""
-    taken, stem, count = dict(sketch.starts), re.sub(r" \d+$", "", name), 2
-    while name in taken:
-        name = f"{stem} {count}"
-        count += 1
-    return name
+    stem = re.sub(r" \d+$", "", name)
+    names = chain([name], (f"{stem} {k}" for k in count(2)))
+    return next(each for each in names if each not in dict(sketch.starts))
 
 
 def label_of(name: str) -> str:
-    name = _encodable(" ".join(name.split()))
-    require(len(name) <= LONGEST_LABEL, f"a name has at most {LONGEST_LABEL} characters")
+    name = text_of(" ".join(name.split()), "a name", LONGEST_LABEL)
     require(all(ord(char) >= 32 and ord(char) != 127 for char in name), "a name is text on one line")
     return name
 
 
-def text_of(text: str, what: str) -> str:
-    require(len(text) <= _LONGEST_TEXT, f"{what} has at most {_LONGEST_TEXT} characters")
-    return _encodable(text.strip())
-
-
-def _encodable(text: str) -> str:
-    """Return text without halves of characters, which no file could hold."""
-    return text.encode("utf-8", "ignore").decode("utf-8")
+def text_of(text: str, what: str, most: int = 10_000) -> str:
+    """Return text as maps can have it: without halves of characters, which no file could hold."""
+    text = text.encode("utf-8", "ignore").decode("utf-8")
+    require(len(text) <= most, f"{what} has at most {most} characters")
+    return text.strip()
 
 
 def _outline(points: Sequence[Point], what: str) -> Ring:
@@ -148,7 +142,6 @@ def door_width(width: float) -> float:
 
 
 def door_opened(sketch: Sketch, key: int, point: Point, width: float) -> Change:
-    """Open a door of a width, m, its middle as near to a point as the wall allows."""
     line = _line(sketch, key)
     if door_width(width) > line.length - SMALLEST:
         raise MapError(f"the {sketch.display_name(key)} is not longer than a door of {width:g} m")

@@ -18,7 +18,6 @@ from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
 
 Feature: TypeAlias = Gaussian | WeightedArea
-
 LIGHTEST = 1e-6  # smallest weight of a hot spot, and of every place where there is none
 
 
@@ -56,9 +55,8 @@ def area_added(
 def areas_made(sketch: Sketch, selection: Selection, weight: float) -> Change:
     chosen = [item.shape for item in selection.items_in(sketch)]
     shapes = [shape for shape in chosen if isinstance(shape, PolygonObstacle)]
-    require(
-        len(shapes) == len(chosen) > 0, "select polygons first: they become areas that count more, or less"
-    )
+    all_are = len(shapes) == len(chosen) > 0
+    require(all_are, "select polygons first: they become areas that count more, or less")
     after = sketch.without(selection.items)
     for shape in shapes:
         after = area_added(after, shape.vertices, weight, shape.holes, shape.name).sketch

@@ -85,7 +85,7 @@ def _beyond(free: MultiPolygon, largest: BaseGeometry, others: list[BaseGeometry
     return shapely.union_all(parts[shapely.intersects(parts, shapely.union_all(others).buffer(-SAGITTA))])
 
 
-def _start_moved(sketch: Sketch, name: str, where: BaseGeometry, radius: float) -> Change | None:
+def _start_moved(sketch: Sketch, name: str, where: BaseGeometry, radius: float) -> Change:
     """Move the spot at the last of some points, or a disc, to where a robot fits that is nearest."""
     room = examined(sketch, radius)[1].buffer(-radius - _SPARE)
     spec, number, spot = sketch.start(name), 0, ""
@@ -95,15 +95,14 @@ def _start_moved(sketch: Sketch, name: str, where: BaseGeometry, radius: float) 
         others = shapely.points(np.delete(np.array(spec.positions), number, axis=0))
         room -= shapely.union_all(shapely.buffer(others, 2.01 * radius + _SPARE))
         spot = f": place {number + 1}"
-    if room.is_empty:
-        return None
+    require(not room.is_empty, "a robot fits nowhere")
     vertex = Vertex(name, 0, number)
     way = shapely.shortest_line(room, shapely.Point(place_of(sketch, vertex)))
     after = with_places(sketch, {vertex: rounded(way.coords[0])})
     return Change(after, Selection.of(name), f"start “{name}”{spot} moved to where a robot fits")
 
 
-def _widened(sketch: Sketch, gap: LineString, width: float) -> Change | None:
+def _widened(sketch: Sketch, gap: LineString, width: float) -> Change:
     """Make a gap as wide as asked: shorten a wall that ends at it, or move the smaller thing beside it."""
     lack = width + _SPARE - gap.length
     ends = [(gap.coords[0], gap.coords[-1]), (gap.coords[-1], gap.coords[0])]
@@ -117,8 +116,7 @@ def _widened(sketch: Sketch, gap: LineString, width: float) -> Change | None:
             return Change(sketch.with_things({item.key: shorter}), Selection.of(item.key), words)
     here, there = ({item.key for item, a, _ in sides if a == end} for end, _ in ends)
     alone = [side for side in sides if side[0].key not in here & there]
-    if not alone or gap.length == 0.0:
-        return None
+    require(alone and gap.length > 0.0, "nothing can move away")
     item, a, b = min(alone, key=lambda side: side[0].geometry.area)
     dx, dy = (lack * (a[k] - b[k]) / gap.length for k in (0, 1))
     change = transform.moved(sketch, Selection.of(item.key), dx, dy)

@@ -1,14 +1,13 @@
 """Edits of the paths along which obstacles move: way points, speed, and what happens at the end."""
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
-from shapely import LineString
 
 from robocov.arrays import Array
-from robocov.environment import ObstaclePath, Point
+from robocov.environment import ObstaclePath, Point, Repeat
 from robocov.errors import MapError
 from robocov.mapfile.models import FASTEST, SLOWEST, SMALLEST
 from robocov_app.editor.model import require
@@ -16,6 +15,7 @@ from robocov_app.editor.model.geometry import as_array, middle_of, nearest_on, p
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
 
+_Change: TypeAlias = Callable[[ObstaclePath], ObstaclePath | None]
 FIRST_SPEED = 0.5  # metres a second of a new path, until another speed is typed
 
 
@@ -60,21 +60,21 @@ def way_point_removed(sketch: Sketch, key: int, number: int) -> Change:
 
 
 def path_removed(sketch: Sketch, selection: Selection) -> Change:
-    return _with_paths(sketch, selection, dict.fromkeys(_paths(sketch, selection)), "path taken away")
+    return _with_paths(sketch, selection, lambda path: None, "path taken away")
 
 
 def path_turned(sketch: Sketch, selection: Selection) -> Change:
     """Let the selected obstacles come back the way they went, or if they do that go in a loop."""
-    paths = _paths(sketch, selection)
-    loops = all(path.repeat == "back-and-forth" for path in paths.values())
-    turned = {key: replace(path, repeat="loop" if loops else "back-and-forth") for key, path in paths.items()}
-    return _with_paths(sketch, selection, turned, "goes in a loop" if loops else "goes back and forth")
+    paths = [item.shape.path for item in selection.items_in(sketch)]
+    back = any(path is not None and path.repeat == "loop" for path in paths)
+    repeat: Repeat = "back-and-forth" if back else "loop"
+    words = "goes back and forth" if back else "goes in a loop"
+    return _with_paths(sketch, selection, lambda path: replace(path, repeat=repeat), words)
 
 
 def path_paced(sketch: Sketch, selection: Selection, speed: float) -> Change:
-    paths, speed = _paths(sketch, selection), _speed(speed)
-    paced = {key: replace(path, speed=speed) for key, path in paths.items()}
-    return _with_paths(sketch, selection, paced, f"{speed:g} m/s")
+    speed = _speed(speed)
+    return _with_paths(sketch, selection, lambda path: replace(path, speed=speed), f"{speed:g} m/s")
 
 
 def speed_of(text: str) -> float:
@@ -118,21 +118,16 @@ def _path(sketch: Sketch, key: int, number: int) -> ObstaclePath:
     return path
 
 
-def _paths(sketch: Sketch, selection: Selection) -> dict[int, ObstaclePath]:
-    shapes = {item.key: item.shape for item in selection.items_in(sketch)}
-    paths = {key: shape.path for key, shape in shapes.items() if shape.path is not None}
-    require(paths, "select an obstacle that moves first; the tool Path gives one a path")
-    return paths
-
-
-def _with_paths(sketch: Sketch, selection: Selection, paths: Mapping[int, Any], words: str) -> Change:
-    shapes = {key: replace(sketch.item(key).shape, path=path) for key, path in paths.items()}
-    return Change(sketch.with_things(shapes), selection, f"{Selection.of(*paths).words(sketch)}: {words}")
+def _with_paths(sketch: Sketch, selection: Selection, change: _Change, words: str) -> Change:
+    shapes = {item.key: item.shape for item in selection.items_in(sketch) if item.shape.path is not None}
+    require(shapes, "select an obstacle that moves first; the tool Path gives one a path")
+    after = sketch.with_things({k: replace(s, path=s.path and change(s.path)) for k, s in shapes.items()})
+    return Change(after, selection, f"{Selection.of(*shapes).words(sketch)}: {words}")
 
 
 def _put(sketch: Sketch, key: int, path: ObstaclePath, words: str) -> Change:
-    if np.ptp(path.points, axis=0).max() < SMALLEST or LineString(path.points).length < SMALLEST:
-        raise MapError("the way points lie in one place: click somewhere else")
+    extent = np.ptp(path.points, axis=0).max()
+    require(extent >= SMALLEST, "the way points lie in one place: click somewhere else")
     after = sketch.with_things({key: replace(sketch.item(key).shape, path=path)})
     return Change(after, Selection.of(key), f"{sketch.display_name(key)}: {words}")
 

@@ -1,6 +1,7 @@
 """Edits of what things are: deleted, named, noted, sized, ordered, grouped, locked, hidden."""
 
 from dataclasses import replace
+from functools import partial
 from itertools import count
 from typing import Any
 
@@ -17,7 +18,6 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 
 def deleted(sketch: Sketch, selection: Selection) -> Change:
-    """Delete what is selected; of single vertices, what `vertices.deleted` deletes."""
     require(selection, "select something first")
     after = sketch.without(selection.items | selection.starts)
     after = replace(after, boundary=None if selection.boundary else sketch.boundary)
@@ -62,15 +62,6 @@ def ungrouped(sketch: Sketch, selection: Selection) -> Change:
     return _marked(sketch, Selection.of(*keys), "ungrouped", group="")
 
 
-def locked(sketch: Sketch, selection: Selection) -> Change:
-    return _marked(sketch, selection, "locked", locked=True)
-
-
-def hidden(sketch: Sketch, selection: Selection) -> Change:
-    """Hide obstacles in the editor; robots meet them all the same."""
-    return _marked(sketch, selection, "hidden", hidden=True)
-
-
 def released(sketch: Sketch) -> Change:
     """Unlock and show all obstacles; those that were locked or hidden are selected then."""
     keys = [item.key for item in sketch.obstacles if not item.takeable]
@@ -87,6 +78,10 @@ def _marked(sketch: Sketch, selection: Selection, words: str, **marks: Any) -> C
     return Change(replace(sketch, obstacles=items), left, words)
 
 
+locked = partial(_marked, words="locked", locked=True)  # the mouse cannot take them
+hidden = partial(_marked, words="hidden", hidden=True)  # in the editor; robots meet them all the same
+
+
 def titled(sketch: Sketch, name: str | None = None, description: str | None = None) -> Change:
     after, words = sketch, "map described"
     if name is not None:
@@ -99,12 +94,10 @@ def titled(sketch: Sketch, name: str | None = None, description: str | None = No
 
 
 def widened(sketch: Sketch, selection: Selection, width: float) -> Change:
-    """Give the selected walls another width, m."""
     return _sized(sketch, selection, WallObstacle, "width", width, "select walls first", "made {:g} m wide")
 
 
 def sized(sketch: Sketch, selection: Selection, radius: float) -> Change:
-    """Give the selected circles and discs another radius, m."""
     missing, kinds = "select circles first, or starts that are discs", (CircleObstacle, DiscStart)
     return _sized(sketch, selection, kinds, "radius", radius, missing, "given a radius of {:g} m")
 
@@ -151,7 +144,6 @@ def made_polygons(sketch: Sketch, selection: Selection) -> Change:
 
 
 def made_boundary(sketch: Sketch, selection: Selection) -> Change:
-    """Make the outline of the one selected polygon the boundary, in place of the obstacle."""
     shapes = [sketch.item(key).shape for key in selection.items]
     if len(shapes) != 1 or not isinstance(shapes[0], PolygonObstacle):
         raise MapError("select one polygon: its outline becomes the boundary")

@@ -32,7 +32,6 @@ SIDES: Final = ("left", "centre", "right", "top", "middle", "bottom")
 _ALONG_X = SIDES[:3]
 _MOST_COPIES = 10_000
 _MANY = 100
-
 _ALIKE = 1e-12  # relative difference of what is the same but for rounding
 
 
@@ -80,10 +79,7 @@ class Affine:
         return geometry.ring_near(np.column_stack(to))
 
     def thing(self, thing: Any) -> Any:
-        """Return where an obstacle, its path, a start, a density or one of its features goes, field by field.
-
-        Stretched, circles become polygons, and walls keep their width; MapError for starts that are discs.
-        """
+        """Return where a thing or a density goes; stretched, circles become polygons, walls keep width."""
         factor = self.factor
         if factor is None and isinstance(thing, env.DiscStart):
             raise MapError("a start that is a disc stays one: scale it by the same factor both ways")
@@ -279,17 +275,14 @@ def _level(box: Box, side: Side) -> float:
 
 
 def _copied(sketch: Sketch, whole: Selection, affine: Affine) -> tuple[Sketch, Selection]:
-    """Return the sketch with copies of whole obstacles and starts at other places, and what they are."""
     shapes = [(affine.thing(item.shape), item.note) for item in whole.items_in(sketch)]
     return added(sketch, shapes, [(n, affine.thing(spec)) for n, spec in sketch.starts if n in whole.starts])
 
 
 def _each_moved(sketch: Sketch, by: Mapping[Owner, float], *, along_x: bool) -> Sketch:
-    for owner, off in by.items():
-        if off:
-            shift = Affine.shift(off, 0.0) if along_x else Affine.shift(0.0, off)
-            sketch = _placed(sketch, Selection.of(owner), shift)
-    return sketch
+    shifts = {owner: (off, 0.0) if along_x else (0.0, off) for owner, off in by.items() if off}
+    things = {owner: Affine.shift(*shift).thing(sketch.thing(owner)) for owner, shift in shifts.items()}
+    return sketch.with_things(things)
 
 
 def _change(sketch: Sketch, selection: Selection, affine: Affine, words: str) -> Change:

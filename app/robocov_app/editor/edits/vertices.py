@@ -27,7 +27,6 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 _STRAIGHT = math.radians(0.1)  # a corner that turns by less has nothing to be cut off
 _MOST_SEGMENTS = 256
 _STEPS = 12  # tolerances that are tried, each half of the one before, until nothing crosses
-
 _Cut: TypeAlias = Callable[[float], tuple[float, int]]  # length and segments for the angle of a turn
 _SAME = 1e-4  # ends of walls that are closer, in metres, are one point
 
@@ -70,8 +69,8 @@ def inserted(sketch: Sketch, edge: Edge) -> Change:
     require(0 <= edge.index < counts.get(edge.ring, 0), "there is no such edge any more")
     rings[edge.ring].insert(edge.index + 1, point_near(edge.point))
     new = Selection(vertices=frozenset({Vertex(edge.of, edge.ring, edge.index + 1)}))
-    words = f"vertex inserted in {sketch.display_name(edge.of)}"
-    return Change(sketch.with_rings(edge.of, rings), new, words)
+    after = sketch.with_rings(edge.of, rings)
+    return Change(after, new, f"vertex inserted in {sketch.display_name(edge.of)}")
 
 
 def deleted(sketch: Sketch, selection: Selection) -> Change:

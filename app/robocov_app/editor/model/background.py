@@ -13,6 +13,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from robocov.environment import Point
 from robocov.errors import MapError
+from robocov.mapfile.models import plain
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import angle_to_level, cos_sin
 
@@ -46,8 +47,7 @@ class Background:
         return left, right, self.place_of((width, 0)), self.place_of((0, 0))
 
     def document(self) -> dict[str, Any]:
-        held = asdict(self) | {"pixels": list(self.pixels), "corner": [_short(each) for each in self.corner]}
-        return held | {name: _short(held[name]) for name in ("scale", "turn", "opacity")}
+        return {name: plain(value) for name, value in asdict(self).items()} | {"shown": self.shown}
 
     @classmethod
     def of_document(cls, document: Any) -> Background | None:
@@ -85,7 +85,6 @@ def to_scale(background: Background, a: Point, b: Point, metres: float) -> Backg
 
 
 def levelled(background: Background, a: Point, b: Point) -> Background:
-    """Return the picture turned about `a` so that the line to `b` becomes level or upright."""
     _require_apart(background, a, b)
     return turned(background, angle_to_level(a, b), a)
 
@@ -100,10 +99,6 @@ def turned(background: Background, degrees: float, about: Point) -> Background:
 
 def _require_apart(background: Background, a: Point, b: Point) -> None:
     require(math.dist(a, b) >= 2 * background.scale, "click two points of the picture that are farther apart")
-
-
-def _short(value: float) -> int | float:
-    return int(value) if float(value).is_integer() else float(value)
 
 
 MARKS = {"note": str, "group": str, "locked": bool, "hidden": bool}

@@ -232,7 +232,6 @@ def _stamp(path: Path) -> tuple[int, int] | None:
 
 FIRST_SHEET = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))  # the boundary of a new map, m
 SUFFIX = ".json"
-
 _LOOKED_AGAIN = 1.0  # seconds between two looks at the file
 
 

@@ -11,14 +11,12 @@ from shapely import Polygon
 
 from robocov.arrays import Array
 from robocov.environment import Point, PolygonObstacle, Ring
-from robocov.errors import MapError
 from robocov.mapfile.models import FARTHEST, SMALLEST
+from robocov_app.editor.model import require
 
 Box: TypeAlias = tuple[float, float, float, float]  # smallest x, smallest y, largest x, largest y, m
-
 ANGLE = 15.0  # degrees: with Shift, lines are drawn at multiples of this
 DECIMALS = 4  # digits after the decimal point of what the editor writes: a tenth of a millimetre
-
 distance = math.dist
 
 
@@ -39,8 +37,8 @@ def as_array(points: Sequence[Point] | Array) -> Array:
 def ring_near(points: Sequence[Point] | Array) -> Ring:
     """Return points to the tenth of a millimetre; MapError where one is farther than maps reach."""
     found = as_array(points)
-    if not np.all(np.abs(found) <= FARTHEST):  # nan is not near either
-        raise MapError(f"that is too far away: maps reach {FARTHEST / 1000:.0f} km from their origin")
+    limit = f"maps reach {FARTHEST / 1000:.0f} km from their origin"
+    require(np.all(np.abs(found) <= FARTHEST), f"that is too far away: {limit}")  # nan is not near either
     return tuple([(x, y) for x, y in (np.round(found, DECIMALS) + 0.0).tolist()])
 
 
@@ -49,7 +47,7 @@ def point_near(point: Point) -> Point:
 
 
 def distinct(ring: Iterable[Point], *, closed: bool = True) -> Ring:
-    """Return points without those that repeat the one before, which of a closed ring's first is its last."""
+    """Return points without those that repeat the one before; in a closed ring the first follows the last."""
     kept = [point for point, _ in groupby(ring)]
     if closed and len(kept) > 1 and kept[0] == kept[-1]:
         kept.pop()

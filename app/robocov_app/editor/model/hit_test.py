@@ -41,7 +41,6 @@ def obstacles_at(sketch: Sketch, point: Point, reach: float) -> list[int]:
 
 
 def edge_at(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner]) -> Edge | None:
-    """Return the nearest place on an edge of some things within `reach` metres; None if there is none."""
     best, nearest = reach, None
     wanted = list(owners)
     if len(wanted) > 8:  # of many obstacles, only those that may have something within reach
@@ -66,8 +65,7 @@ def in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) -> Sele
     if touched:
         places = sketch.tree.query(box, predicate="intersects")
     else:
-        corners = _inside(shapely.bounds(sketch.geometries), a, b)
-        places = np.flatnonzero(corners.reshape(-1, 2).all(axis=1))
+        places = np.flatnonzero(_inside(shapely.bounds(sketch.geometries), a, b).reshape(-1, 2).all(axis=1))
     items = [sketch.obstacles[k] for k in places.tolist()]
     starts = []
     for name, spec in sketch.starts:

@@ -1,6 +1,5 @@
 """Measurements of a sketch: free area, parts, narrowest gap, and where robots cannot pass."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -45,6 +44,13 @@ def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:
     discs = [shapely.Point(_middle(gap)).buffer(gap.width / 2) for gap in narrow]
     marks = _polygons(shapely.union_all([*discs, untouched]) & free)
     sealed = MultiPolygon([polygon for part in reached[1:] for polygon in _polygons(part)])
+    problems = [*found, *_too_narrow(narrow, marks, radius)]
+    if not free.is_empty and not reached:
+        problems.append(Problem(f"no robot of radius {radius:g} m fits anywhere", free, None, False))
+    elif len(reached) > sum(part.area >= np.pi * radius**2 for part in free.geoms):
+        words = f"robots of radius {radius:g} m cannot pass between {len(reached)} parts of the free space"
+        words += f": {sum(part.area for part in reached[1:]):.3g} m² are cut off from the largest"
+        problems.append(Problem(words, sealed, None, False, "cut off"))
     return Measurement(
         free_area=float(free.area),
         components=tuple(float(part.area) for part in free.geoms),
@@ -53,7 +59,7 @@ def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:
         impassable=MultiPolygon(marks),
         sealed=sealed,
         vertices=sum(len(ring) for owner in sketch.owners for _, ring, _ in sketch.rings_of(owner)),
-        problems=(*found, *_too_narrow(narrow, marks, radius), *_cut_off(reached, sealed, free, radius)),
+        problems=tuple(problems),
         radius=radius,
     )
 
@@ -121,17 +127,6 @@ def _too_narrow(narrow: tuple[Gap, ...], marks: list[Polygon], radius: float) ->
         where = shapely.union_all([problem.where for problem in more])
         problems[_MOST_GAPS:] = [Problem(f"{len(more)} more gaps are {narrows}", where, None, False)]
     return problems
-
-
-def _cut_off(
-    reached: tuple[shapely.Geometry, ...], sealed: MultiPolygon, free: MultiPolygon, radius: float
-) -> Iterator[Problem]:
-    if not free.is_empty and not reached:
-        yield Problem(f"no robot of radius {radius:g} m fits anywhere", free, None, False)
-    elif len(reached) > sum(part.area >= np.pi * radius**2 for part in free.geoms):
-        parts = f"robots of radius {radius:g} m cannot pass between {len(reached)} parts of the free space"
-        area = sum(part.area for part in reached[1:])
-        yield Problem(f"{parts}: {area:.3g} m² are cut off from the largest", sealed, None, False, "cut off")
 
 
 def _polygons(geometry: shapely.Geometry) -> list[Polygon]:

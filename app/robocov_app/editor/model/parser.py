@@ -22,10 +22,8 @@ _STARTS: dict[str, Any] = {"disc": env.DiscStart, "uniform": env.UniformStart, "
 _READ_AS = {"center": "point", "holes": "rings", "name": "text", "path": "way", "repeat": "repeat"}
 _READ_AS |= dict.fromkeys(("vertices", "points", "positions"), "ring")
 _READ_AS |= dict.fromkeys(("radius", "width", "speed"), "number")
-
 # extent of a raster on a map without a boundary, m, unless it states its own
 _UNBOUNDED: Ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
-
 _Read = TypeVar("_Read")
 
 

@@ -21,6 +21,7 @@ from robocov_app.editor.model.geometry import Box, as_array
 
 KINDS = {env.PolygonObstacle: "polygon", env.CircleObstacle: "circle", env.WallObstacle: "wall"}
 _LINES = {env.WallObstacle: "points", env.PointsStart: "positions"}
+_SHARED = ("name", "description", "schema", "density")  # fields that sketches have as environments do
 BOUNDARY: Final = -1  # stands for the boundary where obstacles have their keys
 Owner: TypeAlias = int | str  # of vertices: the key of an obstacle, `BOUNDARY`, or the name of a start
 
@@ -73,15 +74,12 @@ class Sketch:
         shapes, free_keys = environment.obstacles, dict(environment.extra)
         marks, background, extra = taken_apart(free_keys, [shape.name for shape in shapes])
         return cls(
-            name=environment.name,
-            description=environment.description,
             boundary=environment.boundary,
             obstacles=tuple(Item(k, shape, **marks.get(k, {})) for k, shape in enumerate(shapes)),
             starts=tuple(environment.starts.items()),
             background=background,
             extra=extra,
-            schema=environment.schema,
-            density=environment.density,
+            **{name: getattr(environment, name) for name in _SHARED},
         )
 
     def environment(self, where: str = "map") -> env.Environment:
@@ -94,14 +92,11 @@ class Sketch:
         for k, item in enumerate(self.obstacles):
             marks[k] = {name: value for name in MARKS if (value := getattr(item, name))}
         return env.Environment(
-            name=self.name,
             boundary=self.boundary or (),
             obstacles=tuple(shapes),
             starts=dict(self.starts),
-            description=self.description,
             extra=annotated(self.extra, marks, [shape.name for shape in shapes], self.background),
-            schema=self.schema,
-            density=self.density,
+            **{name: getattr(self, name) for name in _SHARED},
         )
 
     def item(self, key: int) -> Item:

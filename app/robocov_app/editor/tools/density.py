@@ -102,8 +102,7 @@ class DensityTool(Tool):
             return density.area_added(sketch, rectangle(begun, to), self.weight)
         if number is None:
             return density.peak_added(sketch, begun, max(distance(begun, to), 0.02), self.weight)
-        features = density.features_of(sketch)
-        if number >= len(features):
+        if number >= len(features := density.features_of(sketch)):
             return None
         feature = features[number]
         if isinstance(feature, Gaussian):

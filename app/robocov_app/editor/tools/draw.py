@@ -149,29 +149,25 @@ class MeasureTool(DrawTool):
     hint = "click points, or drag; “level” turns the map so that the line lies level; Esc takes the tape away"
     drags = True
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._kept: tuple[Point, ...] = ()
-
     @property
     def measured(self) -> tuple[Point, ...]:
-        return tuple(self.points) or self._kept
+        return tuple(self.points or self.clicked)
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
-        self._kept = ()
+        self.clicked = []
         super().press(context, event)
 
     def finish(self, context: Workspace) -> bool:
         points = self.outline.take()
-        self._kept = tuple(points) or self._kept
+        self.clicked = points or self.clicked
         return bool(points)
 
     def cancel(self, context: Workspace) -> bool:
-        had, self._kept = bool(self._kept), ()
+        had, self.clicked = bool(self.clicked), []
         return super().cancel(context) or had
 
     def preview(self, context: Workspace) -> Preview | None:
-        points = (*self.points, self.outline.at) if self.points else self._kept
+        points = [*self.points, self.outline.at] if self.points else self.clicked
         if len(points) < 2:
             return None
         (ax, ay), (bx, by) = points[-2], points[-1]
@@ -179,7 +175,7 @@ class MeasureTool(DrawTool):
         if len(points) > 2:
             whole = sum(distance(a, b) for a, b in pairwise(points))
             words += f"   {length_words(whole)} in all, {ring_area(points):.2f} m²"
-        return Preview(points, False, True, words=words)
+        return Preview(tuple(points), False, True, words=words)
 
 
 class PlacesTool(DrawTool):
@@ -225,6 +221,7 @@ class RectangleTool(DrawTool):
     hint = "drag from corner to corner, or click both; type 3 x 2 for metres; Shift makes a square"
     most, drags = 2, True
     make = staticmethod(create.rectangle_drawn)
+    end_for = DrawTool._far_corner
 
     def placed(self, event: PointerEvent) -> Point:
         if not event.shift or not self.points:
@@ -232,9 +229,6 @@ class RectangleTool(DrawTool):
         (x, y), (to_x, to_y) = self.points[0], event.point
         side = max(abs(to_x - x), abs(to_y - y))
         return x + copysign(side, to_x - x), y + copysign(side, to_y - y)
-
-    def end_for(self, text: str) -> Point:
-        return self._far_corner(text)
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         (ax, ay), (bx, by) = points

@@ -19,7 +19,6 @@ SAME = 1e-9  # metres below which nothing has moved
 FEW_POINTS = 60  # points of what is moved that may snap; of more, a choice of them
 NEAR = 0.6  # part of a finger's width within which something is taken hold of
 ON_EDGE = 1e-5  # metres within which a point lies on an edge
-
 # over scale handles, by their sides
 _CURSORS = {(1, 0): "sideways", (0, 1): "updown", (1, 1): "rising", (-1, 1): "falling"}
 _CURSORS |= {(-x, -y): shape for (x, y), shape in _CURSORS.items()}
@@ -57,7 +56,7 @@ class Drag:
 
 
 class Moving(Drag):
-    """Moves whole things, or copies them; by an `offset`, m, where a change in each frame took too long."""
+    """Moves things, with Alt copies; at round angles with Shift, freely with Ctrl; many by an `offset`, m."""
 
     def __init__(self, context: Workspace, selection: Selection, begun: Point) -> None:
         super().__init__(context, selection, begun)
@@ -67,7 +66,6 @@ class Moving(Drag):
         self.copies = False
 
     def to(self, event: PointerEvent) -> None:
-        """Follow the mouse; with Alt copies move, with Shift at round angles, with Ctrl freely."""
         self.copies, self.guides = event.alt, ()
         to = geometry.at_round_angle(self._begun, event.raw) if event.shift else event.raw
         by = [to[0] - self._begun[0], to[1] - self._begun[1]]
@@ -111,7 +109,7 @@ class Moving(Drag):
 
 
 class MovingVertices(Drag):
-    """Moves single vertices: the one that was taken, and those that are selected with it."""
+    """Moves the taken vertex and the selected ones; with Shift at a round angle from the one before it."""
 
     def __init__(self, context: Workspace, taken: Vertex, selection: Selection) -> None:
         dragged = Selection(vertices=selection.vertices | {taken})
@@ -123,7 +121,6 @@ class MovingVertices(Drag):
             self._origin = points[min(1, len(points) - 1) if first else taken.index - 1]
 
     def to(self, event: PointerEvent) -> None:
-        """Follow the mouse; with Shift at a round angle from the vertex before, with Ctrl freely."""
         if event.shift and self._origin is not None:
             self.guides = ()
             self._put(geometry.at_round_angle(self._origin, event.raw))
@@ -143,7 +140,7 @@ class MovingVertices(Drag):
 
 
 class Turning(Drag):
-    """Turns whole things about the middle of their box."""
+    """Turns whole things about the middle of their box; with Shift in steps, with Ctrl freely."""
 
     def __init__(self, context: Workspace, selection: Selection, begun: Point) -> None:
         super().__init__(context, selection, begun)
@@ -151,7 +148,6 @@ class Turning(Drag):
         self._from = geometry.bearing(self.about, begun)
 
     def to(self, event: PointerEvent) -> None:
-        """Follow the mouse; with Shift in steps, with Ctrl freely."""
         degrees = (geometry.bearing(self.about, event.raw) - self._from + 180.0) % 360.0 - 180.0
         if event.shift:
             degrees = geometry.ANGLE * round(degrees / geometry.ANGLE)
@@ -169,7 +165,7 @@ class Turning(Drag):
 
 
 class Scaling(Drag):
-    """Scales whole things by a corner or a side of their box; the opposite one stays."""
+    """Scales things by a corner or side of their box; in proportion with Shift, about its middle with Alt."""
 
     def __init__(self, context: Workspace, selection: Selection, handle: Handle) -> None:
         super().__init__(context, selection, handle.at)
@@ -183,7 +179,6 @@ class Scaling(Drag):
         self._even = bool(selection.starts) or shapes == {CircleObstacle}
 
     def to(self, event: PointerEvent) -> None:
-        """Follow the mouse; with Shift in proportion, with Alt about the middle, with Ctrl freely."""
         to = event.raw[0] - self._offset[0], event.raw[1] - self._offset[1]
         to = self.snapped_to(event, to)
         about = geometry.middle_of(self._bounds) if event.alt else self._fixed

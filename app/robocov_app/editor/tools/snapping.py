@@ -24,7 +24,6 @@ from robocov_app.render.surface_cache import Latest
 
 Dragged: TypeAlias = Iterable[Owner | Vertex]
 PointKind: TypeAlias = Literal["vertex", "centre", "middle"]
-
 MANY = 1500  # vertices of a map from which on the window does not wait for its targets
 _MOST_EDGES = 8  # edges near a point that are looked at: more can only be where nothing can be told apart
 
@@ -142,7 +141,6 @@ def _point(at: Array) -> Point:
 
 
 Kind: TypeAlias = Literal["vertex", "middle", "centre", "crossing", "edge", "angle", "aligned", "grid"]
-
 KINDS: frozenset[Kind] = frozenset(get_args(Kind))
 SNAPS: dict[str, tuple[str, frozenset[Kind]]] = {
     "grid": ("Grid", frozenset({"grid"})),
@@ -263,7 +261,6 @@ def snapped_move(points: Sequence[Point], dx: float, dy: float, targets: Targets
 
 
 def snapped_angle(degrees: float, step: float = 15.0, reach: float = 3.0) -> float:
-    """Return the nearest multiple of `step` degrees if that is within `reach`, else the angle itself."""
     nearest = step * round(degrees / step)
     return nearest + 0.0 if abs(nearest - degrees) <= reach else degrees
 

@@ -15,7 +15,6 @@ from robocov_app.editor.tools.snapping import SNAPS, Dragged, Guide, Snap, Snapp
 from robocov_app.render.surface_cache import Latest
 
 Kind: TypeAlias = Literal["vertex", "scale", "turn"]
-
 BESIDE = 11.0  # pixels at scale 1 between what is selected and the box around it
 KNOB = 24.0  # pixels at scale 1 that the knob is above the box
 SNAPS_WITHIN = 0.6  # part of a finger's width: a line that is far off is not to beat the grid
@@ -176,22 +175,19 @@ class Workspace:
 class Tool:
     """A tool that does nothing; the others are like it."""
 
-    name = ""
+    name = title = ""  # the title is the name where there is no other
     hint = ""  # what to do next
     snaps = True  # whether the point that it gets has snapped to something
     takes_numbers = True  # whether numbers can be typed while it is `busy`
     begins_typed = False  # whether they can be typed before, too
 
     def __init__(self) -> None:
+        self.title = self.title or self.name.capitalize()
         self.guides: tuple[Guide, ...] = ()
         self.begun: PointerEvent | None = None  # where the button was pressed that is held down
         self.clicked: list[Point] = []  # m; points of something that is half done
         self.at: Point = (0.0, 0.0)  # m; where the cursor is
         self.change: Change | None = None  # what letting go of the mouse would make
-
-    @property
-    def title(self) -> str:
-        return self.name.capitalize()
 
     @property
     def busy(self) -> bool:
