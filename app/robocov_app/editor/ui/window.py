@@ -104,7 +104,6 @@ class EditorWindow(BaseWindow):
         self.editor.snapper.close()
 
     def look(self) -> object:
-        """Return all that changes the picture without an event; None while something moves."""
         editor, canvas, ui = self.editor, self.canvas, self.panel.ui
         importing = isinstance(editor.asked, ImportDialog) and editor.asked.busy
         if ui.stale or editor.moves_since is not None or importing:
