@@ -80,12 +80,8 @@ class _List:
         return Rect(self.rect.left + 1, y, self.rect.width - 2, self.row)
 
     def at(self, pixel: tuple[int, int]) -> int | None:
-        k = (
-            int((pixel[1] - self.rect.top - 1 + self.top) // self.row)
-            if self.rect.collidepoint(pixel)
-            else -1
-        )
-        return k if 0 <= k < len(self.options) else None
+        k = int((pixel[1] - self.rect.top - 1 + self.top) // self.row)
+        return k if self.rect.collidepoint(pixel) and 0 <= k < len(self.options) else None
 
     def show(self, k: int) -> None:
         self.chosen = min(max(k, 0), len(self.options) - 1)
@@ -232,12 +228,8 @@ class Ui:
             screen.blit(picture, (box.left + self.px(7), box.top + self.px(5) + k * high))
 
     @property
-    def typing(self) -> bool:
-        return self.edit is not None
-
-    @property
     def busy(self) -> bool:
-        return self.active is not None or self.typing or self.open_list is not None
+        return any(each is not None for each in (self.active, self.edit, self.open_list))
 
     def stop_typing(self) -> None:
         self.focus = self.edit = self.open_list = None

@@ -143,7 +143,7 @@ def test_pages_are_turned_by_keys(hands: Hands) -> None:
     hands.key("h")
     assert hands.window.layout.panel[2] == 0
     hands.key("f2")  # the field of the map's name brings the panel back
-    assert hands.window.layout.panel[2] > 0 and hands.window.panel.ui.typing
+    assert hands.window.layout.panel[2] > 0 and hands.window.panel.ui.edit
     hands.type("New name")
     hands.key("return")
     assert hands.sketch.name == "New name"
@@ -152,9 +152,9 @@ def test_pages_are_turned_by_keys(hands: Hands) -> None:
 def test_keys_go_into_fields_and_not_to_actions_while_typing(hands: Hands) -> None:
     hands.turn("map")
     hands.write("title", "wall")
-    assert hands.editor.tool.name == "select" and hands.window.panel.ui.typing
+    assert hands.editor.tool.name == "select" and hands.window.panel.ui.edit
     hands.key("escape")
-    assert not hands.window.panel.ui.typing and hands.sketch.name == "Untitled"
+    assert not hands.window.panel.ui.edit and hands.sketch.name == "Untitled"
 
 
 def test_what_is_typed_into_a_field_is_undone_there_and_not_in_the_map(hands: Hands) -> None:

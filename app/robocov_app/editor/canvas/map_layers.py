@@ -38,21 +38,15 @@ class Outline:
 
     @cached_property
     def name_place(self) -> tuple[float, float, float, float]:
-        return name_place(self.geometry)
-
-
-def name_place(geometry: BaseGeometry) -> tuple[float, float, float, float]:
-    """Return where a name has most room in a geometry, and how much: x, y, width, height, m."""
-    best = (0.0, 0.0, 0.0, 0.0)
-    if geometry.is_empty:
+        """Where a name has most room, and how much: x, y, width, height, m."""
+        geometry, best = self.geometry, (0.0, 0.0, 0.0, 0.0)
+        for y in () if geometry.is_empty else (geometry.centroid.y, geometry.representative_point().y):
+            for part in _cut(geometry, 0, y):
+                x = part.centroid.x
+                columns = [each for each in _cut(geometry, 1, x) if each.bounds[1] <= y <= each.bounds[3]]
+                if columns and part.length > best[2] * 1.2:
+                    best = (x, columns[0].centroid.y, part.length, columns[0].length)
         return best
-    for y in (geometry.centroid.y, geometry.representative_point().y):
-        for part in _cut(geometry, 0, y):
-            x = part.centroid.x
-            columns = [each for each in _cut(geometry, 1, x) if each.bounds[1] <= y <= each.bounds[3]]
-            if columns and part.length > best[2] * 1.2:
-                best = (x, columns[0].centroid.y, part.length, columns[0].length)
-    return best
 
 
 def _cut(geometry: BaseGeometry, axis: int, at: float) -> Iterable[BaseGeometry]:

@@ -345,9 +345,8 @@ class Panel(SidePanel):
         with ui.scroll("problems"):
             if not problems:
                 seen = editor.measurement is not None
-                ui.words(
-                    "Nothing is wrong with the map." if seen else "Being looked at …", colour=ui.theme.faint
-                )
+                words = "Nothing is wrong with the map." if seen else "Being looked at …"
+                ui.words(words, colour=ui.theme.faint)
             for k, problem in enumerate(problems[:MOST_PROBLEMS]):
                 mends = problem.kind in TITLES
                 lines = wrapped(problem.words, ui.px(TEXT), ui.px(ui.wide - 44 - (66 if mends else 0)))
