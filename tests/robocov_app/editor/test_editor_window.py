@@ -19,6 +19,7 @@ from robocov_app.toolkit import clipboard
 from robocov_app.toolkit import command as help_page
 from robocov_app.toolkit.command import Menu
 from robocov_app.toolkit.dialogs import Choice
+from robocov_app.toolkit.input import shown_cursor
 from robocov_app.toolkit.layout import SMALLEST
 
 BOX = PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), name="box")
@@ -147,6 +148,16 @@ def test_pages_are_turned_by_keys(hands: Hands) -> None:
     hands.type("New name")
     hands.key("return")
     assert hands.sketch.name == "New name"
+
+
+def test_the_cursor_is_the_tools_over_the_map_and_an_arrow_over_the_panel(hands: Hands) -> None:
+    hands.key("w")
+    hands.go((5.0, 5.0))
+    hands.wait()
+    assert shown_cursor() == pygame.SYSTEM_CURSOR_CROSSHAIR
+    hands.move(hands.window.layout.panel[0] + 20, 200)
+    hands.wait()
+    assert shown_cursor() == pygame.SYSTEM_CURSOR_ARROW
 
 
 def test_keys_go_into_fields_and_not_to_actions_while_typing(hands: Hands) -> None:
