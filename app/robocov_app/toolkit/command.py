@@ -65,10 +65,7 @@ class Commands:
         return self._named[name]
 
     def do(self, name: str) -> None:
-        self._do(self._named[name])
-
-    def _do(self, command: Command) -> None:
-        self._attempt(lambda: _done(command))
+        self._attempt(partial(_done, self._named[name]))
 
     def of_key(self, event: pygame.event.Event) -> Command | None:
         """Return the command of a key that goes down; None while it is held and does not repeat."""
@@ -119,7 +116,8 @@ class Commands:
         if command.takes is not None:
             return Option(command.title, f"{command.name} …", f"{command.name} ", command.when())
         keys = " or ".join(key_words(key) for key in command.keys[:2])
-        return Option(command.title, keys, command.title, command.when(), lambda: self._do(command))
+        do = partial(self._attempt, partial(_done, command))
+        return Option(command.title, keys, command.title, command.when(), do)
 
 
 def _done(command: Command, *typed: str) -> object:
@@ -212,10 +210,8 @@ def draw_keys(
     dim(screen, theme)
     lines: list[str | Command] = []
     for group in groups:
-        lines += [
-            group,
-            *(each for each in commands if each.group == group and each.keys and not each.hidden),
-        ]
+        lines.append(group)
+        lines += [each for each in commands if each.group == group and each.keys and not each.hidden]
     width, height = screen.get_size()
     columns = 4 if width >= 1150 * scale else 3
     # small windows get smaller letters rather than a page that does not fit

@@ -187,8 +187,6 @@ class Choice(Dialog):
         option = found[self.chosen] if self.chosen < len(found) else None
         if by := {"up": -1, "down": 1, "page up": -ROWS, "page down": ROWS}.get(name, 0):
             self.wheel(-by)
-            self.chosen = min(max(self.chosen, 0), max(len(found) - 1, 0))
-            self.top = min(max(self.top, self.chosen - ROWS + 1), self.chosen)
         elif name == "tab":
             if option is not None:
                 self._fill(option.fills or option.text, ui)
@@ -199,7 +197,8 @@ class Choice(Dialog):
         return True
 
     def wheel(self, notches: float) -> None:
-        self.chosen = max(self.chosen - round(notches), 0)
+        last = max(len(self.options(self.text)) - 1, 0)
+        self.chosen = min(max(self.chosen - round(notches), 0), last)
         self.top = min(max(self.top, self.chosen - ROWS + 1), self.chosen)
 
 

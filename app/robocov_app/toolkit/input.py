@@ -42,6 +42,7 @@ def shown_cursor() -> int:
 
 def show_cursor(shape: int) -> None:
     global _cursor
-    _cursor = shape
-    with suppress(pygame.error):  # not every display has cursors
-        pygame.mouse.set_cursor(shape)
+    if shape != _cursor:
+        _cursor = shape
+        with suppress(pygame.error):  # not every display has cursors
+            pygame.mouse.set_cursor(shape)

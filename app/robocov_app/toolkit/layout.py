@@ -5,14 +5,10 @@ from typing import NamedTuple, TypeAlias
 
 from robocov_app.render.layout import columns_for
 
-Box: TypeAlias = tuple[int, int, int, int]
-"""Left, top, width and height in pixels."""
-
+Box: TypeAlias = tuple[int, int, int, int]  # left, top, width and height in pixels
 PANEL, CHART, TRACK, STATUS, GAP, LEGEND_ROW = 320, 150, 26, 26, 2, 22
-SMALLEST = (900, 600)
-"""Width and height at scale 1 that everything has room in,"""
-UPRIGHT = (460, 600)
-"""and on a telephone that is held upright, where the panel, while it is shown, takes most of the width."""
+SMALLEST = (900, 600)  # width and height at scale 1 that everything has room in,
+UPRIGHT = (460, 600)  # and on a telephone that is held upright, where the panel takes most of the width
 
 
 class Layout(NamedTuple):

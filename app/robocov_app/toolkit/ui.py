@@ -63,6 +63,7 @@ def _is_function_key(name: str) -> bool:
 class _List:
     """An open list: what it offers, and where."""
 
+    key: str  # of the menu that it hangs from
     options: list[str]
     rect: Rect
     row: int
@@ -79,10 +80,8 @@ class _List:
         return Rect(self.rect.left + 1, y, self.rect.width - 2, self.row)
 
     def at(self, pixel: tuple[int, int]) -> int | None:
-        if not self.rect.collidepoint(pixel):
-            return None
         k = int((pixel[1] - self.rect.top - 1 + self.top) // self.row)
-        return k if 0 <= k < len(self.options) else None
+        return k if self.rect.collidepoint(pixel) and 0 <= k < len(self.options) else None
 
     def show(self, k: int) -> None:
         self.chosen = min(max(k, 0), len(self.options) - 1)
@@ -102,9 +101,7 @@ class Ui:
         self.focus: str | None = None
         self.active: str | None = None
         self.edit: TextEdit | None = None
-        self.shown: dict[str, Shown] = {}  # the widgets of the last run
         self.open_list: _List | None = None
-        self._open_key = ""
         self._event: pygame.event.Event | None = None
         self.surface: Surface | None = None  # to draw on in cells; None in a run for an event
         self._picture: Surface | None = None
@@ -121,7 +118,7 @@ class Ui:
         self._clip = self.box
         self._cells: list[tuple[float, float]] = []
         self._next, self._height, self._below = 0, 26.0, 6.0
-        self.shown = {}
+        self.shown: dict[str, Shown] = {}  # the widgets of the last run
 
     @property
     def _order(self) -> list[str]:
@@ -231,12 +228,8 @@ class Ui:
             screen.blit(picture, (box.left + self.px(7), box.top + self.px(5) + k * high))
 
     @property
-    def typing(self) -> bool:
-        return self.edit is not None
-
-    @property
     def busy(self) -> bool:
-        return self.active is not None or self.typing or self.open_list is not None
+        return any(each is not None for each in (self.active, self.edit, self.open_list))
 
     def stop_typing(self) -> None:
         self.focus = self.edit = self.open_list = None
@@ -667,7 +660,7 @@ class Ui:
     def dropdown(self, key: str, options: Sequence[str], now: str, *, tip: str = "") -> str | None:
         """Show a menu that drops down; return what was chosen of it, if that is another."""
         rect = self.cell()
-        picked = self.open_list.picked if self.open_list is not None and self._open_key == key else None
+        picked = self.open_list.picked if self.open_list is not None and self.open_list.key == key else None
         if picked is not None:
             self.open_list = None
         opened = self._clicks("menu", key, rect, now, now, tip) or self._key(key) == "down"
@@ -681,7 +674,7 @@ class Ui:
             wide = max((text_width(each, self.px(TEXT)) for each in options), default=0) + self.px(34)
             place.width = min(max(wide, rect.width), self.box.width - self.px(16))
             place.right = min(place.right, self.box.right - self.px(8))
-            self.open_list, self._open_key = _List(list(options), place, row), key
+            self.open_list = _List(key, list(options), place, row)
             self.open_list.show(self.open_list.options.index(now) if now in options else 0)
             self.focus, self.edit, self._event = key, None, None
         if self.surface is not None and self._draws(rect):

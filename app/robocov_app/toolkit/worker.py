@@ -67,9 +67,7 @@ class LatestWorker(Generic[_Answer]):
 
     def __init__(self, service: str, doing: str, wire: type[Wire] = Wire, *, patience: float = inf) -> None:
         self.trouble = ""
-        self.process: subprocess.Popen[bytes] | None = (
-            None  # with a thread that writes to it and one that reads
-        )
+        self.process: subprocess.Popen[bytes] | None = None  # a thread writes to it, and one reads
         self._service, self._doing, self._wire, self._patience = service, doing, wire, patience
         self._since = 0.0
         self._number = self._answered = 0
@@ -179,8 +177,7 @@ class DirectWorker(Generic[_Answer]):
 
     def poll(self) -> _Answer | None:
         reply, self._reply = self._reply, Reply(0, None, self.trouble)
-        answer: _Answer | None = None if reply.answer is None else self._wire.decode(reply.answer)
-        return answer
+        return None if reply.answer is None else self._wire.decode(reply.answer)
 
     def close(self) -> None:
         """There is nothing to end."""

@@ -18,6 +18,8 @@ from robocov.errors import InputError, MapError
 from robocov.mapfile import load_map, save_map
 from robocov_app.cli import main
 from robocov_app.editor.edits import create
+from robocov_app.editor.edits.properties import underlaid
+from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.document import Document, recoverable
 from robocov_app.editor.ui.commands import run_typed
 from robocov_app.editor.ui.import_dialog import ImportDialog
@@ -186,6 +188,9 @@ def test_a_picture_is_laid_under_by_its_path_from_the_map(hands: Hands, tmp_path
     assert "not a picture" in hands.refused()
     hands.window.do("background:none")
     assert hands.sketch.background is None
+    hands.editor.change(underlaid(hands.sketch, Background("gone.png", (40, 30))))
+    hands.window.draw()
+    assert "gone.png cannot be shown" in hands.said
 
 
 def test_a_map_is_exported_by_its_suffix_and_nothing_is_replaced_unasked(

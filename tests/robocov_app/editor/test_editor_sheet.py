@@ -20,7 +20,6 @@ from robocov_app.editor.canvas.map_layers import (
     View,
     beyond,
     grid_steps,
-    name_place,
     outline_of,
     outside_colour,
 )
@@ -202,9 +201,9 @@ def test_grid_lines_are_multiples_of_the_grid_and_far_enough_apart() -> None:
 
 def test_names_stand_where_there_is_room() -> None:
     ring = shapely.Polygon([(0, 0), (6, 0), (6, 1), (1, 1), (1, 6), (0, 6)])
-    x, y, room, high = name_place(ring)
+    x, y, room, high = outline_of(ring).name_place
     assert ring.contains(shapely.Point(x, y)) and 1.0 - 1e-9 <= room <= 6.0 + 1e-9 and high >= 1.0 - 1e-9
-    assert name_place(shapely.Polygon())[2] == 0.0
+    assert outline_of(shapely.Polygon()).name_place[2] == 0.0
 
 
 def test_outlines_are_made_once_for_each_obstacle() -> None:

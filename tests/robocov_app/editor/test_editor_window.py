@@ -19,6 +19,7 @@ from robocov_app.toolkit import clipboard
 from robocov_app.toolkit import command as help_page
 from robocov_app.toolkit.command import Menu
 from robocov_app.toolkit.dialogs import Choice
+from robocov_app.toolkit.input import shown_cursor
 from robocov_app.toolkit.layout import SMALLEST
 
 BOX = PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), name="box")
@@ -143,18 +144,28 @@ def test_pages_are_turned_by_keys(hands: Hands) -> None:
     hands.key("h")
     assert hands.window.layout.panel[2] == 0
     hands.key("f2")  # the field of the map's name brings the panel back
-    assert hands.window.layout.panel[2] > 0 and hands.window.panel.ui.typing
+    assert hands.window.layout.panel[2] > 0 and hands.window.panel.ui.edit
     hands.type("New name")
     hands.key("return")
     assert hands.sketch.name == "New name"
 
 
+def test_the_cursor_is_the_tools_over_the_map_and_an_arrow_over_the_panel(hands: Hands) -> None:
+    hands.key("w")
+    hands.go((5.0, 5.0))
+    hands.wait()
+    assert shown_cursor() == pygame.SYSTEM_CURSOR_CROSSHAIR
+    hands.move(hands.window.layout.panel[0] + 20, 200)
+    hands.wait()
+    assert shown_cursor() == pygame.SYSTEM_CURSOR_ARROW
+
+
 def test_keys_go_into_fields_and_not_to_actions_while_typing(hands: Hands) -> None:
     hands.turn("map")
     hands.write("title", "wall")
-    assert hands.editor.tool.name == "select" and hands.window.panel.ui.typing
+    assert hands.editor.tool.name == "select" and hands.window.panel.ui.edit
     hands.key("escape")
-    assert not hands.window.panel.ui.typing and hands.sketch.name == "Untitled"
+    assert not hands.window.panel.ui.edit and hands.sketch.name == "Untitled"
 
 
 def test_what_is_typed_into_a_field_is_undone_there_and_not_in_the_map(hands: Hands) -> None:

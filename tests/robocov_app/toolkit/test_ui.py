@@ -111,12 +111,12 @@ def test_a_field_replaces_undoes_and_gives_its_text_with_enter(page: Page) -> No
     page.press("entry", "name")
     page.ui.take(letters("1"))
     page.ui.take(letters("2"))
-    assert page.ui.typing and page.name == "8"
+    assert page.ui.edit and page.name == "8"
     page.keys("ctrl+z")
     page.draw()
     assert page.text() == "8"  # letters that follow each other are undone together
     page.keys("ctrl+y", "ctrl+a", "ctrl+c", "return")
-    assert page.name == "12" and not page.ui.typing and clipboard.get() == "12"
+    assert page.name == "12" and not page.ui.edit and clipboard.get() == "12"
     page.press("entry", "name")
     page.keys("backspace", "escape")
     page.draw()
@@ -128,7 +128,7 @@ def test_an_input_method_composes_before_it_types(page: Page) -> None:
     page.ui.take(pygame.event.Event(pygame.TEXTEDITING, text="にほ", start=0, length=2))
     page.draw()
     page.keys("return")
-    assert page.ui.typing and page.text() == "8"
+    assert page.ui.edit and page.text() == "8"
     page.ui.take(letters("日本"))
     page.keys("return")
     assert page.name == "日本"
@@ -153,7 +153,7 @@ def test_tab_walks_and_keys_press(page: Page) -> None:
     assert not page.ui.take(key("tab"))  # while nothing has the focus it means something else
     page.press("entry", "name")
     page.keys("shift+tab", "space")
-    assert page.on and not page.ui.typing
+    assert page.on and not page.ui.edit
     page.keys("shift+tab", "left")
     assert page.value < 0.5
     page.keys("shift+tab", "return")

@@ -130,10 +130,10 @@ def test_the_speed_slider_rests_on_speeds(driver: Driver) -> None:
 
 def test_a_value_that_is_typed_replaces_the_old_one_with_enter(driver: Driver) -> None:
     driver.write("k_rep", "1.25")
-    assert driver.session.panes[0].law.value("k_rep") != 1.25 and driver.window.panel.ui.typing
+    assert driver.session.panes[0].law.value("k_rep") != 1.25 and driver.window.panel.ui.edit
     driver.key("return")
     assert driver.session.panes[0].law.value("k_rep") == 1.25
-    assert not driver.window.panel.ui.typing
+    assert not driver.window.panel.ui.edit
     assert driver.widget("slider", "k_rep").value > 0.5
 
 

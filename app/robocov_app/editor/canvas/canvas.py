@@ -117,9 +117,8 @@ class EditorCanvas:
         if problem is None or problem.where is None or problem.where.is_empty:
             return
         spot = problem.where.representative_point()
-        x, y = self.to_pixel((spot.x, spot.y))
         edge = round(80 * self.layout.scale)
-        if not Rect(self.camera.view).inflate(-edge, -edge).collidepoint(x, y):
+        if not Rect(self.camera.view).inflate(-edge, -edge).collidepoint(self.to_pixel((spot.x, spot.y))):
             self._look(replace(self.camera, center=(spot.x, spot.y)))
 
     def zoom(self, factor: float, at: Point | None = None) -> None:
@@ -194,6 +193,9 @@ class EditorCanvas:
         screen.fill(theme.background, box)
         clip = view.clip
         screen.blit(self.sheet.page(view, under, lifted), clip, clip)
+        if self.sheet.underlaid.trouble:
+            editor.say(self.sheet.underlaid.trouble, trouble=True)
+            self.sheet.underlaid.trouble = ""
         screen.set_clip(clip)
         # words keep to the canvas
         canvas = view.canvas(screen.subsurface(box))
@@ -204,14 +206,13 @@ class EditorCanvas:
             there = [item for item in now.obstacles if item.key in lifted or item.key not in base.places]
             self.sheet.draw_items(canvas, there, mix(theme.obstacle, theme.final, 0.22))
         measurement = editor.measurement if "impassable" in shown else None
-        gap = measurement.gap if measurement is not None else None
         if measurement is not None:
             look = view.camera, theme.name, view.scale, view.size
             patch = self._hatched.of(measurement, look, lambda: overlay.hatched(view, measurement))
             if patch is not None:
                 screen.blit(*patch, special_flags=_BLEND)
-        if measurement is not None and gap is not None:
-            overlay.draw_gap(canvas, gap, measurement.radius)
+            if measurement.gap is not None:
+                overlay.draw_gap(canvas, measurement.gap, measurement.radius)
         self._draw_paths(canvas, weighed.sketch if isinstance(weighed, Change) else now)
         for k, (name, spec) in enumerate(now.starts):
             overlay.draw_start(canvas, spec, name, chosen=name in editor.selection.starts, first=k == 0)
@@ -219,9 +220,9 @@ class EditorCanvas:
             self._draw_team(canvas, self.team)
         if carried is None:
             self._draw_selection(view, canvas, now, chosen)
-        if measurement is not None and gap is not None:
+        if measurement is not None and measurement.gap is not None:
             busy = editor.tool is not editor.selector or drag is not None
-            overlay.tag_gap(canvas, gap, measurement.radius, self.at if busy else None)
+            overlay.tag_gap(canvas, measurement.gap, measurement.radius, self.at if busy else None)
         if "problems" in shown:
             overlay.draw_problems(canvas, view, editor.problems, editor.problem, self.hovered)
         overlay.draw_guides(canvas, editor.tool.guides)

@@ -38,21 +38,15 @@ class Outline:
 
     @cached_property
     def name_place(self) -> tuple[float, float, float, float]:
-        return name_place(self.geometry)
-
-
-def name_place(geometry: BaseGeometry) -> tuple[float, float, float, float]:
-    """Return where a name has most room in a geometry, and how much: x, y, width, height, m."""
-    best = (0.0, 0.0, 0.0, 0.0)
-    if geometry.is_empty:
+        """Where a name has most room, and how much: x, y, width, height, m."""
+        geometry, best = self.geometry, (0.0, 0.0, 0.0, 0.0)
+        for y in () if geometry.is_empty else (geometry.centroid.y, geometry.representative_point().y):
+            for part in _cut(geometry, 0, y):
+                x = part.centroid.x
+                columns = [each for each in _cut(geometry, 1, x) if each.bounds[1] <= y <= each.bounds[3]]
+                if columns and part.length > best[2] * 1.2:
+                    best = (x, columns[0].centroid.y, part.length, columns[0].length)
         return best
-    for y in (geometry.centroid.y, geometry.representative_point().y):
-        for part in _cut(geometry, 0, y):
-            x = part.centroid.x
-            columns = [each for each in _cut(geometry, 1, x) if each.bounds[1] <= y <= each.bounds[3]]
-            if columns and part.length > best[2] * 1.2:
-                best = (x, columns[0].centroid.y, part.length, columns[0].length)
-    return best
 
 
 def _cut(geometry: BaseGeometry, axis: int, at: float) -> Iterable[BaseGeometry]:
@@ -89,8 +83,6 @@ class Outlines:
         return known[1]
 
     def touching(self, sketch: Sketch, box: tuple[float, float, float, float]) -> list[Item]:
-        """Return the obstacles whose bounds touch a box, m, in their order, but for hidden ones."""
-
         def bounds() -> Array:
             if len(self._known) > _FORGOTTEN * len(sketch.obstacles) + 1000:
                 self._known = {}
@@ -152,7 +144,18 @@ class ReferenceImage:
 
     def draw(self, page: Surface, background: Background, folder: Path, camera: Camera, clip: Rect) -> None:
         """Draw the picture on a page; `folder` is where its path counts from."""
-        self._load(folder / background.path)
+        path = folder / background.path
+        if path != self._of:
+            self._of, self._picture, self.trouble = path, None, ""
+            try:
+                with Image.open(path) as opened:
+                    full = ImageOps.exif_transpose(opened)
+                    rgb = _on_white(full)
+                rgb.thumbnail((LARGEST, LARGEST))
+                self._shrunk = full.size[0] / rgb.size[0]
+                self._picture = pygame.image.frombytes(rgb.tobytes(), rgb.size, "RGB").convert()
+            except Exception as error:  # whatever a broken picture makes its decoder raise
+                self.trouble = f"the picture {path.name} cannot be shown: {error}"
         picture = self._picture
         if picture is None or not background.shown or background.opacity <= 0.0:
             return
@@ -180,21 +183,6 @@ class ReferenceImage:
             shown = (pygame.transform.smoothscale if factor < 4.0 else pygame.transform.scale)(part, size)
         shown.set_alpha(round(255 * background.opacity))
         page.blit(shown, at)
-
-    def _load(self, path: Path) -> None:
-        if path == self._of:
-            return
-        self._of, self._picture, self.trouble = path, None, ""
-        try:
-            with Image.open(path) as opened:
-                full = ImageOps.exif_transpose(opened)
-                width, rgb = full.size[0], _on_white(full)
-        except Exception as error:  # whatever a broken picture makes its decoder raise
-            self.trouble = f"the picture {path.name} cannot be shown: {error}"
-            return
-        rgb.thumbnail((LARGEST, LARGEST))
-        self._shrunk = width / rgb.size[0]
-        self._picture = pygame.image.frombytes(rgb.tobytes(), rgb.size, "RGB").convert()
 
 
 def _on_white(picture: Image.Image) -> Image.Image:

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from robocov.environment import Point, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.canvas.canvas import EditorCanvas
+from robocov_app.editor.canvas.canvas import REACH, EditorCanvas
 from robocov_app.editor.edits import boolean, density, paths, properties, transform, vertices
 from robocov_app.editor.edits.clipboard import copied, pasted
 from robocov_app.editor.edits.create import anywhere_added
@@ -24,7 +24,6 @@ from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.command import Command, Takes
 
 FAR = 10  # how many times farther arrows nudge with Shift
-FINGER = 12.0  # pixels at scale 1 that a finger is wide
 WIDER = 1.25
 _PAN = 60  # pixels that a key pans
 TOLERANCE = 0.02  # metres that simplified outlines may be off
@@ -143,28 +142,23 @@ def select_next(editor: Editor, by: int) -> None:
 
 
 def one_vertex(editor: Editor) -> Vertex:
-    require(
-        len(editor.selection.vertices) == 1,
-        "select one vertex first: click an obstacle, then one of its corners",
-    )
-    (vertex,) = editor.selection.vertices
-    return vertex
+    found = editor.selection.vertices
+    require(len(found) == 1, "select one vertex first: click an obstacle, then one of its corners")
+    return next(iter(found))
 
 
 def trim(editor: Editor, edit: Edit, length: float | None = None) -> None:
     """Cut the selected corners off, or round them, by twice the grid unless a length is given, m."""
-    require(
-        editor.selection.vertices,
-        "select corners first: click an obstacle, then its corners, or drag a box around them",
-    )
-    editor.change(edit(editor.sketch, vertices_or_things(editor.selection), length or 2 * editor.grid))
+    found = Selection(vertices=editor.selection.vertices)
+    require(found, "select corners first: click an obstacle, then its corners, or drag a box around them")
+    editor.change(edit(editor.sketch, found, length or 2 * editor.grid))
 
 
 def extend(editor: Editor) -> None:
     if editor.cursor is None:
         raise MapError("move the mouse to where the wall is to go on to")
     vertex = one_vertex(editor)
-    to = editor.snapped(editor.cursor, FINGER * editor.pixel, place_of(editor.sketch, vertex)).point
+    to = editor.snapped(editor.cursor, REACH * editor.pixel, place_of(editor.sketch, vertex)).point
     editor.change(vertices.extended(editor.sketch, vertex, to))
 
 
@@ -304,9 +298,7 @@ def _signed(text: str) -> float:
 
 
 def _set_density(editor: Editor, text: str) -> None:
-    require(
-        text == "none", f"density: {text!r}, but none was wanted; hot spots are drawn with the tool Density"
-    )
+    require(text == "none", f"density: {text!r}, but none was wanted; the tool Density draws hot spots")
     editor.change(density.density_removed(editor.sketch))
 
 
@@ -340,8 +332,8 @@ def editor_commands(
     def edited(edit: Edit, *rest: object) -> Run:
         return lambda: editor.change(edit(editor.sketch, selected(editor), *rest))
 
-    def of_map(edit: Edit, *rest: object) -> Run:
-        return lambda: editor.change(edit(editor.sketch, *rest))
+    def of_map(edit: Edit, *rest: Run) -> Run:
+        return lambda: editor.change(edit(editor.sketch, *(each() for each in rest)))
 
     def arrows(name: str, title: str, keys: str, act: Callable[[int, int], object]) -> Iterator[Row]:
         """Yield the commands of the four arrow keys; the first speaks for all of them."""
@@ -349,18 +341,14 @@ def editor_commands(
             yield name.format(way), title, keys.format(way), partial(act, x, y)
             title = ""
 
-    def clip() -> None:
-        editor.change(boolean.clipped(editor.sketch, editor.selection.without_vertices()))
-
-    def fill_unreachable() -> None:
-        editor.change(unreachable_filled(editor.sketch, editor.radius))
-
-    def split() -> None:
-        editor.change(vertices.split(editor.sketch, one_vertex(editor)))
+    def things() -> Selection:
+        return editor.selection.without_vertices()
 
     def switch_theme() -> None:
         editor.theme = "dark" if editor.theme == "light" else "light"
 
+    fill_unreachable = of_map(unreachable_filled, lambda: editor.radius)
+    no_picture = of_map(properties.underlaid, lambda: None)
     table: tuple[str | Row, ...] = (  # the headings of groups, and below each its commands
         "File",
         ("new", "New map", "ctrl+n", documents.new),
@@ -370,7 +358,7 @@ def editor_commands(
         ("save:as", "Save as", "ctrl+shift+s", documents.ask_name),
         ("export", "Export to another format", "ctrl+e", documents.ask_export),
         ("background", "Picture under the map", "ctrl+b", documents.ask_picture),
-        ("background:none", "Take the picture under the map away", "", of_map(properties.underlaid, None)),
+        ("background:none", "Take the picture under the map away", "", no_picture),
         ("reload", "Read the file again", "ctrl+r", documents.reload),
         ("try", "Try it in the demo, and back", "f5", of_window["try"]),
         ("screenshot", "Screenshot", "f12", of_window["screenshot"]),
@@ -420,7 +408,7 @@ def editor_commands(
         ("subtract", "Subtract the upper ones", "alt+s", edited(boolean.subtracted)),
         ("intersect", "Keep what they have in common", "alt+i", edited(boolean.intersected)),
         ("divide", "Cut along each other", "alt+d", edited(boolean.divided)),
-        ("clip", "Cut off outside the boundary", "alt+b", clip),
+        ("clip", "Cut off outside the boundary", "alt+b", of_map(boolean.clipped, things)),
         ("join", "Join walls end to end", "alt+j", edited(vertices.joined)),
         ("polygons", "Turn into polygons", "alt+p", edited(properties.made_polygons)),
         ("boundary:of", "Make it the boundary", "", edited(properties.made_boundary)),
@@ -430,7 +418,7 @@ def editor_commands(
         "Vertices",
         ("bevel", "Cut corners off", "shift+b", does(trim, vertices.bevelled)),
         ("round", "Round corners", "shift+r", does(trim, vertices.rounded_off)),
-        ("split", "Cut a wall in two here", "shift+c", split),
+        ("split", "Cut a wall in two here", "shift+c", of_map(vertices.split, does(one_vertex))),
         ("extend", "Go on with the wall from here", "shift+w", does(extend)),
         ("fill", "Fill the hole", "shift+f", does(fill)),
         ("simplify", "Leave needless vertices out", "shift+p", edited(vertices.simplified, TOLERANCE)),

@@ -90,17 +90,14 @@ class TeamThread:
         self._answer: Future[Team] | None = None
 
     def ask(self, sketch: Sketch, start: str | None, robots: int, seed: int, radius: float) -> None:
-        """Ask where a team would stand; asking the same again does nothing."""
-        team = start, robots, seed, radius
-        if self._asked == (sketch, *team):
-            return
-        self._asked = sketch, *team
-        if self._answer is not None:
-            self._answer.cancel()
-        self._answer = self._pool.submit(placed, sketch, *team)
+        team = sketch, start, robots, seed, radius
+        if self._asked != team:
+            self._asked = team
+            if self._answer is not None:
+                self._answer.cancel()
+            self._answer = self._pool.submit(placed, *team)
 
     def poll(self) -> Team | None:
-        """Return the answer to the newest question, once."""
         if self._answer is None or not self._answer.done():
             return None
         answer, self._answer = self._answer.result(), None

@@ -159,8 +159,8 @@ class FileCommands:
         self.editor.sketch.environment()
         suffixes = [suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes]
         title = f"Export to a file ending in {', '.join(suffixes)}"
-        name = Path(self.editor.document.suggested(self.editor.folder).name).stem
-        self._ask_path(title, self._export, suffixes, f"{name}.svg")
+        suggested = self.editor.document.suggested(self.editor.folder)
+        self._ask_path(title, self._export, suffixes, f"{suggested.stem}.svg")
 
     def _export(self, path: Path, *, over: bool = False) -> str | None:
         if path.exists() and not over:

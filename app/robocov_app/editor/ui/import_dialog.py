@@ -164,8 +164,7 @@ class ImportDialog(Dialog):
         ui.end_row()
 
     def _report(self, ui: Ui, foot: float) -> None:
-        said = self.imported.report.lines() if self.imported is not None else []
-        said = [self.trouble] if self.trouble else said
+        said = [self.trouble] if self.trouble else self.imported.report.lines() if self.imported else []
         lines = [line for each in said for line in wrapped(each, ui.px(SMALL), ui.px(ui.wide))]
         most = int((foot - ui.y) / _LINE) - 1
         if len(lines) > most:

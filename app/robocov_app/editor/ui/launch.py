@@ -59,9 +59,9 @@ def editor_window(
         wanted = size or (settings.width, settings.height)
         wanted = wanted if size or alone else fitting(wanted)
         scale = scale or settings.scale or (1.0 if alone else screen_scale())
+        editor.say(trouble or (heading(document) if path is not None and document is found else ""))
         window = EditorWindow(editor, wanted, scale, drafts, patient=headless)
         window.panel.show_tab(settings.tab)
-        editor.say(trouble or (heading(document) if path is not None and document is found else ""))
         if document.path is not None:
             window.documents.remember(document.path)
         if not alone:

@@ -165,15 +165,13 @@ _STARTS = "Disc tool:disc|Points tool:places|Anywhere start:uniform|Next start:n
 _PICTURE = "Choose… background|Scale, move tool:picture|Remove background:none"
 _PROBLEMS = "Next problem:next|Repair repair|Clip clip|Mend problem:fix"
 _TURNS = "Turn ↺ rotate:left|Turn ↻ rotate:right|Flip ↔ mirror:x|Flip ↕ mirror:y"
+_PATH = "Path tool:path|Loop ↺ path:repeat|Play path:play|No path path:none"
 _BUTTONS = {  # of the page Object, by what is selected
     "vertex": ("Delete delete|Cut off bevel|Round round|Split split",),
     "vertices": ("Delete delete|Cut off bevel|Round round|Align align:left",),
     "boundary": ("Simplify simplify|Straighten straighten|Repair repair",),
     **dict.fromkeys(("disc", "start"), ("Delete delete|Copy duplicate|Default start:default",)),
-    **dict.fromkeys(
-        ("polygon", "circle", "wall"),
-        (_TURNS, "Path tool:path|Loop ↺ path:repeat|Play path:play|No path path:none"),
-    ),
+    **dict.fromkeys(("polygon", "circle", "wall"), (_TURNS, _PATH)),
     "several": (
         _TURNS,
         "Unite unite|Subtract subtract|Intersect intersect|Divide divide",
@@ -347,9 +345,8 @@ class Panel(SidePanel):
         with ui.scroll("problems"):
             if not problems:
                 seen = editor.measurement is not None
-                ui.words(
-                    "Nothing is wrong with the map." if seen else "Being looked at …", colour=ui.theme.faint
-                )
+                words = "Nothing is wrong with the map." if seen else "Being looked at …"
+                ui.words(words, colour=ui.theme.faint)
             for k, problem in enumerate(problems[:MOST_PROBLEMS]):
                 mends = problem.kind in TITLES
                 lines = wrapped(problem.words, ui.px(TEXT), ui.px(ui.wide - 44 - (66 if mends else 0)))

@@ -20,12 +20,11 @@ from robocov_app.editor.ui.panel import TABS, Panel
 from robocov_app.editor.ui.play_mode import PlayWindow, begun, brought_back
 from robocov_app.render.theme import theme_named
 from robocov_app.toolkit.command import Commands, Menu, draw_keys, palette
-from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, WHEEL, key_of, show_cursor, wheel_notches
-from robocov_app.toolkit.layout import inside, laid_out
+from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, SLIP, WHEEL, key_of, show_cursor, wheel_notches
+from robocov_app.toolkit.layout import laid_out
 from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.window import BaseWindow
 
-SLIP = 4.0  # pixels at scale 1 that a click may move
 _SHAPES = {"arrow": pygame.SYSTEM_CURSOR_ARROW, "cross": pygame.SYSTEM_CURSOR_CROSSHAIR}
 _SHAPES |= {"hand": pygame.SYSTEM_CURSOR_HAND, "move": pygame.SYSTEM_CURSOR_SIZEALL}
 _SHAPES |= {"sideways": pygame.SYSTEM_CURSOR_SIZEWE, "updown": pygame.SYSTEM_CURSOR_SIZENS}
@@ -86,7 +85,7 @@ class EditorWindow(BaseWindow):
         self.at = (0, 0)  # where the mouse is, px
         self.held = False  # whether the left button pans, for as long as a key is held
         self.drag = ""  # what a button that is held down drags: "tool", "pan"
-        self._button, self._shape, self._moved_off = 0, -1, False
+        self._button, self._moved_off = 0, False
         self._pressed_at, self._last_click = (0, 0), (-1.0, (0, 0))
         self.team = TeamThread()
         self._patient = editor.snapper.patient = patient
@@ -104,7 +103,6 @@ class EditorWindow(BaseWindow):
         self.editor.snapper.close()
 
     def look(self) -> object:
-        """Return all that changes the picture without an event; None while something moves."""
         editor, canvas, ui = self.editor, self.canvas, self.panel.ui
         importing = isinstance(editor.asked, ImportDialog) and editor.asked.busy
         if ui.stale or editor.moves_since is not None or importing:
@@ -318,7 +316,7 @@ class EditorWindow(BaseWindow):
 
     def _moved(self, event: pygame.event.Event) -> None:
         editor, canvas = self.editor, self.canvas
-        over = canvas.over(event.pos) and not inside(canvas.layout.panel, event.pos)
+        over = canvas.over(event.pos)
         aimed = over or self.drag == "tool"
         editor.cursor = canvas.to_world(event.pos) if aimed else None
         canvas.at = (float(event.pos[0]), float(event.pos[1])) if aimed else None
@@ -351,17 +349,11 @@ class EditorWindow(BaseWindow):
                 self.open_menu(event.pos)
 
     def _show_cursor(self) -> None:
-        canvas, editor = self.canvas, self.editor
-        if inside(canvas.layout.panel, self.at):
-            self._shape = -1  # the panel has set its own
-            return
-        shape = "arrow"
+        canvas, editor, shape = self.canvas, self.editor, "arrow"
         if canvas.over(self.at):
             panned = self.drag == "pan" or self.held
             shape = "move" if panned else "hand" if canvas.hovered else editor.tool.shape_of_cursor(editor)
-        if _SHAPES[shape] != self._shape:
-            self._shape = _SHAPES[shape]
-            show_cursor(self._shape)
+        show_cursor(_SHAPES[shape])
 
     def _key_down(self, event: pygame.event.Event) -> None:
         """Take a key: for a field, for a number while something is drawn, else for a command."""
