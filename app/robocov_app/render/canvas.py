@@ -38,8 +38,11 @@ def clipped_polygon(corners: Array) -> list[Array]:
 
 def clipped_segment(start: Pixel, end: Pixel) -> Sequence[Pixel]:
     """Return the ends of what of a segment lies within `FAR`, none when nothing does."""
-    if max(abs(start[0]), abs(start[1]), abs(end[0]), abs(end[1])) <= FAR:
+    (x1, y1), (x2, y2) = start, end
+    if max(abs(x1), abs(y1), abs(x2), abs(y2)) <= FAR:
         return start, end
+    if min(x1, x2) > FAR or max(x1, x2) < -FAR or min(y1, y2) > FAR or max(y1, y2) < -FAR:
+        return []
     inside = shapely.clip_by_rect(shapely.LineString([start, end]), -FAR, -FAR, FAR, FAR)
     ends: list[Pixel] = shapely.get_coordinates(inside).tolist()
     return ends
