@@ -214,7 +214,7 @@ class WebDisplay:
         told["copied"] = clipboard.get()[:_MOST_COPIED]
         changed = before is None or not np.array_equal(before.pixels, picture.pixels)
         if changed or told != self._told:
-            self._picture, self._told = picture if changed else before, told
+            self._told, self._picture = told, picture if changed else before
             self._loop.call_soon_threadsafe(self._wake)
 
     # the browsers' side, in the server's thread
@@ -394,6 +394,7 @@ class WebDisplay:
             while True:
                 await page.changed.wait()
                 page.changed.clear()
+                picture = self._picture  # before what is told, which is never older then
                 people = [
                     {
                         "number": one.number,
@@ -409,7 +410,6 @@ class WebDisplay:
                 if told != page.told:
                     page.told = told
                     await page.line.send(json.dumps(told))
-                picture = self._picture
                 if picture is not None and picture is not page.shown and len(page.sent) < IN_FLIGHT:
                     before, page.shown = page.shown, picture
                     page.sent.append(picture.number)
