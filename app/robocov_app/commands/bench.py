@@ -71,12 +71,11 @@ def command(options: Arguments) -> None:
             raise ParameterError(missing)
         print(f"robocov: {missing}", file=sys.stderr)
     cases = [case for part in parts for case in getattr(modules[part], PARTS[part][2])(quick=options.quick)]
-    rows: list[Row] = []
-    stopped = None
+    rows, stopped = [], None
     try:
         with progress("measuring", len(cases), quiet=options.json) as update:
             for done, case in enumerate(cases, start=1):
-                rows += case()
+                rows.extend(case())
                 update(done)
     except KeyboardInterrupt as error:
         stopped = error
@@ -85,19 +84,18 @@ def command(options: Arguments) -> None:
         from robocov_app.render.theme import theme_named
 
         save_ratios(rows, options.plot, theme_named(options.theme))
-    tell(options, {"machine": machine(), "rows": [row.to_dict() for row in rows]}, indent=1)
+    names = "numpy", "scipy", "shapely", "pymunk", "pygame-ce"
+    packages = {name: version(name) for name in names}
+    machine: dict[str, Any] = {"python": platform.python_version(), "system": platform.system()}
+    machine |= {"processor": platform.machine(), "cores": os.cpu_count(), "packages": packages}
+    tell(options, {"machine": machine, "rows": [row.to_dict() for row in rows]}, indent=1)
     if not options.json:
         print_tables(rows)
+        out, told = console(), ", ".join(f"{name} {number}" for name, number in packages.items())
+        out.print("before: about the ratio when nothing was compiled (commit 8838167)")
+        out.print(f"Python {machine['python']}, {machine['system']}, {machine['cores']} cores; {told}")
     if stopped is not None:
         raise stopped
-
-
-def machine() -> dict[str, Any]:
-    """Return what times depend on."""
-    names = "numpy", "scipy", "shapely", "pymunk", "pygame-ce"
-    facts: dict[str, Any] = {"python": platform.python_version(), "system": platform.system()}
-    facts |= {"processor": platform.machine(), "cores": os.cpu_count()}
-    return facts | {"packages": {name: version(name) for name in names}}
 
 
 def print_tables(rows: Sequence[Row]) -> None:
@@ -110,20 +108,18 @@ def print_tables(rows: Sequence[Row]) -> None:
             case = "" if words == former else words, row.name if row.case else ""
             times = (duration(each) for each in (row.seconds, row.yardstick_seconds))
             ratios = ("" if each is None else f"{each:.2f}" for each in (row.ratio, row.before))
-            # what is wanted, and whether it is missed
-            goals = [] if row.goal is None or row.ratio is None else [f"{row.goal:.3g}"]
-            goals += [] if row.goal_seconds is None else [duration(row.goal_seconds)]
-            wanted = ", ".join(goals) + " missed" * (row.met is False)
             yardstick = "" if row.yardstick is None else f"/ {row.yardstick}"
-            cells.append((*case, *times, *ratios, wanted, yardstick, row.note))
+            cells.append((*case, *times, *ratios, goals(row), yardstick, row.note))
             former = words
         print_table(columns, cells, title=PARTS[part][0])
         print()
-    facts = machine()
-    packages = ", ".join(f"{name} {number}" for name, number in facts["packages"].items())
-    out = console()
-    out.print("before: about the ratio when nothing was compiled (commit 8838167)")
-    out.print(f"Python {facts['python']}, {facts['system']}, {facts['cores']} cores; {packages}")
+
+
+def goals(row: Row) -> str:
+    """Return what is wanted, and whether it is missed."""
+    wanted = [] if row.goal is None or row.ratio is None else [f"{row.goal:.3g}"]
+    wanted += [] if row.goal_seconds is None else [duration(row.goal_seconds)]
+    return ", ".join(wanted) + " missed" * (row.met is False)
 
 
 def duration(seconds: float | None) -> str:

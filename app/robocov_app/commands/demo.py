@@ -81,26 +81,25 @@ def command(options: Arguments) -> int:
     from robocov_app.viewer.launch import Launcher
     from robocov_app.viewer.session.file import SUFFIX, load_session
     from robocov_app.viewer.session.session import Session
-    from robocov_app.web import serve_each, show, web_display
+    from robocov_app.web import serve_each, show
 
     if options.each:
         return serve_each(command, options)
     headless = options.frames is not None or options.video is not None
-    serving = web_display(options.serve, options.host, options.port, options.folder)
-    if not headless and serving is None:
+    if not headless and not options.serve:
         on_compile.append(lambda _: show_compiling(window_size(options.size) or (900, 600)))
     file, name, laws = None, options.map, (*controller_kinds(), *options.controllers)
     if options.map.endswith(SUFFIX):
         file = Path(options.map)
         saved = load_session(file, laws)
         session, name = Session.opened(saved), str(saved.view.get("map") or "")
-        if serving is not None and not file.resolve().is_relative_to(options.folder.resolve()):
+        if options.serve and not file.resolve().is_relative_to(options.folder.resolve()):
             file = None  # it is saved to a file of its own, where it may be
     else:
         session = session_of(options)
     also, without = options.layers()
     look: dict[str, Any] = {"theme": options.theme, "size": window_size(options.size), "scale": options.scale}
-    look |= {"also": also, "without": without, "headless": headless, "served": serving is not None}
+    look |= {"also": also, "without": without, "headless": headless, "served": options.serve}
     first = file is None and options.lesson is None and not options.tour
     given: dict[str, Any] = {"laws": laws, "lattice": options.lattice, "file": file, "offers_lesson": first}
     opening = Launcher(session, name, options.folder, **look, **given)
@@ -108,7 +107,7 @@ def command(options: Arguments) -> int:
         return rendered(opening, options)
     with opening.window() as window:
         _begin_lesson(window, options)
-        show(window, serving)
+        show(window, options, options.folder)
     return 0
 
 

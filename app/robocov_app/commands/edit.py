@@ -42,13 +42,12 @@ class Arguments(WindowOptions):
 def command(options: Arguments) -> int:
     from robocov.mapfile import bundled_maps, map_file
     from robocov_app.editor.ui.launch import editor_window
-    from robocov_app.web import serve_each, show, web_display
+    from robocov_app.web import serve_each, show
 
     if options.each:
         return serve_each(command, options)
-    serving = web_display(options.serve, options.host, options.port, options.folder)
     look: dict[str, Any] = {"theme": options.theme, "size": window_size(options.size), "scale": options.scale}
-    look |= {"headless": options.screenshot is not None, "served": serving is not None}
+    look |= {"headless": options.screenshot is not None, "served": options.serve}
     path = None if options.map is None else Path(options.map)
     if options.map in bundled_maps() or (path is not None and not path.suffix):
         path = map_file(str(options.map))
@@ -56,7 +55,7 @@ def command(options: Arguments) -> int:
         raise MapError(f"{options.map}: there is no such file")
     with editor_window(path, options.folder, background=options.background, **look) as window:
         if options.screenshot is None:
-            show(window, serving)
+            show(window, options, options.folder)
             return 0
         from robocov.files.atomic import written
         from robocov_app.runs.recording import png_bytes

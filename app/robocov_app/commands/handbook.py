@@ -1,7 +1,5 @@
 """`robocov handbook`."""
 
-from __future__ import annotations
-
 import importlib.util
 import shutil
 import subprocess

@@ -1,11 +1,9 @@
 """`robocov paper`."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import tyro
 
@@ -13,10 +11,6 @@ from robocov.errors import InputError, checked, counted
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
 from robocov_app.terminal.output import BOLD, RIGHT, print_table, tell
-
-if TYPE_CHECKING:
-    from robocov_app.replication.claims import Claim
-    from robocov_app.replication.results import Forecast
 
 _MOST_WORKERS = 1024
 
@@ -69,21 +63,30 @@ def command(options: Arguments) -> int:
     from robocov_app.replication.plan import FULL, QUICK
     from robocov_app.replication.results import Interrupted, RunnerOptions, forecast, open_folder
     from robocov_app.sweep.executors import processors
+    from robocov_app.sweep.sweeping import duration
 
     plan = QUICK if options.quick else FULL
     out, quiet = options.out, options.json
     open_folder(out, plan)
     with_claims = not (options.figures_only or options.beyond_only)
     with_beyond = not (options.figures_only or options.without_beyond)
-    found: tuple[Claim, ...] = ()
-    more: tuple[Claim, ...] = ()
+    found: tuple[Any, ...] = ()  # claims
+    more: tuple[Any, ...] = ()
     paper = beyond = None
     with Interruption() as stop:
         workers, scheduler = options.workers or processors(), options.scheduler
         runner = RunnerOptions(workers, scheduler, quiet, stop, options.keep_versions)
         if not quiet:
             expected = forecast(out, plan, workers, claims=with_claims, beyond=with_beyond)
-            words = _forecast_words(expected, workers, scheduler)
+            words, done = f"all {expected.runs:,} runs are there", expected.runs - expected.left
+            if expected.left:
+                there = f", {done:,} of them there already" if done else ""
+                each = ", ".join(f"{law} {seconds:.2f} s" for law, seconds in expected.each.items())
+                long = f"{duration(expected.seconds)} on {workers} processes"
+                if scheduler:
+                    long = f"{duration(expected.seconds * workers)} of computing, on a Dask cluster"
+                words = f"{expected.runs:,} runs{there}, about {long} (measured: {each} a run)"
+                words += "; Ctrl-C keeps what is done"
             print(f"paper ({plan.name}): {words}", file=sys.stderr, flush=True)
         try:
             if with_claims:
@@ -122,17 +125,3 @@ def command(options: Arguments) -> int:
     answer |= {"failed": failed, "page": str(out / "index.html")}
     tell(options, answer | {"claims": [claim.to_json() for claim in verdicts]}, *lines)
     return int(failed > 0)
-
-
-def _forecast_words(forecast: Forecast, workers: int, scheduler: str | None) -> str:
-    from robocov_app.sweep.sweeping import duration
-
-    if forecast.left == 0:
-        return f"all {forecast.runs:,} runs are there"
-    done = forecast.runs - forecast.left
-    there = f", {done:,} of them there already" if done else ""
-    each = ", ".join(f"{law} {seconds:.2f} s" for law, seconds in forecast.each.items())
-    long = f"about {duration(forecast.seconds)} on {workers} processes"
-    if scheduler:
-        long = f"about {duration(forecast.seconds * workers)} of computing, on a Dask cluster"
-    return f"{forecast.runs:,} runs{there}, {long} (measured: {each} a run); Ctrl-C keeps what is done"

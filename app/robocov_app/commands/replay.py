@@ -102,15 +102,14 @@ def command(options: Arguments) -> int:
 def open_window(options: Arguments, session: Session, file: Path | None = None) -> int:
     from robocov.mapfile import bundled_maps, load_map
     from robocov_app.viewer.launch import Launcher
-    from robocov_app.web import show, web_display
+    from robocov_app.web import show
 
-    serving = web_display(options.serve, options.host, options.port, Path())
     same = (key for key in bundled_maps() if load_map(key) == session.environment)
     (also, without), film = options.film.layers(), options.film
     look: dict[str, Any] = {"theme": film.theme, "size": window_size(film.size), "laws": options.controller}
-    look |= {"also": also, "without": without, "file": file, "served": serving is not None}
+    look |= {"also": also, "without": without, "file": file, "served": options.serve}
     with Launcher(session, next(same, session.environment.name), Path(), **look).window() as window:
-        show(window, serving)
+        show(window, options, Path())
     return 0
 
 

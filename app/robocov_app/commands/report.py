@@ -1,7 +1,5 @@
 """`robocov report`."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack

@@ -1,10 +1,8 @@
 """`robocov sweep`."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import tyro
 
@@ -12,11 +10,6 @@ from robocov.errors import ParameterError, checked, counted
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
 from robocov_app.terminal.output import tell
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from robocov_app.sweep.sweeping import Rehearsal, Totals
 
 FAILED = 1
 
@@ -61,7 +54,7 @@ class Arguments(JsonOption):
 def command(options: Arguments) -> int:
     from robocov_app.sweep.executors import Cluster, processors
     from robocov_app.sweep.study_file import read_study
-    from robocov_app.sweep.sweeping import rehearsed, sweep
+    from robocov_app.sweep.sweeping import duration, rehearsed, sweep
 
     study, out = read_study(options.study), options.out or Path(options.study.stem)
     again: dict[str, Any] = {"retry_failed": options.retry_failed, "keep_versions": options.keep_versions}
@@ -71,43 +64,34 @@ def command(options: Arguments) -> int:
             with Cluster(options.scheduler) as cluster:
                 workers = max(1, cluster.threads)
         rehearsal = rehearsed(study, out, workers=workers, **again)
-        answer = {"out": str(out), "workers": workers, **asdict(rehearsal)}
-        tell(options, answer, *_rehearsal_lines(rehearsal, workers))
+        lines = [f"{name:<20} {count:>7}" for name, count in rehearsal.axes.items()]
+        done = rehearsal.runs - rehearsal.left
+        lines += [f"{'runs':<20} {rehearsal.runs:>7}" + f"   ({done} of them done already)" * bool(done)]
+        lines += rehearsal.notes
+        if rehearsal.error is not None:
+            lines += [f"the run that was tried, {rehearsal.run}, failed: {rehearsal.error}"]
+        each, all_ = rehearsal.bytes_a_run / 1e3, rehearsal.bytes / 1e6
+        lines += [f"a run takes {rehearsal.seconds_a_run:.2f} s and {each:.0f} kB"]
+        words = f"{duration(rehearsal.seconds)} on {counted(workers, 'worker')}; {all_:.0f} MB in all"
+        lines += [f"all that is left: about {words}"]
+        tell(options, {"out": str(out), "workers": workers, **asdict(rehearsal)}, *lines)
         return 0
     where: dict[str, Any] = {"workers": options.workers, "scheduler": options.scheduler}
-    totals = sweep(study, out, **where, **again, quiet=options.json)
-    answer = {"out": str(out), "runs": len(study), **asdict(totals)}
-    tell(options, answer, *_totals_lines(totals, len(study), out))
-    return INTERRUPTED if totals.interrupted else FAILED if totals.failed else 0
-
-
-def _totals_lines(totals: Totals, runs: int, out: Path) -> Iterator[str]:
-    yield f"{totals.done} runs done" + f", {totals.reused} were there already" * bool(totals.reused)
+    totals, runs = sweep(study, out, **where, **again, quiet=options.json), len(study)
+    lines = [f"{totals.done} runs done" + f", {totals.reused} were there already" * bool(totals.reused)]
     if totals.failed:
-        yield f"{totals.failed} of {runs} runs failed:"
-        yield from (f"  {run}: {error}" for run, error in totals.errors.items())
-        yield "--retry-failed does them again; the column error says why each has failed"
+        lines += [f"{totals.failed} of {runs} runs failed:"]
+        lines += [f"  {run}: {error}" for run, error in totals.errors.items()]
+        lines += ["--retry-failed does them again; the column error says why each has failed"]
     if len(totals.versions) > 1:
-        yield "the table has runs of different versions:"
-        yield from (f"  {count} of {versions}" for versions, count in totals.versions.items())
+        lines += ["the table has runs of different versions:"]
+        lines += [f"  {count} of {versions}" for versions, count in totals.versions.items()]
     if totals.interrupted:
         rest = runs - totals.done - totals.failed - totals.reused
-        yield f"stopped, {rest} runs are left: the same command goes on; what was done is in {out}/"
+        lines += [f"stopped, {rest} runs are left: the same command goes on; what was done is in {out}/"]
         if not totals.table_replaced:
-            yield "the table stays as it was: it is replaced when all runs are done"
+            lines += ["the table stays as it was: it is replaced when all runs are done"]
     else:
-        yield f"the table is {out / 'results.csv'}, and as Parquet {out / 'results.parquet'}"
-
-
-def _rehearsal_lines(rehearsal: Rehearsal, workers: int) -> Iterator[str]:
-    from robocov_app.sweep.sweeping import duration
-
-    yield from (f"{name:<20} {count:>7}" for name, count in rehearsal.axes.items())
-    done = rehearsal.runs - rehearsal.left
-    yield f"{'runs':<20} {rehearsal.runs:>7}" + f"   ({done} of them done already)" * bool(done)
-    yield from rehearsal.notes
-    if rehearsal.error is not None:
-        yield f"the run that was tried, {rehearsal.run}, failed: {rehearsal.error}"
-    yield f"a run takes {rehearsal.seconds_a_run:.2f} s and {rehearsal.bytes_a_run / 1e3:.0f} kB"
-    time, megabytes = duration(rehearsal.seconds), rehearsal.bytes / 1e6
-    yield f"all that is left: about {time} on {counted(workers, 'worker')}; {megabytes:.0f} MB in all"
+        lines += [f"the table is {out / 'results.csv'}, and as Parquet {out / 'results.parquet'}"]
+    tell(options, {"out": str(out), "runs": runs, **asdict(totals)}, *lines)
+    return INTERRUPTED if totals.interrupted else FAILED if totals.failed else 0

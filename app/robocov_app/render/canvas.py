@@ -38,8 +38,11 @@ def clipped_polygon(corners: Array) -> list[Array]:
 
 def clipped_segment(start: Pixel, end: Pixel) -> Sequence[Pixel]:
     """Return the ends of what of a segment lies within `FAR`, none when nothing does."""
-    if max(abs(start[0]), abs(start[1]), abs(end[0]), abs(end[1])) <= FAR:
+    (x1, y1), (x2, y2) = start, end
+    if max(abs(x1), abs(y1), abs(x2), abs(y2)) <= FAR:
         return start, end
+    if min(x1, x2) > FAR or max(x1, x2) < -FAR or min(y1, y2) > FAR or max(y1, y2) < -FAR:
+        return []
     inside = shapely.clip_by_rect(shapely.LineString([start, end]), -FAR, -FAR, FAR, FAR)
     ends: list[Pixel] = shapely.get_coordinates(inside).tolist()
     return ends
@@ -122,13 +125,12 @@ class Canvas:
 
     def segments(self, ends: Array, colour: Colour, width: int = 1) -> None:
         """Draw many smooth lines, (k, 4) px: x and y of one end, then of the other."""
-        if len(ends) and np.abs(ends).max() > FAR:
-            for x1, y1, x2, y2 in ends.tolist():
-                self.line((x1, y1), (x2, y2), colour, width)
-            return
-        surface, draw = self.surface, pygame.draw.aaline
+        far = len(ends) > 0 and np.abs(ends).max() > FAR
         for x1, y1, x2, y2 in ends.tolist():
-            draw(surface, colour, (x1, y1), (x2, y2), width)
+            if far:
+                self.line((x1, y1), (x2, y2), colour, width)
+            else:
+                pygame.draw.aaline(self.surface, colour, (x1, y1), (x2, y2), width)
 
     def dashes(self, start: Pixel, end: Pixel, colour: Colour, width: int = 1, dash: float = 5.0) -> None:
         if not (ends := clipped_segment(start, end)):
@@ -200,17 +202,15 @@ class Canvas:
         # as for lines, whole numbers are the middles of pixels
         quarters = np.rint((centers[near] + 0.5) * sprites.FINE).astype(int)
         places, shifts = np.divmod(quarters, sprites.FINE)
-        rows = shifts[:, 0] + sprites.FINE * shifts[:, 1]
-        if which is not None:
-            rows = rows + sprites.FINE**2 * which[near]
-        known: dict[int, tuple[pygame.Surface, int]] = {}
+        number = np.zeros(len(near), dtype=int) if which is None else which[near]
+        known: dict[tuple[int, int, int], tuple[pygame.Surface, int]] = {}
         pictures = []
-        for row, (x, y) in zip(rows.tolist(), places.tolist(), strict=True):
-            if row not in known:
-                sprite, shift = divmod(row, sprites.FINE**2)
-                picture = some[sprite]((shift % sprites.FINE, shift // sprites.FINE))
-                known[row] = picture, picture.get_width() // 2
-            picture, half = known[row]
+        columns = *places.T.tolist(), number.tolist(), *shifts.T.tolist()
+        for x, y, sprite, right, down in zip(*columns, strict=True):
+            if (look := (sprite, right, down)) not in known:
+                picture = some[sprite]((right, down))
+                known[look] = picture, picture.get_width() // 2
+            picture, half = known[look]
             pictures.append((picture, (x - half, y - half)))
         return pictures
 

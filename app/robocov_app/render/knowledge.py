@@ -21,10 +21,8 @@ _OPACITY = {UNKNOWN: 0.28, PRESUMED: 0.45, WALL: 0.85}  # of the colours of cell
 
 def discovered_map(scene: Scene) -> DiscoveredMap | None:
     """Return the map of the robot that is asked about, None where its controller remembers none."""
-    if scene.snapshot is None or scene.selected is None:
-        return None
-    maps = getattr(scene.snapshot.decision.memory, "maps", ())
-    known = maps[scene.selected] if scene.selected < len(maps) else None
+    maps = () if scene.snapshot is None else getattr(scene.snapshot.decision.memory, "maps", ())
+    known = maps[scene.selected] if scene.selected is not None and scene.selected < len(maps) else None
     return known if isinstance(known, DiscoveredMap) else None
 
 

@@ -76,9 +76,8 @@ def checked_layers(option: str, names: Iterable[str]) -> frozenset[str]:
     """Return names of layers, dashes as underscores; ParameterError names the option of an unknown one."""
     known = [layer.name for layer in standard_layers()]
     wanted = [name.replace("-", "_") for name in names]
-    for name in wanted:
-        if name not in known:
-            raise ParameterError(f"{option}: {unknown_name('layer', name, known)}")
+    if unknown := [name for name in wanted if name not in known]:
+        raise ParameterError(f"{option}: {unknown_name('layer', unknown[0], known)}")
     return frozenset(wanted)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from heapq import heapify, heappop, heappush
 from typing import Any, TypeAlias
 
@@ -21,6 +22,7 @@ def rgb(code: str) -> Colour:
     return int(code[0:2], 16), int(code[2:4], 16), int(code[4:6], 16)
 
 
+@lru_cache(maxsize=1000)  # for each of many robots in each frame
 def mix(first: Colour, second: Colour, part: float) -> Colour:
     """Return `first` with `part` (0 to 1) of `second` mixed in."""
     red, green, blue = (round(a + (b - a) * part) for a, b in zip(first, second, strict=True))

@@ -10,27 +10,21 @@ from robocov.extras import extra
 
 if TYPE_CHECKING:
     from robocov_app.toolkit.window import BaseWindow
-    from robocov_app.web.server import WebDisplay
 
 
-def web_display(serve: bool, host: str, port: int, folder: Path) -> WebDisplay | None:
-    """Return where a window is served, None where it is not to be; RobocovError without the extra."""
-    if not serve:
-        return None
-    extra("websockets", "web")
-    from robocov_app.web.server import WebDisplay
+def show(window: BaseWindow, options: Any, folder: Path) -> None:
+    """Run a window until it is closed: on the screen, or in browsers, as the options of a command say.
 
-    return WebDisplay(host, port, folder)
-
-
-def show(window: BaseWindow, display: WebDisplay | None) -> None:
-    """Run a window until it is closed: on the screen, or in browsers."""
-    if display is None:
+    Files below the folder alone can be used then. Raises RobocovError without the extra.
+    """
+    if not options.serve:
         window.run()
         return
+    extra("websockets", "web")
     from robocov_app.web.confined import confined
+    from robocov_app.web.server import WebDisplay
 
-    with display, confined(display.folder):
+    with WebDisplay(options.host, options.port, folder) as display, confined(folder):
         print(f"open {display.link}", flush=True)  # noqa: T201 - it is the answer
         print(f"to watch only: {display.watch_link}", flush=True)  # noqa: T201
         window.remote = display

@@ -1,7 +1,5 @@
 """A window of their own for everybody: a process for each visitor, all behind one port."""
 
-from __future__ import annotations
-
 import asyncio
 import multiprocessing
 import secrets

@@ -1,7 +1,5 @@
 """A served window in a cell of a notebook: a process of its own, and a frame that shows it."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -9,7 +9,9 @@ from __future__ import annotations
 import asyncio
 import json
 import secrets
+import struct
 import threading
+import zlib
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -26,6 +28,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import pygame
+from numpy.typing import NDArray
 
 from robocov.errors import InputError
 from robocov.files.atomic import written
@@ -36,7 +39,6 @@ from robocov_app.toolkit.dialogs import MOST_LISTED
 from robocov_app.toolkit.input import shown_cursor
 from robocov_app.web import events
 from robocov_app.web.access import cookies_of, link_to, same, token_in
-from robocov_app.web.pictures import Picture, encoded
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -69,6 +71,44 @@ _CURSORS = {
     pygame.SYSTEM_CURSOR_WAIT: "wait",
     pygame.SYSTEM_CURSOR_NO: "not-allowed",
 }
+
+
+HEADER = struct.Struct("<I6H")
+"""Number of the picture; its width and height; left, top, width and height of what is different."""
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """Pixels of the window at one moment; `number` grows from picture to picture."""
+
+    number: int
+    pixels: NDArray[np.uint32]  # (height, width), 0xRRGGBB
+
+    @classmethod
+    def of(cls, surface: pygame.Surface, number: int) -> Picture:
+        high, wide = surface.get_height(), surface.get_pitch() // 4
+        buffer: Any = surface.get_buffer()
+        view = np.frombuffer(buffer, np.uint32).reshape(high, wide)
+        return cls(number, view[:, : surface.get_width()] & np.uint32(0xFFFFFF))
+
+
+def encoded(picture: Picture, before: Picture | None) -> bytes:
+    """Return what a browser that shows `before` needs to show a picture: a header and deflated pixels.
+
+    The pixels are those of the smallest box around all that is different, xor those that were there: what
+    stays is 0, which deflate makes nothing of. Text stays as sharp as it is in the window, and all this is
+    several times quicker than PNG. A picture of another size begins from black.
+    """
+    pixels = picture.pixels
+    high, wide = pixels.shape
+    change = pixels if before is None or before.pixels.shape != pixels.shape else pixels ^ before.pixels
+    rows, columns = np.flatnonzero(change.any(axis=1)), np.flatnonzero(change.any(axis=0))
+    left, top, right, bottom = 0, 0, 0, 0
+    if len(rows):
+        left, top, right, bottom = columns[0], rows[0], columns[-1] + 1, rows[-1] + 1
+    box: Any = np.ascontiguousarray(change[top:bottom, left:right])
+    head = HEADER.pack(picture.number % 2**32, wide, high, left, top, right - left, bottom - top)
+    return head + zlib.compress(box, 1)
 
 
 @dataclass(eq=False)
@@ -174,7 +214,7 @@ class WebDisplay:
         told["copied"] = clipboard.get()[:_MOST_COPIED]
         changed = before is None or not np.array_equal(before.pixels, picture.pixels)
         if changed or told != self._told:
-            self._picture, self._told = picture if changed else before, told
+            self._told, self._picture = told, picture if changed else before
             self._loop.call_soon_threadsafe(self._wake)
 
     # the browsers' side, in the server's thread
@@ -354,6 +394,7 @@ class WebDisplay:
             while True:
                 await page.changed.wait()
                 page.changed.clear()
+                picture = self._picture  # before what is told, which is never older then
                 people = [
                     {
                         "number": one.number,
@@ -369,7 +410,6 @@ class WebDisplay:
                 if told != page.told:
                     page.told = told
                     await page.line.send(json.dumps(told))
-                picture = self._picture
                 if picture is not None and picture is not page.shown and len(page.sent) < IN_FLIGHT:
                     before, page.shown = page.shown, picture
                     page.sent.append(picture.number)

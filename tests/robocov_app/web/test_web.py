@@ -24,14 +24,13 @@ from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.input import key_of
 from robocov_app.web.confined import OutsideError, confined
 from robocov_app.web.events import Hands, PageChanged, PictureShown, message_of
-from robocov_app.web.pictures import HEADER, Picture, encoded
 
 pytest.importorskip("websockets")
 
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from robocov_app.web.server import WebDisplay
+from robocov_app.web.server import HEADER, Picture, WebDisplay, encoded
 
 
 def decoded(data: bytes, before: np.ndarray | None) -> np.ndarray:

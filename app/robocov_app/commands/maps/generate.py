@@ -92,7 +92,11 @@ def command(options: Arguments) -> None:
             path = out / f"{name}.json" if out is not None and several else out
             if path is not None and several:
                 _require_map(path)
-            environment = make()
+            try:
+                environment = make()
+            except ParameterError as error:  # its messages begin with the name of the parameter
+                of_seed = "" if options.count is None else f" (seed {options.seed + number - 1})"
+                raise ParameterError(f"--{error}{of_seed}") from None
             made.append(environment)
             if path is None:
                 print(dump_map(environment), end="")
@@ -147,25 +151,16 @@ def _require_map(path: Path) -> None:
 def jobs_of(options: Arguments) -> list[tuple[str, Callable[[], Environment]]]:
     """Return names of maps, and what makes them: of the seeds, or of a study of the paper."""
     if options.study is None:
+        from robocov.generator import generated_map
+
+        names = "kind", "obstacles", "area", "gap", "side", "width", "height"
+        words = {name: getattr(options, name) for name in names}
         seeds = range(options.seed, options.seed + (options.count or 1))
-        digits = len(str(seeds[-1]))
-        return [(f"{options.kind}-{seed:0{digits}}", partial(_generated, options, seed)) for seed in seeds]
+        kind, digits = options.kind, len(str(seeds[-1]))
+        return [(f"{kind}-{seed:0{digits}}", partial(generated_map, seed, **words)) for seed in seeds]
     from robocov_app.replication.plan import FULL, QUICK
     from robocov_app.replication.studies import claim_maps, convex_maps, generated_maps
 
     plan = FULL if options.study == "full" else QUICK
     maps, bundled = (*claim_maps(plan), *generated_maps(plan.tuning), *convex_maps(plan)), bundled_maps()
     return [(each.name, partial(replace, each.environment)) for each in maps if each.name not in bundled]
-
-
-def _generated(options: Arguments, seed: int) -> Environment:
-    """Return the map of a seed; what cannot be made is told with the option that is in the way."""
-    from robocov.generator import generated_map
-
-    try:
-        names = ("kind", "obstacles", "area", "gap", "side", "width", "height")
-        return generated_map(seed, **{name: getattr(options, name) for name in names})
-    except ParameterError as error:
-        # its messages begin with the name of the parameter
-        of_seed = "" if options.count is None else f" (seed {seed})"
-        raise ParameterError(f"--{error}{of_seed}") from None
