@@ -57,7 +57,6 @@ class Pointer:
         self._held = self._button = 0
         self._pressed_at = (0, 0)
         self._last_click = -1.0, (0, 0)
-        self._shape = -1
 
     def take(self, event: pygame.event.Event, now: float) -> None:
         if event.type != pygame.MOUSEWHEEL:
@@ -89,9 +88,6 @@ class Pointer:
         if pane is not None and viewer.tool.name in _TAKES_ROBOTS:
             number = canvas.robot_at(self.at, pane)
         canvas.hovered = (-1, -1) if pane is None or number is None else (pane, number)
-        if inside(layout.panel, self.at):
-            self._shape = -1  # the panel has set its own
-            return
         shape = pygame.SYSTEM_CURSOR_ARROW
         if number is not None:
             shape = pygame.SYSTEM_CURSOR_HAND
@@ -100,9 +96,7 @@ class Pointer:
         elif inside(layout.track, self.at) or inside(layout.chart, self.at):
             offered = self._chart.offers(self.at)
             shape = pygame.SYSTEM_CURSOR_HAND if offered else pygame.SYSTEM_CURSOR_SIZEWE
-        if shape != self._shape:
-            self._shape = shape
-            show_cursor(shape)
+        show_cursor(shape)
 
     def leave(self) -> None:
         self._viewer.cursor = None

@@ -13,6 +13,7 @@ from driven_window import FRAME, Driver, opened, resized
 from PIL import Image
 from touched_run import RAPF, begun
 
+from robocov_app.toolkit.input import shown_cursor
 from robocov_app.toolkit.settings import FOLDER
 from robocov_app.toolkit.window import show_compiling
 from robocov_app.viewer.launch import Launcher
@@ -77,6 +78,17 @@ def test_the_status_line_tells_of_the_place_under_the_cursor(tmp_path: Path) -> 
         driver.post(pygame.WINDOWLEAVE)
         driver.settle()
         assert cursor_words(driver.viewer) == ""
+
+
+def test_over_the_panel_the_cursor_is_an_arrow(driver: Driver) -> None:
+    driver.key("w")
+    driver.move(*driver.pixel((4.2, 1.2)))
+    driver.frames(1)
+    assert shown_cursor() == pygame.SYSTEM_CURSOR_CROSSHAIR
+    left, top, wide, high = driver.window.layout.panel
+    driver.move(left + wide / 2, top + high - 5)
+    driver.frames(1)
+    assert shown_cursor() == pygame.SYSTEM_CURSOR_ARROW
 
 
 def test_a_screenshot_is_what_is_in_the_window(driver: Driver, tmp_path: Path) -> None:
