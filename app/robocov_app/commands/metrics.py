@@ -38,7 +38,7 @@ def command(options: Arguments) -> None:
     from robocov.files.result_folder import extended
     from robocov.metrics.run_metrics import COLUMNS, run_metrics, time_near_final
     from robocov.record import nearest_moments
-    from robocov_app.figures.metrics import Measured
+    from robocov_app.figures.runs import Measured
     from robocov_app.runs.saved import load_saved
 
     measured, runs = [], load_saved(options.folder)
@@ -60,7 +60,7 @@ def command(options: Arguments) -> None:
             answers.append(about | figures)
     if options.plot is not None:
         from robocov_app.figures.files import save_figure
-        from robocov_app.figures.metrics import plot_metrics
+        from robocov_app.figures.runs import plot_metrics
 
         title = f"Metrics  ·  {options.folder.name}"
         save_figure(plot_metrics(measured, options.theme, title=title), options.plot)

@@ -1,16 +1,19 @@
-"""Publication plots: trajectories, cost curves and comparisons, as matplotlib figures (never pyplot's)."""
+"""Publication plots of maps and runs: trajectories, cost curves, comparisons, metrics; never pyplot's."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import compress
 from operator import not_
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.errors import ParameterError, counted, shown
+from robocov.metrics.run_metrics import RunMetrics
 from robocov.record import Record
 from robocov_app.figures.arena import draw_map, draw_run, label_of, map_handles, run_handles, ticks_in_metres
 from robocov_app.figures.curves import Curve, draw_curves, end_label
@@ -21,6 +24,8 @@ from robocov_app.render.layout import columns_for, united
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 
 _SCALE = 1.3  # of texts and lines on a page of the usual width: its legend stands beside the scale bar
+MOST_MAPS = 60  # maps on a sheet: more would be too small to be seen
+_WIDTH, _HIGHEST = 1600, 1600  # pixels of a sheet, across and at most down
 
 
 @plain_style()
@@ -223,3 +228,73 @@ def _cost(environment: Environment, mean_distance: float | None, mean_time: floa
     if mean_distance is None:
         return ""
     return cost_label(mean_label(environment), mean_distance, mean_time)
+
+
+@plain_style()
+def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -> Figure:
+    """Plot the first `MOST_MAPS` maps side by side at one scale, each under its name."""
+    theme = theme_named(theme)
+    drawn = environments[:MOST_MAPS]
+    title = f"{len(drawn)} of {len(environments)}" if len(drawn) < len(environments) else ""
+    bounds = np.array([environment.region.bounds for environment in drawn])
+    wide, high = (bounds[:, 2:] - bounds[:, :2]).max(axis=0).tolist()
+    handles = {str(each.get_label()): each for one in drawn for each in map_handles(one, theme)}
+    entries = [*handles.values()]
+    page = Page((_WIDTH, _HIGHEST), theme, 1.5)
+    above, top = 26 * page.scale, (46 if title else 8) * page.scale
+    columns = columns_for(len(drawn), wide / high, (1600, 1200), above)
+    slot = (_WIDTH - page.margin) / columns - page.margin
+    rows = -(-len(drawn) // columns)
+    tall = top + rows * (above + slot * high / wide + 14 * page.scale) + page.footer_height(entries)
+    page = Page((_WIDTH, int(np.clip(tall, 320, _HIGHEST))), theme, 1.5)
+    below = page.footer_height(entries)
+    panels = page.panels(len(drawn), columns, wide / high, 0.0, above, top, below)
+    for environment, (low_x, low_y, *_), (box, room) in zip(drawn, bounds.tolist(), panels, strict=True):
+        draw_map(page.map_axes(box, low_x, low_y, low_x + wide, low_y + high), environment, theme)
+        page.text(environment.name, box[0], box[1] - 12 * page.scale, bold=True, room=room)
+    first = panels[0][0]
+    if title:
+        y = first[1] - above - 18 * page.scale
+        page.text(title, first[0], y, points=HEADING, bold=True, room=page.room)
+    page.footer(entries, [box for box, _ in panels], first[2] / wide)
+    return page.figure
+
+
+class Measured(NamedTuple):
+    """A run and what was measured of it."""
+
+    label: str
+    controller: str
+    metrics: RunMetrics
+
+
+def share(area: Callable[[RunMetrics], Array]) -> Callable[[RunMetrics], Array]:
+    return lambda metrics: np.asarray(100.0 * area(metrics) / metrics.free_area)
+
+
+# label, unit and values of each panel
+PANELS: tuple[tuple[str, str, Callable[[RunMetrics], Array]], ...] = (
+    ("sensed, in line of sight (% of the free area)", "%", share(lambda each: each.sensed_area)),
+    ("in line of sight (% of the free area)", "%", share(lambda each: each.visible_area)),
+    ("work |F v| (J)", "J", lambda each: each.work),
+    ("way of a robot (m)", "m", lambda each: each.path_length),
+)
+
+
+@plain_style()
+def plot_metrics(runs: Sequence[Measured], theme: Theme | str, title: str) -> Figure:
+    """Plot the metrics of runs against time, each curve named with its value at the end."""
+    theme = theme_named(theme)
+    page = Page((1200, 800), theme)
+    s = page.scale
+    page.title(title, 26)
+    width, height = 600.0, 400.0 - 20 * s
+    for k, (label, unit, of) in enumerate(PANELS):
+        curves = [(each.label, each.controller, each.metrics.time, of(each.metrics)) for each in runs]
+        longest = max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
+        row, column = divmod(k, 2)
+        left, top = column * width + 44 * s, 40 * s + row * height + 36 * s
+        right = min(24 * s + longest, 0.5 * width)
+        axes = page.axes((left, top, width - 44 * s - right, height - 84 * s))
+        draw_curves(axes, curves, theme, label=label, unit=unit, weight=0.8)
+    return page.figure

@@ -14,8 +14,8 @@ from robocov.errors import counted
 from robocov.metrics.run_metrics import RunMetrics, run_metrics
 from robocov_app.figures import results as drawing
 from robocov_app.figures.curves import TIME
-from robocov_app.figures.metrics import share
 from robocov_app.figures.results import MOST_LEVELS, Band, Dependence, Pairs, Sample
+from robocov_app.figures.runs import share
 from robocov_app.figures.styles import CurveStyle, curve_styles
 from robocov_app.report import groups as grouped
 from robocov_app.report.groups import Comparison, Group, Scales, ratio_text, setting_label

@@ -208,10 +208,8 @@ def gathered(folder: Path) -> Result:
         return _of_sweep(folder)
     settle(folder)
     if not any((folder / name).is_file() for name in ("comparison.json", "run.json")):
-        raise InputError(
-            f"{folder}: not the folder of a run, a comparison or a sweep "
-            f"(there is no run.json, no comparison.json and no study.json)"
-        )
+        missing = "(there is no run.json, no comparison.json and no study.json)"
+        raise InputError(f"{folder}: not the folder of a run, a comparison or a sweep {missing}")
     return _of_runs(folder)
 
 

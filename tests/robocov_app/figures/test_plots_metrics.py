@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from robocov.metrics.run_metrics import RunMetrics
-from robocov_app.figures.metrics import PANELS, Measured, plot_metrics
+from robocov_app.figures.runs import PANELS, Measured, plot_metrics
 
 
 def measured(controller: str, seed: int) -> Measured:

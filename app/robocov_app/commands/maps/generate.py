@@ -106,7 +106,7 @@ def command(options: Arguments) -> None:
             update(number)
     if options.plot is not None:
         from robocov_app.figures.files import save_figure
-        from robocov_app.figures.map_sheet import plot_maps
+        from robocov_app.figures.runs import plot_maps
 
         save_figure(plot_maps(made, options.theme), options.plot)
     if out is not None:
