@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
+from matplotlib.ticker import LogLocator, NullLocator
 
 from robocov import __version__
 from robocov.arrays import Array
@@ -25,9 +25,9 @@ from robocov_app.report.tables import Table
 from robocov_app.report.theme_css import theme_rules
 
 AXES: Mapping[str, tuple[str, str, Callable[[Rating], float]]] = {
-    "path": ("way", "mean way of a robot (m)", lambda each: each.median("path_length_m")),
-    "computing": ("computing time", "µs for a robot-second", lambda each: 1e6 * each.rate("deciding_s")),
-    "told": ("bytes told", "bytes that a robot tells a second", lambda each: each.rate("told_bytes")),
+    "path": ("path length", "mean path length of a robot (m)", lambda each: each.median("path_length_m")),
+    "computing": ("computing time", "µs per robot and second", lambda each: 1e6 * each.rate("deciding_s")),
+    "told": ("bytes sent", "bytes a robot sends per second", lambda each: each.rate("told_bytes")),
 }
 """Quantities that the gap is plotted against: title, axis label, and the value of an entry."""
 WHOLE = "whole map"  # what those know that are no rivals
@@ -137,6 +137,7 @@ def pareto_figure(points: Sequence[Point], label: str) -> Figure:
     values = [point.x for point in points]
     if min(values) > 0.0 and max(values) > _SPAN * min(values):
         axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.set_yscale("symlog", linthresh=1.0)  # per cent
     for line in (axes.xaxis, axes.yaxis):
         line.set_major_formatter("{x:g}")

@@ -91,10 +91,10 @@ NOTES = (
     "maps), mean and worst; J_ref is the best placement known, no proven optimum, so gaps may be too small; "
     "in brackets the median above certified lower bounds, where all are known. "
     "To 5 %: from when on J stays within 5 % of its own end. ∫J / J_ref: the integral of J over the run by "
-    "the reference. Path: mean way of a robot.",
+    "the reference. Path: mean path length of a robot.",
     "Medians over runs, but: contacts are the runs in which a robot touched a wall or another one; at rest "
     "is the share of runs in which no robot gets 5 cm in any 4 s at the end; rest is the Kaplan-Meier median "
-    "of when that began, with runs that did not rest as censored. B/s: bytes that a robot tells a second, "
+    "of when that began, with runs that did not rest as censored. B/s: bytes a robot sends per second, "
     "heard or not: 20 for a position, 5 for each changed cell of a shared map. µs/s: processor time of "
     "the law for a robot and second; it is of the machine that ran it.",
 )

@@ -94,7 +94,7 @@ def test_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         == 2
     )
     text = Path(page).read_text()
-    assert "RAPF (k_rep 0.5)" in text and "Gap and way" in text and "<h2" in text
+    assert "RAPF (k_rep 0.5)" in text and "Gap and path length" in text and "<h2" in text
 
 
 def test_built_in_entries_are_whole() -> None:
