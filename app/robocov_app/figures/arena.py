@@ -114,9 +114,8 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     robots = [wreck_colour(theme) if failed[robot] else own[robot] for robot in there.tolist()]
     drawn = draw_robots(axes, last[there], record.team.radius[there], robots, theme, (there + 1).tolist())
     if record.steering is not None:
-        facing = {
-            robot: record.steering[-1, robot, 0] for robot in working[record.team.turns[working]].tolist()
-        }
+        turning = working[record.team.turns[working]].tolist()
+        facing = {robot: record.steering[-1, robot, 0] for robot in turning}
         _draw_noses(axes, last, facing, dict(zip(there.tolist(), drawn, strict=True)), theme)
     if has_goals(record):
         radius = np.array(drawn)[np.searchsorted(there, working)]
@@ -159,11 +158,10 @@ def _draw_noses(
     axes: Axes, places: Array, facing: Mapping[int, float], radii: Mapping[int, float], theme: Theme
 ) -> None:
     """Draw where robots face, rad, as triangles at discs of radii in points, both by row."""
+    inches = figure_of(axes).dpi_scale_trans
     for robot, heading in facing.items():
-        off = 1.25 * radii[robot] / 72.0  # inches
-        shift = ScaledTranslation(
-            off * np.cos(heading), off * np.sin(heading), figure_of(axes).dpi_scale_trans
-        )
+        off = 1.25 * radii[robot] / 72.0
+        shift = ScaledTranslation(off * np.cos(heading), off * np.sin(heading), inches)
         where: Any = {"transform": axes.transData + shift, "zorder": 6, "clip_on": False}
         marker = (3, 0, float(np.degrees(heading)) - 90.0)
         size = 0.9 * radii[robot]

@@ -27,7 +27,6 @@ from robocov_app.render.theme import LIGHT, Theme, border_colour, theme_named
 
 _FINE = 2  # dots of a map's picture for each pixel of the page
 _LEAST = 720, 400  # smallest page for curves and maps
-
 _BAR_LABEL = "distance to the nearest robot"
 
 
@@ -170,7 +169,7 @@ def _draw_all_curves(
     """Draw the mean distances, and if there are any the mean times: below, or beside them in a wide room."""
     s, (left, top, width, height) = page.scale, room
     across = bool(times) and width > 2.4 * height
-    drawn = [(curves, label, "m"), *([(times, TIME, "s")] if times else [])]
+    drawn = [(curves, label, "m"), *[(times, TIME, "s")] * bool(times)]
     for k, (some, words, unit) in enumerate(drawn):
         x, y, wide, high = left, top + k * height / len(drawn), width, height / len(drawn)
         if across:

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from robocov.arrays import Array
-from robocov_app.figures.page import TEXT, even_ticks, figure_of, quiet_axes, tone, value_limits
+from robocov_app.figures.page import TEXT, Tone, even_ticks, figure_of, quiet_axes, tone, value_limits
 from robocov_app.figures.styles import CurveStyle, styles_of
 from robocov_app.render.theme import Theme
 
@@ -71,9 +71,7 @@ def draw_curves(
     _draw_end_labels(axes, ends)
 
 
-def _draw_end_labels(
-    axes: Axes, ends: Sequence[tuple[float, float, tuple[float, float, float], str]]
-) -> None:
+def _draw_end_labels(axes: Axes, ends: Sequence[tuple[float, float, Tone, str]]) -> None:
     """Write the words of each end (x, y, colour, words) beside the axes, a line to what was moved."""
     dpi, box = figure_of(axes).dpi, axes.get_window_extent()
     point, line_height = dpi / 72 / box.width, 1.45 * TEXT * dpi / 72

@@ -18,9 +18,10 @@ from robocov_app.render.theme import Colour, Theme
 
 HEADING, TITLE, TEXT, SMALL = 14.0, 12.5, 9.5, 8.5  # text sizes in points
 Box: TypeAlias = tuple[float, float, float, float]  # left, top, width and height in pixels
+Tone: TypeAlias = tuple[float, float, float]  # a colour as matplotlib has it
 
 
-def tone(colour: Colour) -> tuple[float, float, float]:
+def tone(colour: Colour) -> Tone:
     red, green, blue = colour
     return red / 255, green / 255, blue / 255
 
@@ -88,10 +89,8 @@ class Page:
     """A figure laid out in pixels; texts and lines are `scale` times those at 100 dots an inch."""
 
     def __init__(self, size: tuple[int, int], theme: Theme, scale: float | None = None) -> None:
-        self.size = size
-        self.theme = theme
-        fitting = min(max(min(size[0] / 960, size[1] / 640), 0.8), 6.0)
-        self.scale = fitting if scale is None else scale
+        self.size, self.theme = size, theme
+        self.scale = min(max(min(size[0] / 960, size[1] / 640), 0.8), 6.0) if scale is None else scale
         self.margin = 18.0 * self.scale  # pixels that stay free at the edges
         self.room = size[0] - 2 * self.margin  # between the margins
         self._longest_bar = max(min(120 * self.scale, size[0] / 7), 20.0)
@@ -126,15 +125,13 @@ class Page:
         self, count: int, columns: int, aspect: float, words: float, above: float, top: float, below: float
     ) -> list[tuple[Box, float]]:
         """Return equal boxes, px, and how wide lines above each may be: `words` where there is room."""
-        rows = -(-count // columns)
-        gap = 14 * self.scale
+        rows, gap = -(-count // columns), 14 * self.scale
         widest = (self.size[0] - self.margin) / columns - self.margin
         highest = (self.size[1] - top - below + gap) / rows - above - gap
         width = min(widest, highest * aspect)
         height = width / aspect
-        slot = min(max(width, words), widest)
+        slot, block = min(max(width, words), widest), above + height + gap
         left = (self.size[0] - columns * slot - (columns - 1) * self.margin) / 2
-        block = above + height + gap
         top += max((self.size[1] - top - below + gap - rows * block) / 2, 0.0)
         boxes = []
         for number in range(count):
@@ -227,12 +224,7 @@ class Page:
 
     def _legend(self, handles: Sequence[Artist], columns: int, place: str, at: tuple[float, float]) -> Legend:
         """Draw a legend of which the `place`, as in "upper left", is `at` a pixel."""
-        style: Any = {
-            "frameon": False,
-            "fontsize": SMALL,
-            "labelcolor": tone(self.theme.ink),
-            "borderpad": 0.0,
-        }
-        style |= {"borderaxespad": 0.0, "columnspacing": 1.6, "handletextpad": 0.6, "handlelength": 1.6}
-        where: Any = {"loc": place, "bbox_to_anchor": self.at(*at)}
-        return self.figure.legend(handles=list(handles), ncols=columns, **where, **style)
+        style: Any = {"loc": place, "bbox_to_anchor": self.at(*at), "frameon": False, "fontsize": SMALL}
+        style |= {"labelcolor": tone(self.theme.ink), "borderpad": 0.0, "borderaxespad": 0.0}
+        style |= {"columnspacing": 1.6, "handletextpad": 0.6, "handlelength": 1.6}
+        return self.figure.legend(handles=list(handles), ncols=columns, **style)

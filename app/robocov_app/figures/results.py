@@ -22,6 +22,7 @@ from robocov_app.figures.page import (
     SMALL,
     TEXT,
     Page,
+    Tone,
     cut_to,
     even_ticks,
     figure_of,
@@ -247,9 +248,7 @@ def draw_box(axes: Axes, values: Array, place: float, style: CurveStyle, theme: 
         _draw_median(axes, float(middle), place, theme)
 
 
-def _draw_points(
-    axes: Axes, values: Array, place: float, colour: tuple[float, float, float], theme: Theme
-) -> None:
+def _draw_points(axes: Axes, values: Array, place: float, colour: Tone, theme: Theme) -> None:
     """Draw sorted values as points, up and down so that few hide each other."""
     if len(values) > MOST_POINTS:
         values = values[np.rint(np.linspace(0, len(values) - 1, MOST_POINTS)).astype(int)]
@@ -370,15 +369,13 @@ def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
         room = 0.07 * (high - low) if high > low else 0.5 * max(abs(high), 1.0)
         end = high + 3 * room if unlimited else high
         axes.set_xlim(low - room, end + room)
-    null = [end] if unlimited else []
     ticks = levels.tolist()
     if len(levels) > 8:
         locator = LogLocator(subs=(1.0, 3.0)) if logarithmic else MaxNLocator(6, steps=[1, 2, 5, 10])
         ticks = [float(value) for value in locator.tick_values(low, high) if low <= value <= high]
-    axes.xaxis.set_major_locator(FixedLocator([*ticks, *null]))
+    axes.xaxis.set_major_locator(FixedLocator(ticks + [end] * unlimited))
     axes.xaxis.set_minor_locator(NullLocator())
-    texts = [value_text(value, digits=4) for value in ticks]
-    axes.set_xticklabels([*texts, *("none" for _ in null)])
+    axes.set_xticklabels([value_text(value, digits=4) for value in ticks] + ["none"] * unlimited)
     return end if unlimited else None
 
 

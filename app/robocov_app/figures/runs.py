@@ -186,10 +186,8 @@ def _map_page(
     width = min(page.room, room_y * aspect)
     height = width / aspect
     box = (page.size[0] - width) / 2, above + (room_y - height) / 2, width, height
-    for text, up, points, bold, colour in (
-        (title, 38, TITLE, True, theme.ink),
-        (facts, 16, TEXT, False, theme.faint),
-    ):
+    lines = (title, 38, TITLE, True, theme.ink), (facts, 16, TEXT, False, theme.faint)
+    for text, up, points, bold, colour in lines:
         # above a narrow map lines may be wider than it
         wide = min(page.text_width(text, points=points, bold=bold), page.room)
         start = box[0] if wide <= width else max(box[0] + (width - wide) / 2, page.margin)

@@ -105,15 +105,14 @@ class Claim:
     least_maps: int = LEAST_MAPS  # on fewer maps it is undecided
 
     def judged(
-        self, criteria: Sequence[Criterion], explanation: str, on: Outcomes | GainOutcomes, runs: int
+        self, criteria: Iterable[Criterion], why: str, on: Outcomes | GainOutcomes, runs: int
     ) -> Claim:
         """Return the claim with what `runs` runs in each of some scenarios say of it."""
         runs, maps = runs * len(on.scenarios), len(set(on.maps))
-        return replace(self, criteria=tuple(criteria), explanation=explanation, runs=runs, maps=maps)
+        return replace(self, criteria=tuple(criteria), explanation=why, runs=runs, maps=maps)
 
     @property
     def verdict(self) -> Verdict:
-        """Overall verdict of the criteria; see the head of this module."""
         if self.maps < self.least_maps or not self.criteria:
             return "undecided"
         met = [criterion.met for criterion in self.criteria]
@@ -207,12 +206,10 @@ def paper_claims(
     )
 
 
-def _both(
-    measure: str, ours: Array, theirs: Array, maps: Sequence[str], bound: float
-) -> tuple[Criterion, ...]:
+def _both(measure: str, ours: Array, theirs: Array, maps: Sequence[str], bound: float) -> list[Criterion]:
     mine, others = (bootstrap(values, clusters=maps) for values in (ours, theirs))
     low = Criterion(f"RAPF: {measure}", mine, high=bound, unit="%")
-    return low, Criterion("RPF: the same", others, low=bound, unit="%")
+    return [low, Criterion("RPF: the same", others, low=bound, unit="%")]
 
 
 def pair_claim(
@@ -425,23 +422,19 @@ _GAPS = {
 
 
 def gap_to_reference(outcomes: Outcomes, law: str) -> Claim:
-    """Test how far {"rapf-shared", "rpf-shared", "lloyd"} stays above the centralised reference."""
     head = Claim(f"gap-{law.removesuffix('-shared')}", 6, *_GAPS[law])
     fine = outcomes.measured("gap", law)
     if not fine.scenarios:
         return head
     gap = fine.of(law, "gap")
     bound = {"low": FAR_FROM_OPTIMUM} if law == "rpf-shared" else {"high": NEAR_OPTIMUM}
-    found, measure = bootstrap(gap, clusters=fine.maps), f"{LABELS[law]}: median of J/J_ref - 1"
-    criterion = Criterion(measure, found, unit="%", **bound)
+    measure = f"{LABELS[law]}: median of J/J_ref - 1"
+    criterion = Criterion(measure, bootstrap(gap, clusters=fine.maps), unit="%", **bound)
     beaten = f", and was beaten in {amount((gap < 0).mean(), '%')} of the runs" if (gap < 0).any() else ""
     # bundled maps are larger, and harder
     drawn = np.array([name.startswith("generated-") for name in fine.maps], dtype=bool)
-    medians = [
-        f"on {name} maps {median_text(gap[chosen], '%')}"
-        for name, chosen in (("generated", drawn), ("bundled", ~drawn))
-        if chosen.any()
-    ]
+    kinds = ("generated", gap[drawn]), ("bundled", gap[~drawn])
+    medians = [f"on {kind} maps {median_text(own, '%')}" for kind, own in kinds if len(own)]
     explanation = (
         f"{half_text(gap)[:-1]}; the worst is {amount(gap.max(), '%')} above it "
         f"({fine.scenarios[int(np.argmax(gap))]}). Medians: {', '.join(medians)}. "
@@ -490,7 +483,6 @@ def half_text(gap: Array) -> str:
 
 
 def lost_text(pairs: Comparison, who: str) -> str:
-    """Return in words how many pairs the first does not win, and the highest ratio."""
     worst = int(np.argmax(pairs.ratios))
     ratio, where = amount(pairs.ratios[worst]), pairs.fine.scenarios[worst]
     lost = (pairs.ratios >= 1.0).sum()
@@ -605,9 +597,8 @@ def goals(
                 text = f"On no map {label}'s median is more than {above} above that of {other.label}."
                 mine, theirs = (pairs.fine.median_by_map(each, "final") for each in (key, other.key))
                 words = _highest_text({name: mine[name] / theirs[name] for name in mine}, NEVER_WORSE)
-                criterion = Criterion(
-                    f"highest ratio of a map's medians to {other.label}", worst_ratio(pairs), high=NEVER_WORSE
-                )
+                measure = f"highest ratio of a map's medians to {other.label}"
+                criterion = Criterion(measure, worst_ratio(pairs), high=NEVER_WORSE)
                 add(f"not-worse-{other.key}", text, criterion, words)
 
         touched, rest = fine.of(key, "contacts") > 0, np.isfinite(settled)
@@ -655,10 +646,8 @@ def highest_of_maps(statistic: Callable[[IntArray], Any], maps: Sequence[str]) -
 
 
 def worst_ratio(pairs: Comparison) -> Interval:
-    """Return the highest ratio, over the maps, of the medians of both."""
-    return highest_of_maps(
-        lambda rows: np.median(pairs.a[rows], axis=-1) / np.median(pairs.b[rows], axis=-1), pairs.fine.maps
-    )
+    a, b, maps = pairs.a, pairs.b, pairs.fine.maps
+    return highest_of_maps(lambda k: np.median(a[k], axis=-1) / np.median(b[k], axis=-1), maps)
 
 
 def _highest_text(values: Mapping[str, float], bound: float) -> str:
@@ -667,7 +656,6 @@ def _highest_text(values: Mapping[str, float], bound: float) -> str:
 
 
 def is_met(goal: Claim) -> bool:
-    """Return whether a goal is met by the measured value."""
     (criterion,) = goal.criteria
     return criterion.low <= criterion.interval.estimate <= criterion.high
 
@@ -694,7 +682,6 @@ def goal_counts(found: Sequence[Claim]) -> str:
 
 
 def unseen_claim(outcomes: Outcomes, ours: Contender, contenders: Sequence[Contender]) -> Claim | None:
-    """Return whether the first goals hold on maps that played no part in the development."""
     key, label = ours.key, ours.label
     fine = outcomes.measured("gap", key)
     if not fine.scenarios:

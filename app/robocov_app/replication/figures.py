@@ -65,9 +65,8 @@ def draw_figure(number: int, runs: Mapping[str, FigureRun], first: Record, theme
 def describe_figure(number: int, runs: Mapping[str, FigureRun], first: Record) -> str:
     if number == 1:
         places, environment = first.positions[0], first.environment
-        away = amount(
-            float(np.hypot(*(partition(places, environment.region).centroid - places).T).mean()), "m"
-        )
+        centroids = partition(places, environment.region).centroid
+        away = amount(float(np.hypot(*(centroids - places).T).mean()), "m")
         where = f"The robots stand anywhere in “{environment.name}”, on average {away}"
         return f"{where} from the centres of mass of their cells."
     ours, other = pair = _pair(runs, number)
@@ -124,21 +123,21 @@ def trajectories_figure(runs: Sequence[FigureRun], theme: Theme = LIGHT) -> Figu
     aiming = [record for record in records if arena.has_goals(record)]
     hidden = all((np.hypot(*(each.goals[-1] - each.positions[-1]).T) < HIDDEN).all() for each in aiming)
     finals = [f"mean distance {run.history.mean_distance[-1]:.3f} m" for run in runs]
-    unnamed = (CENTROID, GOAL) if hidden else ()
-    return side_by_side(records, [each.label for each in records], finals, theme, unnamed)
+    titles = [each.label for each in records]
+    return side_by_side(records, titles, finals, theme, (CENTROID, GOAL) if hidden else ())
 
 
 @plain_style()
 def side_by_side(
     records: Sequence[Record],
-    titles: Sequence[str],
-    finals: Sequence[str],
+    titles: Iterable[str],
+    finals: Iterable[str],
     theme: Theme,
-    unnamed: Sequence[str] = (),
+    out: Iterable[str] = (),
 ) -> Figure:
-    """Draw runs on one map side by side, titles and final costs above; the legend leaves `unnamed` out."""
+    """Draw runs on one map side by side, titles and final costs above; the legend leaves `out` some words."""
     handles = united((arena.run_handles(record, theme, "paper") for record in records), arena.label_of)
-    handles = [handle for handle in handles if arena.label_of(handle) not in unnamed]
+    handles = [handle for handle in handles if arena.label_of(handle) not in out]
     page, places = panels(records[0].environment, len(records), WIDE, handles, theme, above=30.0)
     each = zip("abcdef", records, titles, finals, places, strict=False)
     for letter, record, title, final, axes in each:
@@ -222,11 +221,10 @@ def paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
         for gains in ("shared", "best"):
             pairs = claims.compared(f"rapf-{gains}", other.format(gains), measure)
             nonconvex.append((f"{label}, {when}, {gains} gains", pairs, "rapf"))
-    kinds = list(dict.fromkeys(claims.starts))
-    by_start = [
-        (LABELS[law], _samples((f"start {start}", claims.from_starts(start), law) for start in kinds))
-        for law in ("rapf-shared", "rpf-shared")
-    ]
+    by_start = []
+    for law in ("rapf-shared", "rpf-shared"):
+        own = ((f"start {start}", claims.from_starts(start), law) for start in dict.fromkeys(claims.starts))
+        by_start.append((LABELS[law], _samples(own)))
     gaps = [("", _samples((label, claims, law) for law, label in LABELS.items()))]
     known = all(grid.complete.scenarios for grid in results.gains.values())
     against = "RAPF by the other law, pair by pair (1: equal)"
@@ -330,7 +328,6 @@ def plot_degradations(found: Sequence[Degradation], theme: Theme | str = LIGHT) 
     """Plot final costs, one at least, by those of the runs without the disturbance: a panel for each axis."""
     theme = theme_named(theme)
     names = list(dict.fromkeys(each.axis for each in found))
-    styles = curve_styles(each.controller for each in found)
     quiet = mix(theme.background, theme.ink, 0.7)
     columns = min(3, len(names))
     width, height = (_SIZE[0] - 40) / columns, (_SIZE[1] - 110) / -(-len(names) // columns)
@@ -346,7 +343,7 @@ def plot_degradations(found: Sequence[Degradation], theme: Theme | str = LIGHT) 
         box = (20 + column * width + 44, 74 + row * height + 26, width - 60, height - 84)
         axes = page.axes(box)
         axes.set_ylim(bottom - room, top + room)
-        _panel(axes, name, [each for each in found if each.axis == name], styles, theme)
+        _panel(axes, name, [each for each in found if each.axis == name], theme)
     handles, labels = page.figure.axes[0].get_legend_handles_labels()
     place: Any = {"loc": "center right", "bbox_to_anchor": page.at(_SIZE[0] - page.margin, 26)}
     look: Any = {"frameon": False, "fontsize": SMALL, "labelcolor": tone(theme.ink)}
@@ -357,10 +354,9 @@ def plot_degradations(found: Sequence[Degradation], theme: Theme | str = LIGHT) 
     return page.figure
 
 
-def _panel(
-    axes: Axes, name: str, part: Sequence[Degradation], styles: Mapping[str, CurveStyle], theme: Theme
-) -> None:
+def _panel(axes: Axes, name: str, part: Sequence[Degradation], theme: Theme) -> None:
     values = list(dict.fromkeys(each.value for each in part))
+    styles = curve_styles(each.controller for each in part)
     axes.axhline(1.0, color=tone(mix(theme.background, theme.ink, 0.35)), linewidth=1.0, zorder=1)
     for k, (controller, style) in enumerate(styles.items()):
         rows = [each for each in part if each.controller == controller]

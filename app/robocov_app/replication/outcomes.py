@@ -22,7 +22,7 @@ from robocov.metrics import CostHistory
 from robocov.metrics.results import read_results
 from robocov_app.figures.statistics import Interval, bootstrap, share
 from robocov_app.replication.plan import ROBOTS
-from robocov_app.replication.references import Reference
+from robocov_app.replication.references import References
 from robocov_app.replication.studies import Contest
 from robocov_app.sweep.study import Study
 
@@ -81,7 +81,6 @@ class Outcomes:
         return Outcomes(tuple(compress(self.scenarios, chosen)), kept, self.sides)
 
     def measured(self, measure: str, *contenders: str) -> Outcomes:
-        """Return the scenarios in which all of these contenders have a finite value."""
         return self.where(np.all([np.isfinite(self.of(each, measure)) for each in contenders], axis=0))
 
     def from_starts(self, *starts: str) -> Outcomes:
@@ -178,11 +177,9 @@ class GainOutcomes:
         return int(np.argmin(excess[:, np.isfinite(excess).all(axis=0)].mean(axis=1)))
 
     def levels(self, gain: str) -> list[float]:
-        """Return the different values of a gain, ascending."""
         return sorted({float(gains[gain] or 0.0) for gains in self.gains if gain in gains})
 
     def with_gain(self, name: str, value: float) -> GainOutcomes:
-        """Return the part of the grid in which one gain has this value."""
         chosen = [gains.get(name) == value for gains in self.gains]
         return GainOutcomes(self.scenarios, tuple(compress(self.gains, chosen)), self.excess[chosen])
 
@@ -191,7 +188,7 @@ def best_gains(found: Mapping[str, GainOutcomes]) -> dict[str, Mapping[str, Valu
     return {name: grid.gains[grid.best()] for name, grid in found.items() if grid.complete.scenarios}
 
 
-def read_outcomes(folder: Path, contest: Contest, references: Mapping[str, Reference]) -> Outcomes:
+def read_outcomes(folder: Path, contest: Contest, references: References) -> Outcomes:
     """Return what the contenders of a sweep reached; without a reference there is no gap on a map."""
     results, scenarios = read_results(folder), scenarios_of(contest.study)
     laws = {each.key: _law(each.controller, each.all_gains) for each in contest.contenders}
@@ -214,9 +211,7 @@ def read_outcomes(folder: Path, contest: Contest, references: Mapping[str, Refer
     return Outcomes(scenarios, values, sides)
 
 
-def read_gain_outcomes(
-    folder: Path, study: Study, references: Mapping[str, Reference]
-) -> dict[str, GainOutcomes]:
+def read_gain_outcomes(folder: Path, study: Study, references: References) -> dict[str, GainOutcomes]:
     scenarios = scenarios_of(study)
     choices = {name: study.gains_of(name).choices for name in study.controllers}
     excess = {name: np.full((len(sets), len(scenarios)), np.nan) for name, sets in choices.items()}
@@ -254,7 +249,6 @@ def matched_distance(first: Array, second: Array) -> float:
 
 
 def _rows(folder: Path, scenarios: Iterable[Scenario]) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the rows of a table that did not fail, each with the number of its scenario."""
     place = {scenario: k for k, scenario in enumerate(scenarios)}
     for batch in read_results(folder).batches():
         for row in batch.to_pylist():

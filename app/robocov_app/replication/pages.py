@@ -39,11 +39,8 @@ from robocov_app.terminal.progress import progress
 PAGE, BEYOND_PAGE, CLAIMS = "index.html", "beyond.html", "claims.json"
 
 _REPLAY_BUDGET = 400_000  # bytes of the runs in the page's replay
-
 _CASES = {"convex": "Figure 2", "a": "Figure 4", "b": "Figure 6", "other": "Figure 8"}  # which shows what
-
 _TICKS = (0.0, 0.01, 0.03, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0)  # of the axis of gaps
-
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|m|s|m²|m³|N)(?![\w³²]))")
 
 
@@ -72,13 +69,10 @@ def save_paper_figures(
     """Write the paper's figures to ``figures/``, and the plots of the claims, without `results` none."""
 
     def drawn(theme: str) -> figures.Plots:
-        own = {
-            f"figure-{number}": partial(figures.draw_figure, number, runs, first, theme)
-            for number in figures.FIGURES
-        }
+        own = {f"figure-{k}": partial(figures.draw_figure, k, runs, first, theme) for k in figures.FIGURES}
         return own if results is None else {**own, **figures.paper_plots(results, theme)}
 
-    seen = {f"figure-{number}": figures.describe_figure(number, runs, first) for number in figures.FIGURES}
+    seen = {f"figure-{k}": figures.describe_figure(k, runs, first) for k in figures.FIGURES}
     return _save_figures(folder, drawn, seen, quiet=quiet)
 
 
@@ -159,9 +153,7 @@ def paper_page(
 def beyond_page(images: Mapping[str, Image], results: BeyondResults) -> str:
     found, rows = claims.beyond_claims(results), evidence.ranked_rows(results)
     each, tuned = evidence.evidence(results, rows), bool(results.plan.beyond.tuning)
-    goal_claims, rival_claims = (
-        [claim for claim in found if claim.part == part] for part in (claims.GOALS, claims.RIVALS)
-    )
+    goal_claims = [claim for claim in found if claim.part == claims.GOALS]
     beside = ("rapf-best", "rapf-default", "lloyd")
     others = {law.key: law.label for law in results.contenders if law.key in beside}
     context: dict[str, Any] = {
@@ -170,7 +162,7 @@ def beyond_page(images: Mapping[str, Image], results: BeyondResults) -> str:
         "goals": [claim for claim in goal_claims if claim.key != "goal-unseen"],
         "unseen": next((claim for claim in found if claim.key == "goal-unseen"), None),
         "goal_claims": goal_claims,
-        "rival_claims": rival_claims,
+        "rival_claims": [claim for claim in found if claim.part == claims.RIVALS],
         "rows": rows,
         "controllers": [(one, _strips(one, each)) for one in each],
         "failures": _failures(results.worst, results.outcomes, OURS[0], others),
@@ -224,7 +216,6 @@ def span(numbers: Sequence[int]) -> str:
 
 
 def _unbroken(value: Any) -> Any:
-    """Return a text in which no line breaks between a number and its unit."""
     return _UNIT.sub("\N{NO-BREAK SPACE}", value) if type(value) is str else value
 
 
@@ -232,7 +223,7 @@ def _strips(one: Evidence, each: Sequence[Evidence]) -> Markup:
     """Return the medians map by map of a controller above those of ours, or of ours above RAPF's."""
     highest = max((max(other.maps.values()) for other in each if other.maps), default=0.0)
     beside = "rapf" if one.account.controller == OURS[0] else OURS[0]
-    rows = [one, *(other for other in each if other.account.controller == beside and other is not one)]
+    rows = [one, *(other for other in each if other.account.controller == beside)]
     parts = [Strip(row.rows[0].contender.label, row.account.controller in OURS, row.maps) for row in rows]
     return strips(parts, highest)
 
@@ -292,8 +283,7 @@ def strips(rows: Sequence[Strip], highest: float) -> Markup:
         return round(left + min(max(part, 0.0), 1.0) * (wide - left - right), 1)
 
     bottom = tall * len(rows) + 22.0
-    parts, words = [], []
-    last = -math.inf
+    parts, words, last = [], [], -math.inf
     for tick in _TICKS:
         x = at(tick)
         if tick <= highest and x - last >= 36.0:

@@ -40,7 +40,6 @@ class StepTimes:
     seconds: Mapping[str, tuple[float, ...]]
 
     def ratio_interval(self, controller: str) -> Interval:
-        """Return the median time by RAPF's in the same turn."""
         own, yardstick = self.seconds.get(controller), self.seconds.get(YARDSTICK)
         return bootstrap(np.array(own) / np.array(yardstick)) if own and yardstick else UNKNOWN
 
@@ -109,7 +108,6 @@ def _timed(
 
 
 def _kept(path: Path) -> dict[str, Any]:
-    """Return what a file holds, nothing where there is none that can be read."""
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         content = json.loads(path.read_bytes())
         if content["format"] == _HEAD["format"]:

@@ -204,13 +204,11 @@ def gains_study(plan: Plan) -> Study:
 
 
 def convex_contest(plan: Plan, contenders: Sequence[Contender]) -> Contest:
-    """Return all but RPF in convex regions."""
     part = [each for each in contenders if each.controller != "rpf"]
     return contest(plan, convex_maps(plan), part, CONVEX_KINDS, plan.convex_seeds)
 
 
 def claims_contest(plan: Plan, contenders: Sequence[Contender]) -> Contest:
-    """Return all of the paper's contenders on non-convex maps."""
     return contest(plan, claim_maps(plan), contenders, KINDS, plan.seeds)
 
 
@@ -223,31 +221,26 @@ def baseline_gains_study(plan: Plan) -> Study | None:
     return contest(plan, on, sets, plan.tuning_starts, (plan.tuning_seed,)).study
 
 
-def beyond_contests(
-    plan: Plan, best: Mapping[str, Mapping[str, Value]], papers: Sequence[Contender]
-) -> dict[str, Contest]:
+def beyond_contests(plan: Plan, best: laws.BestGains, papers: Sequence[Contender]) -> dict[str, Contest]:
     """Return the sweeps of contenders beyond the paper, but for that of the baselines' gains.
 
     Baselines have their `best` gains or their defaults; beside ours on unseen maps are the paper's strongest.
     """
     beyond, starts, on = plan.beyond, plan.beyond.map_starts, generated_maps(plan.beyond.maps)
+    sides = {"rivals": laws.baselines(best)} | {f"ours-{each.key}": (each,) for each in laws.OWN}
     found = {
         name: contest(plan, baseline_maps(plan), part, beyond.starts, beyond.seeds_of(part[0].controller))
-        for name, part in (
-            {"rivals": laws.baselines(best)} | {f"ours-{each.key}": (each,) for each in laws.OWN}
-        ).items()
+        for name, part in sides.items()
     }
     if beyond.unseen:
-        sides = laws.OWN[0], *laws.strongest(papers)
-        found["unseen"] = contest(plan, generated_maps(beyond.unseen), sides, beyond.starts, beyond.seeds)
+        three = laws.OWN[0], *laws.strongest(papers)
+        found["unseen"] = contest(plan, generated_maps(beyond.unseen), three, beyond.starts, beyond.seeds)
     found["targets"] = contest(plan, on, laws.TARGETS, starts, (0,))
-    known = load_map(DENSITY_MAP)
-    for suffix, weighed, shown in (
-        ("", density_maps(plan), known),
-        ("-ignored", on, replace(known, density=None)),
-    ):
-        found[f"density{suffix}"] = contest(plan, weighed, (laws.RAPF_DEFAULT,), starts, (0,))
-        picture = (StudyMap(DENSITY_MAP, shown),), (laws.RAPF_DEFAULT,), (DENSITY_START,), (0,)
+    known, rapf = load_map(DENSITY_MAP), (laws.RAPF_DEFAULT,)
+    both = ("", density_maps(plan), known), ("-ignored", on, replace(known, density=None))
+    for suffix, weighed, shown in both:
+        found[f"density{suffix}"] = contest(plan, weighed, rapf, starts, (0,))
+        picture = (StudyMap(DENSITY_MAP, shown),), rapf, (DENSITY_START,), (0,)
         found[f"density-picture{suffix}"] = contest(plan, *picture, record_hz=5.0)
     return found | {"teams": contest(plan, on, laws.TEAMS, starts, (0,), group=GROUPS)}
 
@@ -259,7 +252,6 @@ def axes_of_disturbances(plan: Plan) -> dict[str, tuple[float | None, ...]]:
 
 
 def conditions_studies(plan: Plan) -> dict[str, Study]:
-    """Return the sweep of the ideal runs, and one for each axis of disturbances."""
     common: dict[str, Any] = {
         "maps": tuple(StudyMap(name, load_map(name)) for name in plan.beyond.conditions_maps),
         "controllers": DISTURBED,

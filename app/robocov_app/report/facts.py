@@ -104,7 +104,6 @@ def gaps(result: Result) -> list[str]:
 
 
 def _firsts(texts: Sequence[str]) -> str:
-    """Return the first three different texts as a sentence, and how many more there are."""
     different = list(dict.fromkeys(texts))
     more = f"; and {len(different) - 3} more" if len(different) > 3 else ""
     return f"{'; '.join(different[:3])}{more}."
@@ -124,7 +123,6 @@ def troubles(result: Result) -> list[str]:
 
 
 def run_title(result: Result, entry: Entry, label: str) -> str:
-    """Return what a run is called in lists: what tells it from the others, and its controller."""
     parts = [label]
     if len({each.setting for each in result.entries}) > 1 or result.kind == "run":
         parts.append(setting_label(result, entry.setting))

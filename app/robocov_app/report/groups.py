@@ -96,7 +96,6 @@ def by_controller(result: Result) -> list[Group]:
 
 
 def shown_groups(result: Result) -> list[Group]:
-    """Return the groups that plots show: `variants`, or `by_controller` where these are too many."""
     apart = variants(result)
     return apart if len(apart) <= MOST_GROUPS else by_controller(result)
 
@@ -344,7 +343,6 @@ def chosen(result: Result, most: int = MOST_RUNS, panes: int = 4) -> Choice:
 
 
 def _telling(result: Result, entries: Sequence[Entry]) -> set[Entry]:
-    """Return best and worst runs, and those of a middle case."""
     scales = medians(result)
     known = (entry for entry in entries if np.isfinite(scaled(entry, scales)))
     found = set(_middle_case(_best_variants(result, entries), scales))

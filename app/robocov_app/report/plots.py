@@ -13,7 +13,7 @@ from robocov.controllers.gains import Value, value_text
 from robocov.errors import counted
 from robocov.metrics.run_metrics import RunMetrics, run_metrics
 from robocov_app.figures import results as drawing
-from robocov_app.figures.curves import TIME
+from robocov_app.figures.curves import DISTANCE, TIME
 from robocov_app.figures.results import MOST_LEVELS, Band, Dependence, Pairs, Sample
 from robocov_app.figures.runs import share
 from robocov_app.figures.styles import CurveStyle, curve_styles
@@ -27,13 +27,12 @@ from robocov_app.sweep.study import UNITS, WORDS
 
 Looks: TypeAlias = Mapping[str, CurveStyle]  # the styles of a result's groups by label (`groups.styles`)
 
+TOGETHER = "All maps and teams together"
+METRES, RELATIVE = "final mean distance (m)", "final distance / median of map and team"
 MOST_PANELS = 24  # settings up to which each has panels of its own
 PANEL = 420, 290  # of a panel in pixels; on a telephone it is shown a little smaller
 WIDE = 860, 360  # of a plot that stands alone, on a screen that is wide enough
 _MOMENTS = 121  # moments of a cost curve: one every three pixels
-TOGETHER = "All maps and teams together"
-METRES = "final mean distance (m)"
-RELATIVE = "final distance / median of map and team"
 
 
 class Plot(NamedTuple):
@@ -65,8 +64,7 @@ def cost_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
         for entry, each in known.items()
     }
     for title, own, groups, several in _parts(result, key):
-        bands, words = [], []
-        what, unit = "mean distance to the nearest robot (m)", "m"
+        bands, words, what, unit = [], [], DISTANCE, " m"
         if several:
             what, unit = "mean distance / that of the start", ""
         for group in groups:
@@ -77,7 +75,7 @@ def cost_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
                 continue
             bands.append(Band(group.label, looks[group.label], time, np.array(rows)))
             low, middle, high = (row[np.isfinite(row)][-1] for row in drawing.quartiles(bands[-1].values))
-            text = f"{group.label}: {middle:.3f} {unit}".rstrip()
+            text = f"{group.label}: {middle:.3f}{unit}"
             if len(rows) > 1:
                 text += f" at the end (median of {len(rows)} runs, quartiles {low:.3f} to {high:.3f})"
             words.append(text)
@@ -169,7 +167,7 @@ def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
     styles = curve_styles(group.controller for group in groups)
 
     def scale(label: str, part_of: Callable[[Entry], object]) -> tuple[str, Scales]:
-        """Return the axis' label and scales by the medians of parts; of one part metres."""
+        # by the medians of parts; of one part in metres
         if len({part_of(entry) for entry in result.fine}) == 1:
             return METRES, dict.fromkeys(result.fine, 1.0)
         return label, grouped.medians(result, part_of)
@@ -203,13 +201,12 @@ def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
     for k, parameter in enumerate(team):
         if len({parameter.value_of(entry) for entry in result.fine}) > 1:
             yield from plotted(parameter, groups, *by_map, f"{key}-team-{k}")
-    count = 0
+    count = 1
     for group in groups:
         own = [name for name, controllers in varying.items() if group.controller in controllers]
         for names in combinations(own, 2):
             both, style = [gains[name] for name in names], styles[group.controller]
-            plot = _grid_plot(group, names, both, *by_setting, style, f"{key}-grid-{count + 1}")
-            if plot is not None:
+            if plot := _grid_plot(group, names, both, *by_setting, style, f"{key}-grid-{count}"):
                 count += 1
                 yield plot
 
@@ -226,9 +223,10 @@ def _levels_text(row: Dependence, parameter: _Parameter) -> str:
         best = parameter.text(row.gains[int(np.argmin(row.values))])
         return f"{row.label}, {len(row.values)} runs {span}, the lowest value at {best}"
     places = np.nan_to_num(row.gains, nan=np.inf)
-    medians = [np.median(row.values[places == level]) for level in np.nan_to_num(levels, nan=np.inf)]
-    each = zip(levels.tolist(), medians, strict=True)
-    parts = [f"{parameter.text(level)}: {median:.3f}" for level, median in each]
+    parts = [
+        f"{parameter.text(level)}: {np.median(row.values[places == np.nan_to_num(level, nan=np.inf)]):.3f}"
+        for level in levels.tolist()
+    ]
     return f"{row.label}, medians at {', '.join(parts)}"
 
 
@@ -263,8 +261,7 @@ def _grid_plot(
     return Plot(title, inline_svg(figure, key, f"{title}: medians of the {what}, {span}."))
 
 
-MOST_MEASURED = 4  # runs up to which they are measured: what is in sight takes a while to know
-MOST_ROBOTS = 60  # robots up to which they are
+MOST_MEASURED, MOST_ROBOTS = 4, 60  # runs, robots up to which they are measured: sight takes a while to know
 _MEASURED = 30  # moments of a run, besides its first
 
 
