@@ -48,8 +48,8 @@ def draw_curves(
     lines = [np.asarray(curve[3]) for curve in curves] + [edge for band in around if band for edge in band]
     shown = np.concatenate([line[np.isfinite(line)] for line in lines])
     times = np.concatenate([np.asarray(curve[2]) for curve in curves])
-    axes.set_ylim(*value_limits(float(shown.min()), float(shown.max())))
-    axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-9))
+    begin, end = float(times.min()), float(times.max())
+    axes.set(xlim=(begin, max(end, begin + 1e-9)), ylim=value_limits(float(shown.min()), float(shown.max())))
     even_ticks(axes.xaxis, 8)
     even_ticks(axes.yaxis, 6)
     quiet_axes(axes, theme, "time (s)", label, grid="y")

@@ -31,7 +31,6 @@ def figure_of(axes: Axes) -> Figure:
 
 
 def check_some(what: str, items: Sequence[object]) -> None:
-    """Raise ParameterError where there is nothing to plot."""
     if not items:
         raise ParameterError(f"{what}: none were given, but at least one was wanted")
 
@@ -171,7 +170,6 @@ class Page:
         return float(artist.get_window_extent(self.figure.canvas.get_renderer()).width)  # type: ignore[attr-defined]
 
     def footer_height(self, handles: Sequence[Artist], begin: float | None = None) -> float:
-        """Return how much room `footer` needs below what is plotted, in pixels."""
         begin = self.margin if begin is None else begin
         columns, width, height = self._legend_extent(handles, begin)
         if columns == len(handles) and width <= self._beside_bar(begin):

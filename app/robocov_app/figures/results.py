@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullLocator
 
 from robocov.arrays import Array
 from robocov.controllers.gains import Value, value_text
@@ -211,13 +211,12 @@ def ratio_limits(axes: Axes, ratios: Array, theme: Theme) -> None:
     """Give a logarithmic axis around 1 room for all ratios, and mark 1."""
     low, high = min(float(ratios.min()), 0.95), max(float(ratios.max()), 1.05)
     room = (high / low) ** 0.05
-    axes.set_xscale("log")
-    axes.set_xlim(low / room, high * room)
+    axes.set(xscale="log", xlim=(low / room, high * room))
     fitting = [ratio for ratio in _RATIOS if low / room <= ratio <= high * room]
     fitting += [10.0**k for k in range(1, 7) if 10.0**k <= high * room]
     axes.xaxis.set_major_locator(FixedLocator(_thinned(fitting, np.log(high / low) / 7)))
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_major_formatter("{x:g}")
     axes.axvline(1.0, color=tone(theme.ink), linewidth=1.0, zorder=2)
 
 
@@ -237,8 +236,7 @@ def draw_box(axes: Axes, values: Array, place: float, style: CurveStyle, theme: 
     low, middle, high = np.percentile(values, [25, 50, 75])
     if len(values) >= FEW:
         reach = 1.5 * (high - low)
-        begin = values[values >= low - reach].min()
-        end = values[values <= high + reach].max()
+        begin, end = values[values >= low - reach].min(), values[values <= high + reach].max()
         line: Any = {"color": colour, "linewidth": 1.4, "solid_capstyle": "butt", "zorder": 3}
         axes.plot([begin, low], [place, place], **line)
         axes.plot([high, end], [place, place], **line)
@@ -329,14 +327,12 @@ def plot_gain_grid(
         part = (values[row, column] - low) / (high - low) if high > low else 0.0
         colour = tone(colours[round(part * (len(colours) - 1))])
         # a hair's breadth of the page between cells
-        box = (column - 0.48, row - 0.48), 0.96, 0.96
-        axes.add_patch(Rectangle(*box, facecolor=colour, linewidth=0.0))
+        axes.add_patch(Rectangle((column - 0.48, row - 0.48), 0.96, 0.96, facecolor=colour, linewidth=0.0))
         weight = "bold" if values[row, column] == low else "normal"
         text = f"{values[row, column]:.{decimals}f}"
         style: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": tone(theme.ink)}
         axes.text(column, row, text, fontweight=weight, **style)
-    axes.set_xlim(-0.5, len(first) - 0.5)
-    axes.set_ylim(-0.5, len(second) - 0.5)
+    axes.set(xlim=(-0.5, len(first) - 0.5), ylim=(-0.5, len(second) - 0.5))
     axes.set_xticks(range(len(first)), [value_text(value, digits=4) for value in first])
     axes.set_yticks(range(len(second)), [value_text(value, digits=4) for value in second])
     x, y = (cut_to(gain, len, MOST_LETTERS) for gain in gains)

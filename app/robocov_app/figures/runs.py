@@ -66,10 +66,10 @@ def plot_trajectories(
         raise ParameterError(f"colours: {shown(colours)}, but 'paper' or 'robots' was wanted")
     theme = theme_named(theme)
     if axes is None:
-        facts = [_cost(record.environment, mean_distance, mean_time), _time(record), _robots(record)]
+        facts = _line(*_facts(record, mean_distance, mean_time))
         title = _line(record.label, record.environment.name)
         handles = run_handles(record, theme, colours)
-        axes = _map_page(record.environment, theme, size, title, _line(*facts), handles)
+        axes = _map_page(record.environment, theme, size, title, facts, handles)
     else:
         ticks_in_metres(axes, record.environment, theme)
     draw_run(axes, record, theme, colours)
@@ -201,12 +201,13 @@ def _captions(
     records: Sequence[Record], costs: Sequence[float | None], times: Sequence[float | None]
 ) -> tuple[str, list[str]]:
     """Return what is true of all runs, for the page's title, and of each, what is not."""
-    every = [(each.environment.name, _robots(each), _time(each)) for each in records]
-    shared = [len(set(found)) == 1 for found in zip(*every, strict=True)]
-    own = [
-        _line(_cost(each.environment, *known), *compress(facts, map(not_, shared)))
-        for each, facts, *known in zip(records, every, costs, times, strict=True)
+    known = [_facts(*each) for each in zip(records, costs, times, strict=True)]
+    every = [
+        (each.environment.name, robots, time) for each, (_, time, robots) in zip(records, known, strict=True)
     ]
+    shared = [len(set(found)) == 1 for found in zip(*every, strict=True)]
+    unlike = [tuple(compress(facts, map(not_, shared))) for facts in every]
+    own = [_line(cost, *facts) for (cost, _, _), facts in zip(known, unlike, strict=True)]
     return _line(*compress(every[0], shared)), own
 
 
@@ -214,18 +215,12 @@ def _line(*facts: str) -> str:
     return "  ·  ".join(fact for fact in facts if fact)
 
 
-def _robots(record: Record) -> str:
-    return counted(len(record.team), "robot")
-
-
-def _time(record: Record) -> str:
-    return f"t = {record.time[-1]:.1f} s"
-
-
-def _cost(environment: Environment, mean_distance: float | None, mean_time: float | None) -> str:
-    if mean_distance is None:
-        return ""
-    return cost_label(mean_label(environment), mean_distance, mean_time)
+def _facts(record: Record, mean_distance: float | None, mean_time: float | None) -> tuple[str, str, str]:
+    """Return the cost (empty where it is not known), the time, and the number of robots in words."""
+    cost = (
+        "" if mean_distance is None else cost_label(mean_label(record.environment), mean_distance, mean_time)
+    )
+    return cost, f"t = {record.time[-1]:.1f} s", counted(len(record.team), "robot")
 
 
 @plain_style()
@@ -281,7 +276,6 @@ PANELS: tuple[tuple[str, str, Callable[[RunMetrics], Array]], ...] = (
 
 @plain_style()
 def plot_metrics(runs: Sequence[Measured], theme: Theme | str, title: str) -> Figure:
-    """Plot the metrics of runs against time, each curve named with its value at the end."""
     theme = theme_named(theme)
     page = Page((1200, 800), theme)
     s = page.scale

@@ -4,11 +4,6 @@ A claim has one or several *criteria*: an estimate, its 95 % interval, and the r
 lie. A criterion is met where the whole interval lies in that range, refuted where all of it lies outside,
 and open where it reaches over an end of the range.
 
-    all criteria met                              the claim holds
-    some met                                      it holds partly
-    none met, at least one refuted                it does not hold
-    all open, or too few maps to tell             undecided
-
 All thresholds stand here, with their reasons; they were set before the study was run, those of the goals of
 our own controller before it was written, and are the same for every run. A goal speaks of the runs that there
 are: it is met or missed by the measured value, and its verdict as a claim says whether other maps might have
@@ -47,6 +42,37 @@ VERDICTS: dict[Verdict, tuple[str, str]] = {
     "does not hold": ("does not hold", "do not hold"),
     "undecided": ("is undecided", "are undecided"),
 }
+
+SAME_COST = 0.02  # two costs are the same when the median of their ratio is within 2 % of 1
+NEARLY_SAME = 0.05  # in single runs two costs are nearly the same when they differ by at most 5 %
+NEARLY_ALWAYS = 0.9  # the share of runs that "the result is" speaks of, where the paper makes no exceptions
+CLEARLY_BELOW = 0.95  # a law is better than another when the median ratio of their costs is below this
+BARELY = 0.05  # a result barely depends on the gains: its standard deviation is below 5 % of its mean
+REGRET = 0.02  # the best gains depend on the environment when those of other maps cost more than 2 % on it
+# a result barely depends on the starts: its standard deviation over them is below 10 % of its mean; starts
+# matter more than gains do in any law that descends to a local optimum, so the bound is wider
+BARELY_BY_START = 0.1
+# two placements are nearly the same when robots are less than a quarter of the side of their share apart
+SAME_PLACEMENT = 0.25
+# a team is near the reference within 10 % of its cost, and far from it above 25 %
+NEAR_OPTIMUM, FAR_FROM_OPTIMUM = 0.1, 0.25
+CLUSTERED = CONVEX_KINDS[:-1]  # starts in convex regions in which the robots are close together
+GOALS, RIVALS, EXTENSIONS = 7, 8, 9  # questions beyond the paper; its own are 1 to 6
+
+# The goals of our own controller. Its gains were tuned on other generated maps, but what it reached on those
+# of the study was looked at while its rules were made; `unseen_claim` is on maps on which nobody did.
+LEAST_GAP = 0.014  # the median of J/J_ref - 1, at most; RAPF at its best gains had about 5 % at that time
+MAP_GAP = 0.03  # the median on every single map, at most
+NEVER_WORSE = 1.01  # its median on a map by that of RAPF or LA on the same map, at most
+AT_REST = 0.97  # the share of its runs that come to rest
+RARELY = 0.1  # the share of runs with a contact, at most: that of no run is shown by no number of them
+REST_TIME = 40.0  # s, the median time after which they do
+STEP_RATIO = 10.0  # the time of a step of a large team by that of RAPF, at most
+CLOSED = 0.5  # most of a gap is closed when more than half of it is
+
+# what RAPF is to bear: axis and value, words
+BORNE = ((("loss", 0.6), "60 % of all messages are lost"), (("delay", 1.0), "messages arrive after 1 s"))
+_RESAMPLES = 2000
 
 
 @dataclass(frozen=True)
@@ -104,12 +130,10 @@ class Claim:
     explanation: str = "There is no run that could tell."
     least_maps: int = LEAST_MAPS  # on fewer maps it is undecided
 
-    def judged(
-        self, criteria: Iterable[Criterion], why: str, on: Outcomes | GainOutcomes, runs: int
-    ) -> Claim:
+    def judged(self, by: Iterable[Criterion], why: str, on: Outcomes | GainOutcomes, runs: int) -> Claim:
         """Return the claim with what `runs` runs in each of some scenarios say of it."""
         runs, maps = runs * len(on.scenarios), len(set(on.maps))
-        return replace(self, criteria=tuple(criteria), explanation=why, runs=runs, maps=maps)
+        return replace(self, criteria=tuple(by), explanation=why, runs=runs, maps=maps)
 
     @property
     def verdict(self) -> Verdict:
@@ -167,25 +191,6 @@ def verdict_counts(claims: Sequence[Claim]) -> str:
     counts = {verdict: found.count(verdict) for verdict in VERDICTS if verdict in found}
     parts = [f"{count} {VERDICTS[verdict][count > 1]}" for verdict, count in counts.items()]
     return f"Of {len(claims)} claims {', '.join(parts)}."
-
-
-SAME_COST = 0.02  # two costs are the same when the median of their ratio is within 2 % of 1
-NEARLY_SAME = 0.05  # in single runs two costs are nearly the same when they differ by at most 5 %
-NEARLY_ALWAYS = 0.9  # the share of runs that "the result is" speaks of, where the paper makes no exceptions
-CLEARLY_BELOW = 0.95  # a law is better than another when the median ratio of their costs is below this
-BARELY = 0.05  # a result barely depends on the gains: its standard deviation is below 5 % of its mean
-REGRET = 0.02  # the best gains depend on the environment when those of other maps cost more than 2 % on it
-# a result barely depends on the starts: its standard deviation over them is below 10 % of its mean; starts
-# matter more than gains do in any law that descends to a local optimum, so the bound is wider
-BARELY_BY_START = 0.1
-# two placements are nearly the same when robots are less than a quarter of the side of their share apart
-SAME_PLACEMENT = 0.25
-# a team is near the reference within 10 % of its cost, and far from it above 25 %
-NEAR_OPTIMUM, FAR_FROM_OPTIMUM = 0.1, 0.25
-
-CLUSTERED = CONVEX_KINDS[:-1]  # starts in convex regions in which the robots are close together
-
-GOALS, RIVALS, EXTENSIONS = 7, 8, 9  # questions beyond the paper; its own are 1 to 6
 
 
 def paper_claims(
@@ -520,24 +525,6 @@ def same_scenarios(rapf: GainOutcomes, rpf: GainOutcomes) -> tuple[GainOutcomes,
     """Return what both laws did in the scenarios, the same of both, where no run of either failed."""
     fine: Any = np.isfinite(np.vstack([rapf.excess, rpf.excess])).all(axis=0)
     return rapf.where(fine), rpf.where(fine)
-
-
-# The goals of our own controller. Its gains were tuned on other generated maps, but what it reached on those
-# of the study was looked at while its rules were made; `unseen_claim` is on maps on which nobody did.
-LEAST_GAP = 0.014  # the median of J/J_ref - 1, at most; RAPF at its best gains had about 5 % at that time
-MAP_GAP = 0.03  # the median on every single map, at most
-NEVER_WORSE = 1.01  # its median on a map by that of RAPF or LA on the same map, at most
-AT_REST = 0.97  # the share of its runs that come to rest
-RARELY = 0.1  # the share of runs with a contact, at most: that of no run is shown by no number of them
-REST_TIME = 40.0  # s, the median time after which they do
-STEP_RATIO = 10.0  # the time of a step of a large team by that of RAPF, at most
-
-CLOSED = 0.5  # most of a gap is closed when more than half of it is
-
-# what RAPF is to bear: axis and value, words
-BORNE = ((("loss", 0.6), "60 % of all messages are lost"), (("delay", 1.0), "messages arrive after 1 s"))
-
-_RESAMPLES = 2000
 
 
 def beyond_claims(results: BeyondResults) -> tuple[Claim, ...]:

@@ -53,6 +53,21 @@ ARRIVED = 0.05  # a cost has arrived when it stays within 5 % of its last value
 FIGURES = {1: "partition", 2: "convex", 3: "convex", 4: "a", 5: "a", 6: "b", 7: "b", 8: "other"}
 COSTS = (3, 5, 7)  # figures of the cost against time; all but the first of the others show trajectories
 
+# what is said of the figures, by their names
+CAPTIONS: Mapping[str, str] = tomllib.loads((ASSETS / "captions.toml").read_text(encoding="utf-8"))
+
+_TICKS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0)  # of the axis of gaps, %
+_BESIDE = 0.11  # how far controllers stand beside each other, in distances between two values
+_SIZE = (1180, 720)  # of the plot of degradations, px
+
+PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))  # a cell without any symmetry, m
+_APART = 0.13  # heights have words where their places are so far apart, as a part of the path
+_LOW, _HIGH = 0.01, 100.0  # the range of heights, m
+_LIMIT = 1e-7  # so high, relative to the cell's size, a sensor is as good as on the ground
+
+# how every plot is drawn, by its name; those without a run are left out
+Plots: TypeAlias = Mapping[str, Callable[[], Figure]]
+
 
 def draw_figure(number: int, runs: Mapping[str, FigureRun], first: Record, theme: Theme | str) -> Figure:
     theme = theme_named(theme)
@@ -195,17 +210,6 @@ def _difference_text(mine: float, theirs: float) -> str:
     return f"{amount(abs(change), '%')} {'less' if change < 0 else 'more'}"
 
 
-# how every plot is drawn, by its name; those without a run are left out
-Plots: TypeAlias = Mapping[str, Callable[[], Figure]]
-
-# what is said of the figures, by their names
-CAPTIONS: Mapping[str, str] = tomllib.loads((ASSETS / "captions.toml").read_text(encoding="utf-8"))
-
-_TICKS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0)  # of the axis of gaps, %
-_BESIDE = 0.11  # how far controllers stand beside each other, in distances between two values
-_SIZE = (1180, 720)  # of the plot of degradations, px
-
-
 def paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
     convex, claims, theme = results.convex, results.claims, theme_named(theme)
     against_lloyd = [("at the end", convex.compared("rapf-shared", "lloyd"), "rapf")]
@@ -228,15 +232,14 @@ def paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
     gaps = [("", _samples((label, claims, law) for law, label in LABELS.items()))]
     known = all(grid.complete.scenarios for grid in results.gains.values())
     against = "RAPF by the other law, pair by pair (1: equal)"
-    return _drawn(
-        {
-            "claim-1-convex": _pairs_plot(against_lloyd, "RAPF by LA, pair by pair (1: equal)", theme),
-            "claim-2-nonconvex": _pairs_plot(nonconvex, against, theme),
-            "claim-3-gains": partial(gains_plot, results.gains, theme) if known else None,
-            "claim-4-starts": _boxes_plot(by_start, theme),
-            "claim-6-gap": _boxes_plot(gaps, theme),
-        }
-    )
+    plots: dict[str, Callable[[], Figure] | None] = {
+        "claim-1-convex": _pairs_plot(against_lloyd, "RAPF by LA, pair by pair (1: equal)", theme),
+        "claim-2-nonconvex": _pairs_plot(nonconvex, against, theme),
+        "claim-3-gains": partial(gains_plot, results.gains, theme) if known else None,
+        "claim-4-starts": _boxes_plot(by_start, theme),
+        "claim-6-gap": _boxes_plot(gaps, theme),
+    }
+    return {name: draw for name, draw in plots.items() if draw is not None}
 
 
 def beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
@@ -256,17 +259,16 @@ def beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
     pictures = [replace(each.record, environment=weighed) for each in results.density.pictures]
     finals = [f"mean distance by φ {cost:.3f} m" for cost in results.density.costs]
     known = any(np.isfinite(each.ratio.estimate) for each in results.degradations)
-    return _drawn(
-        {
-            "beyond-gaps": partial(gaps_plot, samples, theme) if samples else None,
-            "beyond-pairs": _pairs_plot(duels, "ours by the other's, pair by pair (1: equal)", theme),
-            "beyond-heights": partial(plot_heights, size, theme, 0.68 * DOTS),
-            "beyond-targets": _pairs_plot(targets, "by the centroid, pair by pair (1: equal)", theme),
-            "beyond-density": partial(side_by_side, pictures, ("knows φ", "ignores φ"), finals, theme),
-            "beyond-teams": _pairs_plot(times, "mean time, by time to by distance (1: equal)", theme),
-            "beyond-conditions": partial(plot_degradations, results.degradations, theme) if known else None,
-        }
-    )
+    plots: dict[str, Callable[[], Figure] | None] = {
+        "beyond-gaps": partial(gaps_plot, samples, theme) if samples else None,
+        "beyond-pairs": _pairs_plot(duels, "ours by the other's, pair by pair (1: equal)", theme),
+        "beyond-heights": partial(plot_heights, size, theme, 0.68 * DOTS),
+        "beyond-targets": _pairs_plot(targets, "by the centroid, pair by pair (1: equal)", theme),
+        "beyond-density": partial(side_by_side, pictures, ("knows φ", "ignores φ"), finals, theme),
+        "beyond-teams": _pairs_plot(times, "mean time, by time to by distance (1: equal)", theme),
+        "beyond-conditions": partial(plot_degradations, results.degradations, theme) if known else None,
+    }
+    return {name: draw for name, draw in plots.items() if draw is not None}
 
 
 def gap_samples(results: BeyondResults) -> list[Sample]:
@@ -382,10 +384,6 @@ def style_of(controller: str) -> CurveStyle:
     return style._replace(name="other-0" if controller in OURS else "other-2")
 
 
-def _drawn(plots: Mapping[str, Callable[[], Figure] | None]) -> Plots:
-    return {name: draw for name, draw in plots.items() if draw is not None}
-
-
 def _pairs_plot(
     rows: Iterable[tuple[str, Comparison | None, str]], label: str, theme: Theme
 ) -> Callable[[], Figure] | None:
@@ -420,17 +418,8 @@ def _boxes_plot(rows: Iterable[tuple[str, Sequence[Sample]]], theme: Theme) -> C
     return partial(plot_final_costs, there, label, WIDE, DOTS, theme, origin=1.0) if there else None
 
 
-# The best place for a sensor over a cell, by its height: the optimum of equation (14).
-
-PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))  # a cell without any symmetry, m
-# heights are written beside the path, rounded, where their places are so far apart, as a part of it
-_APART = 0.13
-_LOW, _HIGH = 0.01, 100.0  # the range of the plot, m
-_LIMIT = 1e-7  # so high, relative to the cell's size, a sensor is as good as on the ground
-
-
 class AtHeight(NamedTuple):
-    """The best place, m, at a height, m; `missed`: the part of its value missed over the centroid."""
+    """The best place, m, for a sensor at a height, m (equation 14); `missed`: over the centroid."""
 
     height: float
     x: float
@@ -550,9 +539,7 @@ def _draw_path(
     axes.plot(x, y, "D", color=faint, markersize=6.0, zorder=3)
     axes.annotate("median\n(f = r)", (x, y), (-9, 0), ha="right", color=faint, **beside)
     x, y, width, height = window
-    axes.set_xlim(x, x + width)
-    axes.set_ylim(y, y + height)
-    axes.set_aspect("equal")
+    axes.set(xlim=(x, x + width), ylim=(y, y + height), aspect="equal")
     _plain(axes, theme)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(4, prune="both"))
@@ -568,13 +555,9 @@ def _draw_distance(axes: Axes, path: Sequence[AtHeight], marked: Sequence[AtHeig
     for rows, look in ((inner, {"linewidth": 2.4}), (marked[1:-1], style)):
         millimetres = [1e3 * row.from_centroid for row in rows]
         axes.plot([row.height for row in rows], millimetres, color=line, **look)
-    axes.set_xscale("log")
-    axes.set_xlim(inner[0].height, inner[-1].height)
-    axes.set_ylim(0.0, 1.12 * highest)
+    axes.set(xscale="log", xlim=(inner[0].height, inner[-1].height), ylim=(0.0, 1.12 * highest))
     axes.xaxis.set_major_formatter("{x:g}")
-    quiet_axes(axes, theme, "height h (m)", grid="y")
-    axes.tick_params(length=3.0, left=True)
-    axes.minorticks_off()
+    _plain(axes, theme, "height h (m)", grid="y")
     worst = max(inner, key=lambda row: row.missed)
     style = {"fontsize": SMALL, "color": tone(theme.ink), "ha": "left", "va": "bottom"}
     style |= {"bbox": {"facecolor": tone(theme.background), "edgecolor": "none", "pad": 2.0}}
@@ -583,7 +566,7 @@ def _draw_distance(axes: Axes, path: Sequence[AtHeight], marked: Sequence[AtHeig
     axes.annotate(words, (0.04, 0.07), xycoords="axes fraction", **style)
 
 
-def _plain(axes: Axes, theme: Theme) -> None:
-    quiet_axes(axes, theme)
+def _plain(axes: Axes, theme: Theme, *labels: str, **grid: Any) -> None:
+    quiet_axes(axes, theme, *labels, **grid)
     axes.tick_params(length=3.0, left=True)
     axes.minorticks_off()

@@ -172,7 +172,6 @@ class GainOutcomes:
         return GainOutcomes(kept, self.gains, self.excess[:, np.array(chosen, dtype=bool)])
 
     def best(self, columns: Sequence[int] | None = None) -> int:
-        """Return the number of the gains whose mean of J/J_ref is least where no run failed."""
         excess = self.excess if columns is None else self.excess[:, list(columns)]
         return int(np.argmin(excess[:, np.isfinite(excess).all(axis=0)].mean(axis=1)))
 

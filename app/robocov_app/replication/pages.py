@@ -220,7 +220,6 @@ def _unbroken(value: Any) -> Any:
 
 
 def _strips(one: Evidence, each: Sequence[Evidence]) -> Markup:
-    """Return the medians map by map of a controller above those of ours, or of ours above RAPF's."""
     highest = max((max(other.maps.values()) for other in each if other.maps), default=0.0)
     beside = "rapf" if one.account.controller == OURS[0] else OURS[0]
     rows = [one, *(other for other in each if other.account.controller == beside)]

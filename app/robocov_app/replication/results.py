@@ -212,7 +212,6 @@ def references_of(on: Sequence[StudyMap], folder: Path, plan: Plan, options: Run
 
 
 def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bool) -> Forecast:
-    """Return how many runs there are, and by probes how long those that are left will take."""
     sweeps = studies.figure_studies(plan)
     papers = expected_contenders(plan) if claims or (beyond and grid_is_done(folder, plan)) else UNTUNED
     if claims:
@@ -277,7 +276,6 @@ def run_figures(folder: Path, plan: Plan, options: RunnerOptions) -> dict[str, F
 
 
 def _figure_runs(folder: Path) -> Iterator[tuple[dict[str, Any], FigureRun]]:
-    """Yield the rows of a sweep, each with its run; raise InputError when one failed."""
     results = read_results(folder)
     for row in results.to_table().to_pylist():
         if row["error"] is not None:
@@ -299,16 +297,11 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
 
 
 def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperResults | None) -> BeyondResults:
-    """Do all runs beyond the paper that are not done yet, and read what came of them.
-
-    Without the paper's own part the paper's controllers are run here, with their best gains if the grids of
-    gains have been run before.
-    """
+    """Do the runs beyond the paper; without `paper` also its own, at the best gains where they are known."""
     gains: dict[str, GainOutcomes] = {}
     known: References = {}
     if paper is not None:
-        known |= paper.references
-        papers, claims = paper.contenders, paper.claims
+        known, papers, claims = {**paper.references}, paper.contenders, paper.claims
     else:
         if grid_is_done(folder, plan):
             # nothing is left to be done of it: the table is made sure of

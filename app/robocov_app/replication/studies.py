@@ -1,19 +1,8 @@
 """The sweeps of the study, each with its folder's name.
 
-- ``figures-…``: the runs that figures 2 to 8 show;
-- ``gains``: grids of gains on maps of their own, for the claims on gains and for the best gains;
-- ``convex``: RAPF and LA in convex regions;
-- ``claims``: the paper's contenders on non-convex maps, none of which was used for ``gains``.
-
-Beyond the paper:
-
-- ``rival-gains``: grids of the baselines' gains, on maps of their own;
-- ``ours-…``, ``rivals``: every registered controller, on the maps of the claims and from the same starts;
-- ``unseen``: ours on maps that played no part in its development;
-- ``targets``: RAPF heading for another optimum of its cell than the centroid;
-- ``density``, ``density-ignored``: RAPF that knows which places count more, and RAPF that does not;
-- ``teams``: robots of different speeds, with cells by distance and by time;
-- ``conditions-…``: disturbances, one sweep for each axis of `AXES`.
+``gains`` and ``rival-gains`` are grids of gains on maps of their own, for the best gains. On the maps of
+``claims`` the paper's contenders run, and from the same starts all others in ``rivals`` and ``ours-…``.
+``density-…`` is RAPF that knows which places count more and RAPF that does not.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

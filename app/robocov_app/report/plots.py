@@ -33,6 +33,8 @@ MOST_PANELS = 24  # settings up to which each has panels of its own
 PANEL = 420, 290  # of a panel in pixels; on a telephone it is shown a little smaller
 WIDE = 860, 360  # of a plot that stands alone, on a screen that is wide enough
 _MOMENTS = 121  # moments of a cost curve: one every three pixels
+MOST_MEASURED, MOST_ROBOTS = 4, 60  # runs and robots up to which runs are measured: sight takes a while
+_MEASURED = 30  # moments of a run, besides its first
 
 
 class Plot(NamedTuple):
@@ -261,10 +263,6 @@ def _grid_plot(
     return Plot(title, inline_svg(figure, key, f"{title}: medians of the {what}, {span}."))
 
 
-MOST_MEASURED, MOST_ROBOTS = 4, 60  # runs, robots up to which they are measured: sight takes a while to know
-_MEASURED = 30  # moments of a run, besides its first
-
-
 def _in_contact(gaps: Array) -> Array:
     """Return gaps in whole millimetres: what is below is the solver's slop, which has no sign."""
     return np.asarray(np.round(gaps, 3) + 0.0)
@@ -285,11 +283,7 @@ _PANELS: tuple[tuple[str, str, str, Callable[[RunMetrics], Array]], ...] = (
 def measure_plots(
     result: Result, runs: Sequence[ReplayRun], entries: Sequence[Entry], looks: Looks, key: str
 ) -> list[Plot]:
-    """Return a plot for each metric of a run, or of the runs of a comparison; none of a sweep.
-
-    Nor are there any of very many runs or robots, or where a record does not tell the robots' ways. A
-    metric that tells nothing is left out, as the gap between robots where there is one.
-    """
+    """Return a plot for each metric that tells something; none of a sweep, or where ways are not known."""
     if result.kind == "sweep" or not 0 < len(runs) <= MOST_MEASURED:
         return []
     if any(len(run.record.team) > MOST_ROBOTS or not has_path(run.record) for run in runs):

@@ -189,7 +189,6 @@ def _between(time: Array, rows: Array, times: Array) -> Array:
 
 
 def _cost(history: CostHistory | None, begin: float, times: Array, step: float) -> dict[str, Any] | None:
-    """Return the mean distance at even times from the run's begin; None where it is not known."""
     if history is None:
         return None
     values = _between(history.time - begin, history.mean_distance[:, None], times)[:, 0]
