@@ -85,7 +85,6 @@ def _draw_motion(axes: Axes, environment: Environment, obstacle: MovingObstacle,
 
 
 def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
-    """Draw map, final cells, trajectories, starts, final positions and where robots head."""
     draw_map(axes, record.environment, theme, time=float(record.time[-1]))
     last, n = record.positions[-1], record.positions.shape[1]
     working, there = np.flatnonzero(record.working[-1]), np.flatnonzero(record.present[-1])
@@ -106,8 +105,7 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     axes.add_collection(LineCollection(ways, **style), autolim=False)
     # of one that joins, where it does
     begin = record.positions[np.argmax(record.present, axis=0), np.arange(n)][there]
-    starts_apart = mark_size(_in_points(axes, begin), 3.2, _START)
-    axes.plot(*begin.T, zorder=5, **_start_style(theme, starts_apart))
+    axes.plot(*begin.T, zorder=5, **_start_style(theme, mark_size(_in_points(axes, begin), 3.2, _START)))
     own = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
     failed = record.present[-1] & ~record.working[-1]
     robots = [wreck_colour(theme) if failed[robot] else own[robot] for robot in there.tolist()]
@@ -207,9 +205,8 @@ def map_handles(environment: Environment, theme: Theme, *, density: bool = True)
 
 
 def robot_handle(label: str, fill: Colour, theme: Theme) -> Artist:
-    style: Any = {"linestyle": "none", "marker": "o", "markersize": 8.0}
-    colours: Any = {"markerfacecolor": tone(fill), "markeredgecolor": tone(theme.robot_ring)}
-    return Line2D([], [], label=label, **style, **colours)
+    style: Any = {"markerfacecolor": tone(fill), "markeredgecolor": tone(theme.robot_ring)}
+    return Line2D([], [], label=label, linestyle="none", marker="o", markersize=8.0, **style)
 
 
 def wreck_colour(theme: Theme) -> Colour:

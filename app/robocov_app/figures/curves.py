@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from robocov.arrays import Array
-from robocov_app.figures.page import TEXT, Tone, even_ticks, figure_of, quiet_axes, tone, value_limits
+from robocov_app.figures.page import TEXT, Tone, even_ticks, figure_of, quiet_axes, tone, value_axis
 from robocov_app.figures.styles import CurveStyle, styles_of
 from robocov_app.render.theme import Theme
 
@@ -46,12 +46,10 @@ def draw_curves(
     chosen = styles_of([controller for _, controller, _, _ in curves]) if styles is None else styles
     around = list(bands or [None] * len(curves))
     lines = [np.asarray(curve[3]) for curve in curves] + [edge for band in around if band for edge in band]
-    shown = np.concatenate([line[np.isfinite(line)] for line in lines])
     times = np.concatenate([np.asarray(curve[2]) for curve in curves])
-    begin, end = float(times.min()), float(times.max())
-    axes.set(xlim=(begin, max(end, begin + 1e-9)), ylim=value_limits(float(shown.min()), float(shown.max())))
+    axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-9))
     even_ticks(axes.xaxis, 8)
-    even_ticks(axes.yaxis, 6)
+    value_axis(axes.yaxis, np.concatenate([line[np.isfinite(line)] for line in lines]))
     quiet_axes(axes, theme, "time (s)", label, grid="y")
     for (_, _, time, _), style, band in zip(curves, chosen, around, strict=True):
         if band is not None:

@@ -11,6 +11,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from robocov.arrays import Array
 from robocov.errors import ParameterError
 from robocov_app.figures.files import figure_png
 from robocov_app.render.camera import length_label, round_length
@@ -63,6 +64,13 @@ def value_limits(low: float, high: float, *, room: float = 0.08, origin: float =
 def even_ticks(axis: Any, most: int) -> None:
     axis.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 5, 10]))
     axis.set_major_formatter("{x:g}")
+
+
+def value_axis(axis: Any, values: Array, **ends: float) -> None:
+    """Give an axis even ticks, and ends that suit finite values: those of `value_limits`."""
+    limits = value_limits(float(values.min()), float(values.max()), **ends)
+    axis.axes.set(**{f"{axis.axis_name}lim": limits})
+    even_ticks(axis, 6)
 
 
 def cut_to(text: str, width_of: Callable[[str], float], room: float) -> str:
@@ -169,18 +177,16 @@ class Page:
     def width_of(self, artist: Any) -> float:
         return float(artist.get_window_extent(self.figure.canvas.get_renderer()).width)  # type: ignore[attr-defined]
 
-    def footer_height(self, handles: Sequence[Artist], begin: float | None = None) -> float:
-        begin = self.margin if begin is None else begin
+    def footer_height(self, handles: Sequence[Artist], begin: float = 0) -> float:
+        begin = max(begin, self.margin)
         columns, width, height = self._legend_extent(handles, begin)
         if columns == len(handles) and width <= self._beside_bar(begin):
             return 46 * self.scale
         return 36 * self.scale + height + 14 * self.scale
 
-    def footer(
-        self, handles: Sequence[Artist], boxes: Sequence[Box], zoom: float, begin: float | None = None
-    ) -> None:
+    def footer(self, handles: Sequence[Artist], boxes: Sequence[Box], zoom: float, begin: float = 0) -> None:
         """Draw the scale bar, at `zoom` px/m, and the legend below `boxes`; nothing left of `begin` px."""
-        begin = self.margin if begin is None else begin
+        begin = max(begin, self.margin)
         left, right = boxes[0][0], max(x + width for x, _, width, _ in boxes)
         bottom = max(y + height for _, y, _, height in boxes)
         columns, width, _ = self._legend_extent(handles, begin)

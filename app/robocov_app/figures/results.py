@@ -18,18 +18,7 @@ from robocov.arrays import Array
 from robocov.controllers.gains import Value, value_text
 from robocov_app.figures.curves import draw_curves, end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import (
-    SMALL,
-    TEXT,
-    Page,
-    Tone,
-    cut_to,
-    even_ticks,
-    figure_of,
-    quiet_axes,
-    tone,
-    value_limits,
-)
+from robocov_app.figures.page import SMALL, TEXT, Page, cut_to, figure_of, quiet_axes, tone, value_axis
 from robocov_app.figures.statistics import Interval
 from robocov_app.figures.styles import CurveStyle
 from robocov_app.render.theme import LIGHT, Theme
@@ -117,10 +106,8 @@ def plot_final_costs(
     finite = [np.sort(sample.values[np.isfinite(sample.values)]) for sample in samples]
     for sample, values, place in zip(samples, finite, places, strict=True):
         draw_box(axes, values, place, sample.style, theme)
-    _row_frame(axes, places, names, total, theme, label, [sample.style for sample in samples])
-    low, high = (float(end) for end in (min(map(np.min, finite)), max(map(np.max, finite))))
-    axes.set_xlim(*value_limits(low, high, room=0.06, origin=origin))
-    even_ticks(axes.xaxis, 6)
+    _row_frame(axes, places, names, theme, label, [sample.style for sample in samples])
+    value_axis(axes.xaxis, np.concatenate(finite), room=0.06, origin=origin)
     box, ink = axes.get_position(), tone(theme.ink)
     style: Any = {"fontsize": TEXT, "fontweight": "bold", "va": "center", "color": ink}
     for (name, _), head in zip(rows, heads, strict=True):
@@ -136,13 +123,13 @@ def plot_paired(pairs: Sequence[Pairs], label: str, width: int, scale: float, th
     places, _, total = laid_rows([("", len(pairs))])
     axes, names = rows_page(total, [each.label for each in pairs], theme, width, scale)
     for each, place in zip(pairs, places, strict=True):
-        _draw_points(axes, np.sort(each.ratios), place, tone(each.style.colour(theme)), theme)
+        _draw_points(axes, np.sort(each.ratios), place, each.style, theme)
         ratio = each.interval
         if np.isfinite(ratio.low):
             line: Any = {"linewidth": 2.4, "solid_capstyle": "butt", "zorder": 4}
             axes.plot([ratio.low, ratio.high], [place, place], color=tone(theme.ink), **line)
         _draw_median(axes, ratio.estimate, place, theme)
-    _row_frame(axes, places, names, total, theme, label)
+    _row_frame(axes, places, names, theme, label)
     ratios = np.concatenate([each.ratios for each in pairs])
     ends = [end for each in pairs for end in (each.interval.low, each.interval.high) if np.isfinite(end)]
     # an interval of two or three values may be endless: it leaves the axis then
@@ -174,32 +161,24 @@ def laid_rows(groups: Sequence[tuple[str, int]]) -> tuple[list[float], list[floa
     return places, heads, at
 
 
-def rows_page(
-    total: float, names: Sequence[str], theme: Theme, width: int, scale: float
-) -> tuple[Axes, list[str]]:
-    """Return axes on a page high enough for `total` rows, and the names as they fit to the left of them."""
-    page = Page((width, 200), theme, scale)
-    short = [cut_to(name, page.text_width, 0.42 * width) for name in names]
+def rows_page(rows: float, names: list[str], theme: Theme, wide: int, scale: float) -> tuple[Axes, list[str]]:
+    """Return axes on a page high enough for so many rows, and the names as they fit to the left of them."""
+    page = Page((wide, 200), theme, scale)
+    short = [cut_to(name, page.text_width, 0.42 * wide) for name in names]
     left = max(page.text_width(name) for name in short) + 32 * scale
     above, below = 8 * scale, 46 * scale
-    height = round(above + _ROW * scale * total + below)
-    page = Page((width, height), theme, scale)
-    return page.axes((left, above, width - left - 16 * scale, height - above - below)), short
+    height = round(above + _ROW * scale * rows + below)
+    page = Page((wide, height), theme, scale)
+    axes = page.axes((left, above, wide - left - 16 * scale, height - above - below))
+    axes.set_ylim(rows, 0.0)
+    return axes, short
 
 
 def _row_frame(
-    axes: Axes,
-    places: Sequence[float],
-    names: Sequence[str],
-    total: float,
-    theme: Theme,
-    label: str,
-    looks: Sequence[CurveStyle] = (),
+    axes: Axes, places: list[float], names: list[str], theme: Theme, x: str, looks: Sequence[CurveStyle] = ()
 ) -> None:
-    """Write the names beside the rows, with the marks of their styles, and what the values are."""
-    axes.set_ylim(total, 0.0)
-    axes.set_yticks(list(places), list(names))
-    quiet_axes(axes, theme, label, grid="x")
+    axes.set_yticks(places, names)
+    quiet_axes(axes, theme, x, grid="x")
     axes.tick_params(axis="y", left=True, length=0.0, labelsize=TEXT, pad=_BESIDE)
     aside = -0.5 * (_BESIDE + 3.0) * figure_of(axes).dpi / 72 / axes.get_window_extent().width
     style: Any = {"markersize": 5.5, "transform": axes.get_yaxis_transform(), "clip_on": False}
@@ -208,7 +187,6 @@ def _row_frame(
 
 
 def ratio_limits(axes: Axes, ratios: Array, theme: Theme) -> None:
-    """Give a logarithmic axis around 1 room for all ratios, and mark 1."""
     low, high = min(float(ratios.min()), 0.95), max(float(ratios.max()), 1.05)
     room = (high / low) ** 0.05
     axes.set(xscale="log", xlim=(low / room, high * room))
@@ -232,7 +210,7 @@ def _thinned(marks: Sequence[float], apart: float) -> list[float]:
 def draw_box(axes: Axes, values: Array, place: float, style: CurveStyle, theme: Theme) -> None:
     """Draw one row of sorted values: points and median, and from `FEW` values on their box and whiskers."""
     colour = tone(style.colour(theme))
-    _draw_points(axes, values, place, colour, theme)
+    _draw_points(axes, values, place, style, theme)
     low, middle, high = np.percentile(values, [25, 50, 75])
     if len(values) >= FEW:
         reach = 1.5 * (high - low)
@@ -246,7 +224,7 @@ def draw_box(axes: Axes, values: Array, place: float, style: CurveStyle, theme: 
         _draw_median(axes, float(middle), place, theme)
 
 
-def _draw_points(axes: Axes, values: Array, place: float, colour: Tone, theme: Theme) -> None:
+def _draw_points(axes: Axes, values: Array, place: float, style: CurveStyle, theme: Theme) -> None:
     """Draw sorted values as points, up and down so that few hide each other."""
     if len(values) > MOST_POINTS:
         values = values[np.rint(np.linspace(0, len(values) - 1, MOST_POINTS)).astype(int)]
@@ -254,7 +232,7 @@ def _draw_points(axes: Axes, values: Array, place: float, colour: Tone, theme: T
     aside = np.zeros(len(values)) if alone else (_scattered(len(values)) - 0.5) * 1.5 * _HALF
     look: Any = {"markersize": 6.0, "alpha": 1.0} if alone else {"markersize": 3.6, "alpha": 0.65}
     rim: Any = {"markeredgecolor": tone(theme.background), "markeredgewidth": 0.4}
-    axes.plot(values, place + aside, "o", color=colour, zorder=3.5, **look, **rim)
+    axes.plot(values, place + aside, "o", color=tone(style.colour(theme)), zorder=3.5, **look, **rim)
 
 
 def _draw_median(axes: Axes, value: float, place: float, theme: Theme) -> None:
@@ -294,9 +272,7 @@ def plot_gains(
     null = _gain_axis(axes, np.concatenate([each.gains for each in dependences]), words)
     for each in dependences:
         _draw_dependence(axes, each, null, joined=not words)
-    values = np.concatenate([each.values for each in dependences])
-    axes.set_ylim(*value_limits(float(values.min()), float(values.max())))
-    even_ticks(axes.yaxis, 6)
+    value_axis(axes.yaxis, np.concatenate([each.values for each in dependences]))
     quiet_axes(axes, LIGHT, cut_to(gain, len, MOST_LETTERS), label, grid="y")
     if len(dependences) > 1:
         axes.legend(frameon=False, fontsize=SMALL, labelcolor=tone(LIGHT.ink), borderaxespad=0.2)
@@ -328,10 +304,9 @@ def plot_gain_grid(
         colour = tone(colours[round(part * (len(colours) - 1))])
         # a hair's breadth of the page between cells
         axes.add_patch(Rectangle((column - 0.48, row - 0.48), 0.96, 0.96, facecolor=colour, linewidth=0.0))
-        weight = "bold" if values[row, column] == low else "normal"
-        text = f"{values[row, column]:.{decimals}f}"
         style: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": tone(theme.ink)}
-        axes.text(column, row, text, fontweight=weight, **style)
+        style["fontweight"] = "bold" if values[row, column] == low else "normal"
+        axes.text(column, row, f"{values[row, column]:.{decimals}f}", **style)
     axes.set(xlim=(-0.5, len(first) - 0.5), ylim=(-0.5, len(second) - 0.5))
     axes.set_xticks(range(len(first)), [value_text(value, digits=4) for value in first])
     axes.set_yticks(range(len(second)), [value_text(value, digits=4) for value in second])
@@ -351,8 +326,7 @@ def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
         axes.set_xlim(-0.5, len(words) - 0.5)
         axes.set_xticks(range(len(words)), list(words))
         return None
-    finite = gains[np.isfinite(gains)]
-    levels = np.unique(finite)
+    levels = np.unique(gains[np.isfinite(gains)])
     logarithmic = len(levels) > 1 and levels[0] > 0 and levels[-1] / levels[0] >= _WIDE
     low, high = (float(levels[0]), float(levels[-1])) if len(levels) else (0.0, 0.0)
     unlimited = bool(np.isnan(gains).any())

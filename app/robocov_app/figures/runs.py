@@ -39,8 +39,7 @@ def plot_environment(
     theme = theme_named(theme)
     if axes is None:
         facts = f"{environment.area:.4g} m² inside the boundary, {environment.free_area:.4g} m² free"
-        handles = map_handles(environment, theme)
-        axes = _map_page(environment, theme, size, environment.name, facts, handles)
+        axes = _map_page(environment, theme, size, environment.name, facts, map_handles(environment, theme))
     else:
         ticks_in_metres(axes, environment, theme)
     draw_map(axes, environment, theme)
@@ -67,8 +66,7 @@ def plot_trajectories(
     theme = theme_named(theme)
     if axes is None:
         facts = _line(*_facts(record, mean_distance, mean_time))
-        title = _line(record.label, record.environment.name)
-        handles = run_handles(record, theme, colours)
+        title, handles = _line(record.label, record.environment.name), run_handles(record, theme, colours)
         axes = _map_page(record.environment, theme, size, title, facts, handles)
     else:
         ticks_in_metres(axes, record.environment, theme)
@@ -202,9 +200,8 @@ def _captions(
 ) -> tuple[str, list[str]]:
     """Return what is true of all runs, for the page's title, and of each, what is not."""
     known = [_facts(*each) for each in zip(records, costs, times, strict=True)]
-    every = [
-        (each.environment.name, robots, time) for each, (_, time, robots) in zip(records, known, strict=True)
-    ]
+    both = zip(records, known, strict=True)
+    every = [(record.environment.name, robots, time) for record, (_, time, robots) in both]
     shared = [len(set(found)) == 1 for found in zip(*every, strict=True)]
     unlike = [tuple(compress(facts, map(not_, shared))) for facts in every]
     own = [_line(cost, *facts) for (cost, _, _), facts in zip(known, unlike, strict=True)]
@@ -217,9 +214,8 @@ def _line(*facts: str) -> str:
 
 def _facts(record: Record, mean_distance: float | None, mean_time: float | None) -> tuple[str, str, str]:
     """Return the cost (empty where it is not known), the time, and the number of robots in words."""
-    cost = (
-        "" if mean_distance is None else cost_label(mean_label(record.environment), mean_distance, mean_time)
-    )
+    mean = mean_label(record.environment)
+    cost = "" if mean_distance is None else cost_label(mean, mean_distance, mean_time)
     return cost, f"t = {record.time[-1]:.1f} s", counted(len(record.team), "robot")
 
 
@@ -231,8 +227,7 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
     title = f"{len(drawn)} of {len(environments)}" if len(drawn) < len(environments) else ""
     bounds = np.array([environment.region.bounds for environment in drawn])
     wide, high = (bounds[:, 2:] - bounds[:, :2]).max(axis=0).tolist()
-    handles = {str(each.get_label()): each for one in drawn for each in map_handles(one, theme)}
-    entries = [*handles.values()]
+    entries = [*{label_of(each): each for one in drawn for each in map_handles(one, theme)}.values()]
     page = Page((_WIDTH, _HIGHEST), theme, 1.5)
     above, top = 26 * page.scale, (46 if title else 8) * page.scale
     columns = columns_for(len(drawn), wide / high, (1600, 1200), above)
@@ -240,12 +235,11 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
     rows = -(-len(drawn) // columns)
     tall = top + rows * (above + slot * high / wide + 14 * page.scale) + page.footer_height(entries)
     page = Page((_WIDTH, int(np.clip(tall, 320, _HIGHEST))), theme, 1.5)
-    below = page.footer_height(entries)
-    panels = page.panels(len(drawn), columns, wide / high, 0.0, above, top, below)
+    panels = page.panels(len(drawn), columns, wide / high, 0.0, above, top, page.footer_height(entries))
     for environment, (low_x, low_y, *_), (box, room) in zip(drawn, bounds.tolist(), panels, strict=True):
         draw_map(page.map_axes(box, low_x, low_y, low_x + wide, low_y + high), environment, theme)
         page.text(environment.name, box[0], box[1] - 12 * page.scale, bold=True, room=room)
-    first = panels[0][0]
+    first, _ = panels[0]
     if title:
         y = first[1] - above - 18 * page.scale
         page.text(title, first[0], y, points=HEADING, bold=True, room=page.room)

@@ -553,14 +553,10 @@ def _first_criteria(fine: Outcomes, key: str) -> tuple[Criterion, Criterion, Cri
 
 
 def goals(
-    outcomes: Outcomes,
-    ours: Contender,
-    contenders: Sequence[Contender],
-    steps: Mapping[int, StepTimes],
-    plan: Plan,
+    outcomes: Outcomes, own: Contender, among: Sequence[Contender], steps: Mapping[int, StepTimes], plan: Plan
 ) -> list[Claim]:
-    """Return the goals of a controller of ours among all `contenders`, each a claim with one criterion."""
-    key, label = ours.key, ours.label
+    """Return the goals of a controller of our own among all, each a claim with one criterion."""
+    key, label = own.key, own.label
     fine = outcomes.measured("gap", key)
     found: list[Claim] = []
 
@@ -578,7 +574,7 @@ def goals(
         criterion = Criterion("highest median of a map", worst, high=MAP_GAP, unit="%")
         add("every-map", text, criterion, _highest_text(fine.median_by_map(key), MAP_GAP))
 
-        for other in laws.strongest(contenders):
+        for other in laws.strongest(among):
             if (pairs := outcomes.compared(key, other.key)) is not None:
                 above = amount(NEVER_WORSE - 1.0, "%")
                 text = f"On no map {label}'s median is more than {above} above that of {other.label}."
@@ -603,18 +599,17 @@ def goals(
 
     of_runs = len(found)
     large, huge = (steps.get(robots) for robots in (plan.beyond.large, plan.beyond.huge))
-    if large is not None and math.isfinite((ratio := large.ratio_interval(ours.controller)).estimate):
+    if large is not None and math.isfinite((ratio := large.ratio_interval(own.controller)).estimate):
         most = f"at most {STEP_RATIO:g} times as long as RAPF's with {large.robots} robots"
         words = "Timed in turn, over whole seconds of simulated time: plans and scans count by their share."
         criterion = Criterion("time of a step by RAPF's", ratio, high=STEP_RATIO)
         add("step", f"A step of {label} takes {most}.", criterion, words)
-    if huge is not None and math.isfinite((taken := huge.interval(ours.controller)).estimate):
+    if huge is not None and math.isfinite((taken := huge.interval(own.controller)).estimate):
         part = Interval(*(value / huge.dt for value in (taken.estimate, taken.low, taken.high)))
         text = f"{label} runs in real time with {huge.robots} robots."
         criterion = Criterion("computing time by simulated time", part, high=1.0)
         add("real-time", text, criterion, "One process; the physics of the world included.")
-    timed = (replace(goal, runs=0, maps=1, least_maps=1) for goal in found[of_runs:])
-    return [*found[:of_runs], *timed]
+    return found[:of_runs] + [replace(goal, runs=0, maps=1, least_maps=1) for goal in found[of_runs:]]
 
 
 def highest_of_maps(statistic: Callable[[IntArray], Any], maps: Sequence[str]) -> Interval:
@@ -774,8 +769,7 @@ def teams_claim(outcomes: Outcomes, controller: str) -> Claim:
 
 
 def conditions_claim(found: Iterable[Degradation], maps: int) -> Claim:
-    near = amount(NEARLY_SAME, "%")
-    text = f"RAPF ends within {near} of its cost where messages get lost or are late."
+    text = f"RAPF ends within {amount(NEARLY_SAME, '%')} of its cost where messages get lost or are late."
     head = Claim("conditions", EXTENSIONS, text)
     rapf = [each for each in found if each.controller == "rapf" and math.isfinite(each.ratio.estimate)]
     known = {(each.axis, each.value): each for each in rapf}

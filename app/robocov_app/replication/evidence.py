@@ -137,8 +137,8 @@ def failure_text(outcomes: Outcomes, law: LawRow) -> str:
     )
     if not troubles and law.touched == 0.0:
         troubles = "No contact in any run"
-    more = f" {capitalised(troubles)}." if troubles else ""
-    return f"{words} ({outcomes.scenarios[worst]}).{more}"
+    words = f"{words} ({outcomes.scenarios[worst]})."
+    return f"{words} {capitalised(troubles)}." if troubles else words
 
 
 def gains_text(controller: str, grid: GainOutcomes) -> str:

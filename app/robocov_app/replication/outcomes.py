@@ -129,8 +129,7 @@ class Comparison:
     @cached_property
     def wins(self) -> Interval:
         """Share of pairs in which the first's value is the lower one; ties count half."""
-        won = np.where(self.a < self.b, 1.0, np.where(self.a == self.b, 0.5, 0.0))
-        return share(won, self.fine.maps)
+        return share((self.a < self.b) + 0.5 * (self.a == self.b), self.fine.maps)
 
 
 def joined(parts: Sequence[Outcomes]) -> Outcomes:
@@ -195,8 +194,7 @@ def read_outcomes(folder: Path, contest: Contest, references: References) -> Out
     values = {(key, measure): np.full(len(scenarios), np.nan) for key in laws for measure in measures}
     values |= {(key, "placement"): np.full((len(scenarios), ROBOTS, 2), np.nan) for key in laws}
     for at, row in _rows(folder, scenarios):
-        here = _law(row["controller"], row)
-        for key in (key for key, law in laws.items() if law == here):
+        for key in (key for key, law in laws.items() if law == _law(row["controller"], row)):
             values[key, "placement"][at] = results.record(row["run"]).positions[-1]
             for measure, column in COLUMNS.items():
                 if row.get(column) is not None:
@@ -234,9 +232,7 @@ def mean_until(history: CostHistory, until: float) -> float:
     inside = history.time < end
     time = np.append(history.time[inside], end)
     values = np.append(history.mean_distance[inside], np.interp(end, history.time, history.mean_distance))
-    if len(time) < 2:
-        return float(values[-1])
-    return float(np.trapezoid(values, time) / (time[-1] - time[0]))
+    return float(np.trapezoid(values, time) / (time[-1] - time[0]) if len(time) > 1 else values[-1])
 
 
 def matched_distance(first: Array, second: Array) -> float:

@@ -1,8 +1,4 @@
-"""The results as files: figures, ``claims.json`` and the two pages, ``index.html`` and ``beyond.html``.
-
-In the pages are small pictures of numbers as SVG: intervals of claims, and medians map by map. Their colours
-are CSS variables; what they show is said in words as well.
-"""
+"""The results as files: figures, ``claims.json`` and the two pages, ``index.html`` and ``beyond.html``."""
 
 import json
 import math
@@ -94,9 +90,8 @@ def _save_figures(
             for suffix in ("png", "svg", "pdf"):
                 save_figure(figure, target / f"{name}.{suffix}")
             save_figure(dark[name](), target / f"{name}-dark.png")
-            size = round(figure.bbox.width), round(figure.bbox.height)
             words = f"{figures.CAPTIONS[name]} {seen.get(name, '')}".rstrip()
-            found[name] = Image(name, *size, words)
+            found[name] = Image(name, round(figure.bbox.width), round(figure.bbox.height), words)
             update(number)
     return found
 
@@ -235,19 +230,16 @@ def interval_bar(criterion: Criterion) -> Markup:
     if not known or not ends:
         return Markup("")
     low, high = min(known + ends), max(known + ends)
-    least = 0.0 if criterion.unit == "%" and low >= 0.0 else -math.inf
     room = 0.18 * (high - low) if high > low else max(0.1 * abs(high), 0.01)
-    low, high = max(low - room, least), high + room
+    low, high = max(low - room, 0.0 if criterion.unit == "%" and low >= 0.0 else -math.inf), high + room
 
     def at(value: float) -> float:
         part = (min(max(value, low), high) - low) / (high - low)
         return round(edge + part * (wide - 2 * edge), 1)
 
     begin, end = at(criterion.low), at(criterion.high)
-    parts = [
-        f'<rect class="wanted" x="{begin}" y="4" width="{round(end - begin, 1)}" height="26" rx="3"/>',
-        f'<path class="axis" d="M{edge} 30H{wide - edge}"/>',
-    ]
+    parts = [f'<rect class="wanted" x="{begin}" y="4" width="{round(end - begin, 1)}" height="26" rx="3"/>']
+    parts.append(f'<path class="axis" d="M{edge} 30H{wide - edge}"/>')
     near = len(ends) == 2 and end - begin < 40.0  # their numbers then stand aside
     for value, anchor in zip(ends, ("end", "start"), strict=False):
         parts.append(f'<path class="bound" d="M{at(value)} 4V34"/>')

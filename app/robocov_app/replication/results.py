@@ -147,8 +147,8 @@ def open_folder(folder: Path, plan: Plan) -> None:
     mark = folder / MARK
     with for_results(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        used = any(folder.iterdir())
-    if not used:
+        empty = not any(folder.iterdir())
+    if empty:
         with written(mark) as part:
             part.write_text(json.dumps({**_HEAD, "plan": plan.name}) + "\n", encoding="utf-8")
         return
@@ -374,7 +374,7 @@ def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
         disturbed = _finals(at / f"conditions-{axis.replace('_', '-')}", parameter_column(axis), bad[0])
         for value in (best, *bad):
             for controller in studies.DISTURBED:
-                usual = ideal.get((controller, None), {})
+                usual = ideal.get((controller, None))
                 if not usual:
                     runs = counted(plan.beyond.conditions_seeds, "run")
                     raise RobocovError(f"{controller}: all {runs} on each map failed")

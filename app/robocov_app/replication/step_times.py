@@ -24,10 +24,8 @@ YARDSTICK = "rapf"  # the controller whose steps the others' are measured by
 MAP = "campus"  # where steps are timed: the largest of the bundled maps has room for large teams
 BLOCK = 50  # steps that are timed together: what is done now and then, a scan or a plan, counts by its share
 FILE = "steps.json"
-
 _FINE = 1e-5  # s: what a clock has to tell apart, a block of the quickest steps being some milliseconds
 _HEAD = {"format": "robocov-steps", "version": 1}
-
 UNKNOWN = Interval(float("nan"), float("nan"), float("nan"))
 
 

@@ -27,10 +27,8 @@ from robocov_app.sweep.study import Study, StudyMap
 
 RADII = (0.8, 0.6, 0.45)  # m, of the discs of clustered starts; the first that fits is taken
 TIGHT = 0.35  # m, of the disc of "tight": it has room for the centres of six robots, and hardly more
-
 SIDE = 10.0  # m, of the square in which regions are drawn by chance
 HOT_SPOTS = 2  # Gaussians drawn by chance on a map: in the middle of one a place counts 20 times as much
-
 _POINTS, _LEAST_AREA, _LEAST_WIDTH = 9, 40.0, 5.0
 
 # which runs the figures show: (map, starts, contenders); "paper" is the same on both maps, "other" figure 8's
@@ -57,7 +55,6 @@ AXES: Mapping[str, tuple[float | None, ...]] = {
 # conditions of all these runs, the ideal ones as well: of sixty messages a second nobody would miss one
 ALWAYS = {"message_rate": 2.0}
 DISTURBED = ("rapf", "lloyd")  # controllers that are disturbed
-
 BASELINE_GAINS = "rival-gains"
 
 
@@ -143,8 +140,7 @@ def claim_maps(plan: Plan) -> tuple[StudyMap, ...]:
 
 @cache
 def convex_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    known = (bundled(name, CONVEX_KINDS) for name in CONVEX)
-    return (*known, *map(convex_region, plan.convex_generated))
+    return (*(bundled(name, CONVEX_KINDS) for name in CONVEX), *map(convex_region, plan.convex_generated))
 
 
 def baseline_maps(plan: Plan) -> tuple[StudyMap, ...]:

@@ -174,15 +174,13 @@ def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
             return METRES, dict.fromkeys(result.fine, 1.0)
         return label, grouped.medians(result, part_of)
 
-    def plotted(
-        parameter: _Parameter, some: Sequence[Group], label: str, scales: Scales, key: str
-    ) -> Iterator[Plot]:
-        rows = [parameter.dependence(group, scales, styles[group.controller]) for group in some]
+    def plotted(over: _Parameter, some: list[Group], by: tuple[str, Scales], key: str) -> Iterator[Plot]:
+        label, scales = by
+        rows = [over.dependence(group, scales, styles[group.controller]) for group in some]
         if rows := [row for row in rows if len(row.values)]:
-            figure = drawing.plot_gains(rows, parameter.title, PANEL, label, parameter.choices)
-            words = "; ".join(_levels_text(row, parameter) for row in rows)
-            sentence = f"{label} against {parameter.title}. {words}."
-            yield Plot(parameter.title, inline_svg(figure, key, sentence))
+            figure = drawing.plot_gains(rows, over.title, PANEL, label, over.choices)
+            words = "; ".join(_levels_text(row, over) for row in rows)
+            yield Plot(over.title, inline_svg(figure, key, f"{label} against {over.title}. {words}."))
 
     by_setting = scale(RELATIVE, lambda entry: entry.setting)
     gains: dict[str, _Parameter] = {}
@@ -192,7 +190,7 @@ def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
         title = f"{name} ({unit})" if unit else name
         gains[name] = _Parameter(title, partial(_named, "gains", name), choices)
         some = [group for group in groups if group.controller in controllers]
-        yield from plotted(gains[name], some, *by_setting, f"{key}-{k}")
+        yield from plotted(gains[name], some, by_setting, f"{key}-{k}")
     team = [_Parameter("robots", lambda entry: entry.robots)]
     for name, _ in result.fine[0].team if result.fine else ():
         if name not in WORDS:
@@ -202,13 +200,13 @@ def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
     by_map = scale("final distance / median of map", lambda entry: entry.map)
     for k, parameter in enumerate(team):
         if len({parameter.value_of(entry) for entry in result.fine}) > 1:
-            yield from plotted(parameter, groups, *by_map, f"{key}-team-{k}")
+            yield from plotted(parameter, groups, by_map, f"{key}-team-{k}")
     count = 1
     for group in groups:
         own = [name for name, controllers in varying.items() if group.controller in controllers]
         for names in combinations(own, 2):
-            both, style = [gains[name] for name in names], styles[group.controller]
-            if plot := _grid_plot(group, names, both, *by_setting, style, f"{key}-grid-{count}"):
+            both, style = {name: gains[name] for name in names}, styles[group.controller]
+            if plot := _grid_plot(group, both, by_setting, style, f"{key}-grid-{count}"):
                 count += 1
                 yield plot
 
@@ -233,15 +231,10 @@ def _levels_text(row: Dependence, parameter: _Parameter) -> str:
 
 
 def _grid_plot(
-    group: Group,
-    names: Sequence[str],
-    gains: Sequence[_Parameter],
-    label: str,
-    scales: Scales,
-    style: CurveStyle,
-    key: str,
+    group: Group, over: Mapping[str, _Parameter], by: tuple[str, Scales], style: CurveStyle, key: str
 ) -> Plot | None:
     """Return medians over two gains of a controller; None where they were not tried on a grid."""
+    (label, scales), gains = by, list(over.values())
     first, second = (gain.dependence(group, scales, style) for gain in gains)
     columns, i = np.unique(first.gains, return_inverse=True)
     rows, j = np.unique(second.gains, return_inverse=True)
@@ -256,7 +249,7 @@ def _grid_plot(
     titles = gains[0].title, gains[1].title
     figure = drawing.plot_gain_grid(PANEL, levels[0], levels[1], values, titles)
     row, column = np.unravel_index(int(np.nanargmin(values)), values.shape)
-    title = f"{group.label} over {names[0]} and {names[1]}"
+    title = f"{group.label} over {' and '.join(over)}"
     what = "final distance in m" if label == METRES else RELATIVE
     best = f"{titles[0]} {gains[0].text(columns[column])} and {titles[1]} {gains[1].text(rows[row])}"
     span = f"from {np.nanmin(values):.3g} at {best} to {np.nanmax(values):.3g}"

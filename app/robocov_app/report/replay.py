@@ -231,7 +231,6 @@ def replay_part(runs: Sequence[ReplayRun], panes: Sequence[int] | None = None, b
 
 
 def replay_css() -> str:
-    """Return the style of replays and pictures; `theme_rules` gives it colours."""
     return asset("picture.css") + asset("replay.css")
 
 

@@ -317,12 +317,10 @@ def _of_sweep(folder: Path) -> Result:
                 facts["versions"] = _json(entry.folder / "run.json").get("versions")
                 break
     columns = {column.name: column.metadata or {} for column in results.dataset.schema}
-    about = {name: columns.get(gain_column(name), {}) for own in gains.values() for name in own}
-    texts = {
-        name: [own.get(key, b"").decode() for key in (b"unit", b"meaning")] for name, own in about.items()
-    }
+    meta = {name: columns.get(gain_column(name), {}) for own in gains.values() for name in own}
+    text = {name: [own.get(key, b"").decode() for key in (b"unit", b"meaning")] for name, own in meta.items()}
     maps = {printable(name): environment for name, environment in maps.items()}
-    known = _known_gains(entries, texts)
+    known = _known_gains(entries, text)
     return Result("sweep", folder, _labelled(entries), maps, wanted, *known, facts, {})
 
 

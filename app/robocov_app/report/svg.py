@@ -16,7 +16,6 @@ from robocov_app.report.theme_css import hex_code, named_colours
 
 _STYLE: Any = {"svg.hashsalt": "robocov", "svg.fonttype": "none", "savefig.bbox": None}
 _METADATA: dict[str, str | None] = {"Date": None, "Creator": None, "Format": None, "Type": None}
-
 _SPACE = "{http://www.w3.org/2000/svg}"
 _LINK = "{http://www.w3.org/1999/xlink}href"
 _NUMBER = re.compile(r"-?\d*\.?\d+(?:e[-+]?\d+)?")
