@@ -1,6 +1,6 @@
 """World layers of a plot: the map, and a whole run in it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from matplotlib.path import Path as Outline
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
 
-from robocov.arrays import Array, BoolArray
+from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.record import Record
 from robocov_app.figures.page import figure_of, tone
@@ -31,7 +31,6 @@ _DOTS = 400  # dots of the shading of a density along the longer side of a map
 
 
 def ticks_in_metres(axes: Axes, environment: Environment, theme: Theme) -> None:
-    """Prepare axes that somebody else laid out: equal scales, ticks in metres."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     axes.set(aspect="equal", xlim=(low_x, high_x), ylim=(low_y, high_y), xlabel="x (m)", ylabel="y (m)")
     for axis in (axes.xaxis, axes.yaxis):
@@ -86,7 +85,6 @@ def _draw_motion(axes: Axes, environment: Environment, obstacle: MovingObstacle,
 
 
 def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
-    """Draw map, final cells, trajectories, starts, final positions and where robots head."""
     draw_map(axes, record.environment, theme, time=float(record.time[-1]))
     last, n = record.positions[-1], record.positions.shape[1]
     working, there = np.flatnonzero(record.working[-1]), np.flatnonzero(record.present[-1])
@@ -107,17 +105,20 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     axes.add_collection(LineCollection(ways, **style), autolim=False)
     # of one that joins, where it does
     begin = record.positions[np.argmax(record.present, axis=0), np.arange(n)][there]
-    starts_apart = mark_size(_in_points(axes, begin), 3.2, _START)
-    axes.plot(*begin.T, zorder=5, **_start_style(theme, starts_apart))
+    axes.plot(*begin.T, zorder=5, **_start_style(theme, mark_size(_in_points(axes, begin), 3.2, _START)))
     own = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
-    failed = _failed(record)
+    failed = record.present[-1] & ~record.working[-1]
     robots = [wreck_colour(theme) if failed[robot] else own[robot] for robot in there.tolist()]
     drawn = draw_robots(axes, last[there], record.team.radius[there], robots, theme, (there + 1).tolist())
     if record.steering is not None:
-        facing = {
-            robot: record.steering[-1, robot, 0] for robot in working[record.team.turns[working]].tolist()
-        }
-        _draw_noses(axes, last, facing, dict(zip(there.tolist(), drawn, strict=True)), theme)
+        # where robots face, triangles at their discs
+        radii, inches = dict(zip(there.tolist(), drawn, strict=True)), figure_of(axes).dpi_scale_trans
+        for robot in working[record.team.turns[working]].tolist():
+            heading, off = record.steering[-1, robot, 0], 1.25 * radii[robot] / 72.0
+            shift = ScaledTranslation(off * np.cos(heading), off * np.sin(heading), inches)
+            style = {"transform": axes.transData + shift, "zorder": 6, "clip_on": False, "ls": ""}
+            style |= {"marker": (3, 0, float(np.degrees(heading)) - 90.0), "ms": 0.9 * radii[robot]}
+            axes.plot(*last[robot], mec="none", c=tone(theme.ink), **style)
     if has_goals(record):
         radius = np.array(drawn)[np.searchsorted(there, working)]
         aims = record.goals[-1][working]
@@ -155,21 +156,6 @@ def draw_robots(
     return drawn
 
 
-def _draw_noses(
-    axes: Axes, places: Array, facing: Mapping[int, float], radii: Mapping[int, float], theme: Theme
-) -> None:
-    """Draw where robots face, rad, as triangles at discs of radii in points, both by row."""
-    for robot, heading in facing.items():
-        off = 1.25 * radii[robot] / 72.0  # inches
-        shift = ScaledTranslation(
-            off * np.cos(heading), off * np.sin(heading), figure_of(axes).dpi_scale_trans
-        )
-        where: Any = {"transform": axes.transData + shift, "zorder": 6, "clip_on": False}
-        marker = (3, 0, float(np.degrees(heading)) - 90.0)
-        size = 0.9 * radii[robot]
-        axes.plot(*places[robot], marker=marker, ms=size, mec="none", c=tone(theme.ink), ls="", **where)
-
-
 def _line_colours(n: int, hues: list[int], theme: Theme, paper: bool) -> list[Colour]:
     if paper or n > ONE_HUE_EACH:
         return [theme.trajectory if paper else mix(theme.trajectory, theme.background, 0.25)] * n
@@ -205,7 +191,6 @@ def label_of(handle: Artist) -> str:
 
 
 def map_handles(environment: Environment, theme: Theme, *, density: bool = True) -> list[Artist]:
-    """Return the legend's entries for what `draw_map` draws."""
     handles: list[Artist] = [Line2D([], [], color=tone(theme.boundary), linewidth=1.6, label="known region")]
     if not environment.blocked.is_empty:
         handles.append(Patch(label="obstacle (unknown to robots)", **_static_style(theme)))
@@ -220,21 +205,17 @@ def map_handles(environment: Environment, theme: Theme, *, density: bool = True)
 
 
 def robot_handle(label: str, fill: Colour, theme: Theme) -> Artist:
-    style: Any = {"linestyle": "none", "marker": "o", "markersize": 8.0}
-    colours: Any = {"markerfacecolor": tone(fill), "markeredgecolor": tone(theme.robot_ring)}
-    return Line2D([], [], label=label, **style, **colours)
+    style: Any = {"markerfacecolor": tone(fill), "markeredgecolor": tone(theme.robot_ring)}
+    return Line2D([], [], label=label, linestyle="none", marker="o", markersize=8.0, **style)
 
 
 def wreck_colour(theme: Theme) -> Colour:
     return mix(theme.background, theme.ink, 0.3)
 
 
-def _failed(record: Record) -> BoolArray:
-    return np.asarray(record.present[-1] & ~record.working[-1])
-
-
 def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
     paper, n = colours == "paper", record.positions.shape[1]
+    failed = record.present[-1] & ~record.working[-1]
     line = _line_colours(n, list(range(n)), theme, paper)[0]
     aims: list[Artist] = []
     if has_goals(record):
@@ -244,7 +225,7 @@ def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
         Line2D([], [], label="start", **_start_style(theme, _START)),
         Line2D([], [], color=tone(line), linewidth=1.6, label="trajectory"),
         robot_handle("final position", theme.final if paper else theme.robots[0], theme),
-        *([robot_handle("failed robot", wreck_colour(theme), theme)] if _failed(record).any() else []),
+        *([robot_handle("failed robot", wreck_colour(theme), theme)] if failed.any() else []),
         *aims,
         Line2D([], [], color=tone(theme.cell_edge), linewidth=0.9, label="final Voronoi cell"),
         *map_handles(record.environment, theme)[1:],

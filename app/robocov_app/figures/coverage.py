@@ -27,7 +27,6 @@ from robocov_app.render.theme import LIGHT, Theme, border_colour, theme_named
 
 _FINE = 2  # dots of a map's picture for each pixel of the page
 _LEAST = 720, 400  # smallest page for curves and maps
-
 _BAR_LABEL = "distance to the nearest robot"
 
 
@@ -113,11 +112,10 @@ def plot_coverage(
     page.title(title, 26, (width if below else bar_left) - 2 * margin)
     if curves:
         weighed = any(density_label(moment.environment) for moment in moments)
-        _draw_all_curves(page, curves, times, curves_room, WEIGHED if weighed else DISTANCE)
+        _draw_both(page, curves, times, curves_room, WEIGHED if weighed else DISTANCE)
     panels = _panels(maps_room, maps, aspect, 50 * s, 16 * s)
     for moment, (box, slot) in zip(moments, panels, strict=True):
-        axes = page.map_axes(box, low_x, low_y, high_x, high_y)
-        _draw_moment(axes, moment, limit, theme, box, s)
+        _draw_moment(page.map_axes(box, low_x, low_y, high_x, high_y), moment, limit, theme, box, s)
         page.text(moment.title, box[0], box[1] - 35 * s, points=TEXT + 1.5, bold=True, room=slot)
         page.text(moment.facts, box[0], box[1] - 14 * s, colour=theme.faint, room=slot)
     boxes = [box for box, _ in panels]
@@ -164,16 +162,13 @@ def _handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
     return handles
 
 
-def _draw_all_curves(
-    page: Page, curves: Sequence[Curve], times: Sequence[Curve], room: Box, label: str
-) -> None:
+def _draw_both(page: Page, curves: Sequence[Curve], times: Sequence[Curve], room: Box, label: str) -> None:
     """Draw the mean distances, and if there are any the mean times: below, or beside them in a wide room."""
     s, (left, top, width, height) = page.scale, room
-    across = bool(times) and width > 2.4 * height
-    drawn = [(curves, label, "m"), *([(times, TIME, "s")] if times else [])]
+    drawn = [(curves, label, "m"), *[(times, TIME, "s")] * bool(times)]
     for k, (some, words, unit) in enumerate(drawn):
         x, y, wide, high = left, top + k * height / len(drawn), width, height / len(drawn)
-        if across:
+        if times and width > 2.4 * height:
             x, y, wide, high = left + k * width / 2, top, width / 2, height
         longest = max(page.text_width(end_label(curve, unit), bold=True) for curve in some)
         right = min(26 * s + longest, 0.45 * wide)
@@ -201,7 +196,6 @@ def _panels(room: Box, count: int, aspect: float, above: float, gap: float) -> l
 
 
 def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Box, scale: float) -> None:
-    """Draw the distances cut at the walls, the borders of the geodesic cells, the map and the robots."""
     (low_x, high_x), (low_y, high_y) = axes.get_xlim(), axes.get_ylim()
     zoom = _FINE * box[2] / (high_x - low_x)
     columns, rows = max(round(_FINE * box[2]), 2), max(round(_FINE * box[3]), 2)

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from robocov.arrays import Array
-from robocov_app.figures.page import TEXT, even_ticks, figure_of, quiet_axes, tone, value_limits
+from robocov_app.figures.page import TEXT, Tone, even_ticks, figure_of, quiet_axes, tone, value_axis
 from robocov_app.figures.styles import CurveStyle, styles_of
 from robocov_app.render.theme import Theme
 
@@ -46,12 +46,10 @@ def draw_curves(
     chosen = styles_of([controller for _, controller, _, _ in curves]) if styles is None else styles
     around = list(bands or [None] * len(curves))
     lines = [np.asarray(curve[3]) for curve in curves] + [edge for band in around if band for edge in band]
-    shown = np.concatenate([line[np.isfinite(line)] for line in lines])
     times = np.concatenate([np.asarray(curve[2]) for curve in curves])
-    axes.set_ylim(*value_limits(float(shown.min()), float(shown.max())))
     axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-9))
     even_ticks(axes.xaxis, 8)
-    even_ticks(axes.yaxis, 6)
+    value_axis(axes.yaxis, np.concatenate([line[np.isfinite(line)] for line in lines]))
     quiet_axes(axes, theme, "time (s)", label, grid="y")
     for (_, _, time, _), style, band in zip(curves, chosen, around, strict=True):
         if band is not None:
@@ -71,9 +69,7 @@ def draw_curves(
     _draw_end_labels(axes, ends)
 
 
-def _draw_end_labels(
-    axes: Axes, ends: Sequence[tuple[float, float, tuple[float, float, float], str]]
-) -> None:
+def _draw_end_labels(axes: Axes, ends: Sequence[tuple[float, float, Tone, str]]) -> None:
     """Write the words of each end (x, y, colour, words) beside the axes, a line to what was moved."""
     dpi, box = figure_of(axes).dpi, axes.get_window_extent()
     point, line_height = dpi / 72 / box.width, 1.45 * TEXT * dpi / 72

@@ -45,7 +45,6 @@ def plain_style() -> Iterator[None]:
 
 
 def figure_png(figure: Figure) -> bytes:
-    """Return a figure as PNG, of exactly the page's pixels."""
     file = io.BytesIO()
     _write(figure, file, "png")
     return file.getvalue()

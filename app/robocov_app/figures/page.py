@@ -11,6 +11,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from robocov.arrays import Array
 from robocov.errors import ParameterError
 from robocov_app.figures.files import figure_png
 from robocov_app.render.camera import length_label, round_length
@@ -18,9 +19,10 @@ from robocov_app.render.theme import Colour, Theme
 
 HEADING, TITLE, TEXT, SMALL = 14.0, 12.5, 9.5, 8.5  # text sizes in points
 Box: TypeAlias = tuple[float, float, float, float]  # left, top, width and height in pixels
+Tone: TypeAlias = tuple[float, float, float]  # a colour as matplotlib has it
 
 
-def tone(colour: Colour) -> tuple[float, float, float]:
+def tone(colour: Colour) -> Tone:
     red, green, blue = colour
     return red / 255, green / 255, blue / 255
 
@@ -30,7 +32,6 @@ def figure_of(axes: Axes) -> Figure:
 
 
 def check_some(what: str, items: Sequence[object]) -> None:
-    """Raise ParameterError where there is nothing to plot."""
     if not items:
         raise ParameterError(f"{what}: none were given, but at least one was wanted")
 
@@ -65,6 +66,13 @@ def even_ticks(axis: Any, most: int) -> None:
     axis.set_major_formatter("{x:g}")
 
 
+def value_axis(axis: Any, values: Array, **ends: float) -> None:
+    """Give an axis even ticks, and ends that suit finite values: those of `value_limits`."""
+    limits = value_limits(float(values.min()), float(values.max()), **ends)
+    axis.axes.set(**{f"{axis.axis_name}lim": limits})
+    even_ticks(axis, 6)
+
+
 def cut_to(text: str, width_of: Callable[[str], float], room: float) -> str:
     """Return a text, cut so that it is no wider than `room` unless that leaves nothing of it: "Lloyd's…"."""
     kept = text
@@ -88,10 +96,8 @@ class Page:
     """A figure laid out in pixels; texts and lines are `scale` times those at 100 dots an inch."""
 
     def __init__(self, size: tuple[int, int], theme: Theme, scale: float | None = None) -> None:
-        self.size = size
-        self.theme = theme
-        fitting = min(max(min(size[0] / 960, size[1] / 640), 0.8), 6.0)
-        self.scale = fitting if scale is None else scale
+        self.size, self.theme = size, theme
+        self.scale = min(max(min(size[0] / 960, size[1] / 640), 0.8), 6.0) if scale is None else scale
         self.margin = 18.0 * self.scale  # pixels that stay free at the edges
         self.room = size[0] - 2 * self.margin  # between the margins
         self._longest_bar = max(min(120 * self.scale, size[0] / 7), 20.0)
@@ -126,15 +132,13 @@ class Page:
         self, count: int, columns: int, aspect: float, words: float, above: float, top: float, below: float
     ) -> list[tuple[Box, float]]:
         """Return equal boxes, px, and how wide lines above each may be: `words` where there is room."""
-        rows = -(-count // columns)
-        gap = 14 * self.scale
+        rows, gap = -(-count // columns), 14 * self.scale
         widest = (self.size[0] - self.margin) / columns - self.margin
         highest = (self.size[1] - top - below + gap) / rows - above - gap
         width = min(widest, highest * aspect)
         height = width / aspect
-        slot = min(max(width, words), widest)
+        slot, block = min(max(width, words), widest), above + height + gap
         left = (self.size[0] - columns * slot - (columns - 1) * self.margin) / 2
-        block = above + height + gap
         top += max((self.size[1] - top - below + gap - rows * block) / 2, 0.0)
         boxes = []
         for number in range(count):
@@ -173,19 +177,16 @@ class Page:
     def width_of(self, artist: Any) -> float:
         return float(artist.get_window_extent(self.figure.canvas.get_renderer()).width)  # type: ignore[attr-defined]
 
-    def footer_height(self, handles: Sequence[Artist], begin: float | None = None) -> float:
-        """Return how much room `footer` needs below what is plotted, in pixels."""
-        begin = self.margin if begin is None else begin
+    def footer_height(self, handles: Sequence[Artist], begin: float = 0) -> float:
+        begin = max(begin, self.margin)
         columns, width, height = self._legend_extent(handles, begin)
         if columns == len(handles) and width <= self._beside_bar(begin):
             return 46 * self.scale
         return 36 * self.scale + height + 14 * self.scale
 
-    def footer(
-        self, handles: Sequence[Artist], boxes: Sequence[Box], zoom: float, begin: float | None = None
-    ) -> None:
+    def footer(self, handles: Sequence[Artist], boxes: Sequence[Box], zoom: float, begin: float = 0) -> None:
         """Draw the scale bar, at `zoom` px/m, and the legend below `boxes`; nothing left of `begin` px."""
-        begin = self.margin if begin is None else begin
+        begin = max(begin, self.margin)
         left, right = boxes[0][0], max(x + width for x, _, width, _ in boxes)
         bottom = max(y + height for _, y, _, height in boxes)
         columns, width, _ = self._legend_extent(handles, begin)
@@ -227,12 +228,7 @@ class Page:
 
     def _legend(self, handles: Sequence[Artist], columns: int, place: str, at: tuple[float, float]) -> Legend:
         """Draw a legend of which the `place`, as in "upper left", is `at` a pixel."""
-        style: Any = {
-            "frameon": False,
-            "fontsize": SMALL,
-            "labelcolor": tone(self.theme.ink),
-            "borderpad": 0.0,
-        }
-        style |= {"borderaxespad": 0.0, "columnspacing": 1.6, "handletextpad": 0.6, "handlelength": 1.6}
-        where: Any = {"loc": place, "bbox_to_anchor": self.at(*at)}
-        return self.figure.legend(handles=list(handles), ncols=columns, **where, **style)
+        style: Any = {"loc": place, "bbox_to_anchor": self.at(*at), "frameon": False, "fontsize": SMALL}
+        style |= {"labelcolor": tone(self.theme.ink), "borderpad": 0.0, "borderaxespad": 0.0}
+        style |= {"columnspacing": 1.6, "handletextpad": 0.6, "handlelength": 1.6}
+        return self.figure.legend(handles=list(handles), ncols=columns, **style)

@@ -12,23 +12,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullLocator
 
 from robocov.arrays import Array
 from robocov.controllers.gains import Value, value_text
 from robocov_app.figures.curves import draw_curves, end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import (
-    SMALL,
-    TEXT,
-    Page,
-    cut_to,
-    even_ticks,
-    figure_of,
-    quiet_axes,
-    tone,
-    value_limits,
-)
+from robocov_app.figures.page import SMALL, TEXT, Page, cut_to, figure_of, quiet_axes, tone, value_axis
 from robocov_app.figures.statistics import Interval
 from robocov_app.figures.styles import CurveStyle
 from robocov_app.render.theme import LIGHT, Theme
@@ -116,10 +106,8 @@ def plot_final_costs(
     finite = [np.sort(sample.values[np.isfinite(sample.values)]) for sample in samples]
     for sample, values, place in zip(samples, finite, places, strict=True):
         draw_box(axes, values, place, sample.style, theme)
-    _row_frame(axes, places, names, total, theme, label, [sample.style for sample in samples])
-    low, high = (float(end) for end in (min(map(np.min, finite)), max(map(np.max, finite))))
-    axes.set_xlim(*value_limits(low, high, room=0.06, origin=origin))
-    even_ticks(axes.xaxis, 6)
+    _row_frame(axes, places, names, theme, label, [sample.style for sample in samples])
+    value_axis(axes.xaxis, np.concatenate(finite), room=0.06, origin=origin)
     box, ink = axes.get_position(), tone(theme.ink)
     style: Any = {"fontsize": TEXT, "fontweight": "bold", "va": "center", "color": ink}
     for (name, _), head in zip(rows, heads, strict=True):
@@ -135,13 +123,13 @@ def plot_paired(pairs: Sequence[Pairs], label: str, width: int, scale: float, th
     places, _, total = laid_rows([("", len(pairs))])
     axes, names = rows_page(total, [each.label for each in pairs], theme, width, scale)
     for each, place in zip(pairs, places, strict=True):
-        _draw_points(axes, np.sort(each.ratios), place, tone(each.style.colour(theme)), theme)
+        _draw_points(axes, np.sort(each.ratios), place, each.style, theme)
         ratio = each.interval
         if np.isfinite(ratio.low):
             line: Any = {"linewidth": 2.4, "solid_capstyle": "butt", "zorder": 4}
             axes.plot([ratio.low, ratio.high], [place, place], color=tone(theme.ink), **line)
         _draw_median(axes, ratio.estimate, place, theme)
-    _row_frame(axes, places, names, total, theme, label)
+    _row_frame(axes, places, names, theme, label)
     ratios = np.concatenate([each.ratios for each in pairs])
     ends = [end for each in pairs for end in (each.interval.low, each.interval.high) if np.isfinite(end)]
     # an interval of two or three values may be endless: it leaves the axis then
@@ -173,32 +161,24 @@ def laid_rows(groups: Sequence[tuple[str, int]]) -> tuple[list[float], list[floa
     return places, heads, at
 
 
-def rows_page(
-    total: float, names: Sequence[str], theme: Theme, width: int, scale: float
-) -> tuple[Axes, list[str]]:
-    """Return axes on a page high enough for `total` rows, and the names as they fit to the left of them."""
-    page = Page((width, 200), theme, scale)
-    short = [cut_to(name, page.text_width, 0.42 * width) for name in names]
+def rows_page(rows: float, names: list[str], theme: Theme, wide: int, scale: float) -> tuple[Axes, list[str]]:
+    """Return axes on a page high enough for so many rows, and the names as they fit to the left of them."""
+    page = Page((wide, 200), theme, scale)
+    short = [cut_to(name, page.text_width, 0.42 * wide) for name in names]
     left = max(page.text_width(name) for name in short) + 32 * scale
     above, below = 8 * scale, 46 * scale
-    height = round(above + _ROW * scale * total + below)
-    page = Page((width, height), theme, scale)
-    return page.axes((left, above, width - left - 16 * scale, height - above - below)), short
+    height = round(above + _ROW * scale * rows + below)
+    page = Page((wide, height), theme, scale)
+    axes = page.axes((left, above, wide - left - 16 * scale, height - above - below))
+    axes.set_ylim(rows, 0.0)
+    return axes, short
 
 
 def _row_frame(
-    axes: Axes,
-    places: Sequence[float],
-    names: Sequence[str],
-    total: float,
-    theme: Theme,
-    label: str,
-    looks: Sequence[CurveStyle] = (),
+    axes: Axes, places: list[float], names: list[str], theme: Theme, x: str, looks: Sequence[CurveStyle] = ()
 ) -> None:
-    """Write the names beside the rows, with the marks of their styles, and what the values are."""
-    axes.set_ylim(total, 0.0)
-    axes.set_yticks(list(places), list(names))
-    quiet_axes(axes, theme, label, grid="x")
+    axes.set_yticks(places, names)
+    quiet_axes(axes, theme, x, grid="x")
     axes.tick_params(axis="y", left=True, length=0.0, labelsize=TEXT, pad=_BESIDE)
     aside = -0.5 * (_BESIDE + 3.0) * figure_of(axes).dpi / 72 / axes.get_window_extent().width
     style: Any = {"markersize": 5.5, "transform": axes.get_yaxis_transform(), "clip_on": False}
@@ -207,16 +187,14 @@ def _row_frame(
 
 
 def ratio_limits(axes: Axes, ratios: Array, theme: Theme) -> None:
-    """Give a logarithmic axis around 1 room for all ratios, and mark 1."""
     low, high = min(float(ratios.min()), 0.95), max(float(ratios.max()), 1.05)
     room = (high / low) ** 0.05
-    axes.set_xscale("log")
-    axes.set_xlim(low / room, high * room)
+    axes.set(xscale="log", xlim=(low / room, high * room))
     fitting = [ratio for ratio in _RATIOS if low / room <= ratio <= high * room]
     fitting += [10.0**k for k in range(1, 7) if 10.0**k <= high * room]
     axes.xaxis.set_major_locator(FixedLocator(_thinned(fitting, np.log(high / low) / 7)))
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_major_formatter("{x:g}")
     axes.axvline(1.0, color=tone(theme.ink), linewidth=1.0, zorder=2)
 
 
@@ -232,12 +210,11 @@ def _thinned(marks: Sequence[float], apart: float) -> list[float]:
 def draw_box(axes: Axes, values: Array, place: float, style: CurveStyle, theme: Theme) -> None:
     """Draw one row of sorted values: points and median, and from `FEW` values on their box and whiskers."""
     colour = tone(style.colour(theme))
-    _draw_points(axes, values, place, colour, theme)
+    _draw_points(axes, values, place, style, theme)
     low, middle, high = np.percentile(values, [25, 50, 75])
     if len(values) >= FEW:
         reach = 1.5 * (high - low)
-        begin = values[values >= low - reach].min()
-        end = values[values <= high + reach].max()
+        begin, end = values[values >= low - reach].min(), values[values <= high + reach].max()
         line: Any = {"color": colour, "linewidth": 1.4, "solid_capstyle": "butt", "zorder": 3}
         axes.plot([begin, low], [place, place], **line)
         axes.plot([high, end], [place, place], **line)
@@ -247,9 +224,7 @@ def draw_box(axes: Axes, values: Array, place: float, style: CurveStyle, theme: 
         _draw_median(axes, float(middle), place, theme)
 
 
-def _draw_points(
-    axes: Axes, values: Array, place: float, colour: tuple[float, float, float], theme: Theme
-) -> None:
+def _draw_points(axes: Axes, values: Array, place: float, style: CurveStyle, theme: Theme) -> None:
     """Draw sorted values as points, up and down so that few hide each other."""
     if len(values) > MOST_POINTS:
         values = values[np.rint(np.linspace(0, len(values) - 1, MOST_POINTS)).astype(int)]
@@ -257,7 +232,7 @@ def _draw_points(
     aside = np.zeros(len(values)) if alone else (_scattered(len(values)) - 0.5) * 1.5 * _HALF
     look: Any = {"markersize": 6.0, "alpha": 1.0} if alone else {"markersize": 3.6, "alpha": 0.65}
     rim: Any = {"markeredgecolor": tone(theme.background), "markeredgewidth": 0.4}
-    axes.plot(values, place + aside, "o", color=colour, zorder=3.5, **look, **rim)
+    axes.plot(values, place + aside, "o", color=tone(style.colour(theme)), zorder=3.5, **look, **rim)
 
 
 def _draw_median(axes: Axes, value: float, place: float, theme: Theme) -> None:
@@ -297,9 +272,7 @@ def plot_gains(
     null = _gain_axis(axes, np.concatenate([each.gains for each in dependences]), words)
     for each in dependences:
         _draw_dependence(axes, each, null, joined=not words)
-    values = np.concatenate([each.values for each in dependences])
-    axes.set_ylim(*value_limits(float(values.min()), float(values.max())))
-    even_ticks(axes.yaxis, 6)
+    value_axis(axes.yaxis, np.concatenate([each.values for each in dependences]))
     quiet_axes(axes, LIGHT, cut_to(gain, len, MOST_LETTERS), label, grid="y")
     if len(dependences) > 1:
         axes.legend(frameon=False, fontsize=SMALL, labelcolor=tone(LIGHT.ink), borderaxespad=0.2)
@@ -330,14 +303,11 @@ def plot_gain_grid(
         part = (values[row, column] - low) / (high - low) if high > low else 0.0
         colour = tone(colours[round(part * (len(colours) - 1))])
         # a hair's breadth of the page between cells
-        box = (column - 0.48, row - 0.48), 0.96, 0.96
-        axes.add_patch(Rectangle(*box, facecolor=colour, linewidth=0.0))
-        weight = "bold" if values[row, column] == low else "normal"
-        text = f"{values[row, column]:.{decimals}f}"
+        axes.add_patch(Rectangle((column - 0.48, row - 0.48), 0.96, 0.96, facecolor=colour, linewidth=0.0))
         style: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": tone(theme.ink)}
-        axes.text(column, row, text, fontweight=weight, **style)
-    axes.set_xlim(-0.5, len(first) - 0.5)
-    axes.set_ylim(-0.5, len(second) - 0.5)
+        style["fontweight"] = "bold" if values[row, column] == low else "normal"
+        axes.text(column, row, f"{values[row, column]:.{decimals}f}", **style)
+    axes.set(xlim=(-0.5, len(first) - 0.5), ylim=(-0.5, len(second) - 0.5))
     axes.set_xticks(range(len(first)), [value_text(value, digits=4) for value in first])
     axes.set_yticks(range(len(second)), [value_text(value, digits=4) for value in second])
     x, y = (cut_to(gain, len, MOST_LETTERS) for gain in gains)
@@ -356,8 +326,7 @@ def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
         axes.set_xlim(-0.5, len(words) - 0.5)
         axes.set_xticks(range(len(words)), list(words))
         return None
-    finite = gains[np.isfinite(gains)]
-    levels = np.unique(finite)
+    levels = np.unique(gains[np.isfinite(gains)])
     logarithmic = len(levels) > 1 and levels[0] > 0 and levels[-1] / levels[0] >= _WIDE
     low, high = (float(levels[0]), float(levels[-1])) if len(levels) else (0.0, 0.0)
     unlimited = bool(np.isnan(gains).any())
@@ -370,15 +339,13 @@ def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
         room = 0.07 * (high - low) if high > low else 0.5 * max(abs(high), 1.0)
         end = high + 3 * room if unlimited else high
         axes.set_xlim(low - room, end + room)
-    null = [end] if unlimited else []
     ticks = levels.tolist()
     if len(levels) > 8:
         locator = LogLocator(subs=(1.0, 3.0)) if logarithmic else MaxNLocator(6, steps=[1, 2, 5, 10])
         ticks = [float(value) for value in locator.tick_values(low, high) if low <= value <= high]
-    axes.xaxis.set_major_locator(FixedLocator([*ticks, *null]))
+    axes.xaxis.set_major_locator(FixedLocator(ticks + [end] * unlimited))
     axes.xaxis.set_minor_locator(NullLocator())
-    texts = [value_text(value, digits=4) for value in ticks]
-    axes.set_xticklabels([*texts, *("none" for _ in null)])
+    axes.set_xticklabels([value_text(value, digits=4) for value in ticks] + ["none"] * unlimited)
     return end if unlimited else None
 
 

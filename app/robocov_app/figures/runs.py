@@ -39,8 +39,7 @@ def plot_environment(
     theme = theme_named(theme)
     if axes is None:
         facts = f"{environment.area:.4g} m² inside the boundary, {environment.free_area:.4g} m² free"
-        handles = map_handles(environment, theme)
-        axes = _map_page(environment, theme, size, environment.name, facts, handles)
+        axes = _map_page(environment, theme, size, environment.name, facts, map_handles(environment, theme))
     else:
         ticks_in_metres(axes, environment, theme)
     draw_map(axes, environment, theme)
@@ -66,10 +65,9 @@ def plot_trajectories(
         raise ParameterError(f"colours: {shown(colours)}, but 'paper' or 'robots' was wanted")
     theme = theme_named(theme)
     if axes is None:
-        facts = [_cost(record.environment, mean_distance, mean_time), _time(record), _robots(record)]
-        title = _line(record.label, record.environment.name)
-        handles = run_handles(record, theme, colours)
-        axes = _map_page(record.environment, theme, size, title, _line(*facts), handles)
+        facts = _line(*_facts(record, mean_distance, mean_time))
+        title, handles = _line(record.label, record.environment.name), run_handles(record, theme, colours)
+        axes = _map_page(record.environment, theme, size, title, facts, handles)
     else:
         ticks_in_metres(axes, record.environment, theme)
     draw_run(axes, record, theme, colours)
@@ -186,10 +184,8 @@ def _map_page(
     width = min(page.room, room_y * aspect)
     height = width / aspect
     box = (page.size[0] - width) / 2, above + (room_y - height) / 2, width, height
-    for text, up, points, bold, colour in (
-        (title, 38, TITLE, True, theme.ink),
-        (facts, 16, TEXT, False, theme.faint),
-    ):
+    lines = (title, 38, TITLE, True, theme.ink), (facts, 16, TEXT, False, theme.faint)
+    for text, up, points, bold, colour in lines:
         # above a narrow map lines may be wider than it
         wide = min(page.text_width(text, points=points, bold=bold), page.room)
         start = box[0] if wide <= width else max(box[0] + (width - wide) / 2, page.margin)
@@ -203,12 +199,12 @@ def _captions(
     records: Sequence[Record], costs: Sequence[float | None], times: Sequence[float | None]
 ) -> tuple[str, list[str]]:
     """Return what is true of all runs, for the page's title, and of each, what is not."""
-    every = [(each.environment.name, _robots(each), _time(each)) for each in records]
+    known = [_facts(*each) for each in zip(records, costs, times, strict=True)]
+    both = zip(records, known, strict=True)
+    every = [(record.environment.name, robots, time) for record, (_, time, robots) in both]
     shared = [len(set(found)) == 1 for found in zip(*every, strict=True)]
-    own = [
-        _line(_cost(each.environment, *known), *compress(facts, map(not_, shared)))
-        for each, facts, *known in zip(records, every, costs, times, strict=True)
-    ]
+    unlike = [tuple(compress(facts, map(not_, shared))) for facts in every]
+    own = [_line(cost, *facts) for (cost, _, _), facts in zip(known, unlike, strict=True)]
     return _line(*compress(every[0], shared)), own
 
 
@@ -216,18 +212,11 @@ def _line(*facts: str) -> str:
     return "  ·  ".join(fact for fact in facts if fact)
 
 
-def _robots(record: Record) -> str:
-    return counted(len(record.team), "robot")
-
-
-def _time(record: Record) -> str:
-    return f"t = {record.time[-1]:.1f} s"
-
-
-def _cost(environment: Environment, mean_distance: float | None, mean_time: float | None) -> str:
-    if mean_distance is None:
-        return ""
-    return cost_label(mean_label(environment), mean_distance, mean_time)
+def _facts(record: Record, mean_distance: float | None, mean_time: float | None) -> tuple[str, str, str]:
+    """Return the cost (empty where it is not known), the time, and the number of robots in words."""
+    mean = mean_label(record.environment)
+    cost = "" if mean_distance is None else cost_label(mean, mean_distance, mean_time)
+    return cost, f"t = {record.time[-1]:.1f} s", counted(len(record.team), "robot")
 
 
 @plain_style()
@@ -238,8 +227,7 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
     title = f"{len(drawn)} of {len(environments)}" if len(drawn) < len(environments) else ""
     bounds = np.array([environment.region.bounds for environment in drawn])
     wide, high = (bounds[:, 2:] - bounds[:, :2]).max(axis=0).tolist()
-    handles = {str(each.get_label()): each for one in drawn for each in map_handles(one, theme)}
-    entries = [*handles.values()]
+    entries = [*{label_of(each): each for one in drawn for each in map_handles(one, theme)}.values()]
     page = Page((_WIDTH, _HIGHEST), theme, 1.5)
     above, top = 26 * page.scale, (46 if title else 8) * page.scale
     columns = columns_for(len(drawn), wide / high, (1600, 1200), above)
@@ -247,12 +235,11 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
     rows = -(-len(drawn) // columns)
     tall = top + rows * (above + slot * high / wide + 14 * page.scale) + page.footer_height(entries)
     page = Page((_WIDTH, int(np.clip(tall, 320, _HIGHEST))), theme, 1.5)
-    below = page.footer_height(entries)
-    panels = page.panels(len(drawn), columns, wide / high, 0.0, above, top, below)
+    panels = page.panels(len(drawn), columns, wide / high, 0.0, above, top, page.footer_height(entries))
     for environment, (low_x, low_y, *_), (box, room) in zip(drawn, bounds.tolist(), panels, strict=True):
         draw_map(page.map_axes(box, low_x, low_y, low_x + wide, low_y + high), environment, theme)
         page.text(environment.name, box[0], box[1] - 12 * page.scale, bold=True, room=room)
-    first = panels[0][0]
+    first, _ = panels[0]
     if title:
         y = first[1] - above - 18 * page.scale
         page.text(title, first[0], y, points=HEADING, bold=True, room=page.room)
@@ -283,7 +270,6 @@ PANELS: tuple[tuple[str, str, Callable[[RunMetrics], Array]], ...] = (
 
 @plain_style()
 def plot_metrics(runs: Sequence[Measured], theme: Theme | str, title: str) -> Figure:
-    """Plot the metrics of runs against time, each curve named with its value at the end."""
     theme = theme_named(theme)
     page = Page((1200, 800), theme)
     s = page.scale

@@ -48,24 +48,22 @@ def bootstrap_by(
     return _interval(lambda drawn: [statistic(rows) for rows in drawn], clusters, resamples)
 
 
-def _interval(
-    statistic: Callable[[IntArray], ArrayLike], clusters: Sequence[object], resamples: int
-) -> Interval:
+def _interval(of: Callable[[IntArray], ArrayLike], clusters: Sequence[object], resamples: int) -> Interval:
     """Return a statistic of (r, m) row numbers, one for each row, with its percentiles over resamples."""
     rows: dict[object, list[int]] = {}
     for row, label in enumerate(clusters):
         rows.setdefault(label, []).append(row)
     members = [np.array(own) for own in rows.values()]
-    estimate = float(np.asarray(statistic(np.arange(len(clusters))[None]))[0])
+    estimate = float(np.asarray(of(np.arange(len(clusters))[None]))[0])
     if len(members) < 2:
         return Interval(estimate, float("nan"), float("nan"))
     drawn = np.random.default_rng(0).integers(0, len(members), (resamples, len(members)))
     if len({len(own) for own in members}) == 1:
         together = np.array(members)
         parts = np.array_split(drawn, 1 + len(clusters) * resamples // _AT_ONCE)
-        several = [statistic(together[part].reshape(len(part), -1)) for part in parts]
+        several = [of(together[part].reshape(len(part), -1)) for part in parts]
     else:
-        several = [statistic(np.concatenate([members[k] for k in each])[None]) for each in drawn]
+        several = [of(np.concatenate([members[k] for k in each])[None]) for each in drawn]
     found = np.concatenate([np.asarray(each) for each in several])
     # a resample may have no value of the statistic: its percentiles are those of the others
     known, tail = found[~np.isnan(found)], (1.0 - LEVEL) / 2.0

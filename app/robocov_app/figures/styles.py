@@ -2,25 +2,22 @@
 
 import itertools
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from robocov_app.render.theme import Colour, Theme
 
-# dashes and end mark of the paper's controllers: the same in every picture
-_KNOWN: dict[str, tuple[Any, str]] = {
-    "rapf": ("-", "o"),
-    "rpf": ((0, (5, 1.6)), "s"),
-    "lloyd": ((0, (1.6, 1.2)), "^"),
-}
+Look: TypeAlias = tuple[Any, str]  # dashes and end mark
+
+# of the paper's controllers
+_KNOWN: dict[str, Look] = {"rapf": ("-", "o"), "rpf": ((0, (5, 1.6)), "s"), "lloyd": ((0, (1.6, 1.2)), "^")}
 # those of controllers that have none of their own, and of one controller's second, third, ... gains.
-VARIANTS: tuple[tuple[Any, str], ...] = (
+VARIANTS: tuple[Look, ...] = (
     ((0, (6, 1.6, 1.6, 1.6)), "D"),
     ((0, (9, 2.5)), "v"),
     ((0, (3, 1.2, 1.2, 1.2, 1.2, 1.2)), "P"),
     ((0, (2.5, 2.5)), "*"),
     ((0, (9, 1.4, 3, 1.4)), "X"),
 )
-
 _LOOKS = (*_KNOWN.values(), *VARIANTS)
 
 # the marks as SVG paths round the origin, 10 to 13 across
@@ -62,10 +59,8 @@ def styles_of(controllers: Sequence[str]) -> list[CurveStyle]:
         CurveStyle(f"other-{k}", *VARIANTS[(k + turn) % count]) for turn in range(count) for k in range(count)
     )
     spare = [CurveStyle(f"other-{k}", *look) for k, look in enumerate(VARIANTS)]
-    first = {
-        name: CurveStyle(name, *_KNOWN[name]) if name in _KNOWN else next(free)
-        for name in dict.fromkeys(controllers)
-    }
+    names = dict.fromkeys(controllers)
+    first = {name: CurveStyle(name, *_KNOWN[name]) if name in _KNOWN else next(free) for name in names}
     left, used = dict(first), set(first.values())
     styles = []
     for name in controllers:

@@ -4,11 +4,6 @@ A claim has one or several *criteria*: an estimate, its 95 % interval, and the r
 lie. A criterion is met where the whole interval lies in that range, refuted where all of it lies outside,
 and open where it reaches over an end of the range.
 
-    all criteria met                              the claim holds
-    some met                                      it holds partly
-    none met, at least one refuted                it does not hold
-    all open, or too few maps to tell             undecided
-
 All thresholds stand here, with their reasons; they were set before the study was run, those of the goals of
 our own controller before it was written, and are the same for every run. A goal speaks of the runs that there
 are: it is met or missed by the measured value, and its verdict as a claim says whether other maps might have
@@ -47,6 +42,37 @@ VERDICTS: dict[Verdict, tuple[str, str]] = {
     "does not hold": ("does not hold", "do not hold"),
     "undecided": ("is undecided", "are undecided"),
 }
+
+SAME_COST = 0.02  # two costs are the same when the median of their ratio is within 2 % of 1
+NEARLY_SAME = 0.05  # in single runs two costs are nearly the same when they differ by at most 5 %
+NEARLY_ALWAYS = 0.9  # the share of runs that "the result is" speaks of, where the paper makes no exceptions
+CLEARLY_BELOW = 0.95  # a law is better than another when the median ratio of their costs is below this
+BARELY = 0.05  # a result barely depends on the gains: its standard deviation is below 5 % of its mean
+REGRET = 0.02  # the best gains depend on the environment when those of other maps cost more than 2 % on it
+# a result barely depends on the starts: its standard deviation over them is below 10 % of its mean; starts
+# matter more than gains do in any law that descends to a local optimum, so the bound is wider
+BARELY_BY_START = 0.1
+# two placements are nearly the same when robots are less than a quarter of the side of their share apart
+SAME_PLACEMENT = 0.25
+# a team is near the reference within 10 % of its cost, and far from it above 25 %
+NEAR_OPTIMUM, FAR_FROM_OPTIMUM = 0.1, 0.25
+CLUSTERED = CONVEX_KINDS[:-1]  # starts in convex regions in which the robots are close together
+GOALS, RIVALS, EXTENSIONS = 7, 8, 9  # questions beyond the paper; its own are 1 to 6
+
+# The goals of our own controller. Its gains were tuned on other generated maps, but what it reached on those
+# of the study was looked at while its rules were made; `unseen_claim` is on maps on which nobody did.
+LEAST_GAP = 0.014  # the median of J/J_ref - 1, at most; RAPF at its best gains had about 5 % at that time
+MAP_GAP = 0.03  # the median on every single map, at most
+NEVER_WORSE = 1.01  # its median on a map by that of RAPF or LA on the same map, at most
+AT_REST = 0.97  # the share of its runs that come to rest
+RARELY = 0.1  # the share of runs with a contact, at most: that of no run is shown by no number of them
+REST_TIME = 40.0  # s, the median time after which they do
+STEP_RATIO = 10.0  # the time of a step of a large team by that of RAPF, at most
+CLOSED = 0.5  # most of a gap is closed when more than half of it is
+
+# what RAPF is to bear: axis and value, words
+BORNE = ((("loss", 0.6), "60 % of all messages are lost"), (("delay", 1.0), "messages arrive after 1 s"))
+_RESAMPLES = 2000
 
 
 @dataclass(frozen=True)
@@ -104,16 +130,13 @@ class Claim:
     explanation: str = "There is no run that could tell."
     least_maps: int = LEAST_MAPS  # on fewer maps it is undecided
 
-    def judged(
-        self, criteria: Sequence[Criterion], explanation: str, on: Outcomes | GainOutcomes, runs: int
-    ) -> Claim:
+    def judged(self, by: Iterable[Criterion], why: str, on: Outcomes | GainOutcomes, runs: int) -> Claim:
         """Return the claim with what `runs` runs in each of some scenarios say of it."""
         runs, maps = runs * len(on.scenarios), len(set(on.maps))
-        return replace(self, criteria=tuple(criteria), explanation=explanation, runs=runs, maps=maps)
+        return replace(self, criteria=tuple(by), explanation=why, runs=runs, maps=maps)
 
     @property
     def verdict(self) -> Verdict:
-        """Overall verdict of the criteria; see the head of this module."""
         if self.maps < self.least_maps or not self.criteria:
             return "undecided"
         met = [criterion.met for criterion in self.criteria]
@@ -170,25 +193,6 @@ def verdict_counts(claims: Sequence[Claim]) -> str:
     return f"Of {len(claims)} claims {', '.join(parts)}."
 
 
-SAME_COST = 0.02  # two costs are the same when the median of their ratio is within 2 % of 1
-NEARLY_SAME = 0.05  # in single runs two costs are nearly the same when they differ by at most 5 %
-NEARLY_ALWAYS = 0.9  # the share of runs that "the result is" speaks of, where the paper makes no exceptions
-CLEARLY_BELOW = 0.95  # a law is better than another when the median ratio of their costs is below this
-BARELY = 0.05  # a result barely depends on the gains: its standard deviation is below 5 % of its mean
-REGRET = 0.02  # the best gains depend on the environment when those of other maps cost more than 2 % on it
-# a result barely depends on the starts: its standard deviation over them is below 10 % of its mean; starts
-# matter more than gains do in any law that descends to a local optimum, so the bound is wider
-BARELY_BY_START = 0.1
-# two placements are nearly the same when robots are less than a quarter of the side of their share apart
-SAME_PLACEMENT = 0.25
-# a team is near the reference within 10 % of its cost, and far from it above 25 %
-NEAR_OPTIMUM, FAR_FROM_OPTIMUM = 0.1, 0.25
-
-CLUSTERED = CONVEX_KINDS[:-1]  # starts in convex regions in which the robots are close together
-
-GOALS, RIVALS, EXTENSIONS = 7, 8, 9  # questions beyond the paper; its own are 1 to 6
-
-
 def paper_claims(
     convex: Outcomes, nonconvex: Outcomes, gains: Mapping[str, GainOutcomes]
 ) -> tuple[Claim, ...]:
@@ -207,12 +211,10 @@ def paper_claims(
     )
 
 
-def _both(
-    measure: str, ours: Array, theirs: Array, maps: Sequence[str], bound: float
-) -> tuple[Criterion, ...]:
+def _both(measure: str, ours: Array, theirs: Array, maps: Sequence[str], bound: float) -> list[Criterion]:
     mine, others = (bootstrap(values, clusters=maps) for values in (ours, theirs))
     low = Criterion(f"RAPF: {measure}", mine, high=bound, unit="%")
-    return low, Criterion("RPF: the same", others, low=bound, unit="%")
+    return [low, Criterion("RPF: the same", others, low=bound, unit="%")]
 
 
 def pair_claim(
@@ -425,23 +427,19 @@ _GAPS = {
 
 
 def gap_to_reference(outcomes: Outcomes, law: str) -> Claim:
-    """Test how far {"rapf-shared", "rpf-shared", "lloyd"} stays above the centralised reference."""
     head = Claim(f"gap-{law.removesuffix('-shared')}", 6, *_GAPS[law])
     fine = outcomes.measured("gap", law)
     if not fine.scenarios:
         return head
     gap = fine.of(law, "gap")
     bound = {"low": FAR_FROM_OPTIMUM} if law == "rpf-shared" else {"high": NEAR_OPTIMUM}
-    found, measure = bootstrap(gap, clusters=fine.maps), f"{LABELS[law]}: median of J/J_ref - 1"
-    criterion = Criterion(measure, found, unit="%", **bound)
+    measure = f"{LABELS[law]}: median of J/J_ref - 1"
+    criterion = Criterion(measure, bootstrap(gap, clusters=fine.maps), unit="%", **bound)
     beaten = f", and was beaten in {amount((gap < 0).mean(), '%')} of the runs" if (gap < 0).any() else ""
     # bundled maps are larger, and harder
     drawn = np.array([name.startswith("generated-") for name in fine.maps], dtype=bool)
-    medians = [
-        f"on {name} maps {median_text(gap[chosen], '%')}"
-        for name, chosen in (("generated", drawn), ("bundled", ~drawn))
-        if chosen.any()
-    ]
+    kinds = ("generated", gap[drawn]), ("bundled", gap[~drawn])
+    medians = [f"on {kind} maps {median_text(own, '%')}" for kind, own in kinds if len(own)]
     explanation = (
         f"{half_text(gap)[:-1]}; the worst is {amount(gap.max(), '%')} above it "
         f"({fine.scenarios[int(np.argmax(gap))]}). Medians: {', '.join(medians)}. "
@@ -490,7 +488,6 @@ def half_text(gap: Array) -> str:
 
 
 def lost_text(pairs: Comparison, who: str) -> str:
-    """Return in words how many pairs the first does not win, and the highest ratio."""
     worst = int(np.argmax(pairs.ratios))
     ratio, where = amount(pairs.ratios[worst]), pairs.fine.scenarios[worst]
     lost = (pairs.ratios >= 1.0).sum()
@@ -530,24 +527,6 @@ def same_scenarios(rapf: GainOutcomes, rpf: GainOutcomes) -> tuple[GainOutcomes,
     return rapf.where(fine), rpf.where(fine)
 
 
-# The goals of our own controller. Its gains were tuned on other generated maps, but what it reached on those
-# of the study was looked at while its rules were made; `unseen_claim` is on maps on which nobody did.
-LEAST_GAP = 0.014  # the median of J/J_ref - 1, at most; RAPF at its best gains had about 5 % at that time
-MAP_GAP = 0.03  # the median on every single map, at most
-NEVER_WORSE = 1.01  # its median on a map by that of RAPF or LA on the same map, at most
-AT_REST = 0.97  # the share of its runs that come to rest
-RARELY = 0.1  # the share of runs with a contact, at most: that of no run is shown by no number of them
-REST_TIME = 40.0  # s, the median time after which they do
-STEP_RATIO = 10.0  # the time of a step of a large team by that of RAPF, at most
-
-CLOSED = 0.5  # most of a gap is closed when more than half of it is
-
-# what RAPF is to bear: axis and value, words
-BORNE = ((("loss", 0.6), "60 % of all messages are lost"), (("delay", 1.0), "messages arrive after 1 s"))
-
-_RESAMPLES = 2000
-
-
 def beyond_claims(results: BeyondResults) -> tuple[Claim, ...]:
     outcomes, ours, contenders = results.outcomes, OWN[0], results.contenders
     unseen = None if results.unseen is None else unseen_claim(results.unseen, ours, contenders)
@@ -574,14 +553,10 @@ def _first_criteria(fine: Outcomes, key: str) -> tuple[Criterion, Criterion, Cri
 
 
 def goals(
-    outcomes: Outcomes,
-    ours: Contender,
-    contenders: Sequence[Contender],
-    steps: Mapping[int, StepTimes],
-    plan: Plan,
+    outcomes: Outcomes, own: Contender, among: Sequence[Contender], steps: Mapping[int, StepTimes], plan: Plan
 ) -> list[Claim]:
-    """Return the goals of a controller of ours among all `contenders`, each a claim with one criterion."""
-    key, label = ours.key, ours.label
+    """Return the goals of a controller of our own among all, each a claim with one criterion."""
+    key, label = own.key, own.label
     fine = outcomes.measured("gap", key)
     found: list[Claim] = []
 
@@ -599,15 +574,14 @@ def goals(
         criterion = Criterion("highest median of a map", worst, high=MAP_GAP, unit="%")
         add("every-map", text, criterion, _highest_text(fine.median_by_map(key), MAP_GAP))
 
-        for other in laws.strongest(contenders):
+        for other in laws.strongest(among):
             if (pairs := outcomes.compared(key, other.key)) is not None:
                 above = amount(NEVER_WORSE - 1.0, "%")
                 text = f"On no map {label}'s median is more than {above} above that of {other.label}."
                 mine, theirs = (pairs.fine.median_by_map(each, "final") for each in (key, other.key))
                 words = _highest_text({name: mine[name] / theirs[name] for name in mine}, NEVER_WORSE)
-                criterion = Criterion(
-                    f"highest ratio of a map's medians to {other.label}", worst_ratio(pairs), high=NEVER_WORSE
-                )
+                measure = f"highest ratio of a map's medians to {other.label}"
+                criterion = Criterion(measure, worst_ratio(pairs), high=NEVER_WORSE)
                 add(f"not-worse-{other.key}", text, criterion, words)
 
         touched, rest = fine.of(key, "contacts") > 0, np.isfinite(settled)
@@ -625,18 +599,17 @@ def goals(
 
     of_runs = len(found)
     large, huge = (steps.get(robots) for robots in (plan.beyond.large, plan.beyond.huge))
-    if large is not None and math.isfinite((ratio := large.ratio_interval(ours.controller)).estimate):
+    if large is not None and math.isfinite((ratio := large.ratio_interval(own.controller)).estimate):
         most = f"at most {STEP_RATIO:g} times as long as RAPF's with {large.robots} robots"
         words = "Timed in turn, over whole seconds of simulated time: plans and scans count by their share."
         criterion = Criterion("time of a step by RAPF's", ratio, high=STEP_RATIO)
         add("step", f"A step of {label} takes {most}.", criterion, words)
-    if huge is not None and math.isfinite((taken := huge.interval(ours.controller)).estimate):
+    if huge is not None and math.isfinite((taken := huge.interval(own.controller)).estimate):
         part = Interval(*(value / huge.dt for value in (taken.estimate, taken.low, taken.high)))
         text = f"{label} runs in real time with {huge.robots} robots."
         criterion = Criterion("computing time by simulated time", part, high=1.0)
         add("real-time", text, criterion, "One process; the physics of the world included.")
-    timed = (replace(goal, runs=0, maps=1, least_maps=1) for goal in found[of_runs:])
-    return [*found[:of_runs], *timed]
+    return found[:of_runs] + [replace(goal, runs=0, maps=1, least_maps=1) for goal in found[of_runs:]]
 
 
 def highest_of_maps(statistic: Callable[[IntArray], Any], maps: Sequence[str]) -> Interval:
@@ -655,10 +628,8 @@ def highest_of_maps(statistic: Callable[[IntArray], Any], maps: Sequence[str]) -
 
 
 def worst_ratio(pairs: Comparison) -> Interval:
-    """Return the highest ratio, over the maps, of the medians of both."""
-    return highest_of_maps(
-        lambda rows: np.median(pairs.a[rows], axis=-1) / np.median(pairs.b[rows], axis=-1), pairs.fine.maps
-    )
+    a, b, maps = pairs.a, pairs.b, pairs.fine.maps
+    return highest_of_maps(lambda k: np.median(a[k], axis=-1) / np.median(b[k], axis=-1), maps)
 
 
 def _highest_text(values: Mapping[str, float], bound: float) -> str:
@@ -667,7 +638,6 @@ def _highest_text(values: Mapping[str, float], bound: float) -> str:
 
 
 def is_met(goal: Claim) -> bool:
-    """Return whether a goal is met by the measured value."""
     (criterion,) = goal.criteria
     return criterion.low <= criterion.interval.estimate <= criterion.high
 
@@ -694,7 +664,6 @@ def goal_counts(found: Sequence[Claim]) -> str:
 
 
 def unseen_claim(outcomes: Outcomes, ours: Contender, contenders: Sequence[Contender]) -> Claim | None:
-    """Return whether the first goals hold on maps that played no part in the development."""
     key, label = ours.key, ours.label
     fine = outcomes.measured("gap", key)
     if not fine.scenarios:
@@ -800,8 +769,7 @@ def teams_claim(outcomes: Outcomes, controller: str) -> Claim:
 
 
 def conditions_claim(found: Iterable[Degradation], maps: int) -> Claim:
-    near = amount(NEARLY_SAME, "%")
-    text = f"RAPF ends within {near} of its cost where messages get lost or are late."
+    text = f"RAPF ends within {amount(NEARLY_SAME, '%')} of its cost where messages get lost or are late."
     head = Claim("conditions", EXTENSIONS, text)
     rapf = [each for each in found if each.controller == "rapf" and math.isfinite(each.ratio.estimate)]
     known = {(each.axis, each.value): each for each in rapf}

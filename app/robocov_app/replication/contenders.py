@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
+from typing import TypeAlias
 
 from robocov.controllers import CONTROLLERS, gain_values, make_controller
 from robocov.controllers.gains import Value, value_text
@@ -13,6 +14,8 @@ ASSETS = Path(__file__).parent / "assets"
 
 PAPER = ("rapf", "rpf", "lloyd")  # controllers of the paper's claims
 OURS = ("atlas", "atlas-shared")  # the project's own controllers; the goals are for the first
+
+BestGains: TypeAlias = Mapping[str, Mapping[str, Value]]  # of controllers that were tuned
 
 # Potential parameters of both RAPF and RPF, as in the paper, which does not print its own: the repulsion then
 # holds a robot that is pulled with 1 N about 0.83 m off a wall.
@@ -92,12 +95,12 @@ GRIDS: Mapping[str, tuple[dict[str, Value], ...]] = {
 }
 
 
-def baselines(best: Mapping[str, Mapping[str, Value]]) -> tuple[Contender, ...]:
+def baselines(best: BestGains) -> tuple[Contender, ...]:
     others = [name for name in CONTROLLERS if name not in (*PAPER, *OURS)]
     return tuple(with_gains(name, best.get(name, {})) for name in others)
 
 
-def paper_contenders(best: Mapping[str, Mapping[str, Value]]) -> tuple[Contender, ...]:
+def paper_contenders(best: BestGains) -> tuple[Contender, ...]:
     if not best:
         return UNTUNED
     rapf, rpf = (of_paper(f"{name}-best", best[name]) for name in ("rapf", "rpf"))

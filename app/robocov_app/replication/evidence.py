@@ -20,8 +20,6 @@ from robocov_app.report.groups import parted
 WORST_MAPS = 3  # so many maps are named on which a controller does worst
 OFTEN = 0.05  # a failure is told of a controller when it happens in more than 5 % of its runs
 
-_NOT_READ = "; made from what is generally known of it, not from its text."
-
 
 class Account(NamedTuple):
     """A controller: the `information` it goes by, its source in short and in full, and what it does."""
@@ -67,7 +65,7 @@ def account_of(controller: str) -> Account:
     known = tomllib.loads((ASSETS / "controllers.toml").read_text(encoding="utf-8")).get(controller, {})
     source = known.get("source", "")
     if not known.get("read", True):
-        source = source.removesuffix(".") + _NOT_READ
+        source = source.removesuffix(".") + "; made from what is generally known of it, not from its text."
     does = known.get("does") or f"{capitalised(kind.summary).rstrip('.')}."
     return Account(controller, kind.label, information_of(kind), known.get("short", "–"), source, does)
 
@@ -78,8 +76,7 @@ def law_rows(outcomes: Outcomes, contenders: Iterable[Contender]) -> list[LawRow
         fine = outcomes.measured("gap", each.key)
         if not fine.scenarios:
             continue
-        names = "gap", "settled", "contacts", "stuck"
-        gap, settled, touched, stuck = (fine.of(each.key, name) for name in names)
+        gap, settled = fine.of(each.key, "gap"), fine.of(each.key, "settled")
         low, high = np.quantile(gap, [0.25, 0.75]).tolist()
         rest = settled[np.isfinite(settled)]
         rows.append(
@@ -88,8 +85,8 @@ def law_rows(outcomes: Outcomes, contenders: Iterable[Contender]) -> list[LawRow
                 runs=len(gap),
                 gap=bootstrap(gap, clusters=fine.maps),
                 quartiles=(low, high),
-                touched=share_above_zero(touched),
-                stuck=share_above_zero(stuck),
+                touched=share_above_zero(fine.of(each.key, "contacts")),
+                stuck=share_above_zero(fine.of(each.key, "stuck")),
                 settled=len(rest) / len(settled),
                 settling=float(np.median(rest)) if len(rest) else np.nan,
             )
@@ -98,7 +95,6 @@ def law_rows(outcomes: Outcomes, contenders: Iterable[Contender]) -> list[LawRow
 
 
 def ranked_rows(results: BeyondResults) -> list[LawRow]:
-    """Return a row for each contender that has runs, the one with the least median gap first."""
     return sorted(law_rows(results.outcomes, results.contenders), key=lambda row: row.gap.estimate)
 
 
@@ -119,9 +115,7 @@ def evidence(results: BeyondResults, rows: Iterable[LawRow]) -> list[Evidence]:
 
 def duels(results: BeyondResults, rows: Sequence[LawRow]) -> list[tuple[str, str, Comparison]]:
     both = [(ours, row.contender) for ours in OWN for row in rows if row.contender.key != ours.key]
-    pairs = [
-        (ours.label, other.label, results.outcomes.compared(ours.key, other.key)) for ours, other in both
-    ]
+    pairs = [(a.label, b.label, results.outcomes.compared(a.key, b.key)) for a, b in both]
     return [(first, second, found) for first, second, found in pairs if found is not None]
 
 
@@ -141,10 +135,10 @@ def failure_text(outcomes: Outcomes, law: LawRow) -> str:
         )
         if share > OFTEN
     )
-    more = (
-        f" {capitalised(troubles)}." if troubles else " No contact in any run." if law.touched == 0.0 else ""
-    )
-    return f"{words} ({outcomes.scenarios[worst]}).{more}"
+    if not troubles and law.touched == 0.0:
+        troubles = "No contact in any run"
+    words = f"{words} ({outcomes.scenarios[worst]})."
+    return f"{words} {capitalised(troubles)}." if troubles else words
 
 
 def gains_text(controller: str, grid: GainOutcomes) -> str:

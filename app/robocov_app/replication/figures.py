@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -53,6 +53,21 @@ ARRIVED = 0.05  # a cost has arrived when it stays within 5 % of its last value
 FIGURES = {1: "partition", 2: "convex", 3: "convex", 4: "a", 5: "a", 6: "b", 7: "b", 8: "other"}
 COSTS = (3, 5, 7)  # figures of the cost against time; all but the first of the others show trajectories
 
+# what is said of the figures, by their names
+CAPTIONS: Mapping[str, str] = tomllib.loads((ASSETS / "captions.toml").read_text(encoding="utf-8"))
+
+_TICKS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0)  # of the axis of gaps, %
+_BESIDE = 0.11  # how far controllers stand beside each other, in distances between two values
+_SIZE = (1180, 720)  # of the plot of degradations, px
+
+PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))  # a cell without any symmetry, m
+_APART = 0.13  # heights have words where their places are so far apart, as a part of the path
+_LOW, _HIGH = 0.01, 100.0  # the range of heights, m
+_LIMIT = 1e-7  # so high, relative to the cell's size, a sensor is as good as on the ground
+
+# how every plot is drawn, by its name; those without a run are left out
+Plots: TypeAlias = Mapping[str, Callable[[], Figure]]
+
 
 def draw_figure(number: int, runs: Mapping[str, FigureRun], first: Record, theme: Theme | str) -> Figure:
     theme = theme_named(theme)
@@ -65,9 +80,8 @@ def draw_figure(number: int, runs: Mapping[str, FigureRun], first: Record, theme
 def describe_figure(number: int, runs: Mapping[str, FigureRun], first: Record) -> str:
     if number == 1:
         places, environment = first.positions[0], first.environment
-        away = amount(
-            float(np.hypot(*(partition(places, environment.region).centroid - places).T).mean()), "m"
-        )
+        centroids = partition(places, environment.region).centroid
+        away = amount(float(np.hypot(*(centroids - places).T).mean()), "m")
         where = f"The robots stand anywhere in “{environment.name}”, on average {away}"
         return f"{where} from the centres of mass of their cells."
     ours, other = pair = _pair(runs, number)
@@ -123,25 +137,19 @@ def trajectories_figure(runs: Sequence[FigureRun], theme: Theme = LIGHT) -> Figu
     records = [run.record for run in runs]
     aiming = [record for record in records if arena.has_goals(record)]
     hidden = all((np.hypot(*(each.goals[-1] - each.positions[-1]).T) < HIDDEN).all() for each in aiming)
-    finals = [f"mean distance {run.history.mean_distance[-1]:.3f} m" for run in runs]
-    unnamed = (CENTROID, GOAL) if hidden else ()
-    return side_by_side(records, [each.label for each in records], finals, theme, unnamed)
+    heads = [(run.record.label, f"mean distance {run.history.mean_distance[-1]:.3f} m") for run in runs]
+    return side_by_side(records, heads, theme, (CENTROID, GOAL) if hidden else ())
 
 
 @plain_style()
 def side_by_side(
-    records: Sequence[Record],
-    titles: Sequence[str],
-    finals: Sequence[str],
-    theme: Theme,
-    unnamed: Sequence[str] = (),
+    records: Sequence[Record], heads: Iterable[tuple[str, str]], theme: Theme, unnamed: Sequence[str] = ()
 ) -> Figure:
-    """Draw runs on one map side by side, titles and final costs above; the legend leaves `unnamed` out."""
+    """Draw runs on one map side by side, title and final cost above; the legend leaves `unnamed` out."""
     handles = united((arena.run_handles(record, theme, "paper") for record in records), arena.label_of)
     handles = [handle for handle in handles if arena.label_of(handle) not in unnamed]
     page, places = panels(records[0].environment, len(records), WIDE, handles, theme, above=30.0)
-    each = zip("abcdef", records, titles, finals, places, strict=False)
-    for letter, record, title, final, axes in each:
+    for letter, record, (title, final), axes in zip("abcdef", records, heads, places, strict=False):
         arena.draw_run(axes, record, theme, "paper")
         box = axes.get_position()
         left, right = box.x0 * page.size[0], box.x1 * page.size[0]
@@ -196,17 +204,6 @@ def _difference_text(mine: float, theirs: float) -> str:
     return f"{amount(abs(change), '%')} {'less' if change < 0 else 'more'}"
 
 
-# how every plot is drawn, by its name; those without a run are left out
-Plots: TypeAlias = Mapping[str, Callable[[], Figure]]
-
-# what is said of the figures, by their names
-CAPTIONS: Mapping[str, str] = tomllib.loads((ASSETS / "captions.toml").read_text(encoding="utf-8"))
-
-_TICKS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0)  # of the axis of gaps, %
-_BESIDE = 0.11  # how far controllers stand beside each other, in distances between two values
-_SIZE = (1180, 720)  # of the plot of degradations, px
-
-
 def paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
     convex, claims, theme = results.convex, results.claims, theme_named(theme)
     against_lloyd = [("at the end", convex.compared("rapf-shared", "lloyd"), "rapf")]
@@ -214,38 +211,34 @@ def paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
         pairs = convex.from_starts(start).compared("rapf-shared", "lloyd", "early")
         against_lloyd.append((f"first 20 s, start {start}", pairs, "rapf"))
     nonconvex = []
-    for label, other, measure, when in (
-        ("RPF", "rpf-{}", "final", "at the end"),
-        ("RPF", "rpf-{}", "first_minute", "first 60 s"),
-        ("LA", "lloyd", "final", "at the end"),
+    for what, other, measure in (
+        ("RPF, at the end", "rpf-{}", "final"),
+        ("RPF, first 60 s", "rpf-{}", "first_minute"),
+        ("LA, at the end", "lloyd", "final"),
     ):
         for gains in ("shared", "best"):
             pairs = claims.compared(f"rapf-{gains}", other.format(gains), measure)
-            nonconvex.append((f"{label}, {when}, {gains} gains", pairs, "rapf"))
-    kinds = list(dict.fromkeys(claims.starts))
-    by_start = [
-        (LABELS[law], _samples((f"start {start}", claims.from_starts(start), law) for start in kinds))
-        for law in ("rapf-shared", "rpf-shared")
-    ]
+            nonconvex.append((f"{what}, {gains} gains", pairs, "rapf"))
+    by_start = []
+    for law in ("rapf-shared", "rpf-shared"):
+        own = ((f"start {start}", claims.from_starts(start), law) for start in dict.fromkeys(claims.starts))
+        by_start.append((LABELS[law], _samples(own)))
     gaps = [("", _samples((label, claims, law) for law, label in LABELS.items()))]
     known = all(grid.complete.scenarios for grid in results.gains.values())
-    against = "RAPF by the other law, pair by pair (1: equal)"
-    return _drawn(
-        {
-            "claim-1-convex": _pairs_plot(against_lloyd, "RAPF by LA, pair by pair (1: equal)", theme),
-            "claim-2-nonconvex": _pairs_plot(nonconvex, against, theme),
-            "claim-3-gains": partial(gains_plot, results.gains, theme) if known else None,
-            "claim-4-starts": _boxes_plot(by_start, theme),
-            "claim-6-gap": _boxes_plot(gaps, theme),
-        }
-    )
+    plots: dict[str, Callable[[], Figure] | None] = {
+        "claim-1-convex": _pairs_plot(against_lloyd, "RAPF by LA, pair by pair (1: equal)", theme),
+        "claim-2-nonconvex": _pairs_plot(nonconvex, "RAPF by the other law, pair by pair (1: equal)", theme),
+        "claim-3-gains": partial(gains_plot, results.gains, theme) if known else None,
+        "claim-4-starts": _boxes_plot(by_start, theme),
+        "claim-6-gap": _boxes_plot(gaps, theme),
+    }
+    return {name: draw for name, draw in plots.items() if draw is not None}
 
 
 def beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
     theme, outcomes, teams = theme_named(theme), results.outcomes, results.teams
-    laws = [row.contender for row in ranked_rows(results)]
     ours = OWN[0].key
-    others = [law for law in laws if law.key != ours]
+    others = [law for row in ranked_rows(results) if (law := row.contender).key != ours]
     duels = [(law.label, outcomes.compared(ours, law.key), law.controller) for law in others]
     targets = [(law.label, results.targets.compared(law.key, TARGETS[0].key), "rapf") for law in TARGETS[1:]]
     times = [
@@ -256,26 +249,25 @@ def beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
     # both over the density
     weighed = results.density.pictures[0].record.environment
     pictures = [replace(each.record, environment=weighed) for each in results.density.pictures]
-    finals = [f"mean distance by φ {cost:.3f} m" for cost in results.density.costs]
+    finals = (f"mean distance by φ {cost:.3f} m" for cost in results.density.costs)
+    heads = list(zip(("knows φ", "ignores φ"), finals, strict=True))
     known = any(np.isfinite(each.ratio.estimate) for each in results.degradations)
-    return _drawn(
-        {
-            "beyond-gaps": partial(gaps_plot, samples, theme) if samples else None,
-            "beyond-pairs": _pairs_plot(duels, "ours by the other's, pair by pair (1: equal)", theme),
-            "beyond-heights": partial(plot_heights, size, theme, 0.68 * DOTS),
-            "beyond-targets": _pairs_plot(targets, "by the centroid, pair by pair (1: equal)", theme),
-            "beyond-density": partial(side_by_side, pictures, ("knows φ", "ignores φ"), finals, theme),
-            "beyond-teams": _pairs_plot(times, "mean time, by time to by distance (1: equal)", theme),
-            "beyond-conditions": partial(plot_degradations, results.degradations, theme) if known else None,
-        }
-    )
+    plots: dict[str, Callable[[], Figure] | None] = {
+        "beyond-gaps": partial(gaps_plot, samples, theme) if samples else None,
+        "beyond-pairs": _pairs_plot(duels, "ours by the other's, pair by pair (1: equal)", theme),
+        "beyond-heights": partial(plot_heights, size, theme, 0.68 * DOTS),
+        "beyond-targets": _pairs_plot(targets, "by the centroid, pair by pair (1: equal)", theme),
+        "beyond-density": partial(side_by_side, pictures, heads, theme),
+        "beyond-teams": _pairs_plot(times, "mean time, by time to by distance (1: equal)", theme),
+        "beyond-conditions": partial(plot_degradations, results.degradations, theme) if known else None,
+    }
+    return {name: draw for name, draw in plots.items() if draw is not None}
 
 
 def gap_samples(results: BeyondResults) -> list[Sample]:
     ranked = [row.contender for row in ranked_rows(results)]
     gaps = [100.0 * results.outcomes.measured("gap", law.key).of(law.key, "gap") for law in ranked]
-    each = zip(ranked, gaps, strict=True)
-    return [Sample(law.label, style_of(law.controller), gap) for law, gap in each]
+    return [Sample(law.label, style_of(law.controller), gap) for law, gap in zip(ranked, gaps, strict=True)]
 
 
 @plain_style()
@@ -286,11 +278,9 @@ def gains_plot(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
     panels = [("RPF", rpf), *attracted]
     first, second = rpf.levels("k_rep"), rpf.levels("rho_0")
     columns = 3 if len(panels) > 4 else 2
-    rows = -(-len(panels) // columns)
     left, right, above, below = 44 * DOTS, 10 * DOTS, 52 * DOTS, 44 * DOTS
-    width = WIDE / columns - left - right
-    height = len(second) * 24 * DOTS
-    page = Page((WIDE, round(rows * (height + above + below))), theme, DOTS)
+    width, height = WIDE / columns - left - right, len(second) * 24 * DOTS
+    page = Page((WIDE, round(-(-len(panels) // columns) * (height + above + below))), theme, DOTS)
     for number, (name, part) in enumerate(panels):
         row, column = divmod(number, columns)
         x, y = left + column * (width + left + right), above + row * (height + above + below)
@@ -306,7 +296,6 @@ def gains_plot(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
 
 @plain_style()
 def gaps_plot(samples: Sequence[Sample], theme: Theme) -> Figure:
-    """Draw the gaps of all contenders as boxes, in percent, on an axis of square roots."""
     figure = plot_final_costs([("", samples)], "J/J_ref − 1 at the end (%)", WIDE, DOTS, theme)
     (axes,) = figure.axes
     values = np.concatenate([sample.values for sample in samples])
@@ -330,7 +319,6 @@ def plot_degradations(found: Sequence[Degradation], theme: Theme | str = LIGHT) 
     """Plot final costs, one at least, by those of the runs without the disturbance: a panel for each axis."""
     theme = theme_named(theme)
     names = list(dict.fromkeys(each.axis for each in found))
-    styles = curve_styles(each.controller for each in found)
     quiet = mix(theme.background, theme.ink, 0.7)
     columns = min(3, len(names))
     width, height = (_SIZE[0] - 40) / columns, (_SIZE[1] - 110) / -(-len(names) // columns)
@@ -343,10 +331,9 @@ def plot_degradations(found: Sequence[Degradation], theme: Theme | str = LIGHT) 
     page.text(words, page.margin, 50, colour=quiet, room=page.room)
     for k, name in enumerate(names):
         row, column = divmod(k, columns)
-        box = (20 + column * width + 44, 74 + row * height + 26, width - 60, height - 84)
-        axes = page.axes(box)
+        axes = page.axes((64 + column * width, 100 + row * height, width - 60, height - 84))
         axes.set_ylim(bottom - room, top + room)
-        _panel(axes, name, [each for each in found if each.axis == name], styles, theme)
+        _panel(axes, name, [each for each in found if each.axis == name], theme)
     handles, labels = page.figure.axes[0].get_legend_handles_labels()
     place: Any = {"loc": "center right", "bbox_to_anchor": page.at(_SIZE[0] - page.margin, 26)}
     look: Any = {"frameon": False, "fontsize": SMALL, "labelcolor": tone(theme.ink)}
@@ -357,10 +344,9 @@ def plot_degradations(found: Sequence[Degradation], theme: Theme | str = LIGHT) 
     return page.figure
 
 
-def _panel(
-    axes: Axes, name: str, part: Sequence[Degradation], styles: Mapping[str, CurveStyle], theme: Theme
-) -> None:
+def _panel(axes: Axes, name: str, part: Sequence[Degradation], theme: Theme) -> None:
     values = list(dict.fromkeys(each.value for each in part))
+    styles = curve_styles(each.controller for each in part)
     axes.axhline(1.0, color=tone(mix(theme.background, theme.ink, 0.35)), linewidth=1.0, zorder=1)
     for k, (controller, style) in enumerate(styles.items()):
         rows = [each for each in part if each.controller == controller]
@@ -381,21 +367,15 @@ def _panel(
 def style_of(controller: str) -> CurveStyle:
     """Return the style of a controller among many: ours stands out, baselines are alike."""
     style = curve_styles([controller])[controller]
-    if not style.name.startswith("other"):
-        return style
-    return style._replace(name="other-0" if controller in OURS else "other-2")
-
-
-def _drawn(plots: Mapping[str, Callable[[], Figure] | None]) -> Plots:
-    return {name: draw for name, draw in plots.items() if draw is not None}
+    other = "other-0" if controller in OURS else "other-2"
+    return style._replace(name=other) if style.name.startswith("other") else style
 
 
 def _pairs_plot(
     rows: Iterable[tuple[str, Comparison | None, str]], label: str, theme: Theme
 ) -> Callable[[], Figure] | None:
     """Return how pairs are drawn: words, comparison, and the controller that the style is of."""
-    known = [(words, each, style_of(controller)) for words, each, controller in rows if each is not None]
-    pairs = [Pairs(words, style, each.ratios, each.ratio) for words, each, style in known]
+    pairs = [Pairs(words, style_of(law), each.ratios, each.ratio) for words, each, law in rows if each]
 
     def draw() -> Figure:
         figure = plot_paired(pairs, label, WIDE, DOTS, theme)
@@ -424,17 +404,8 @@ def _boxes_plot(rows: Iterable[tuple[str, Sequence[Sample]]], theme: Theme) -> C
     return partial(plot_final_costs, there, label, WIDE, DOTS, theme, origin=1.0) if there else None
 
 
-# The best place for a sensor over a cell, by its height: the optimum of equation (14).
-
-PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))  # a cell without any symmetry, m
-# heights are written beside the path, rounded, where their places are so far apart, as a part of it
-_APART = 0.13
-_LOW, _HIGH = 0.01, 100.0  # the range of the plot, m
-_LIMIT = 1e-7  # so high, relative to the cell's size, a sensor is as good as on the ground
-
-
 class AtHeight(NamedTuple):
-    """The best place, m, at a height, m; `missed`: the part of its value missed over the centroid."""
+    """The best place, m, for a sensor at a height, m (equation 14); `missed`: over the centroid."""
 
     height: float
     x: float
@@ -456,17 +427,14 @@ def best_at_heights(heights: Sequence[float]) -> list[AtHeight]:
                 offsets = np.array([place, centroid])[:, None] - cell.generators
                 best, plain = (value(cell.edges, each, Sensing(height))[0] for each in offsets)
                 missed = float(1.0 - plain / best)
-        away = float(np.hypot(*(place - centroid)))
-        rows.append(AtHeight(height, float(place[0]), float(place[1]), away, missed))
+        x, y = place.tolist()
+        rows.append(AtHeight(height, x, y, float(np.hypot(*(place - centroid))), missed))
     return rows
 
 
 @plain_style()
 def plot_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
-    """Plot the path of the optimum of f = 1/(r²+h²) over a cell, from h → 0 to the centroid for h → ∞.
-
-    From left to right: the cell; what happens in it, enlarged; how far the optimum is from the centroid.
-    """
+    """Plot the path of the optimum of f = 1/(r²+h²) over a cell, from h → 0 to the centroid for h → ∞."""
     cell = _cell()
     path = best_at_heights(np.geomspace(_LOW, _HIGH, 240).tolist())
     marked = _apart(best_at_heights([n * 10.0**k for k in (-1, 0, 1) for n in (1, 2, 3, 5)]))
@@ -484,9 +452,17 @@ def plot_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
     for part, words in zip((0.0, 0.37, 0.68), heads, strict=True):
         page.text(words, begin + part * room, top - 16 * scale)
     window = _window(np.array([[row.x, row.y] for row in path] + [median]), 0.26 * room / tall)
-    _draw_cell(left, cell, window, theme)
-    _draw_path(middle, path, marked, median, window, theme)
+    fill, edge = tone(mix(theme.background, theme.robots[1], theme.tint)), tone(theme.boundary)
+    left.add_patch(Polygon(cell.polygons[0], facecolor=fill, edgecolor=edge, linewidth=1.6))
     x, y, width, height = window
+    left.add_patch(Rectangle((x, y), width, height, fill=False, edgecolor=tone(theme.ink), linewidth=1.2))
+    left.set_aspect("equal")
+    left.margins(0.02)
+    left.autoscale_view()
+    _plain(left, theme)
+    for axis in (left.xaxis, left.yaxis):
+        axis.set_major_locator(MaxNLocator(6, integer=True))
+    _draw_path(middle, path, marked, median, window, theme)
     for part in (0.0, 1.0):
         ray: Any = {"xyA": (x + width, y + part * height), "xyB": (0.0, part)}
         ray |= {"coordsA": left.transData, "coordsB": middle.transAxes, "color": tone(theme.faint)}
@@ -519,20 +495,6 @@ def _window(points: Array, aspect: float) -> Box:
     return float(low[0] - 0.2 * width), float((low[1] + high[1] - height) / 2.0), float(width), float(height)
 
 
-def _draw_cell(axes: Axes, cell: VoronoiPartition, window: Box, theme: Theme) -> None:
-    ring = cell.polygons[0]
-    fill = tone(mix(theme.background, theme.robots[1], theme.tint))
-    axes.add_patch(Polygon(ring, facecolor=fill, edgecolor=tone(theme.boundary), linewidth=1.6))
-    x, y, width, height = window
-    axes.add_patch(Rectangle((x, y), width, height, fill=False, edgecolor=tone(theme.ink), linewidth=1.2))
-    axes.set_aspect("equal")
-    axes.margins(0.02)
-    axes.autoscale_view()
-    _plain(axes, theme)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator(6, integer=True))
-
-
 def _draw_path(
     axes: Axes, path: Sequence[AtHeight], marked: Sequence[AtHeight], median: Array, window: Box, theme: Theme
 ) -> None:
@@ -554,9 +516,7 @@ def _draw_path(
     axes.plot(x, y, "D", color=faint, markersize=6.0, zorder=3)
     axes.annotate("median\n(f = r)", (x, y), (-9, 0), ha="right", color=faint, **beside)
     x, y, width, height = window
-    axes.set_xlim(x, x + width)
-    axes.set_ylim(y, y + height)
-    axes.set_aspect("equal")
+    axes.set(xlim=(x, x + width), ylim=(y, y + height), aspect="equal")
     _plain(axes, theme)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(4, prune="both"))
@@ -570,15 +530,10 @@ def _draw_distance(axes: Axes, path: Sequence[AtHeight], marked: Sequence[AtHeig
     axes.axhline(highest, color=tone(theme.faint), linewidth=1.0, linestyle=(0, (4, 3)))
     style: Any = {"marker": "o", "linestyle": "none", "markersize": 5.5, "markeredgewidth": 0.0}
     for rows, look in ((inner, {"linewidth": 2.4}), (marked[1:-1], style)):
-        millimetres = [1e3 * row.from_centroid for row in rows]
-        axes.plot([row.height for row in rows], millimetres, color=line, **look)
-    axes.set_xscale("log")
-    axes.set_xlim(inner[0].height, inner[-1].height)
-    axes.set_ylim(0.0, 1.12 * highest)
+        axes.plot([row.height for row in rows], [1e3 * row.from_centroid for row in rows], color=line, **look)
+    axes.set(xscale="log", xlim=(inner[0].height, inner[-1].height), ylim=(0.0, 1.12 * highest))
     axes.xaxis.set_major_formatter("{x:g}")
-    quiet_axes(axes, theme, "height h (m)", grid="y")
-    axes.tick_params(length=3.0, left=True)
-    axes.minorticks_off()
+    _plain(axes, theme, "height h (m)", grid="y")
     worst = max(inner, key=lambda row: row.missed)
     style = {"fontsize": SMALL, "color": tone(theme.ink), "ha": "left", "va": "bottom"}
     style |= {"bbox": {"facecolor": tone(theme.background), "edgecolor": "none", "pad": 2.0}}
@@ -587,7 +542,7 @@ def _draw_distance(axes: Axes, path: Sequence[AtHeight], marked: Sequence[AtHeig
     axes.annotate(words, (0.04, 0.07), xycoords="axes fraction", **style)
 
 
-def _plain(axes: Axes, theme: Theme) -> None:
-    quiet_axes(axes, theme)
+def _plain(axes: Axes, theme: Theme, x: str = "", grid: Literal["y", ""] = "") -> None:
+    quiet_axes(axes, theme, x, grid=grid)
     axes.tick_params(length=3.0, left=True)
     axes.minorticks_off()

@@ -22,7 +22,7 @@ from robocov.metrics import CostHistory
 from robocov.metrics.results import read_results
 from robocov_app.figures.statistics import Interval, bootstrap, share
 from robocov_app.replication.plan import ROBOTS
-from robocov_app.replication.references import Reference
+from robocov_app.replication.references import References
 from robocov_app.replication.studies import Contest
 from robocov_app.sweep.study import Study
 
@@ -81,7 +81,6 @@ class Outcomes:
         return Outcomes(tuple(compress(self.scenarios, chosen)), kept, self.sides)
 
     def measured(self, measure: str, *contenders: str) -> Outcomes:
-        """Return the scenarios in which all of these contenders have a finite value."""
         return self.where(np.all([np.isfinite(self.of(each, measure)) for each in contenders], axis=0))
 
     def from_starts(self, *starts: str) -> Outcomes:
@@ -130,8 +129,7 @@ class Comparison:
     @cached_property
     def wins(self) -> Interval:
         """Share of pairs in which the first's value is the lower one; ties count half."""
-        won = np.where(self.a < self.b, 1.0, np.where(self.a == self.b, 0.5, 0.0))
-        return share(won, self.fine.maps)
+        return share((self.a < self.b) + 0.5 * (self.a == self.b), self.fine.maps)
 
 
 def joined(parts: Sequence[Outcomes]) -> Outcomes:
@@ -173,16 +171,13 @@ class GainOutcomes:
         return GainOutcomes(kept, self.gains, self.excess[:, np.array(chosen, dtype=bool)])
 
     def best(self, columns: Sequence[int] | None = None) -> int:
-        """Return the number of the gains whose mean of J/J_ref is least where no run failed."""
         excess = self.excess if columns is None else self.excess[:, list(columns)]
         return int(np.argmin(excess[:, np.isfinite(excess).all(axis=0)].mean(axis=1)))
 
     def levels(self, gain: str) -> list[float]:
-        """Return the different values of a gain, ascending."""
         return sorted({float(gains[gain] or 0.0) for gains in self.gains if gain in gains})
 
     def with_gain(self, name: str, value: float) -> GainOutcomes:
-        """Return the part of the grid in which one gain has this value."""
         chosen = [gains.get(name) == value for gains in self.gains]
         return GainOutcomes(self.scenarios, tuple(compress(self.gains, chosen)), self.excess[chosen])
 
@@ -191,7 +186,7 @@ def best_gains(found: Mapping[str, GainOutcomes]) -> dict[str, Mapping[str, Valu
     return {name: grid.gains[grid.best()] for name, grid in found.items() if grid.complete.scenarios}
 
 
-def read_outcomes(folder: Path, contest: Contest, references: Mapping[str, Reference]) -> Outcomes:
+def read_outcomes(folder: Path, contest: Contest, references: References) -> Outcomes:
     """Return what the contenders of a sweep reached; without a reference there is no gap on a map."""
     results, scenarios = read_results(folder), scenarios_of(contest.study)
     laws = {each.key: _law(each.controller, each.all_gains) for each in contest.contenders}
@@ -199,8 +194,7 @@ def read_outcomes(folder: Path, contest: Contest, references: Mapping[str, Refer
     values = {(key, measure): np.full(len(scenarios), np.nan) for key in laws for measure in measures}
     values |= {(key, "placement"): np.full((len(scenarios), ROBOTS, 2), np.nan) for key in laws}
     for at, row in _rows(folder, scenarios):
-        here = _law(row["controller"], row)
-        for key in (key for key, law in laws.items() if law == here):
+        for key in (key for key, law in laws.items() if law == _law(row["controller"], row)):
             values[key, "placement"][at] = results.record(row["run"]).positions[-1]
             for measure, column in COLUMNS.items():
                 if row.get(column) is not None:
@@ -214,9 +208,7 @@ def read_outcomes(folder: Path, contest: Contest, references: Mapping[str, Refer
     return Outcomes(scenarios, values, sides)
 
 
-def read_gain_outcomes(
-    folder: Path, study: Study, references: Mapping[str, Reference]
-) -> dict[str, GainOutcomes]:
+def read_gain_outcomes(folder: Path, study: Study, references: References) -> dict[str, GainOutcomes]:
     scenarios = scenarios_of(study)
     choices = {name: study.gains_of(name).choices for name in study.controllers}
     excess = {name: np.full((len(sets), len(scenarios)), np.nan) for name, sets in choices.items()}
@@ -240,9 +232,7 @@ def mean_until(history: CostHistory, until: float) -> float:
     inside = history.time < end
     time = np.append(history.time[inside], end)
     values = np.append(history.mean_distance[inside], np.interp(end, history.time, history.mean_distance))
-    if len(time) < 2:
-        return float(values[-1])
-    return float(np.trapezoid(values, time) / (time[-1] - time[0]))
+    return float(np.trapezoid(values, time) / (time[-1] - time[0]) if len(time) > 1 else values[-1])
 
 
 def matched_distance(first: Array, second: Array) -> float:
@@ -254,7 +244,6 @@ def matched_distance(first: Array, second: Array) -> float:
 
 
 def _rows(folder: Path, scenarios: Iterable[Scenario]) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the rows of a table that did not fail, each with the number of its scenario."""
     place = {scenario: k for k, scenario in enumerate(scenarios)}
     for batch in read_results(folder).batches():
         for row in batch.to_pylist():

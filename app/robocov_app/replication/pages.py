@@ -1,8 +1,4 @@
-"""The results as files: figures, ``claims.json`` and the two pages, ``index.html`` and ``beyond.html``.
-
-In the pages are small pictures of numbers as SVG: intervals of claims, and medians map by map. Their colours
-are CSS variables; what they show is said in words as well.
-"""
+"""The results as files: figures, ``claims.json`` and the two pages, ``index.html`` and ``beyond.html``."""
 
 import json
 import math
@@ -39,11 +35,8 @@ from robocov_app.terminal.progress import progress
 PAGE, BEYOND_PAGE, CLAIMS = "index.html", "beyond.html", "claims.json"
 
 _REPLAY_BUDGET = 400_000  # bytes of the runs in the page's replay
-
 _CASES = {"convex": "Figure 2", "a": "Figure 4", "b": "Figure 6", "other": "Figure 8"}  # which shows what
-
 _TICKS = (0.0, 0.01, 0.03, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0)  # of the axis of gaps
-
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|m|s|m²|m³|N)(?![\w³²]))")
 
 
@@ -72,13 +65,10 @@ def save_paper_figures(
     """Write the paper's figures to ``figures/``, and the plots of the claims, without `results` none."""
 
     def drawn(theme: str) -> figures.Plots:
-        own = {
-            f"figure-{number}": partial(figures.draw_figure, number, runs, first, theme)
-            for number in figures.FIGURES
-        }
+        own = {f"figure-{k}": partial(figures.draw_figure, k, runs, first, theme) for k in figures.FIGURES}
         return own if results is None else {**own, **figures.paper_plots(results, theme)}
 
-    seen = {f"figure-{number}": figures.describe_figure(number, runs, first) for number in figures.FIGURES}
+    seen = {f"figure-{k}": figures.describe_figure(k, runs, first) for k in figures.FIGURES}
     return _save_figures(folder, drawn, seen, quiet=quiet)
 
 
@@ -100,9 +90,8 @@ def _save_figures(
             for suffix in ("png", "svg", "pdf"):
                 save_figure(figure, target / f"{name}.{suffix}")
             save_figure(dark[name](), target / f"{name}-dark.png")
-            size = round(figure.bbox.width), round(figure.bbox.height)
             words = f"{figures.CAPTIONS[name]} {seen.get(name, '')}".rstrip()
-            found[name] = Image(name, *size, words)
+            found[name] = Image(name, round(figure.bbox.width), round(figure.bbox.height), words)
             update(number)
     return found
 
@@ -159,9 +148,7 @@ def paper_page(
 def beyond_page(images: Mapping[str, Image], results: BeyondResults) -> str:
     found, rows = claims.beyond_claims(results), evidence.ranked_rows(results)
     each, tuned = evidence.evidence(results, rows), bool(results.plan.beyond.tuning)
-    goal_claims, rival_claims = (
-        [claim for claim in found if claim.part == part] for part in (claims.GOALS, claims.RIVALS)
-    )
+    goal_claims = [claim for claim in found if claim.part == claims.GOALS]
     beside = ("rapf-best", "rapf-default", "lloyd")
     others = {law.key: law.label for law in results.contenders if law.key in beside}
     context: dict[str, Any] = {
@@ -170,7 +157,7 @@ def beyond_page(images: Mapping[str, Image], results: BeyondResults) -> str:
         "goals": [claim for claim in goal_claims if claim.key != "goal-unseen"],
         "unseen": next((claim for claim in found if claim.key == "goal-unseen"), None),
         "goal_claims": goal_claims,
-        "rival_claims": rival_claims,
+        "rival_claims": [claim for claim in found if claim.part == claims.RIVALS],
         "rows": rows,
         "controllers": [(one, _strips(one, each)) for one in each],
         "failures": _failures(results.worst, results.outcomes, OURS[0], others),
@@ -224,15 +211,13 @@ def span(numbers: Sequence[int]) -> str:
 
 
 def _unbroken(value: Any) -> Any:
-    """Return a text in which no line breaks between a number and its unit."""
     return _UNIT.sub("\N{NO-BREAK SPACE}", value) if type(value) is str else value
 
 
 def _strips(one: Evidence, each: Sequence[Evidence]) -> Markup:
-    """Return the medians map by map of a controller above those of ours, or of ours above RAPF's."""
     highest = max((max(other.maps.values()) for other in each if other.maps), default=0.0)
     beside = "rapf" if one.account.controller == OURS[0] else OURS[0]
-    rows = [one, *(other for other in each if other.account.controller == beside and other is not one)]
+    rows = [one, *(other for other in each if other.account.controller == beside)]
     parts = [Strip(row.rows[0].contender.label, row.account.controller in OURS, row.maps) for row in rows]
     return strips(parts, highest)
 
@@ -245,19 +230,16 @@ def interval_bar(criterion: Criterion) -> Markup:
     if not known or not ends:
         return Markup("")
     low, high = min(known + ends), max(known + ends)
-    least = 0.0 if criterion.unit == "%" and low >= 0.0 else -math.inf
     room = 0.18 * (high - low) if high > low else max(0.1 * abs(high), 0.01)
-    low, high = max(low - room, least), high + room
+    low, high = max(low - room, 0.0 if criterion.unit == "%" and low >= 0.0 else -math.inf), high + room
 
     def at(value: float) -> float:
         part = (min(max(value, low), high) - low) / (high - low)
         return round(edge + part * (wide - 2 * edge), 1)
 
     begin, end = at(criterion.low), at(criterion.high)
-    parts = [
-        f'<rect class="wanted" x="{begin}" y="4" width="{round(end - begin, 1)}" height="26" rx="3"/>',
-        f'<path class="axis" d="M{edge} 30H{wide - edge}"/>',
-    ]
+    parts = [f'<rect class="wanted" x="{begin}" y="4" width="{round(end - begin, 1)}" height="26" rx="3"/>']
+    parts.append(f'<path class="axis" d="M{edge} 30H{wide - edge}"/>')
     near = len(ends) == 2 and end - begin < 40.0  # their numbers then stand aside
     for value, anchor in zip(ends, ("end", "start"), strict=False):
         parts.append(f'<path class="bound" d="M{at(value)} 4V34"/>')
@@ -292,8 +274,7 @@ def strips(rows: Sequence[Strip], highest: float) -> Markup:
         return round(left + min(max(part, 0.0), 1.0) * (wide - left - right), 1)
 
     bottom = tall * len(rows) + 22.0
-    parts, words = [], []
-    last = -math.inf
+    parts, words, last = [], [], -math.inf
     for tick in _TICKS:
         x = at(tick)
         if tick <= highest and x - last >= 36.0:

@@ -9,7 +9,7 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from robocov.errors import OutputError
 from robocov.files.atomic import written
@@ -52,6 +52,9 @@ class Reference:
     agreement: float  # share of the restarts that end within 0.5 % of it
 
 
+References: TypeAlias = dict[str, Reference]  # by the map's name
+
+
 class Searching:
     """Searches for references in a process of its own."""
 
@@ -68,8 +71,8 @@ class Searching:
 
 def find_references(
     maps: Sequence[StudyMap], folder: Path, plan: Plan, workers: int, stop: Interruption, *, quiet: bool
-) -> dict[str, Reference]:
-    """Return the reference of every map by its name, kept in `folder` or searched for until `stop`."""
+) -> References:
+    """Return the reference of every map, kept in `folder` or searched for until `stop`."""
     with for_results(folder):
         folder.mkdir(parents=True, exist_ok=True)
     how = ROBOTS, TEAM["radius"], plan.lattice, plan.restarts
@@ -87,7 +90,6 @@ def find_references(
 
 
 def _kept(path: Path, question: Question) -> Reference | None:
-    """Return the answer in a file, None where there is none to this question."""
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         content = json.loads(path.read_bytes())
         if content["digest"] == question.digest:

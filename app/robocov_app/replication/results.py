@@ -27,7 +27,7 @@ from robocov_app.replication import studies
 from robocov_app.replication.contenders import OURS, OWN, RAPF_SHARED, UNTUNED, Contender, paper_contenders
 from robocov_app.replication.outcomes import GainOutcomes, Outcomes, Scenario, best_gains, read_outcomes
 from robocov_app.replication.plan import PARTITION_SEED, ROBOTS, Plan
-from robocov_app.replication.references import Reference, find_references
+from robocov_app.replication.references import References, find_references
 from robocov_app.replication.step_times import UNKNOWN, StepTimes, step_times
 from robocov_app.replication.studies import BASELINE_GAINS
 from robocov_app.sweep import worker
@@ -38,13 +38,13 @@ from robocov_app.sweep.sweeping import Count, sweep, sweep_progress, worked_off
 from robocov_app.terminal.interruption import Interruption
 
 MARK = "paper.json"  # says that a folder is that of a study of the paper, and which
-
 _HEAD = {"format": "robocov-paper", "version": 1}
-
 WORST = 4  # so many of RAPF's worst runs are shown
 
 # maps from which intervals draw whole maps; of fewer, runs one by one: they are then of these maps alone
 ENOUGH_MAPS = 5
+
+ShownRuns: TypeAlias = list[tuple[Scenario, Record]]
 
 
 class Interrupted(Exception):  # noqa: N818 - it is no error
@@ -96,8 +96,8 @@ class PaperResults:
     convex: Outcomes  # in convex regions
     claims: Outcomes  # on non-convex maps
     contenders: tuple[Contender, ...]
-    references: Mapping[str, Reference]  # by map
-    worst: Sequence[tuple[Scenario, Record]]  # RAPF's with the shared gains, done again to be shown
+    references: References
+    worst: ShownRuns  # RAPF's with the shared gains, done again to be shown
     runs: int
     failed: int  # among these
 
@@ -133,7 +133,7 @@ class BeyondResults:
     contenders: tuple[Contender, ...]
     gains: Mapping[str, GainOutcomes]  # of the baselines whose gains were tuned here
     steps: Mapping[int, StepTimes]  # by number of robots
-    worst: Sequence[tuple[Scenario, Record]]  # runs of the first of ours, done again to be shown
+    worst: ShownRuns  # runs of the first of ours, done again to be shown
     targets: Outcomes  # of `TARGETS`
     density: DensityResults
     teams: Outcomes  # of `TEAMS`
@@ -147,8 +147,8 @@ def open_folder(folder: Path, plan: Plan) -> None:
     mark = folder / MARK
     with for_results(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        used = any(folder.iterdir())
-    if not used:
+        empty = not any(folder.iterdir())
+    if empty:
         with written(mark) as part:
             part.write_text(json.dumps({**_HEAD, "plan": plan.name}) + "\n", encoding="utf-8")
         return
@@ -204,17 +204,14 @@ def run_together(sweeps: Mapping[str, Study], folder: Path, options: RunnerOptio
         run_study(study, folder, name, replace(options, quiet=quiet))
 
 
-def references_of(
-    maps: Sequence[StudyMap], folder: Path, plan: Plan, options: RunnerOptions
-) -> dict[str, Reference]:
+def references_of(on: Sequence[StudyMap], folder: Path, plan: Plan, options: RunnerOptions) -> References:
     how = options.workers, options.stop
-    found = find_references(maps, folder / "references", plan, *how, quiet=options.quiet)
+    found = find_references(on, folder / "references", plan, *how, quiet=options.quiet)
     options.raise_if_stopped()
     return found
 
 
 def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bool) -> Forecast:
-    """Return how many runs there are, and by probes how long those that are left will take."""
     sweeps = studies.figure_studies(plan)
     papers = expected_contenders(plan) if claims or (beyond and grid_is_done(folder, plan)) else UNTUNED
     if claims:
@@ -279,7 +276,6 @@ def run_figures(folder: Path, plan: Plan, options: RunnerOptions) -> dict[str, F
 
 
 def _figure_runs(folder: Path) -> Iterator[tuple[dict[str, Any], FigureRun]]:
-    """Yield the rows of a sweep, each with its run; raise InputError when one failed."""
     results = read_results(folder)
     for row in results.to_table().to_pylist():
         if row["error"] is not None:
@@ -288,7 +284,6 @@ def _figure_runs(folder: Path) -> Iterator[tuple[dict[str, Any], FigureRun]]:
 
 
 def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
-    """Do all runs of the paper's claims that are not done yet, and read what came of them."""
     figures = run_figures(folder, plan, options)
     gains, known = _run_grid(studies.gains_study(plan), "gains", folder, plan, options)
     papers = paper_contenders(best_gains(gains))
@@ -302,16 +297,11 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
 
 
 def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperResults | None) -> BeyondResults:
-    """Do all runs beyond the paper that are not done yet, and read what came of them.
-
-    Without the paper's own part the paper's controllers are run here, with their best gains if the grids of
-    gains have been run before.
-    """
+    """Do the runs beyond the paper; without `paper` also its own, at the best gains where they are known."""
     gains: dict[str, GainOutcomes] = {}
-    known: dict[str, Reference] = {}
+    known: References = {}
     if paper is not None:
-        known |= paper.references
-        papers, claims = paper.contenders, paper.claims
+        known, papers, claims = {**paper.references}, paper.contenders, paper.claims
     else:
         if grid_is_done(folder, plan):
             # nothing is left to be done of it: the table is made sure of
@@ -348,8 +338,7 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
 
 
 def among_baselines(outcomes: Outcomes, plan: Plan) -> Outcomes:
-    names = {each.name for each in studies.baseline_maps(plan)}
-    starts = plan.beyond.starts
+    names, starts = {each.name for each in studies.baseline_maps(plan)}, plan.beyond.starts
     return outcomes.where([each.map in names and each.start in starts for each in outcomes.scenarios])
 
 
@@ -361,9 +350,7 @@ def time_steps(folder: Path, plan: Plan, options: RunnerOptions) -> dict[int, St
     return found
 
 
-def worst_runs(
-    study: Study, outcomes: Outcomes, contender: Contender, count: int
-) -> list[tuple[Scenario, Record]]:
+def worst_runs(study: Study, outcomes: Outcomes, contender: Contender, count: int) -> ShownRuns:
     """Return a contender's runs farthest above the reference, one a map, done again to be shown."""
     there = outcomes.measured("gap", contender.key)
     wanted: dict[str, Scenario] = {}
@@ -387,7 +374,7 @@ def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
         disturbed = _finals(at / f"conditions-{axis.replace('_', '-')}", parameter_column(axis), bad[0])
         for value in (best, *bad):
             for controller in studies.DISTURBED:
-                usual = ideal.get((controller, None), {})
+                usual = ideal.get((controller, None))
                 if not usual:
                     runs = counted(plan.beyond.conditions_seeds, "run")
                     raise RobocovError(f"{controller}: all {runs} on each map failed")
@@ -401,12 +388,11 @@ def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
     return found
 
 
-Finals: TypeAlias = dict[tuple[str, float | None], dict[tuple[str, int], float]]
-
-
-def _finals(folder: Path, column: str = "", only: float | None = None) -> Finals:
+def _finals(
+    folder: Path, column: str = "", only: float | None = None
+) -> dict[tuple[str, float | None], dict[tuple[str, int], float]]:
     """Return final costs by map and seed, by controller and value of a column, `only` if there is none."""
-    found: Finals = {}
+    found: dict[tuple[str, float | None], dict[tuple[str, int], float]] = {}
     for row in read_results(folder).to_table().to_pylist():
         if row["mean_distance_m"] is not None:
             group = found.setdefault((row["controller"], row.get(column, only)), {})
@@ -433,7 +419,7 @@ def _density(at: Path, plan: Plan, *found: Outcomes) -> DensityResults:
 
 def _run_grid(
     study: Study, name: str, folder: Path, plan: Plan, options: RunnerOptions
-) -> tuple[dict[str, GainOutcomes], dict[str, Reference]]:
+) -> tuple[dict[str, GainOutcomes], References]:
     known = references_of(study.maps, folder, plan, options)
     return reached.read_gain_outcomes(run_study(study, folder, name, options), study, known), known
 

@@ -24,10 +24,8 @@ YARDSTICK = "rapf"  # the controller whose steps the others' are measured by
 MAP = "campus"  # where steps are timed: the largest of the bundled maps has room for large teams
 BLOCK = 50  # steps that are timed together: what is done now and then, a scan or a plan, counts by its share
 FILE = "steps.json"
-
 _FINE = 1e-5  # s: what a clock has to tell apart, a block of the quickest steps being some milliseconds
 _HEAD = {"format": "robocov-steps", "version": 1}
-
 UNKNOWN = Interval(float("nan"), float("nan"), float("nan"))
 
 
@@ -40,7 +38,6 @@ class StepTimes:
     seconds: Mapping[str, tuple[float, ...]]
 
     def ratio_interval(self, controller: str) -> Interval:
-        """Return the median time by RAPF's in the same turn."""
         own, yardstick = self.seconds.get(controller), self.seconds.get(YARDSTICK)
         return bootstrap(np.array(own) / np.array(yardstick)) if own and yardstick else UNKNOWN
 
@@ -109,7 +106,6 @@ def _timed(
 
 
 def _kept(path: Path) -> dict[str, Any]:
-    """Return what a file holds, nothing where there is none that can be read."""
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         content = json.loads(path.read_bytes())
         if content["format"] == _HEAD["format"]:

@@ -1,19 +1,8 @@
 """The sweeps of the study, each with its folder's name.
 
-- ``figures-…``: the runs that figures 2 to 8 show;
-- ``gains``: grids of gains on maps of their own, for the claims on gains and for the best gains;
-- ``convex``: RAPF and LA in convex regions;
-- ``claims``: the paper's contenders on non-convex maps, none of which was used for ``gains``.
-
-Beyond the paper:
-
-- ``rival-gains``: grids of the baselines' gains, on maps of their own;
-- ``ours-…``, ``rivals``: every registered controller, on the maps of the claims and from the same starts;
-- ``unseen``: ours on maps that played no part in its development;
-- ``targets``: RAPF heading for another optimum of its cell than the centroid;
-- ``density``, ``density-ignored``: RAPF that knows which places count more, and RAPF that does not;
-- ``teams``: robots of different speeds, with cells by distance and by time;
-- ``conditions-…``: disturbances, one sweep for each axis of `AXES`.
+``gains`` and ``rival-gains`` are grids of gains on maps of their own, for the best gains. On the maps of
+``claims`` the paper's contenders run, and from the same starts all others in ``rivals`` and ``ours-…``.
+``density-…`` is RAPF that knows which places count more and RAPF that does not.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -38,10 +27,8 @@ from robocov_app.sweep.study import Study, StudyMap
 
 RADII = (0.8, 0.6, 0.45)  # m, of the discs of clustered starts; the first that fits is taken
 TIGHT = 0.35  # m, of the disc of "tight": it has room for the centres of six robots, and hardly more
-
 SIDE = 10.0  # m, of the square in which regions are drawn by chance
 HOT_SPOTS = 2  # Gaussians drawn by chance on a map: in the middle of one a place counts 20 times as much
-
 _POINTS, _LEAST_AREA, _LEAST_WIDTH = 9, 40.0, 5.0
 
 # which runs the figures show: (map, starts, contenders); "paper" is the same on both maps, "other" figure 8's
@@ -68,7 +55,6 @@ AXES: Mapping[str, tuple[float | None, ...]] = {
 # conditions of all these runs, the ideal ones as well: of sixty messages a second nobody would miss one
 ALWAYS = {"message_rate": 2.0}
 DISTURBED = ("rapf", "lloyd")  # controllers that are disturbed
-
 BASELINE_GAINS = "rival-gains"
 
 
@@ -154,8 +140,7 @@ def claim_maps(plan: Plan) -> tuple[StudyMap, ...]:
 
 @cache
 def convex_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    known = (bundled(name, CONVEX_KINDS) for name in CONVEX)
-    return (*known, *map(convex_region, plan.convex_generated))
+    return (*(bundled(name, CONVEX_KINDS) for name in CONVEX), *map(convex_region, plan.convex_generated))
 
 
 def baseline_maps(plan: Plan) -> tuple[StudyMap, ...]:
@@ -204,13 +189,11 @@ def gains_study(plan: Plan) -> Study:
 
 
 def convex_contest(plan: Plan, contenders: Sequence[Contender]) -> Contest:
-    """Return all but RPF in convex regions."""
     part = [each for each in contenders if each.controller != "rpf"]
     return contest(plan, convex_maps(plan), part, CONVEX_KINDS, plan.convex_seeds)
 
 
 def claims_contest(plan: Plan, contenders: Sequence[Contender]) -> Contest:
-    """Return all of the paper's contenders on non-convex maps."""
     return contest(plan, claim_maps(plan), contenders, KINDS, plan.seeds)
 
 
@@ -223,31 +206,26 @@ def baseline_gains_study(plan: Plan) -> Study | None:
     return contest(plan, on, sets, plan.tuning_starts, (plan.tuning_seed,)).study
 
 
-def beyond_contests(
-    plan: Plan, best: Mapping[str, Mapping[str, Value]], papers: Sequence[Contender]
-) -> dict[str, Contest]:
+def beyond_contests(plan: Plan, best: laws.BestGains, papers: Sequence[Contender]) -> dict[str, Contest]:
     """Return the sweeps of contenders beyond the paper, but for that of the baselines' gains.
 
     Baselines have their `best` gains or their defaults; beside ours on unseen maps are the paper's strongest.
     """
     beyond, starts, on = plan.beyond, plan.beyond.map_starts, generated_maps(plan.beyond.maps)
+    sides = {"rivals": laws.baselines(best)} | {f"ours-{each.key}": (each,) for each in laws.OWN}
     found = {
         name: contest(plan, baseline_maps(plan), part, beyond.starts, beyond.seeds_of(part[0].controller))
-        for name, part in (
-            {"rivals": laws.baselines(best)} | {f"ours-{each.key}": (each,) for each in laws.OWN}
-        ).items()
+        for name, part in sides.items()
     }
     if beyond.unseen:
-        sides = laws.OWN[0], *laws.strongest(papers)
-        found["unseen"] = contest(plan, generated_maps(beyond.unseen), sides, beyond.starts, beyond.seeds)
+        three = laws.OWN[0], *laws.strongest(papers)
+        found["unseen"] = contest(plan, generated_maps(beyond.unseen), three, beyond.starts, beyond.seeds)
     found["targets"] = contest(plan, on, laws.TARGETS, starts, (0,))
-    known = load_map(DENSITY_MAP)
-    for suffix, weighed, shown in (
-        ("", density_maps(plan), known),
-        ("-ignored", on, replace(known, density=None)),
-    ):
-        found[f"density{suffix}"] = contest(plan, weighed, (laws.RAPF_DEFAULT,), starts, (0,))
-        picture = (StudyMap(DENSITY_MAP, shown),), (laws.RAPF_DEFAULT,), (DENSITY_START,), (0,)
+    known, rapf = load_map(DENSITY_MAP), (laws.RAPF_DEFAULT,)
+    both = ("", density_maps(plan), known), ("-ignored", on, replace(known, density=None))
+    for suffix, weighed, shown in both:
+        found[f"density{suffix}"] = contest(plan, weighed, rapf, starts, (0,))
+        picture = (StudyMap(DENSITY_MAP, shown),), rapf, (DENSITY_START,), (0,)
         found[f"density-picture{suffix}"] = contest(plan, *picture, record_hz=5.0)
     return found | {"teams": contest(plan, on, laws.TEAMS, starts, (0,), group=GROUPS)}
 
@@ -259,7 +237,6 @@ def axes_of_disturbances(plan: Plan) -> dict[str, tuple[float | None, ...]]:
 
 
 def conditions_studies(plan: Plan) -> dict[str, Study]:
-    """Return the sweep of the ideal runs, and one for each axis of disturbances."""
     common: dict[str, Any] = {
         "maps": tuple(StudyMap(name, load_map(name)) for name in plan.beyond.conditions_maps),
         "controllers": DISTURBED,

@@ -20,7 +20,6 @@ from robocov_app.report.results import Result
 from robocov_app.report.theme_css import theme_rules
 
 MOST_MAPS = 12  # maps that are drawn
-
 MOST_LETTERS = 40  # a longer word is cut, and stands whole in a tooltip
 
 

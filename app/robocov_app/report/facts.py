@@ -81,8 +81,7 @@ def meanings(result: Result) -> list[tuple[str, str]]:
 def weighed_text(result: Result) -> str:
     """Return by which densities the places of which maps count, empty where all places count the same."""
     words = {name: density_label(environment) for name, environment in result.maps.items()}
-    several = [each if len(words) == 1 else f"{name}: {each}" for name, each in words.items() if each]
-    return "; ".join(several)
+    return "; ".join(each if len(words) == 1 else f"{name}: {each}" for name, each in words.items() if each)
 
 
 def gaps(result: Result) -> list[str]:
@@ -104,7 +103,6 @@ def gaps(result: Result) -> list[str]:
 
 
 def _firsts(texts: Sequence[str]) -> str:
-    """Return the first three different texts as a sentence, and how many more there are."""
     different = list(dict.fromkeys(texts))
     more = f"; and {len(different) - 3} more" if len(different) > 3 else ""
     return f"{'; '.join(different[:3])}{more}."
@@ -124,12 +122,10 @@ def troubles(result: Result) -> list[str]:
 
 
 def run_title(result: Result, entry: Entry, label: str) -> str:
-    """Return what a run is called in lists: what tells it from the others, and its controller."""
     parts = [label]
     if len({each.setting for each in result.entries}) > 1 or result.kind == "run":
         parts.append(setting_label(result, entry.setting))
-    starts = {(each.map, each.start) for each in result.entries}
-    if entry.start and len(starts) > len(result.maps):
+    if entry.start and len({(each.map, each.start) for each in result.entries}) > len(result.maps):
         parts.append(entry.start)
     if entry.seed is not None and len({each.seed for each in result.entries}) > 1:
         parts.append(f"seed\u00a0{entry.seed}")
@@ -176,9 +172,8 @@ def _team_text(result: Result) -> str:
     team = result.facts.get("team")
     parts = [_parameter(str(key), value) for key, value in team.items()] if isinstance(team, dict) else []
     for name, _ in result.entries[0].team if result.entries else ():
-        values = dict.fromkeys(dict(entry.team)[name] for entry in result.entries)
-        several = ", ".join(parameter_text(name, value) for value in values)
-        parts.append(f"{name.replace('_', ' ')} {several}")
+        values = dict.fromkeys(parameter_text(name, dict(entry.team)[name]) for entry in result.entries)
+        parts.append(f"{name.replace('_', ' ')} {', '.join(values)}")
     return ", ".join(filter(None, parts))
 
 

@@ -20,9 +20,14 @@ from robocov_app.sweep.study import parameter_text
 MOST_GROUPS = 8  # controllers with their gains up to which each is shown apart; of more, by controller
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 TUNED = " (tuned)"  # stands behind a controller's label where its gains were chosen on other runs than these
-
 _DIRECT = 12  # letters that a gain and its value may take in a label
+MOST_COMPARED = 4  # groups up to which each is compared with each; of more, each with the first
+MOST_SAID = 6  # comparisons that the first words tell
+FEW_MAPS = 5  # a bootstrap over fewer maps has too few different samples for a 95 % interval (126 of five)
+NEGLIGIBLE = 0.001  # part by which a cost has to differ to be called better or worse
+MOST_RUNS = 50  # runs of a result that a page shows as pictures
 
+Verdict: TypeAlias = Literal["better", "worse", "undecided"]
 T = TypeVar("T")
 K = TypeVar("K")
 Scales: TypeAlias = Mapping[Entry, float]  # what the costs of runs are divided by
@@ -96,7 +101,6 @@ def by_controller(result: Result) -> list[Group]:
 
 
 def shown_groups(result: Result) -> list[Group]:
-    """Return the groups that plots show: `variants`, or `by_controller` where these are too many."""
     apart = variants(result)
     return apart if len(apart) <= MOST_GROUPS else by_controller(result)
 
@@ -149,14 +153,6 @@ def gain_text(gains: Sequence[tuple[str, Value]], units: Mapping[str, str]) -> s
     return ", ".join(f"{name} {value_text(value)} {unit}".rstrip() for name, value, unit in known)
 
 
-Verdict: TypeAlias = Literal["better", "worse", "undecided"]
-
-MOST_COMPARED = 4  # groups up to which each is compared with each; of more, each with the first
-MOST_SAID = 6  # comparisons that the first words tell
-FEW_MAPS = 5  # a bootstrap over fewer maps has too few different samples for a 95 % interval (126 of five)
-NEGLIGIBLE = 0.001  # part by which a cost has to differ to be called better or worse
-
-
 class MapPairs(NamedTuple):
     """The pairs of one map: (m,) m at the end, and the geometric mean of their ratios over seeds."""
 
@@ -192,7 +188,6 @@ class Comparison:
         return sum(len(each.a) for each in self.maps)
 
     def tally(self) -> str:
-        """Return on how many maps the first is better, worse, or neither, in words."""
         counts, total = Counter(each.verdict for each in self.maps), len(self.maps)
         if len(counts) == 1:
             where = {1: "the map", 2: "both maps"}.get(total, f"all {total} maps")
@@ -201,7 +196,6 @@ class Comparison:
         return ", ".join([f"{words[0]} of {total} maps", *words[1:]])
 
     def headline(self) -> str:
-        """Return what came of it in a sentence that does not hide where maps disagree."""
         names = f"{self.first.label} against {self.second.label}"
         ratio, total = self.ratio, len(self.maps)
         if total > 1:
@@ -250,11 +244,7 @@ def compared(first: Group, second: Group) -> Comparison | None:
 
 
 def compared_groups(result: Result) -> tuple[list[Group], str]:
-    """Return the groups that are compared, variants of a controller or controllers with fair gains; and how.
-
-    Where controllers have several sets of gains, those for a map are chosen on the other maps (on one map,
-    those for a start and seed on the others): no run is compared that its own gains were chosen on.
-    """
+    """Return the groups that are compared, variants of one controller or tuned controllers; and how."""
     apart = variants(result)
     by = parted(apart, lambda group: group.controller)
     if len(by) < 2 or len(by) == len(apart):
@@ -301,9 +291,6 @@ def _exp(effect: Interval) -> Interval:
         return Interval(*np.exp([effect.estimate, effect.low, effect.high]).tolist())
 
 
-MOST_RUNS = 50  # runs of a result that a page shows as pictures
-
-
 class Choice(NamedTuple):
     """Runs to be shown, in the result's order; how they were chosen; which stand side by side at first."""
 
@@ -313,12 +300,7 @@ class Choice(NamedTuple):
 
 
 def chosen(result: Result, most: int = MOST_RUNS, panes: int = 4) -> Choice:
-    """Return the runs of a result to be shown.
-
-    All, as long as they are at most `most`. Of more, on every map of each controller the best run and the
-    worst, and of one case that is nearest to the middle of all controllers a run of each, so that they can
-    be watched from the same starts. Where that is still too much, the same over all maps together.
-    """
+    """Return at most `most` runs to be shown: all, the telling ones of each map, or those of all maps."""
     entries, words = result.fine, "All runs."
     if len(entries) > most:
         what = (
@@ -344,7 +326,6 @@ def chosen(result: Result, most: int = MOST_RUNS, panes: int = 4) -> Choice:
 
 
 def _telling(result: Result, entries: Sequence[Entry]) -> set[Entry]:
-    """Return best and worst runs, and those of a middle case."""
     scales = medians(result)
     known = (entry for entry in entries if np.isfinite(scaled(entry, scales)))
     found = set(_middle_case(_best_variants(result, entries), scales))

@@ -53,8 +53,8 @@ def density_picture(environment: Environment) -> str:
     # one colour for light and dark: it is between the two
     picture[..., :3] = mix(LIGHT.density, DARK.density, 0.5)
     x, y = np.meshgrid(*dots(environment, _DOTS))
-    places = np.column_stack([x.ravel(), y.ravel()])
-    picture[~environment.region.contains(places).reshape(x.shape), 3] = 0
+    inside = environment.region.contains(np.column_stack([x.ravel(), y.ravel()]))
+    picture[~inside.reshape(x.shape), 3] = 0
     file = io.BytesIO()
     Image.fromarray(picture[::-1]).save(file, "PNG", optimize=True)
     return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
@@ -97,8 +97,7 @@ def run_picture(
 ) -> str:
     """Return a run as an SVG element; with `numbers` on robots, or `hidden` from screen readers."""
     frame = Frame(record.environment, width, height)
-    n = len(record.team)
-    last = record.positions[-1]
+    n, last = len(record.team), record.positions[-1]
     parts: list[str] = []
     if n <= MOST_ROBOTS:
         cells, working = record.cells(), np.flatnonzero(record.working[-1])

@@ -13,7 +13,7 @@ from robocov.controllers.gains import Value, value_text
 from robocov.errors import counted
 from robocov.metrics.run_metrics import RunMetrics, run_metrics
 from robocov_app.figures import results as drawing
-from robocov_app.figures.curves import TIME
+from robocov_app.figures.curves import DISTANCE, TIME
 from robocov_app.figures.results import MOST_LEVELS, Band, Dependence, Pairs, Sample
 from robocov_app.figures.runs import share
 from robocov_app.figures.styles import CurveStyle, curve_styles
@@ -27,13 +27,14 @@ from robocov_app.sweep.study import UNITS, WORDS
 
 Looks: TypeAlias = Mapping[str, CurveStyle]  # the styles of a result's groups by label (`groups.styles`)
 
+TOGETHER = "All maps and teams together"
+METRES, RELATIVE = "final mean distance (m)", "final distance / median of map and team"
 MOST_PANELS = 24  # settings up to which each has panels of its own
 PANEL = 420, 290  # of a panel in pixels; on a telephone it is shown a little smaller
 WIDE = 860, 360  # of a plot that stands alone, on a screen that is wide enough
 _MOMENTS = 121  # moments of a cost curve: one every three pixels
-TOGETHER = "All maps and teams together"
-METRES = "final mean distance (m)"
-RELATIVE = "final distance / median of map and team"
+MOST_MEASURED, MOST_ROBOTS = 4, 60  # runs and robots up to which runs are measured: sight takes a while
+_MEASURED = 30  # moments of a run, besides its first
 
 
 class Plot(NamedTuple):
@@ -65,8 +66,7 @@ def cost_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
         for entry, each in known.items()
     }
     for title, own, groups, several in _parts(result, key):
-        bands, words = [], []
-        what, unit = "mean distance to the nearest robot (m)", "m"
+        bands, words, what, unit = [], [], DISTANCE, " m"
         if several:
             what, unit = "mean distance / that of the start", ""
         for group in groups:
@@ -77,7 +77,7 @@ def cost_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
                 continue
             bands.append(Band(group.label, looks[group.label], time, np.array(rows)))
             low, middle, high = (row[np.isfinite(row)][-1] for row in drawing.quartiles(bands[-1].values))
-            text = f"{group.label}: {middle:.3f} {unit}".rstrip()
+            text = f"{group.label}: {middle:.3f}{unit}"
             if len(rows) > 1:
                 text += f" at the end (median of {len(rows)} runs, quartiles {low:.3f} to {high:.3f})"
             words.append(text)
@@ -169,20 +169,18 @@ def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
     styles = curve_styles(group.controller for group in groups)
 
     def scale(label: str, part_of: Callable[[Entry], object]) -> tuple[str, Scales]:
-        """Return the axis' label and scales by the medians of parts; of one part metres."""
+        # by the medians of parts; of one part in metres
         if len({part_of(entry) for entry in result.fine}) == 1:
             return METRES, dict.fromkeys(result.fine, 1.0)
         return label, grouped.medians(result, part_of)
 
-    def plotted(
-        parameter: _Parameter, some: Sequence[Group], label: str, scales: Scales, key: str
-    ) -> Iterator[Plot]:
-        rows = [parameter.dependence(group, scales, styles[group.controller]) for group in some]
+    def plotted(over: _Parameter, some: list[Group], by: tuple[str, Scales], key: str) -> Iterator[Plot]:
+        label, scales = by
+        rows = [over.dependence(group, scales, styles[group.controller]) for group in some]
         if rows := [row for row in rows if len(row.values)]:
-            figure = drawing.plot_gains(rows, parameter.title, PANEL, label, parameter.choices)
-            words = "; ".join(_levels_text(row, parameter) for row in rows)
-            sentence = f"{label} against {parameter.title}. {words}."
-            yield Plot(parameter.title, inline_svg(figure, key, sentence))
+            figure = drawing.plot_gains(rows, over.title, PANEL, label, over.choices)
+            words = "; ".join(_levels_text(row, over) for row in rows)
+            yield Plot(over.title, inline_svg(figure, key, f"{label} against {over.title}. {words}."))
 
     by_setting = scale(RELATIVE, lambda entry: entry.setting)
     gains: dict[str, _Parameter] = {}
@@ -192,7 +190,7 @@ def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
         title = f"{name} ({unit})" if unit else name
         gains[name] = _Parameter(title, partial(_named, "gains", name), choices)
         some = [group for group in groups if group.controller in controllers]
-        yield from plotted(gains[name], some, *by_setting, f"{key}-{k}")
+        yield from plotted(gains[name], some, by_setting, f"{key}-{k}")
     team = [_Parameter("robots", lambda entry: entry.robots)]
     for name, _ in result.fine[0].team if result.fine else ():
         if name not in WORDS:
@@ -202,14 +200,13 @@ def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
     by_map = scale("final distance / median of map", lambda entry: entry.map)
     for k, parameter in enumerate(team):
         if len({parameter.value_of(entry) for entry in result.fine}) > 1:
-            yield from plotted(parameter, groups, *by_map, f"{key}-team-{k}")
-    count = 0
+            yield from plotted(parameter, groups, by_map, f"{key}-team-{k}")
+    count = 1
     for group in groups:
         own = [name for name, controllers in varying.items() if group.controller in controllers]
         for names in combinations(own, 2):
-            both, style = [gains[name] for name in names], styles[group.controller]
-            plot = _grid_plot(group, names, both, *by_setting, style, f"{key}-grid-{count + 1}")
-            if plot is not None:
+            both, style = {name: gains[name] for name in names}, styles[group.controller]
+            if plot := _grid_plot(group, both, by_setting, style, f"{key}-grid-{count}"):
                 count += 1
                 yield plot
 
@@ -226,22 +223,18 @@ def _levels_text(row: Dependence, parameter: _Parameter) -> str:
         best = parameter.text(row.gains[int(np.argmin(row.values))])
         return f"{row.label}, {len(row.values)} runs {span}, the lowest value at {best}"
     places = np.nan_to_num(row.gains, nan=np.inf)
-    medians = [np.median(row.values[places == level]) for level in np.nan_to_num(levels, nan=np.inf)]
-    each = zip(levels.tolist(), medians, strict=True)
-    parts = [f"{parameter.text(level)}: {median:.3f}" for level, median in each]
+    parts = [
+        f"{parameter.text(level)}: {np.median(row.values[places == np.nan_to_num(level, nan=np.inf)]):.3f}"
+        for level in levels.tolist()
+    ]
     return f"{row.label}, medians at {', '.join(parts)}"
 
 
 def _grid_plot(
-    group: Group,
-    names: Sequence[str],
-    gains: Sequence[_Parameter],
-    label: str,
-    scales: Scales,
-    style: CurveStyle,
-    key: str,
+    group: Group, over: Mapping[str, _Parameter], by: tuple[str, Scales], style: CurveStyle, key: str
 ) -> Plot | None:
     """Return medians over two gains of a controller; None where they were not tried on a grid."""
+    (label, scales), gains = by, list(over.values())
     first, second = (gain.dependence(group, scales, style) for gain in gains)
     columns, i = np.unique(first.gains, return_inverse=True)
     rows, j = np.unique(second.gains, return_inverse=True)
@@ -256,16 +249,11 @@ def _grid_plot(
     titles = gains[0].title, gains[1].title
     figure = drawing.plot_gain_grid(PANEL, levels[0], levels[1], values, titles)
     row, column = np.unravel_index(int(np.nanargmin(values)), values.shape)
-    title = f"{group.label} over {names[0]} and {names[1]}"
+    title = f"{group.label} over {' and '.join(over)}"
     what = "final distance in m" if label == METRES else RELATIVE
     best = f"{titles[0]} {gains[0].text(columns[column])} and {titles[1]} {gains[1].text(rows[row])}"
     span = f"from {np.nanmin(values):.3g} at {best} to {np.nanmax(values):.3g}"
     return Plot(title, inline_svg(figure, key, f"{title}: medians of the {what}, {span}."))
-
-
-MOST_MEASURED = 4  # runs up to which they are measured: what is in sight takes a while to know
-MOST_ROBOTS = 60  # robots up to which they are
-_MEASURED = 30  # moments of a run, besides its first
 
 
 def _in_contact(gaps: Array) -> Array:
@@ -288,11 +276,7 @@ _PANELS: tuple[tuple[str, str, str, Callable[[RunMetrics], Array]], ...] = (
 def measure_plots(
     result: Result, runs: Sequence[ReplayRun], entries: Sequence[Entry], looks: Looks, key: str
 ) -> list[Plot]:
-    """Return a plot for each metric of a run, or of the runs of a comparison; none of a sweep.
-
-    Nor are there any of very many runs or robots, or where a record does not tell the robots' ways. A
-    metric that tells nothing is left out, as the gap between robots where there is one.
-    """
+    """Return a plot for each metric that tells something; none of a sweep, or where ways are not known."""
     if result.kind == "sweep" or not 0 < len(runs) <= MOST_MEASURED:
         return []
     if any(len(run.record.team) > MOST_ROBOTS or not has_path(run.record) for run in runs):

@@ -28,7 +28,6 @@ from robocov_app.report.theme_css import theme_rules
 from robocov_app.runs.saved import roster_of
 
 MOST_PANES = 4  # runs side by side
-
 _SCRIPTS = ("data.js", "arena.js", "chart.js", "replay.js")
 RATE = 5.0  # moments of a run per simulated second, where there is room
 BUDGET = 1_500_000  # bytes that runs of one page take together; beyond, they are embedded at a lower rate
@@ -97,16 +96,19 @@ def embedded_map(environment: Environment) -> dict[str, Any]:
     }
 
 
-def embedded_run(
-    run: ReplayRun, place: int, style: CurveStyle, rate: float, *, goals: bool
-) -> dict[str, Any]:
-    """Return one run: `place` is the number of its map, `rate` in Hz, `goals` whether those come along."""
+def embedded_run(run: ReplayRun, on: int, style: CurveStyle, rate: float, *, goals: bool) -> dict[str, Any]:
+    """Return one run: `on` is the number of its map, `rate` in Hz, `goals` whether those come along."""
     record = run.record
     begin, end = float(record.time[0]), float(record.time[-1])
     times = even_times(end - begin, rate) if has_path(record) else np.unique([0.0, end - begin])
     wanted = goals and bool(np.isfinite(record.goals).any())
     radius = record.team.radius.tolist()
     life = lives(record) if record.conditions is not None else []
+    headings = {}
+    if record.steering is not None:
+        angles = np.where(record.team.turns, record.steering[:, :, 0], np.nan)
+        vectors = np.stack([np.cos(angles), np.sin(angles)], axis=2).reshape(len(record), -1)
+        headings = {"headings": quantised(_between(record.time, vectors, times + begin), -1.0, 1.0)}
     return {
         "title": run.title,
         "facts": run.facts,
@@ -114,7 +116,7 @@ def embedded_run(
         "style": style.name,
         "dashes": [] if isinstance(style.dashes, str) else list(style.dashes[1]),
         "mark": MARKS[style.mark],
-        "map": place,
+        "map": on,
         "radius": radius[0] if len(set(radius)) == 1 else radius,
         **({"speeds": record.team.max_speed.tolist()} if record.by_time else {}),
         "numbers": list(roster_of(record).numbers),
@@ -126,7 +128,7 @@ def embedded_run(
         "count": len(times),
         "positions": _places(record, record.positions, times + begin),
         "goals": _places(record, record.goals, times + begin) if wanted else None,
-        **({} if record.steering is None else {"headings": _headings(record, times + begin)}),
+        **headings,
         "cost": _cost(run.history, begin, even_times(end - begin, rate), 1.0 / rate),
     }
 
@@ -136,14 +138,14 @@ def embedded(
 ) -> dict[str, Any]:
     """Return all that a replay needs, at the rate up to `RATE`, and with goals, that fits the `budget`."""
     rate, goals = _affordable(runs, budget)
-    environments = [roster_of(run.record).environment for run in runs]
-    places = {environment: k for k, environment in enumerate(dict.fromkeys(environments))}
+    on = [roster_of(run.record).environment for run in runs]
+    maps = list(dict.fromkeys(on))
     found = [
-        embedded_run(run, places[environment], style, rate, goals=goals)
-        for run, style, environment in zip(runs, styles, environments, strict=True)
+        embedded_run(run, maps.index(environment), style, rate, goals=goals)
+        for run, style, environment in zip(runs, styles, on, strict=True)
     ]
-    maps = list(map(embedded_map, places))
-    return {"version": 1, "rate": rate, "maps": maps, "runs": found, "panes": list(panes)}
+    each = list(map(embedded_map, maps))
+    return {"version": 1, "rate": rate, "maps": each, "runs": found, "panes": list(panes)}
 
 
 def script_json(content: Any) -> str:
@@ -174,13 +176,6 @@ def _places(record: Record, values: Array, times: Array) -> str:
     return quantised((flat - low) / (high - low), 0.0, 1.0)
 
 
-def _headings(record: Record, times: Array) -> str:
-    assert record.steering is not None
-    angles = np.where(record.team.turns, record.steering[:, :, 0], np.nan)
-    vectors = np.stack([np.cos(angles), np.sin(angles)], axis=2).reshape(len(record), -1)
-    return quantised(_between(record.time, vectors, times), -1.0, 1.0)
-
-
 def _between(time: Array, rows: Array, times: Array) -> Array:
     """Return (T, m) rows at other times, linear in between; nan where either neighbour is."""
     after = np.clip(np.searchsorted(time, times), 1, max(len(time) - 1, 1))
@@ -194,7 +189,6 @@ def _between(time: Array, rows: Array, times: Array) -> Array:
 
 
 def _cost(history: CostHistory | None, begin: float, times: Array, step: float) -> dict[str, Any] | None:
-    """Return the mean distance at even times from the run's begin; None where it is not known."""
     if history is None:
         return None
     values = _between(history.time - begin, history.mean_distance[:, None], times)[:, 0]
@@ -237,7 +231,6 @@ def replay_part(runs: Sequence[ReplayRun], panes: Sequence[int] | None = None, b
 
 
 def replay_css() -> str:
-    """Return the style of replays and pictures; `theme_rules` gives it colours."""
     return asset("picture.css") + asset("replay.css")
 
 

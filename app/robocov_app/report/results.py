@@ -74,7 +74,6 @@ class Entry:
 
     @property
     def case(self) -> tuple[object, ...]:
-        """Key of paired runs: the setting, the start and the seed."""
         return *self.setting, self.start, self.seed
 
 
@@ -148,7 +147,6 @@ class Result:
         return entry.final / reference.mean_distance - 1.0
 
     def record(self, entry: Entry) -> Record:
-        """Return the record of a run. Raises InputError when it cannot be read."""
         if entry.folder in self.loaded:
             return self.loaded[entry.folder].record
         record = Record.load(entry.folder)
@@ -157,7 +155,6 @@ class Result:
         return record
 
     def history(self, entry: Entry) -> CostHistory | None:
-        """Return the cost along a run, None without a file; raises InputError when it cannot be read."""
         if entry.folder in self.loaded:
             return self.loaded[entry.folder].history
         path = entry.folder / "cost.csv"
@@ -320,12 +317,10 @@ def _of_sweep(folder: Path) -> Result:
                 facts["versions"] = _json(entry.folder / "run.json").get("versions")
                 break
     columns = {column.name: column.metadata or {} for column in results.dataset.schema}
-    about = {name: columns.get(gain_column(name), {}) for own in gains.values() for name in own}
-    texts = {
-        name: [known.get(key, b"").decode() for key in (b"unit", b"meaning")] for name, known in about.items()
-    }
+    meta = {name: columns.get(gain_column(name), {}) for own in gains.values() for name in own}
+    text = {name: [own.get(key, b"").decode() for key in (b"unit", b"meaning")] for name, own in meta.items()}
     maps = {printable(name): environment for name, environment in maps.items()}
-    known = _known_gains(entries, texts)
+    known = _known_gains(entries, text)
     return Result("sweep", folder, _labelled(entries), maps, wanted, *known, facts, {})
 
 

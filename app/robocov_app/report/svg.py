@@ -16,12 +16,10 @@ from robocov_app.report.theme_css import hex_code, named_colours
 
 _STYLE: Any = {"svg.hashsalt": "robocov", "svg.fonttype": "none", "savefig.bbox": None}
 _METADATA: dict[str, str | None] = {"Date": None, "Creator": None, "Format": None, "Type": None}
-
 _SPACE = "{http://www.w3.org/2000/svg}"
 _LINK = "{http://www.w3.org/1999/xlink}href"
 _NUMBER = re.compile(r"-?\d*\.?\d+(?:e[-+]?\d+)?")
 _MANY = 8  # so many equal round marks are drawn as one dotted line
-
 _PLOTTED = ("background", "ink", "faint", "grid", "rapf", "rpf", "lloyd")
 
 
@@ -67,7 +65,6 @@ class _Copy:
                 target.append(self._element(child))
 
     def _define(self, shape: Element) -> None:
-        """Keep a marker or a clip path under a short name."""
         if "id" in shape.attrib:
             element = self._element(shape)
             element.extend([self._element(child) for child in shape])

@@ -62,8 +62,7 @@ def summary_tables(result: Result) -> list[Table]:
     distance, over_run, *others = _figure_columns(result)
 
     def above(entries: Sequence[Entry]) -> str:
-        gaps = [100.0 * gap for entry in entries if np.isfinite(gap := result.gap(entry))]
-        return _quartiles(gaps, 1)
+        return _quartiles([100.0 * gap for entry in entries if np.isfinite(gap := result.gap(entry))], 1)
 
     gap: list[Column] = [("Above J_ref, %", above)] * bool(result.references)
 
@@ -74,9 +73,7 @@ def summary_tables(result: Result) -> list[Table]:
     settled: Column = "Settled", rest
 
     def table(caption: str, columns: Sequence[Column], parts: Sequence[Group], *notes: str) -> Table:
-        rows = [
-            (each.label, str(len(each.entries)), *(of(each.entries) for _, of in columns)) for each in parts
-        ]
+        rows = [(own.label, str(len(own.entries)), *(of(own.entries) for _, of in columns)) for own in parts]
         return Table(caption, ("Controller", "Runs", *(head for head, _ in columns)), rows, notes=notes)
 
     tables = []
