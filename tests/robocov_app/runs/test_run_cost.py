@@ -12,7 +12,8 @@ from robocov_app.runs.cost import built_cost, cost_for_pictures
 PLACE = np.array([[2.0, 2.0]])
 
 
-def test_it_is_the_cost(capsys):
+def test_it_is_the_cost(monkeypatch, capsys):
+    monkeypatch.setattr("robocov_app.terminal.progress.PATIENCE", 600.0)  # also on a slow machine
     cost = built_cost(ROOMS, 48)
     assert cost.lattice == 48
     assert cost(PLACE).value == CoverageCost(ROOMS, 48)(PLACE).value
