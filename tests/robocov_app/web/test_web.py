@@ -70,11 +70,8 @@ def test_a_picture_without_a_change_is_empty():
     ],
 )
 def test_keys_have_the_names_that_the_window_knows(key, held, name):
-    event = next(
-        Hands().events(
-            MESSAGES.validate_json(json.dumps({"kind": "key", "key": key, "down": True, "held": held}))
-        )
-    )
+    told = json.dumps({"kind": "key", "key": key, "down": True, "held": held})
+    event = next(Hands().events(MESSAGES.validate_json(told)))
     assert key_of(event) == name
 
 
