@@ -19,19 +19,16 @@ from pathlib import Path
 from robocov_app.commands import COMMANDS
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-
 TRACEBACK = "ROBOCOV_TRACEBACK"  # environment variable; where it is set, errors come with their traceback
 # commands that call kernels, see `robocov.compiled`
 _COMPILING = {"run", "compare", "sweep", "demo", "report", "paper", "replay", "cost", "optimum", "benchmark"}
 _LONGEST = 1000  # characters of an error that are told
-
 _EXAMPLES = (
     ("robocov demo", "the interactive window; robocov demo --tour plays a lesson of eleven chapters"),
     ("robocov run rooms --video --out first-run", "six robots cover six rooms; pictures and a film"),
     ("robocov compare office --controllers rapf rpf lloyd --out office", "three controllers, same starts"),
     ("robocov run rooms --controller mine.py:MyController", "a control law of your own"),
 )
-
 _FIRST_STEPS = """\
 robocov demo --tour                           a lesson in the window
 robocov run rooms --video --out first-run     one run, with pictures and a film
@@ -151,8 +148,7 @@ def _complain(message: str) -> int:
 def _overview() -> str:
     width = max(map(len, COMMANDS))
     parts = ["usage: robocov COMMAND [options]", "Multi-robot coverage control among unknown obstacles."]
-    parts += [
-        "\n".join(["commands:", *(f"  {name:<{width}}  {line}" for name, (_, line) in COMMANDS.items())])
-    ]
+    lines = [f"  {name:<{width}}  {line}" for name, (_, line) in COMMANDS.items()]
+    parts += ["\n".join(["commands:", *lines])]
     parts += ["\n".join(["examples:", *(f"  {call}\n      {line}" for call, line in _EXAMPLES)])]
     return "\n\n".join([*parts, "robocov COMMAND -h explains a command; robocov --version"])

@@ -14,7 +14,6 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
-from robocov.controllers import make_controller
 from robocov.cost import LATTICE, CoverageResult
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, counted, shown
@@ -22,7 +21,6 @@ from robocov.mapfile import load_map, save_map
 from robocov.metrics import CostHistory, cost_history
 from robocov.record import Record
 from robocov.robots import Team
-from robocov.simulation import Simulation
 from robocov_app.figures.files import figure_png
 from robocov_app.render.camera import length_label, round_length
 from robocov_app.render.density import mean_label
@@ -32,6 +30,7 @@ from robocov_app.report.pictures import Frame, map_picture
 from robocov_app.report.replay import ReplayRun, asset, replay_html
 from robocov_app.report.theme_css import theme_rules
 from robocov_app.runs.cost import PICTURE_LATTICE, built_cost
+from robocov_app.runs.spec import RunSpec
 from robocov_app.web.live import LiveWindow
 
 if TYPE_CHECKING:  # pages of HTML need no matplotlib
@@ -78,8 +77,7 @@ def plot_history(
     **options: Any,
 ) -> Axes:
     """Plot the mean distance against time, and return the axes; see `robocov_app.figures.runs.plot_cost`."""
-    curve = (label, controller, history.time, history.mean_distance)
-    return _plotted("plot_cost", [curve], axes, options)
+    return _plotted("plot_cost", [(label, controller, history.time, history.mean_distance)], axes, options)
 
 
 def plot_result(
@@ -175,8 +173,7 @@ def show(
     """Return the interactive window of a map, live; without ``robocov[web]`` a replay of one minute."""
     if find_spec("websockets") is None:
         environment = map if isinstance(map, Environment) else load_map(map)
-        starts = environment.start().sample(robots, seed=seed)
-        return Simulation(environment, make_controller(controllers[0]), starts=starts).run(60.0)
+        return RunSpec(environment, controllers[0], team=Team.homogeneous(robots), seed=seed).record()
     options = ["--robots", str(robots), "--seed", str(seed), "--controllers", *controllers]
     if not isinstance(map, Environment):
         return LiveWindow(["demo", str(map), *options], height)

@@ -22,13 +22,11 @@ from robocov_app.bench.measure import Call, Case, Row, in_turn
 VERTICES = (20, 200, 1000)
 LATTICES = (64, 128, 256, 512)
 ROBOTS = (6, 50, 200)
-GOALS = {
+GOALS = {  # wanted ratios, by lattice, vertices and robots
     (128, 200, 50): 0.75, (256, 200, 50): 0.45, (512, 200, 50): 0.25, (256, 1000, 50): 0.9,
     (128, 200, 6): 1.0, (256, 200, 6): 0.65, (512, 200, 6): 0.45,
 }  # fmt: skip
-"""Wanted ratios, by lattice, vertices and robots."""
-BUILD_GOALS = {(128, 200): 0.15, (512, 1000): 8.0}
-"""Wanted seconds for what is computed once for a map, by lattice and vertices."""
+BUILD_GOALS = {(128, 200): 0.15, (512, 1000): 8.0}  # wanted seconds, by lattice and vertices
 YARDSTICK = "scikit-fmm, order 2"
 
 
@@ -65,8 +63,7 @@ def _rows(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
     for robots in (6, 50) if quick else ROBOTS:
         if robots > len(cost.points):
             continue
-        places = Places(cost, robots)
-        exact, *marched = _compared(cost, places, _marched if has_yardstick() else None, quick)
+        exact, *marched = _compared(cost, Places(cost, robots), _marched if has_yardstick() else None, quick)
         row = Row("cost", "evaluated", size | {"robots": robots}, exact)
         goal = GOALS.get((lattice, vertices, robots))
         yield replace(row, yardstick=YARDSTICK, yardstick_seconds=marched[0], goal=goal) if marched else row
@@ -84,7 +81,6 @@ class Places:
         self.blocked = blocked.reshape(cost.lattice, cost.lattice)
 
     def move(self) -> None:
-        """Go to other free positions, (n, 2) m."""
         places = self._start + self._rng.uniform(-self._step, self._step, self._start.shape)
         free = shapely.intersects_xy(self._geodesics.free, *self._geodesics.grid.snap(places).T)
         self.now = np.where(free[:, None], places, self._start)
@@ -107,14 +103,13 @@ def _marched(cost: CoverageCost, places: Places) -> float:
     column, row = np.floor(places.now / cost.spacing).astype(int).T
     front = np.ones((side, side))
     front[row, column] = -1.0
-    masked = np.ma.MaskedArray(front, places.blocked)
-    return float(skfmm.distance(masked, dx=cost.spacing, order=2).mean())
+    return float(skfmm.distance(np.ma.MaskedArray(front, places.blocked), dx=cost.spacing, order=2).mean())
 
 
 # on bundled maps, against the distances that a k-d tree finds: the least that a coverage cost takes
 
 TREE = "k-d tree of the robots"
-BEFORE = {
+BEFORE = {  # multiples of the time of the tree, by map, lattice and robots; see `Row.before`
     ("rooms", 64, 6): 4.5, ("rooms", 128, 6): 2.8, ("rooms", 256, 6): 1.7,
     ("rooms", 64, 50): 4.9, ("rooms", 128, 50): 2.4, ("rooms", 256, 50): 1.0,
     ("museum", 64, 6): 7.4, ("museum", 128, 6): 3.8, ("museum", 256, 6): 1.9,
@@ -123,9 +118,7 @@ BEFORE = {
     ("campus", 64, 50): 20.6, ("campus", 128, 50): 10.3, ("campus", 256, 50): 3.2,
     ("campus", 64, 1000): 136.8,
 }  # fmt: skip
-"""Multiples of the time of the tree, by map, lattice and robots; see `Row.before`."""
-FASTER = {64: 4.0, 128: 2.5, 256: 1.7}
-"""Wanted speed-ups by lattice; twice that on campus, ten times for 1000 robots."""
+FASTER = {64: 4.0, 128: 2.5, 256: 1.7}  # wanted speed-ups by lattice
 
 
 def map_cases(*, quick: bool = False) -> list[Case]:

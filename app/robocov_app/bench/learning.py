@@ -34,10 +34,8 @@ class PointMasses(gymnasium.Env[Any, Any]):
         return self._seen(), {}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, Any]:
-        """Move for 1/60 s, at 1 m/s at most."""
         self._velocities += (action - 2.0 * self._velocities) / 60.0
-        speed = np.hypot(*self._velocities.T)[:, None]
-        self._velocities /= np.maximum(speed, 1.0)
+        self._velocities /= np.maximum(np.hypot(*self._velocities.T)[:, None], 1.0)
         self._positions = np.clip(self._positions + self._velocities / 60.0, 0.0, SIDE)
         distances = np.hypot(*np.moveaxis(self._sites - self._positions, -1, 0))
         return self._seen(), -float(distances.min(axis=1).mean()), False, False, {}

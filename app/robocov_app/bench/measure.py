@@ -9,8 +9,7 @@ from time import perf_counter
 from typing import Any, TypeAlias
 
 Call: TypeAlias = Callable[[], object]
-Case: TypeAlias = Callable[[], Iterable["Row"]]
-"""Something to measure."""
+Case: TypeAlias = Callable[[], Iterable["Row"]]  # something to measure
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,7 @@ from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, quiet_axes, ton
 from robocov_app.render.theme import LIGHT, Theme
 
 WIDTH = 1100
-ABOVE, ROW, LEFT, RIGHT = 92, 26, 400, 90
-"""Pixels: for the title, for a line, for its words, for its value."""
+ABOVE, ROW, LEFT, RIGHT = 92, 26, 400, 90  # pixels: for the title, for a line, for its words, for its value
 GAP = 66  # pixels between what belongs to one part and the next, for its heading
 HEADINGS = {
     "step": "Simulated step", "maps": "Exact coverage cost on maps",

@@ -42,14 +42,13 @@ def _rows(seeds: int) -> Iterator[Row]:
 # how long a command takes before it does anything
 
 EVERYTHING = "import robocov\nfor name in robocov.__all__: getattr(robocov, name)"
-WORDS: dict[str, tuple[str, ...]] = {
+WORDS: dict[str, tuple[str, ...]] = {  # first actions of a user, with the interpreter's arguments for each
     "robocov --help": ("-m", "robocov_app", "--help"),
     "robocov run --help": ("-m", "robocov_app", "run", "--help"),
     "robocov maps": ("-m", "robocov_app", "maps"),
     "import robocov": ("-c", "import robocov"),
     "import robocov, all of it": ("-c", EVERYTHING),
 }
-"""First actions of a user, with the interpreter's arguments for each."""
 GOALS = {"robocov --help": 2.0}
 
 

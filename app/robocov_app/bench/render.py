@@ -42,7 +42,6 @@ def _frames(name: str, n: int, quick: bool) -> Iterator[Row]:
 
 
 def cleared(canvas: pygame.Surface | None) -> Call:
-    """Return what fills an empty picture and copies it."""
     assert canvas is not None
     empty = pygame.Surface(SIZE)
     return lambda: (empty.fill((255, 255, 255)), canvas.blit(empty, (0, 0)))
@@ -68,6 +67,5 @@ def _films(quick: bool) -> Iterator[Row]:
 
 
 def _travelled(name: str, n: int) -> Record:
-    """Return five seconds of a run, which has trajectories and cells in motion."""
     environment = load_map(name)
     return Simulation(environment, Rapf(), environment.start("uniform").sample(n, seed=0)).run(5.0)

@@ -14,10 +14,8 @@ from robocov_app.bench.measure import Call, Case, Row, in_turn
 
 GOALS = {6: (1.0, 16.0), 50: (0.7, 12.0), 200: (0.5, 9.0), 1000: (0.5, 8.0)}
 """Wanted multiples of the times of the triangulation and of bare physics, by number of robots."""
-BEFORE = {6: (4.2, 80.0), 50: (2.6, 57.0), 200: (1.4, 38.0), 1000: (1.0, 31.0)}
-"""Ratios before; see `Row.before`."""
-TOGETHER, TOGETHER_GOAL = 64, 5.0
-"""Runs of six robots that are moved on together, and the wanted multiple of bare physics for each."""
+BEFORE = {6: (4.2, 80.0), 50: (2.6, 57.0), 200: (1.4, 38.0), 1000: (1.0, 31.0)}  # see `Row.before`
+TOGETHER, TOGETHER_GOAL = 64, 5.0  # runs moved on together; wanted multiple of bare physics for each
 BARE = "bare Space.step"  # the physics engine alone: the same bodies in an empty space
 WARM_UP = 120  # steps before the first that counts: two seconds, by when the team is on its way
 
@@ -35,12 +33,11 @@ def _rows(n: int, quick: bool) -> Iterator[Row]:
     calls["delaunay"] = lambda: Delaunay(simulation.positions)
     taken = in_turn(calls, rounds)
     step = taken["step"]
-    note = f"{simulation.dt / step:.0f} x real time"
     # six robots 60 times as fast as real ones
     slowest = simulation.dt / 60.0 if n == 6 else None
     shown, triangulated = ("step", "one step", {"robots": n}, step), ("Qhull's Delaunay", taken["delaunay"])
     (goal, bare_goal), (before, bare_before) = GOALS[n], BEFORE[n]
-    yield Row(*shown, *triangulated, goal, slowest, note, before)
+    yield Row(*shown, *triangulated, goal, slowest, f"{simulation.dt / step:.0f} x real time", before)
     yield Row(*shown, BARE, taken["space"], bare_goal, before=bare_before)
 
 
@@ -48,9 +45,8 @@ def _together(quick: bool) -> Iterator[Row]:
     campus, n = load_map("campus"), 6
     starts = [campus.start("uniform").sample(n, seed=seed) for seed in range(TOGETHER)]
     simulation = Simulation(campus, Rapf(), np.concatenate(starts), runs=TOGETHER)
-    space = _warmed_up(simulation, n)
     # as often as there are runs: what one call takes is too short for the clock
-    bare = [partial(space.step, simulation.dt)] * TOGETHER
+    bare = [partial(_warmed_up(simulation, n).step, simulation.dt)] * TOGETHER
     calls: dict[str, Call] = {"step": simulation.step, "space": lambda: [call() for call in bare]}
     taken = in_turn(calls, 60 if quick else 300)
     size, each = {"robots": n, "runs together": TOGETHER}, taken["step"] / TOGETHER

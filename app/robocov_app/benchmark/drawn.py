@@ -27,26 +27,20 @@ _LEAST = 0.04  # part of the area that is blocked at least
 
 
 def drawn_map(kind: str, seed: int) -> Environment:
-    """Return the map of a kind and a seed: the first of its plans that is in one piece without narrow gaps.
-
-    Raises ParameterError where there is none.
-    """
+    """Return the first plan of a kind and seed in one piece without narrow gaps; ParameterError for none."""
     for attempt in range(_ATTEMPTS):
         boundary, obstacles = KINDS[kind](np.random.default_rng([_ORDER.index(kind), seed, attempt]))
         plan = Environment(f"{kind} {seed}", boundary, tuple(obstacles))
         room = plan.free.buffer(-_PASSAGE / 2.0, quad_segs=16)
         blocked = sum(each.polygon.area for each in plan.obstacles)
-        # a robot would not get everywhere, or there is too little in its way
-        if not (
-            len(plan.free.geoms) == 1 and isinstance(room, shapely.Polygon) and blocked >= _LEAST * plan.area
-        ):
+        whole = len(plan.free.geoms) == 1 and isinstance(room, shapely.Polygon)
+        if not whole or blocked < _LEAST * plan.area:  # no way everywhere, or too little that is in the way
             continue
         start = plan.static.free.buffer(-_START - 0.01)
         if start.is_empty:
             continue
-        at = shapely.shortest_line(start, shapely.Point(plan.region.bounds[:2])).coords[
-            0
-        ]  # in the lower left
+        lower_left = shapely.Point(plan.region.bounds[:2])
+        at = shapely.shortest_line(start, lower_left).coords[0]
         disc = world.DiscStart((round(at[0], 2), round(at[1], 2)), _START)
         document = to_json(Environment(plan.name, plan.boundary, plan.obstacles, {"entry": disc}))
         with suppress(MapError):
@@ -122,8 +116,7 @@ def _office(rng: np.random.Generator) -> Plan:
     cuts = np.linspace(0.0, width, int(rng.integers(5, 8)))
     cuts[1:-1] += rng.uniform(-0.4, 0.4, len(cuts) - 2)
     for left, right in itertools.pairwise(cuts.tolist()):
-        door = rng.uniform(left + 0.7, right - 0.7)
-        obstacles += _wall_with_door(False, high, left, right, door, 0.9)
+        obstacles += _wall_with_door(False, high, left, right, rng.uniform(left + 0.7, right - 0.7), 0.9)
         if right < width:
             obstacles.append(WallObstacle(_rounded([(right, high), (right, height)]), _WALL))
         if rng.random() < 0.6:

@@ -60,7 +60,6 @@ def page_of(results: Sequence[Mapping[str, Any]], title: str) -> str:
     }
     if not tracks:
         raise ParameterError("DIR: the results have no run in common, so there is nothing to compare")
-    method = list(dict.fromkeys(words for each in results for words in each["method"]))
     return template("benchmark.html.jinja").render(
         title=title,
         suite=suite.VERSION,
@@ -71,7 +70,7 @@ def page_of(results: Sequence[Mapping[str, Any]], title: str) -> str:
         overview=_overview(labels, tracks),
         tracks=[_section(name, own, looks, knows) for name, own in tracks.items()],
         notes=ratings.NOTES,
-        method=method,
+        method=list(dict.fromkeys(words for each in results for words in each["method"])),
         entries=_entries(results, labels),
     )
 
@@ -163,8 +162,7 @@ def label_places(marks: Array, points: Sequence[Point]) -> Array:
         tried = mark + np.array(steps)
         boxes = shapely.box(*(tried - half).T, *(tried + half).T)
         hidden = shapely.area(shapely.intersection(boxes[:, None], taken)).sum(axis=1)
-        outside = shapely.area(shapely.difference(boxes, frame))
-        best = int(np.argmin(np.round(hidden + 1e3 * outside, 6)))
+        best = int(np.argmin(np.round(hidden + 1e3 * shapely.area(shapely.difference(boxes, frame)), 6)))
         taken.append(boxes[best])
         middles.append(tried[best])
     return np.array(middles)

@@ -23,11 +23,9 @@ class Rating:
     failed: int
 
     def values(self, figure: str) -> Array:
-        """Return a figure of each run that has it."""
         return np.array([row[figure] for row in self.rows if row[figure] is not None], dtype=float)
 
     def median(self, figure: str) -> float:
-        """Return the median of a figure, nan for none."""
         values = self.values(figure)
         return float(np.median(values)) if len(values) else float("nan")
 
@@ -77,15 +75,13 @@ def labels_of(results: Iterable[Mapping[str, Any]]) -> list[str]:
 
 
 def number(value: float | None, form: str = ".3g") -> str:
-    """Return a number as text, a dash for None and nan."""
     return NOTHING if value is None or not np.isfinite(value) else f"{value:{form}}"
 
 
-HEAD = (
+HEAD = (  # columns of a track's table; `NOTES` say what they are
     *("Controller", "Knows", "Runs", "Gap, %", "95 %", "Mean", "Worst", "To 5 %, s", "∫J / J_ref, s"),
     *("Path, m", "Work, J", "Contacts", "At rest", "Rest, s", "B/s", "µs/s"),
 )
-"""The columns of a track's table; `NOTES` say what they are."""
 NOTES = (
     "Gap: J / J_ref − 1 at the end, the median over runs with its 95 % interval (bootstrap that draws whole "
     "maps), mean and worst; J_ref is the best placement known, no proven optimum, so gaps may be too small; "

@@ -70,13 +70,10 @@ def make_references(path: Path, *, workers: int, quiet: bool, stop: Interruption
             held, robots, environment = wanted[key]
             places = np.round(answer.positions, _DIGITS)  # the cost is that of the places as they stand there
             result = CoverageCost(environment, suite.LATTICE)(places)
-            held[robots] = {
-                "mean_distance_m": result.mean_distance,
-                "uncovered_area_m2": result.uncovered_area,
-                "agreement": answer.agreement,
-                "lower_bound_m": None,
-                "positions_m": places.tolist(),
-            }
+            mean, uncovered = result.mean_distance, result.uncovered_area
+            held[robots] = {"mean_distance_m": mean, "uncovered_area_m2": uncovered}
+            held[robots] |= {"agreement": answer.agreement, "lower_bound_m": None}
+            held[robots]["positions_m"] = places.tolist()
             kept()
         asked = {key: (to_json(wanted[key][2]), found(key)["positions_m"]) for key in bounds if found(key)}
         for key, bound in searched(asked, workers, stop, f"{__name__}:Bounding") if asked else ():

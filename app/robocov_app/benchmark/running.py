@@ -32,11 +32,10 @@ TRACKS = "tracks"  # folder of the tracks' sweeps
 ORACLE = "oracle"
 _FORMAT = {"format": "robocov-benchmark", "version": 1}
 _ALIKE = 1e-6  # m² by which uncovered areas of the same rooms differ at most
-FIGURES = (
+FIGURES = (  # of a run that a result holds, beside those of its effort and its gap
     *("mean_distance_m", "mean_distance_over_run_m", "uncovered_area_m2", "near_final_s", "settled_at_s"),
     *("path_length_m", "work_J", "contacts", "min_clearance_m", "stuck_robots"),
 )
-"""The figures of a run that a result holds, beside those of its effort and its gap."""
 Row: TypeAlias = dict[str, Any]
 
 
@@ -80,14 +79,13 @@ class Contender:
         name = study.controllers[0]
         kind, source = study.kind(name), study.sources.get(name)
         texts = [] if source is None else [source.text, *(each.text for each in source.modules.values())]
-        digest = hashlib.sha256("\0".join(texts).encode()).hexdigest() if texts else None
         return {
             "controller": self.controller.rpartition("/")[2],
             "label": getattr(kind, "label", kind.__name__),
             "information": information_of(kind),
             "gains": dict(study.gains_of(name).choices[0]),
             "set": dict(self.gains),
-            "source_sha256": digest,
+            "source_sha256": hashlib.sha256("\0".join(texts).encode()).hexdigest() if texts else None,
         }
 
 
@@ -260,8 +258,7 @@ def verify(
     contender = Contender(name, entry["set"])
     selection = Selection(chosen["quick"], tuple(chosen["tracks"]), tuple(chosen["maps"]))
     studies = dict(contender.studies(selection))
-    digest = contender.facts(next(iter(studies.values())))["source_sha256"]
-    if digest != entry["source_sha256"]:
+    if contender.facts(next(iter(studies.values())))["source_sha256"] != entry["source_sha256"]:
         raise InputError(f"{path}: --controller: {name} is not the source that was rated: its digest differs")
     found = [f"made with {words}" for words in [difference_of(result["versions"])] if words]
     told = {(row["track"], row["map"], row["seed"]): row for row in result["rows"]}

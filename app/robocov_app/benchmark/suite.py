@@ -38,22 +38,19 @@ def _numbered(kind: str, count: int, first: int = _FIRST) -> tuple[str, ...]:
     return tuple(f"{kind}-{seed}" for seed in range(first, first + count))
 
 
-FAMILIES: Mapping[str, tuple[str, ...]] = {
+FAMILIES: Mapping[str, tuple[str, ...]] = {  # maps of the ideal track
     "bundled": _BUNDLED,
     **{kind: _numbered(kind, 7) for kind in GENERATORS},
     **{kind: _numbered(kind, 6) for kind in KINDS if kind != "traffic"},
 }
-"""The maps of the ideal track by their families."""
 _DRAWN = [kind for kind in FAMILIES if kind != "bundled"]
-_OTHERS: Mapping[str, tuple[str, ...]] = {
+_OTHERS: Mapping[str, tuple[str, ...]] = {  # of other tracks; those of tuning are for choosing gains alone
     "density": tuple(f"dense-{each}" for kind in _DRAWN for each in _numbered(kind, 1)),
     "moving": ("forklifts", *_numbered("traffic", 5)),
     "large": tuple(f"large-{each}" for kind in _LARGE_KINDS for each in _numbered(kind, 2)),
     "tuning": tuple(name for kind in _DRAWN for name in _numbered(kind, 2, first=1)),
 }
-"""The maps of other tracks. Those of tuning are for choosing gains, and for nothing else."""
 FAMILY_OF = {name: family for family, names in {**FAMILIES, **_OTHERS}.items() for name in names}
-"""All maps, in the order of the families."""
 _CORE = tuple(name for names in FAMILIES.values() for name in names[:3])
 
 
@@ -76,7 +73,7 @@ class Track:
 
 _FAILURES = ((0, 15.0), (3, 30.0))  # indices, and seconds
 _LOSSY = {"loss": 0.3, "delay": 0.5, "message_rate": 2.0}
-TRACKS: Mapping[str, Track] = {
+TRACKS: Mapping[str, Track] = {  # `RATED` are those that count
     "ideal": Track("nothing goes wrong", sum(FAMILIES.values(), ()), (0, 1)),
     "short-range": Track("robots hear each other up to 3 m", changes={"communication_range": 3.0}),
     "lossy": Track("2 messages a second, 0.5 s late, 30 % lost", changes={"conditions": _LOSSY}),
@@ -89,10 +86,8 @@ TRACKS: Mapping[str, Track] = {
     "one-robot": Track("one robot", robots=1),
     "tuning": Track("as ideal, for choosing gains: no result", _OTHERS["tuning"]),
 }
-"""The tracks by their names; `RATED` are those that count."""
 RATED = tuple(name for name in TRACKS if name != "tuning")
-QUICK = ("ideal", "short-range")
-"""The tracks of ``--quick``, of which it takes the first map of each family, with the first seed."""
+QUICK = ("ideal", "short-range")  # of ``--quick``: the first map of each family, with the first seed
 
 
 def heading(track: str) -> str:
@@ -158,6 +153,5 @@ def study_of(
     changes: dict[str, Any] = {"robots": (track.robots,), "duration": track.duration, "radius": RADIUS}
     changes |= {"lattice": LATTICE, "cost_hz": 2.0, "record_hz": 0.0, "metrics": True, **track.changes}
     if track.failures:
-        words = " ".join(f"{robot + 1}@{time:g}" for robot, time in track.failures)
-        changes["conditions"] = {"fail": words}
+        changes["conditions"] = {"fail": " ".join(f"{robot + 1}@{time:g}" for robot, time in track.failures)}
     return Study(tuple(maps), (controller,), seeds=seeds, folder=folder, **changes, **more)

@@ -1,6 +1,6 @@
 """The subcommands of `robocov`: parse, call, print; the work is done elsewhere."""
 
-COMMANDS = {
+COMMANDS = {  # module, and one line
     "demo": ("demo", "the interactive window: watch, touch, compare, go back in time"),
     "run": ("run", "one headless run, everything saved in a folder: record, cost, pictures, film"),
     "compare": ("compare", "several controllers from the same starts, side by side"),
@@ -25,4 +25,3 @@ COMMANDS = {
     "completion": ("completion", "a script by which the shell completes commands, options and names"),
     "handbook": ("handbook", "tutorials, guides and the reference, in a browser; no network"),
 }
-"""The subcommands: module, and one line."""

@@ -84,8 +84,7 @@ def command(options: Arguments) -> None:
         from robocov_app.render.theme import theme_named
 
         save_ratios(rows, options.plot, theme_named(options.theme))
-    names = "numpy", "scipy", "shapely", "pymunk", "pygame-ce"
-    packages = {name: version(name) for name in names}
+    packages = {name: version(name) for name in ("numpy", "scipy", "shapely", "pymunk", "pygame-ce")}
     machine: dict[str, Any] = {"python": platform.python_version(), "system": platform.system()}
     machine |= {"processor": platform.machine(), "cores": os.cpu_count(), "packages": packages}
     tell(options, {"machine": machine, "rows": [row.to_dict() for row in rows]}, indent=1)
@@ -116,14 +115,12 @@ def print_tables(rows: Sequence[Row]) -> None:
 
 
 def goals(row: Row) -> str:
-    """Return what is wanted, and whether it is missed."""
     wanted = [] if row.goal is None or row.ratio is None else [f"{row.goal:.3g}"]
     wanted += [] if row.goal_seconds is None else [duration(row.goal_seconds)]
     return ", ".join(wanted) + " missed" * (row.met is False)
 
 
 def duration(seconds: float | None) -> str:
-    """Return a time in the unit that suits it, nothing for none."""
     if seconds is None:
         return ""
     if seconds < 1e-3:

@@ -56,24 +56,18 @@ def command(options: Arguments) -> None:
 
 
 def sources() -> Path:
-    """Return the folder of the handbook's sources: in the package, else in the checkout."""
     app = Path(__file__).resolve().parents[1]
     return next(each for each in (app / "handbook", app.parent / "handbook") if each.is_dir())
 
 
 def built(folder: Path) -> None:
-    """Build the pages into a new folder; a warning of Sphinx is an error.
-
-    Raises InputError where the folder has something in it, RobocovError where Sphinx is missing or complains.
-    """
+    """Build the pages into a new folder; InputError where it is none, RobocovError where Sphinx complains."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: exists already; a new or an empty folder was wanted")
     needed = "sphinx", "furo", "myst_parser"
     if missing := [name for name in needed if importlib.util.find_spec(name) is None]:
-        raise RobocovError(
-            f'{missing[0]} is not installed: pip install "robocov[docs]"; '
-            f"the pages can be read as text, too: {sources() / 'index.md'}"
-        )
+        text = f"the pages can be read as text, too: {sources() / 'index.md'}"
+        raise RobocovError(f'{missing[0]} is not installed: pip install "robocov[docs]"; {text}')
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".handbook-") as work:

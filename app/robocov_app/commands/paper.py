@@ -53,7 +53,6 @@ class Arguments(JsonOption):
 
     @property
     def parts(self) -> list[str]:
-        """The options that say which part is wanted: one, or none where all is."""
         names = ("figures_only", "without_beyond", "beyond_only")
         return [f"--{name.replace('_', '-')}" for name in names if getattr(self, name)]
 
@@ -103,8 +102,7 @@ def command(options: Arguments) -> int:
             if beyond is not None:
                 drawn = pages.save_beyond_figures(out, beyond, quiet=quiet)
                 pages.save(out / pages.BEYOND_PAGE, pages.beyond_page(drawn, beyond))
-            page = pages.paper_page(plan, images, runs, first, paper, found, more)
-            pages.save(out / pages.PAGE, page)
+            pages.save(out / pages.PAGE, pages.paper_page(plan, images, runs, first, paper, found, more))
         except Interrupted:
             again = " ".join(["--out", str(out), *["--quick"] * options.quick, *options.parts])
             tell(options, {"out": str(out), "interrupted": True}, f"stopped; to go on: robocov paper {again}")

@@ -86,9 +86,8 @@ def command(options: Arguments) -> int:
 
     for controller in options.controller:
         controller_kind(controller)
-        kind = controller.rpartition(":")[2]
         names = [each.record.controller for each in saved]
-        if kind not in (name.rpartition(":")[2] for name in names):
+        if controller.rpartition(":")[2] not in (name.rpartition(":")[2] for name in names):
             wanted = f"the controller of a run was wanted: {listed(names)}"
             raise ParameterError(f"--controller: {controller}, but {wanted}")
     try:

@@ -112,14 +112,8 @@ def write_report(
     counts, lines = [], []
     for (folder, _), result, shown in zip(parts, results, page.shown, strict=True):
         runs, failed, lost = len(result.fine), len(result.failed), [each._asdict() for each in result.damaged]
-        count = {
-            "folder": called(folder),
-            "kind": result.kind,
-            "runs": runs,
-            "failed": failed,
-            "damaged": lost,
-        }
-        counts.append(count | {"missing": result.missing, "shown": shown})
+        count = {"folder": called(folder), "kind": result.kind, "runs": runs, "failed": failed}
+        counts.append(count | {"damaged": lost, "missing": result.missing, "shown": shown})
         words = [f"{called(result.folder)}: {result.kind} of {counted(runs, 'run')}"]
         words += [f"{failed} failed"] * bool(failed) + [f"{len(lost)} cannot be read"] * bool(lost)
         words += [f"{result.missing} of {result.wanted} missing"] * bool(result.missing)

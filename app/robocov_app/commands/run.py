@@ -45,9 +45,8 @@ def command(options: Arguments) -> int:
     out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
     runs, stopped = performed({"": spec}, out, options)
     record, history, summary = runs[""].record, runs[""].history, runs[""].summary
-    lines = [
-        f"{record.label} on {record.environment.name}, {len(record.team)} robots, {record.time[-1]:.1f} s"
-    ]
+    facts = f"{len(record.team)} robots, {record.time[-1]:.1f} s"
+    lines = [f"{record.label} on {record.environment.name}, {facts}"]
     first = f"(at the start {history.mean_distance[0]:.3f} m)"
     lines += [f"  mean distance   {summary['mean_distance_m']:.3f} m   {first}"]
     if history.mean_time is not None:

@@ -236,11 +236,8 @@ class ExportReport(_Report):
 
     def lines(self) -> list[str]:
         area, of_it = square_metres(self.area), square_metres(self.area_written)
-        return [
-            f"{self.format}: free area {area}, written {of_it}",
-            *self._told("dropped", "notes"),
-            f"saved in {', '.join(str(file) for file in self.files)}",
-        ]
+        first = f"{self.format}: free area {area}, written {of_it}"
+        return [first, *self._told("dropped", "notes"), f"saved in {', '.join(map(str, self.files))}"]
 
 
 @dataclass(frozen=True)

@@ -31,8 +31,7 @@ from robocov_app.formats.geometry.shapes import Line, Shapes
 MOST_LINES = 8_000_000  # of text: a line of the drawing takes about 24, a vertex 4
 MOST_ENTITIES = 50_000  # in the file, on any layer: ezdxf takes an eighth of a millisecond and 5 kB for each
 MOST_DRAWN = 200_000  # that are drawn, blocks and all
-# units of the header's $INSUNITS, with their metres
-UNITS = {
+UNITS = {  # of the header's $INSUNITS, with their metres
     1: ("inches", 0.0254), 2: ("feet", 0.3048), 3: ("miles", 1609.344), 4: ("millimetres", 0.001),
     5: ("centimetres", 0.01), 6: ("metres", 1.0), 7: ("kilometres", 1000.0), 9: ("mils", 2.54e-5),
     10: ("yards", 0.9144), 13: ("micrometres", 1e-6), 14: ("decimetres", 0.1), 15: ("decametres", 10.0),
@@ -78,13 +77,12 @@ def spline(entity: Any, tolerance: float) -> Array:
     if not np.isfinite(knots).all() or not (np.isfinite(weights).all() and (weights > 0.0).all()):
         raise ValueError("knots and weights of a spline, but finite ones were wanted")
     rational = BSpline(knots, np.column_stack([control, np.ones(len(control))]) * weights[:, None], degree)
-    breaks = np.unique(knots[degree : len(control) + 1])
 
     def curve(t: Array) -> Array:
         found = rational(t)
         return np.asarray(found[:, :2] / found[:, 2:])
 
-    return sampled(curve, breaks, tolerance)
+    return sampled(curve, np.unique(knots[degree : len(control) + 1]), tolerance)
 
 
 def flat(points: Sequence[Any]) -> Array:
@@ -156,7 +154,6 @@ class DxfDrawing:
                 self.shapes.leave_out("damaged shape", f"({kind}: {type(error).__name__})")
 
     def _one(self, entity: Any, layer: str, blocks: tuple[str, ...]) -> None:
-        """Add an entity, or what a block holds."""
         shapes, kind, labels = self.shapes, entity.dxftype(), (layer, *reversed(blocks))
         at = one_line(f"{kind} {entity.dxf.handle}" if entity.dxf.get("handle") else kind)[:60]
         if layer.casefold() in self._hidden or entity.dxf.get("invisible", 0):
@@ -269,7 +266,6 @@ class DxfDrawing:
         self._line(points * self.scale, labels, at, width)
 
     def _hatch(self, entity: Any) -> list[Array]:
-        """Return the boundary paths of a hatch, as ezdxf approximates them."""
         from ezdxf.path import from_hatch
 
         rings = []

@@ -201,8 +201,7 @@ def is_number(value: object) -> bool:
     return type(value) in (int, float) and -1e100 < value < 1e100  # type: ignore[operator]
 
 
-# text as it is written, or a list or a mapping of values
-Value: TypeAlias = "str | list[Value] | dict[str, Value]"
+Value: TypeAlias = "str | list[Value] | dict[str, Value]"  # text is as it is written
 MAX_YAML_BYTES = 262_144  # which take a second to read: a map has 200, a world some thousand
 DEEPEST = 12  # deepest nesting of lists and mappings
 

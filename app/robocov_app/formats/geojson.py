@@ -96,8 +96,7 @@ class _Found:
         if feature.get("geometry") is None:
             self.shapes.leave_out("feature", "without a geometry")
         else:
-            names = tuple(dict.fromkeys(filter(None, labels)))
-            self._geometry(feature["geometry"], (*at, "geometry"), names)
+            self._geometry(feature["geometry"], (*at, "geometry"), tuple(dict.fromkeys(filter(None, labels))))
 
     def _geometry(self, geometry: Any, at: Steps, labels: tuple[str, ...]) -> None:
         kind = geometry.get("type") if isinstance(geometry, dict) else None

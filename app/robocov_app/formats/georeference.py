@@ -56,8 +56,7 @@ def _points(figures: Sequence[Figure]) -> Array:
 
 
 def _with_points(figures: Sequence[Figure], points: Array) -> list[Figure]:
-    ends = np.cumsum([len(ring) for figure in figures for ring in figure.rings])
-    rings = iter(np.split(points, ends[:-1]))
+    rings = iter(np.split(points, np.cumsum([len(ring) for figure in figures for ring in figure.rings])[:-1]))
     return [replace(figure, rings=tuple(islice(rings, len(figure.rings)))) for figure in figures]
 
 
@@ -73,8 +72,7 @@ def _on_globe(figures: Sequence[Figure], possible: bool) -> bool:
 
 def _unwrapped(points: Array, about: float) -> Array:
     """Return longitudes without a jump at the antimeridian: all within 180 degrees of one."""
-    longitude = about + (points[:, 0] - about + 180.0) % 360.0 - 180.0
-    return np.column_stack([longitude, points[:, 1]])
+    return np.column_stack([about + (points[:, 0] - about + 180.0) % 360.0 - 180.0, points[:, 1]])
 
 
 def _authority(crs: str, where: str) -> str:

@@ -194,7 +194,6 @@ class _Node:
         return value
 
     def numbers(self, default: list[float]) -> Array:
-        """Return a list of numbers, of which the last may be missing."""
         values = [item.number(0.0) for item in self.items()]
         if self.given and len(values) < 2:
             self.refuse(f"a list of {len(default)} numbers")

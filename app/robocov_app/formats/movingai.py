@@ -53,9 +53,8 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     bad = cells == _BAD
     if bad.any():
         row, column = (int(k) for k in np.argwhere(bad)[0])
-        letter = chr(letters[row, column])
         place = f"{where}: line {line + row}, column {column + 1}"
-        raise MapError(f"{place}: {shown(letter)}, but one of . G S @ O T W was wanted")
+        raise MapError(f"{place}: {shown(chr(letters[row, column]))}, but one of . G S @ O T W was wanted")
     cell = CELL if options.cell is None else options.cell
     notes = () if options.cell is not None else (f"no cell size was given: {CELL:g} m taken",)
     text = f"A grid of {cell:g} m a cell, imported from Moving AI's format."
@@ -68,8 +67,7 @@ def _header(data: bytes, where: str) -> tuple[int, int, bytes, int]:
     at = 0
     for number in range(1, 20):
         end = data.find(b"\n", at, at + 200)
-        line = data[at : end if end >= 0 else at + 200]
-        words = line.decode("ascii", "replace").split()
+        words = data[at : end if end >= 0 else at + 200].decode("ascii", "replace").split()
         place = f"{where}: line {number}"
         at = end + 1 if end >= 0 else len(data)
         key = words[0].lower() if words else ""

@@ -114,8 +114,7 @@ class _Extract:
                 shapes.leave_out(thing.kind, "of which the file does not have all")
             elif thing.kind == "way" and wall and not built and tags.get("area") != "yes":
                 width = _METRES.fullmatch(tags.get("width", "").strip())
-                given = float(width[1]) if width else None
-                yield Figure("line", (lines[0],), thing.labels, at, width=given)
+                yield Figure("line", (lines[0],), thing.labels, at, width=float(width[1]) if width else None)
             else:
                 merged = shapely.line_merge(shapely.MultiLineString([shapely.LineString(x) for x in lines]))
                 rings = [shapely.get_coordinates(part) for part in shapely.get_parts(merged)]

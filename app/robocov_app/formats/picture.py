@@ -30,20 +30,17 @@ from robocov_app.formats.geometry.raster import BLOCKED, FREE, UNKNOWN, foreign_
 
 _PIECE = 1 << 20  # bytes that are unpacked at a time
 _STRIP = 512  # rows that are converted at a time, which bounds the memory
-# what separates the numbers of a PGM header: a comment runs to the end of its line
-_BLANK = re.compile(rb"(?:[ \t\r\n\v\f]|#[^\r\n]*[\r\n])+")
+_BLANK = re.compile(rb"(?:[ \t\r\n\v\f]|#[^\r\n]*[\r\n])+")  # between the numbers of a PGM header
 _DIGITS = re.compile(rb"\d+")
 _NETPBM = re.compile(rb"P[2356][\s#]")
-# first bytes (magic numbers) of formats that Pillow reads, by its names for them
-_PILLOW = {
+_PILLOW = {  # first bytes (magic numbers) of formats that Pillow reads, by its names for them
     "PNG": re.compile(rb"\x89PNG\r\n\x1a\n"),
     "JPEG": re.compile(rb"\xff\xd8\xff"),
     "BMP": re.compile(rb"BM.{12}[\x0c\x28\x34\x38\x40\x6c\x7c]\0\0\0", re.DOTALL),
     "TIFF": re.compile(rb"II[*+]\0|MM\0[*+]"),
     "PPM": re.compile(rb"P[14][\s#]"),
 }
-# pixels a byte: a block of 8 x 8 takes a bit at least. What is not there would be made up in grey
-_MOST_OF_JPEG = 512
+_MOST_OF_JPEG = 512  # pixels a byte: 8 x 8 take a bit at least; what is not there would be made up in grey
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,8 +192,7 @@ def _converted(image: Image) -> Brightness:
     return Brightness(level, 255 * colours, alpha, texts, lossy)
 
 
-# key of the text chunk that says where the picture belongs: JSON with ``cell_m`` and ``origin_m``
-CHUNK = "robocov"
+CHUNK = "robocov"  # key of the text chunk that says where it belongs: JSON with ``cell_m`` and ``origin_m``
 TITLE = "Title"  # key of the text chunk with the name of what is shown
 _NOISE = 1.5  # single cells beside dark ones come of how a JPEG is saved
 _OPAQUE = 128  # less opaque pixels count as transparent, of 255

@@ -27,7 +27,6 @@ from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import LIGHT, Colour, Theme, theme_named
 
 # of the page, of the arenas on it, and the least for what is written, in pixels
-# of the page, of the arenas on it, and the least for what is written, in pixels
 _WIDTH, _HEIGHT, _NARROWEST = 1600, 1000, 1040
 # of texts and lines; then pixels at scale 1 for titles, captions, and a line of the report
 _SCALE, _TOP, _ABOVE, _LINE = 1.3, 66.0, 34.0, 17.0
@@ -75,17 +74,12 @@ def plot_import(
         _draw(first, outside, theme.obstacle, theme.obstacle_edge)
         # where free space ends, also where the page is what lies beyond
         rings = shapely.get_rings(shapely.get_parts(compared.before))
-        style: Any = {"linewidths": 0.8, "clip_on": False, "zorder": 2}
-        edges = LineCollection(
-            [*map(shapely.get_coordinates, rings)], colors=tone(theme.obstacle_edge), **style
-        )
+        style: Any = {"colors": tone(theme.obstacle_edge), "linewidths": 0.8, "clip_on": False, "zorder": 2}
+        edges = LineCollection([*map(shapely.get_coordinates, rings)], **style)
         first.add_collection(edges, autolim=False)
         _draw(first, compared.lost, theme.trajectory, theme.trajectory, _MARK)
-        style = {
-            "color": tone(theme.ink),
-            "zorder": 5,
-            "path_effects": [withStroke(linewidth=3.0, foreground=tone(theme.background))],
-        }
+        halo = [withStroke(linewidth=3.0, foreground=tone(theme.background))]
+        style = {"color": tone(theme.ink), "zorder": 5, "path_effects": halo}
         for x, y in report.others:
             first.plot([x], [y], marker="+", markersize=8.0, **style)
             words = f"{x:.10g} {y:.10g}"
@@ -142,15 +136,11 @@ def _draw(axes: Axes, area: BaseGeometry, fill: Colour, edge: Colour, opacity: f
 
 
 def _draw_gap(axes: Axes, gap: Gap | None, theme: Theme) -> None:
-    """Draw the narrowest passage, in a ring that makes it found."""
     if gap is None:
         return
     colour, points = tone(theme.final), np.array(gap.between)
-    style: dict[str, Any] = {
-        "zorder": 5,
-        "clip_on": False,
-        "path_effects": [withStroke(linewidth=4.2, foreground=tone(theme.background))],
-    }
+    halo = [withStroke(linewidth=4.2, foreground=tone(theme.background))]
+    style: dict[str, Any] = {"zorder": 5, "clip_on": False, "path_effects": halo}
     axes.plot(*points.T, color=colour, linewidth=2.0, **style)
     ends = axes.transData.transform(points) * (72 / axes.figure.dpi)
     if np.hypot(*(ends[1] - ends[0])) < _RING:
@@ -170,8 +160,7 @@ def _handles(environment: Environment, theme: Theme, compared: Comparison) -> li
         (compared.opened, "opened: {} m² were solid", theme.start),
     ):
         if not area.is_empty:
-            label = words.format(_number(area.area))
-            handles.append(Patch(label=label, **_style(colour, colour, _MARK)))
+            handles.append(Patch(label=words.format(_number(area.area)), **_style(colour, colour, _MARK)))
     if compared.gap is not None:
         words = f"narrowest passage, {compared.gap.width:.3g} m"
         handles.append(Line2D([], [], color=tone(theme.final), linewidth=2.0, label=words))

@@ -36,8 +36,7 @@ from robocov_app.formats.geometry.raster import BLOCKED, FREE, UNKNOWN, Cells, f
 from robocov_app.formats.picture import Brightness, read_picture
 
 _OCCUPIED, _FREE = 0.65, 0.196
-# of a file that gives none, as map_server writes them
-_THRESHOLDS = {"occupied_thresh": _OCCUPIED, "free_thresh": _FREE}
+_THRESHOLDS = {"occupied_thresh": _OCCUPIED, "free_thresh": _FREE}  # as map_server writes them
 _KNOWN = ("image", "resolution", "origin", "negate", "mode", *_THRESHOLDS)
 _NOISE = 1.5  # in maps that robots made single cells are noise
 _SAVED_UNKNOWN = 205  # what savers write for unknown cells, of 255
@@ -171,8 +170,7 @@ def _number(text: files.Value, where: str) -> float:
 
 
 _WHITE = 254  # what map_saver writes for free cells; occupied ones are 0
-# of scale and raw a cell's occupancy is the part of so many by so many of its places that is solid
-_FINER = 4
+_FINER = 4  # so many by so many places of a cell, of which the solid part is its occupancy of scale and raw
 
 
 def files_of(path: Path, options: WriteOptions) -> tuple[Path, ...]:
@@ -193,10 +191,8 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     text_name = image.name if plain else json.dumps(image.name)
     grid = grid_over(environment, options.cell)
     free = free_cells(environment, grid)
-    # a wall of one cell all around what is free
-    unknown = ~(
-        grid.covered(environment.boundary_polygon) | ndimage.binary_dilation(free, np.ones((3, 3), bool))
-    )
+    walled = ndimage.binary_dilation(free, np.ones((3, 3), bool))  # by one cell all around what is free
+    unknown = ~(grid.covered(environment.boundary_polygon) | walled)
     solid = None
     if mode != "trinary":
         # a cell that is not free is occupied for sure: costmaps take what is less than sure for free

@@ -37,8 +37,7 @@ from robocov_app.formats.geometry.shapes import Outline, Shapes
 from robocov_app.formats.picture import read_picture
 
 MAX_BYTES = 5_000_000  # largest file of a world, in bytes
-# words and numbers in a world and all that it includes; models and blocks that macros make of them
-MOST_TOKENS, MOST_ENTITIES = 200_000, 10_000
+MOST_TOKENS, MOST_ENTITIES = 200_000, 10_000  # words and numbers; models and blocks that macros make of them
 _DARK = 127 / 255  # pixels that are not brighter are solid
 _TOKEN = re.compile(
     r"(?P<blank>(?>[ \t\r\n]+|#[^\n]*)++)|(?P<word>[A-Za-z_][\w.-]*(?:\[\d+\][\w.-]*)*)"
@@ -135,7 +134,6 @@ class _World:
         return files.named_file(self.path, name, what, at, notes, anywhere)
 
     def _split(self, path: Path, depth: int) -> None:
-        """Add the tokens of a file, and of those that it includes."""
         world = files.content(path, MAX_BYTES).decode("utf-8", "replace")
         line, name, include = 1, one_line(path), False
         for found in _TOKEN.finditer(world):
@@ -159,7 +157,6 @@ class _World:
             include = not include and token[:2] == ("word", "include")
 
     def _fill(self, entity: _Entity, depth: int) -> None:
-        """Read the content of an entity, up to its closing bracket."""
         end = _Token("", "the end of the file", entity.at)
         if depth > files.MAX_DEPTH:
             raise MapError(f"{entity.at}: nested deeper than {files.MAX_DEPTH}, but less was wanted")
@@ -186,7 +183,6 @@ class _World:
             end.refuse("a ) after what begins here")
 
     def _values(self, name: _Token) -> list[str]:
-        """Read the value of a property: a number, a text, or a list of these."""
         values = [self.tokens.popleft()] if self.tokens else [name]
         if values[0].kind == "[":
             values = []
@@ -245,7 +241,6 @@ class _World:
         return frame(x * self.metre, y * self.metre, turn * self.turn)
 
     def _shape(self, entity: _Entity, around: Array, labels: tuple[str, ...]) -> None:
-        """Add what a model covers: its bitmap, its blocks, or a box."""
         size = entity.numbers("size", (0.4, 0.4)) * self.metre
         for length in size.tolist():
             files.require_length(length, f"{entity.at}: size")

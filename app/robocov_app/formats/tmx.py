@@ -32,11 +32,9 @@ from robocov_app.formats.geometry.shapes import Line, Shapes
 from robocov_app.formats.xml_tree import Element, read_xml_tree
 
 MOST_TILES, MOST_READ = 4_000_000, 16_000_000  # of a map, and of all its layers together
-# collision objects of tiles, each as often as its tile is on the map, and tiles beside the grid
-MOST_PARTS = 10_000
+MOST_PARTS = 10_000  # collision objects, each as often as its tile is there, and tiles beside the grid
 CELL = 1.0  # width of a tile in metres where none is given: the format has only pixels
-# bits of a global tile ID: the three flips, and the tile
-_FLIPPED, _UPSIDE, _SWAPPED, _ID = 0x80000000, 0x40000000, 0x20000000, 0x0FFFFFFF
+_FLIPPED, _UPSIDE, _SWAPPED, _ID = 0x80000000, 0x40000000, 0x20000000, 0x0FFFFFFF  # bits of a global ID
 _RECTANGLE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 ROOT = re.compile(rb"<map[\s>]")
 _SOLID = re.compile(
@@ -109,10 +107,9 @@ class _Map:
         shapes.require_known_names()
         if not (solid.any() or shapes.outlines or shapes.lines or shapes.pillars):
             names = listed([shown(layer.labels[0]) for layer in layers if layer.labels])
-            raise MapError(
-                f"{where}: nothing is solid by properties, collision objects or names of layers, but "
-                f"--only LAYER, with one of walls, was wanted then: {names or 'there is none'}"
-            )
+            nothing = "nothing is solid by properties, collision objects or names of layers"
+            wanted = f"--only LAYER, with one of walls, was wanted then: {names or 'there is none'}"
+            raise MapError(f"{where}: {nothing}, but {wanted}")
         width, height = (self.pixel * self.tile).tolist()
         world = free_area(~solid, (width, height), (0.0, 0.0), where)
         shapes.count(vertices_of(world))
@@ -120,7 +117,6 @@ class _Map:
         return shapes.foreign_map(self.path.stem, "A map of Tiled, imported.", solid=True, world=world)
 
     def _tiles(self) -> dict[int, _Tile]:
-        """Return the tiles that are solid, by their global IDs."""
         found: dict[int, _Tile] = {}
         for tileset in self.root.children:
             if tileset.tag != "tileset":
@@ -146,7 +142,6 @@ class _Map:
     def _layers(
         self, parent: Element, labels: tuple[str, ...], offset: Array, *, wall: bool
     ) -> Iterator[_Layer]:
-        """Yield the layers that are asked for, groups opened."""
         shapes = self.shapes
         for element in parent.children:
             if element.tag not in ("layer", "objectgroup", "group"):
@@ -304,10 +299,7 @@ def _decoded(part: Element, data: Element, count: int) -> _IDs:
 
 
 def _figure(element: Element) -> tuple[str, Array]:
-    """Return the kind of an object, polygon, line, circle, point or none, and its points in pixels.
-
-    Of a circle they are its centre and one of the rim.
-    """
+    """Return an object's kind, if any, and its points, px: of a circle its centre and one of the rim."""
     x, y, width, height, turn = (_number(element, key) for key in ("x", "y", "width", "height", "rotation"))
     kind, points = "polygon", _RECTANGLE * [width, height]
     children = {child.tag: child for child in element.children}
@@ -342,7 +334,6 @@ def _turned(points: Array, gid: int, size: Array) -> Array:
 
 
 def _says_solid(element: Element, names: Iterable[str] = ()) -> bool:
-    """Return whether an element is solid by its names, its class or a property."""
     properties = element.child("properties")
     given = () if properties is None else [child.attributes for child in properties.children]
     yes = [each.get("name", "") for each in given if each.get("value", "").casefold() not in _NO]

@@ -48,9 +48,8 @@ _KINDS = [
     (r"PK\x03\x04", "a zip archive", _UNPACK),
     (r"\x1f\x8b|BZh\d|\xfd7zXZ|7z\xbc\xaf|\x28\xb5\x2f\xfd|.{257}ustar", "a packed file", _UNPACK),
 ]  # fmt: skip
-_TABLE = [
-    (re.compile(begin.encode("latin-1"), re.DOTALL | re.IGNORECASE), what, way) for begin, what, way in _KINDS
-]
+_ANY = re.DOTALL | re.IGNORECASE
+_TABLE = [(re.compile(begin.encode("latin-1"), _ANY), what, way) for begin, what, way in _KINDS]
 _PARTS = (".dbf", ".shx", ".prj", ".cpg")
 
 

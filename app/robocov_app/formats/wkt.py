@@ -29,8 +29,7 @@ from robocov_app.formats.geometry.polygons import DIGITS, decimal, on_grid, ring
 from robocov_app.formats.geometry.shapes import Figure, Shapes
 from robocov_app.formats.georeference import in_metres
 
-# the geometries that are read
-KINDS = (
+KINDS = (  # the geometries that are read
     "POINT", "LINESTRING", "LINEARRING", "POLYGON", "TRIANGLE", "MULTIPOINT", "MULTILINESTRING",
     "MULTIPOLYGON", "POLYHEDRALSURFACE", "TIN", "GEOMETRYCOLLECTION",
 )  # fmt: skip
@@ -63,8 +62,7 @@ class WktText:
     def figures(self) -> list[Figure]:
         number = 0
         while self._skip_space() < len(self.text):
-            srid = _SRID.match(self.text, self.at)
-            if srid:
+            if srid := _SRID.match(self.text, self.at):
                 if self.srid not in (None, int(srid[1])):
                     self._refuse(f"SRID {srid[1]} after {self.srid}, but one for all geometries was wanted")
                 self.srid = int(srid[1])
@@ -174,7 +172,6 @@ class WktText:
         return array[:, :2]
 
     def _skip_space(self) -> int:
-        """Go on to what is not a space; return where that is."""
         match = _SPACE.match(self.text, self.at)
         assert match is not None
         self.at = match.end()
@@ -213,8 +210,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     shapes = Shapes(where, options)
     parsed = WktText(text, where, shapes)
     figures = parsed.figures()
-    crs = f"EPSG:{parsed.srid}" if parsed.srid else None
-    shapes.add_all(in_metres(figures, shapes, crs))
+    shapes.add_all(in_metres(figures, shapes, f"EPSG:{parsed.srid}" if parsed.srid else None))
     return shapes.foreign_map(name_of_map(path), "Imported from WKT.", solid=False, overlap=True)
 
 

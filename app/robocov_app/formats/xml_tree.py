@@ -19,9 +19,7 @@ MOST_ELEMENTS = 100_000  # in a file, and drawn of it where parts are used again
 MOST_ATTRIBUTES = 1_000_000
 DEEPEST = 100  # deepest nesting of elements and uses; drawing programs stay below 30
 _SVG = "http://www.w3.org/2000/svg"
-# most characters that entities and default attributes may add to a file: those of drawing programs stand for
-# names of namespaces
-_EXPANDED = 1_000_000
+_EXPANDED = 1_000_000  # characters that entities and default attributes may add: mostly names of namespaces
 _LONGEST_NAMESPACE, _MOST_DECLARATIONS = 1000, 1000
 
 
@@ -56,10 +54,8 @@ class Element:
         values = np.array([files.number(part) for part in (text or "").replace(",", " ").split()])
         if text is None or count not in (None, len(values)) or not (np.abs(values) <= FARTHEST).all():
             found = "missing" if text is None else shown(text)
-            wanted = {None: "numbers within 1e7 were", 1: "a number within 1e7 was"}
-            self.refuse(
-                f"{name}: {found}, but {wanted.get(count, f'{count} numbers within 1e7 were')} wanted"
-            )
+            many = "numbers within 1e7 were" if count is None else f"{count} numbers within 1e7 were"
+            self.refuse(f"{name}: {found}, but {'a number within 1e7 was' if count == 1 else many} wanted")
         return values
 
     def refuse(self, what: str) -> NoReturn:
@@ -145,14 +141,13 @@ class _Reader:
     def _entity(self, name: str, parameter: bool, value: str | None, *rest: object) -> None:
         """Check an entity: it may stand for a few words, which expat puts in where it is used."""
         self._declared()
+        stands = f"entity {shown(name)} stands"
         if value is None:
-            self._refuse(
-                f"entity {shown(name)} stands for another file ({shown(rest[1])}), which is not read"
-            )
+            self._refuse(f"{stands} for another file ({shown(rest[1])}), which is not read")
         if parameter or "&" in value or "%" in value:
-            self._refuse(f"entity {shown(name)} stands for other entities")
+            self._refuse(f"{stands} for other entities")
         if len(value) * self.references > _EXPANDED:
-            self._refuse(f"entity {shown(name)} stands for too much")
+            self._refuse(f"{stands} for too much")
 
     def _declared(self, *given: object) -> None:
         """Count entities and attributes that are declared: expat looks through all of them each time."""

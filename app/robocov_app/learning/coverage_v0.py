@@ -8,7 +8,6 @@ from robocov_app.learning.parallel import CoverageParallelEnv
 
 __all__ = ["env", "parallel_env", "raw_env"]
 
-
 parallel_env = CoverageParallelEnv
 
 

@@ -92,8 +92,7 @@ def drawn_episode(
             raise StartError(f"positions: {shown(options['positions'])}, but (n, 2) were wanted") from None
         start = {"positions": positions, "start": None, "seed": None}
     more: dict[str, Any] = {"duration": task.duration, "dt": task.dt, "conditions": conditions}
-    spec = RunSpec(environment, team=task.whole_team, **start, **more)
-    return Episode(task, spec, cost, place)
+    return Episode(task, RunSpec(environment, team=task.whole_team, **start, **more), cost, place)
 
 
 class SharedSimulation:
@@ -122,9 +121,8 @@ class SharedSimulation:
         if due:
             positions = self._simulation.positions.reshape(actions.shape)[due]
             results = dict(zip(due, episodes[due[0]].cost.of_teams(positions), strict=True))
-        return {
-            run: each.moved(contact[run], run in results, results.get(run)) for run, each in episodes.items()
-        }
+        each = episodes.items()
+        return {run: one.moved(contact[run], run in results, results.get(run)) for run, one in each}
 
     def rows(self) -> Rows:
         assert self._simulation is not None
@@ -201,11 +199,8 @@ class Episode:
         return rows.ravel()
 
     def facts(self) -> dict[str, float]:
-        return {
-            "time_s": self.time,
-            "mean_distance_m": self.result.mean_distance,
-            "uncovered_area_m2": self.result.uncovered_area,
-        }
+        facts = {"time_s": self.time, "mean_distance_m": self.result.mean_distance}
+        return facts | {"uncovered_area_m2": self.result.uncovered_area}
 
     def advance(self, actions: Array, *, last: bool = False) -> Outcome:
         """Hold actions, (n, 2) N or m/s, for one decision; the last one is rewarded in any case."""

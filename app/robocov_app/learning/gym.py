@@ -42,8 +42,7 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
 
     def __init__(self, task: CoverageTask | None = None, **options: Any) -> None:
         super().__init__(task, **options)
-        n = self.task.robots
-        low, high = (np.tile(row, (n, 1)) for row in self.task.observation.bounds)
+        low, high = (np.tile(row, (self.task.robots, 1)) for row in self.task.observation.bounds)
         self.observation_space = Box(low, high, dtype=np.float32)
         limit = np.tile(action_limit(self.task.action, self.task.whole_team)[:, None], (1, 2))
         self.action_space = Box(-limit.astype(np.float32), limit.astype(np.float32), dtype=np.float32)

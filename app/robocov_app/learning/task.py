@@ -158,8 +158,7 @@ class Scenarios:
         return source if len(self._sources) == 1 and isinstance(source, Environment) else None
 
     def draw(self, rng: np.random.Generator) -> Environment:
-        source = self._sources[int(rng.integers(len(self._sources)))]
-        return map_of(source, int(rng.integers(SEEDS)))
+        return map_of(self._sources[int(rng.integers(len(self._sources)))], int(rng.integers(SEEDS)))
 
     def cost(self, environment: Environment) -> CoverageCost:
         # the last one is the last that was asked for
@@ -249,9 +248,7 @@ class ObservationLayout:
         """Least and largest values of a row, (size,) each."""
         low = np.full(self.size, -1.0, dtype=np.float32)
         rays = 7 + 3 * self.neighbours
-        low[6:rays:3] = low[rays : rays + self.rays] = (
-            0.0  # whether there is a point, who is heard, distances
-        )
+        low[6:rays:3] = low[rays : rays + self.rays] = 0.0  # whether a point is there; distances
         return low, np.ones(self.size, dtype=np.float32)
 
     def rows(self, seen: Observations, team: Team, scans: Scans | None = None) -> Rows:

@@ -76,8 +76,7 @@ def draw_status(canvas: Canvas, scene: Scene) -> None:
     y = canvas.surface.get_height() - 0.5 * STRIP * canvas.scale
     size = canvas.text_size(canvas.theme.text)
     name = shortened(scene.label, size, right - taken, bold=True)
-    room = right - taken - canvas.text_width(name, bold=True)
-    text = fitting_status(scene, size, room)
+    text = fitting_status(scene, size, right - taken - canvas.text_width(name, bold=True))
     canvas.text(text, (right, y), anchor="right")
     left = right - canvas.text_width(text) if text else right
     canvas.text(name, (left, y), anchor="right", bold=True)
@@ -102,8 +101,7 @@ class LegendStrip:
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         width, words = canvas.surface.get_width(), tuple(entry.key() for entry in canvas.legend)
         key = (words, width, canvas.theme.name, canvas.scale, canvas.hues[:1].tolist(), canvas.shown)
-        strip = self._strip.of(None, key, lambda: legend_strip(canvas.legend, canvas))
-        canvas.surface.blit(strip, (0, 0))
+        canvas.surface.blit(self._strip.of(None, key, lambda: legend_strip(canvas.legend, canvas)), (0, 0))
 
 
 def legend_strip(entries: Iterable[LegendEntry], canvas: Canvas) -> pygame.Surface:

@@ -8,8 +8,6 @@ import numpy as np
 from robocov.arrays import Array
 
 SMALLEST, LARGEST = 1e-4, 1e7  # zoom, px/m: from a hundred times the largest map to a tenth of the smallest
-
-
 Box: TypeAlias = tuple[float, float, float, float]
 
 
@@ -72,7 +70,6 @@ def round_length(at_most: float) -> float:
 
 
 def length_label(metres: float) -> str:
-    """Return a length as people write it."""
     if metres >= 1000:
         return f"{metres / 1000:g} km"
     return f"{metres * 100:g} cm" if metres < 0.1 else f"{metres:g} m"

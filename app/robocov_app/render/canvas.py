@@ -136,8 +136,7 @@ class Canvas:
         if not (ends := clipped_segment(start, end)):
             return
         a, b = map(np.array, ends)
-        length = float(np.hypot(*(b - a)))
-        count = max(1, round(length / (2 * dash * self.scale)))
+        count = max(1, round(float(np.hypot(*(b - a))) / (2 * dash * self.scale)))
         for k in range(count):
             first, last = a + (b - a) * (k / count), a + (b - a) * ((k + 0.55) / count)
             pygame.draw.aaline(self.surface, colour, first.tolist(), last.tolist(), width)
@@ -200,8 +199,7 @@ class Canvas:
         far = np.add(self.surface.get_size(), 500)
         near = np.flatnonzero(((centers > -500) & (centers < far)).all(axis=1))
         # as for lines, whole numbers are the middles of pixels
-        quarters = np.rint((centers[near] + 0.5) * sprites.FINE).astype(int)
-        places, shifts = np.divmod(quarters, sprites.FINE)
+        places, shifts = np.divmod(np.rint((centers[near] + 0.5) * sprites.FINE).astype(int), sprites.FINE)
         number = np.zeros(len(near), dtype=int) if which is None else which[near]
         known: dict[tuple[int, int, int], tuple[pygame.Surface, int]] = {}
         pictures = []

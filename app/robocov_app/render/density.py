@@ -57,7 +57,6 @@ def density_range(environment: Environment) -> tuple[float, float]:
 
 @lru_cache(maxsize=16)
 def value_range(density: Density, bounds: Bounds) -> tuple[float, float]:
-    """Return the least and the largest value of a density within bounds."""
     low, high = np.array(bounds[:2]), np.array(bounds[2:])
     step = (high - low).max() / _SAMPLES
     x, y = (np.arange(first + 0.5 * step, last, step) for first, last in zip(low, high, strict=True))
@@ -74,7 +73,6 @@ def _grid(x: Array, y: Array) -> Array:
 
 
 def density_label(environment: Environment) -> str:
-    """Return the words of the legend, empty where every place counts the same."""
     density = environment.density
     return "" if density is None or density.uniform else range_label(density_range(environment))
 
@@ -84,7 +82,6 @@ def range_label(span: tuple[float, float]) -> str:
 
 
 def mean_label(environment: Environment) -> str:
-    """Return what the mean distance to the nearest robot is called, whether weighed or not."""
     return "mean distance by φ" if density_label(environment) else "mean distance"
 
 
@@ -99,7 +96,6 @@ def cost_label(what: str, mean_distance: float, mean_time: float | None = None) 
 
 
 def density_kind(environment: Environment) -> str | None:
-    """Return the kind of a map's density, as its file calls it; None where there is none."""
     return None if environment.density is None else environment.density.kind
 
 

@@ -29,21 +29,18 @@ class FieldLattice:
         # squares between four cells' middles, low left, low right, high left, high right; the rim's stick out
         rows = np.clip(np.arange(-1, side + 1), 0, side - 1)
         lower, upper = rows[:-1], rows[1:]
-        corners = [number[np.ix_(y, x)] for y in (lower, upper) for x in (lower, upper)]
-        around = np.stack(corners, axis=-1)
+        around = np.stack([number[np.ix_(y, x)] for y in (lower, upper) for x in (lower, upper)], axis=-1)
         # a site that is not free speaks as another one of the square, and where none is, as the nearest
         some = around.max(axis=-1)
         row, column = distance_transform_edt(number < 0, return_distances=False, return_indices=True)
-        nearest = number[row, column]
-        some = np.where(some < 0, nearest[np.ix_(upper, upper)], some)
+        some = np.where(some < 0, number[row, column][np.ix_(upper, upper)], some)
         self.around: IntArray = np.where(around < 0, some[..., None], around)
         self.free: BoolArray = around >= 0
 
     def squares(self, x: Array, y: Array) -> tuple[IntArray, IntArray]:
         """Return the columns and the rows of the squares that hold coordinates, (w,) and (h,) m."""
-        last = len(self.around) - 1
         cells = [(at - low) / self.spacing for at, low in zip((x, y), self.origin, strict=True)]
-        column, row = (np.clip(np.floor(at) + 1, 0, last).astype(np.intp) for at in cells)
+        column, row = (np.clip(np.floor(at) + 1, 0, len(self.around) - 1).astype(np.intp) for at in cells)
         return column, row
 
 
@@ -76,8 +73,7 @@ class Field:
         way = result.positions[owner]
         bent = (last >= 0).nonzero()[0]
         way[bent] = result.corners[last[bent]]
-        rest = np.hypot(*(result.points - way).T)
-        start = np.maximum(result.distances - rest, 0.0)
+        start = np.maximum(result.distances - np.hypot(*(result.points - way).T), 0.0)
         start[(last < 0) & (owner >= 0)] = 0.0
         self._way_x, self._way_y = np.ascontiguousarray(way.T)
         self._start, self._owner = start, owner
@@ -96,8 +92,7 @@ class Field:
         corner = self.lattice.around[squares]
         points = self.result.points[corner]
         length = self._distance(site[:, None], points[..., 0, None], points[..., 1, None])
-        known = self.result.distances[corner][..., None]
-        return number, site, length >= known - 1e-9 * self.lattice.spacing
+        return number, site, length >= self.result.distances[corner][..., None] - 1e-9 * self.lattice.spacing
 
     @property
     def largest(self) -> float:
@@ -180,9 +175,8 @@ class Field:
         _, site, right_way = rivals
         distance = self._distance(site[number], x[:, None], y[:, None])
         # the square's corner beside the place
-        cells = [
-            (at - low) / self.lattice.spacing for at, low in zip((x, y), self.lattice.origin, strict=True)
-        ]
+        spacing, origin = self.lattice.spacing, self.lattice.origin
+        cells = [(at - low) / spacing for at, low in zip((x, y), origin, strict=True)]
         right, upper = ((np.floor(at - 0.5) - np.floor(at)).astype(np.intp) + 1 for at in cells)
         return np.where(right_way[number, 2 * upper + right], distance, np.inf)
 
@@ -259,7 +253,6 @@ def _first_different(site: IntArray, source: IntArray) -> IntArray:
 
 
 _STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-
 FARTHEST = 253  # number of the colour at the limit of the scale and beyond
 
 

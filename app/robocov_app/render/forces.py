@@ -79,8 +79,6 @@ def force_layer(term: str, title: str, head: str) -> Layer:
 
 
 def velocity_layer() -> Layer:
-    """Return arrows of velocities, in proportion to each robot's largest speed."""
-
     def vectors(scene: Scene, scale: float) -> Array:
         part = scene.now.velocities / scene.team.max_speed[:, None]
         return np.asarray(part * np.array([1.0, -1.0]) * VELOCITY_LENGTH * scale)
@@ -133,7 +131,6 @@ links_legend = says("neighbours", lambda canvas, x, y: _link(canvas, *canvas.lev
 
 
 def draw_points(canvas: Canvas, scene: Scene) -> None:
-    """Draw the obstacle point that is nearest to each robot, with a line to it."""
     points = canvas.camera.to_pixels(scene.now.seen.obstacle_points)
     centers = canvas.camera.to_pixels(scene.now.positions)
     there = np.isfinite(points).all(axis=1)

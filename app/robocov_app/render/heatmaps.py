@@ -124,7 +124,6 @@ def field_drawing(
 
 
 def draw_distances(canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
-    """Return how far every place is from the nearest robot, around obstacles, as colours."""
     # smooth as it is, every second pixel will do
     coarse = levels(field, middles(x, 2), middles(y, 2), scene.field_limit, _HATCH)
     small = _paletted(coarse, palette(canvas.theme)).convert(canvas.surface)

@@ -82,7 +82,9 @@ def draw_scans(canvas: Canvas, scene: Scene) -> None:
     for ring in outlines:
         pygame.draw.lines(sketch.large, premultiplied(colour, 0.4), True, ring.tolist(), _FINE)
     sketch.onto(canvas.surface)
-    _dots(canvas, np.concatenate([_hits(*scan) for scan in scans]), _HIT * canvas.scale, colour)
+    far = [np.hypot(*(ends - place).T) for place, ends in scans]
+    hits = [ends[length < length.max() * (1.0 - 1e-6)] for (_, ends), length in zip(scans, far, strict=True)]
+    _dots(canvas, np.concatenate(hits), _HIT * canvas.scale, colour)
 
 
 def _draw_rays(large: pygame.Surface, place: Array, ends: Array, canvas: Canvas) -> None:
@@ -100,11 +102,6 @@ def _draw_rays(large: pygame.Surface, place: Array, ends: Array, canvas: Canvas)
     for line in zip(first.tolist(), ends[shown].tolist(), strict=True):
         if seen := clipped_segment(*line):
             pygame.draw.line(large, colour, seen[0], seen[1], width)
-
-
-def _hits(place: Array, ends: Array) -> Array:
-    length = np.hypot(*(ends - place).T)
-    return np.asarray(ends[length < length.max() * (1.0 - 1e-6)])
 
 
 def _scan_glyph(canvas: Canvas, x: float, y: float) -> None:

@@ -60,9 +60,8 @@ def draw_cells(canvas: Canvas, scene: Scene) -> None:
         tints = [canvas.theme.cell(hue) for hue in range(len(canvas.theme.robots))]
         hues = canvas.hues if scene.cell_owners is None else canvas.hues[scene.cell_owners]
         fills = [tints[hue] for hue in hues.tolist()]
-    wide = canvas.camera.zoom * (scene.environment.region.area / len(sizes)) ** 0.5
     edge = canvas.theme.cell_edge
-    narrow = wide < NARROW * canvas.scale
+    narrow = canvas.camera.zoom * (scene.environment.region.area / len(sizes)) ** 0.5 < NARROW * canvas.scale
     canvas.polygons(corners, ends.tolist(), fills, edge if narrow else None)
     if narrow:
         return

@@ -20,8 +20,7 @@ def nearest_distance(points: Array, step: int = 1) -> Array:
         square = np.asarray(delta[..., 0] ** 2 + delta[..., 1] ** 2)
         np.fill_diagonal(square, np.inf)
         return np.asarray(np.sqrt(square.min(axis=1)))
-    distances: Array = np.asarray(KDTree(points).query(points[::step], k=2)[0])
-    return distances[:, 1]
+    return np.asarray(KDTree(points).query(points[::step], k=[2])[0]).ravel()
 
 
 def fitted_radii(centers: Array, true: Array, least: float, most: float) -> Array:

@@ -119,7 +119,6 @@ def centroids_legend(scene: Scene) -> list[LegendEntry]:
 
 
 def draw_goals(canvas: Canvas, scene: Scene) -> None:
-    """Draw a times sign where each robot is drawn to, and a dashed line to it."""
     if scene.now.decision.goals is None:
         return
     goals = canvas.camera.to_pixels(scene.now.decision.goals)
@@ -159,7 +158,6 @@ goals_legend = says(GOAL, _aim_glyph(GOAL), lambda scene: scene.now.decision.goa
 
 
 def draw_failed(canvas: Canvas, scene: Scene) -> None:
-    """Draw robots that do not work any more: grey discs, crossed out, with their numbers beside them."""
     failed = canvas.camera.to_pixels(np.array(list(scene.failed.values())))
     working = canvas.camera.to_pixels(scene.snapshot.positions) if scene.snapshot else np.empty((0, 2))
     centers = np.concatenate([failed, working])
@@ -184,8 +182,7 @@ def _label(canvas: Canvas, text: str, at: Array, radius: float, centers: Array, 
         room = float((np.hypot(apart[:, 0], apart[:, 1]) - around).min())
         # the first that is good enough: numbers do not hop as others pass by
         rooms.append((min(room, 0.5 * gap), middle.tolist()))
-    best = max(rooms, key=lambda each: each[0])[1]
-    canvas.text(text, best, size=size, bold=True, anchor="middle")
+    canvas.text(text, max(rooms, key=lambda each: each[0])[1], size=size, bold=True, anchor="middle")
 
 
 def _draw_wreck(canvas: Canvas, x: float, y: float, radius: float) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
-from robocov.arrays import IntArray
 from robocov.environment import Environment
 from robocov.errors import ParameterError, unknown_name
 from robocov_app.render import annotations, forces, heatmaps, knowledge, layers, marks
@@ -96,16 +95,7 @@ def pane_layers(trails: str = "robots") -> list[Layer]:
 
 def scale_for(size: tuple[int, int]) -> float:
     """Return the scale of text and lines of films, larger than a window's: 1.25 for 1280 x 720."""
-    fitting = min(size[0] / 1024, size[1] / 576)
-    return min(max(round(fitting * 8) / 8, 0.875), 6.0)
-
-
-def _hues(scene: Scene, previous: IntArray) -> IntArray:
-    """Return the index of each robot's colour: in a small team it stays with the robot's number."""
-    numbers = scene.numbers
-    if numbers is not None and max(numbers, default=1) <= ONE_HUE_EACH:
-        return np.array(numbers, dtype=np.intp) - 1
-    return robot_hues(len(scene.team), scene.adjacency, previous)
+    return min(max(round(min(size[0] / 1024, size[1] / 576) * 8) / 8, 0.875), 6.0)
 
 
 class Painter:
@@ -139,8 +129,7 @@ class Painter:
 
     def change(self, also: Iterable[str], without: Iterable[str]) -> None:
         """Show some layers too, and others not; names that this painter has no layers of are passed over."""
-        known = {layer.name for layer in self.layers}
-        self.visible = (self.visible | set(also) & known) - set(without)
+        self.visible = (self.visible | set(also) & {layer.name for layer in self.layers}) - set(without)
 
     @property
     def needs_field(self) -> bool:
@@ -152,8 +141,7 @@ class Painter:
         (width, height), scale, (_, rows, beside) = self.size, self.scale, self._room
         top = (6 + LEGEND_ROW * rows + 6 if rows else MARGIN) * scale
         small = annotations.is_small(height, scale, self.visible)
-        below = bool({"scale_bar", "status"} & self.visible) and not small
-        bottom = (STRIP if below else MARGIN) * scale
+        bottom = (STRIP if {"scale_bar", "status"} & self.visible and not small else MARGIN) * scale
         view = (0.0, top, max(width - beside, 1.0), max(height - top - bottom, 1.0))
         if self._camera is not None:
             return self._camera.within(view)
@@ -179,7 +167,11 @@ class Painter:
     def draw(self, surface: pygame.Surface, scene: Scene) -> None:
         """Draw a scene on all of a surface; what was zoomed or panned stays so in another size."""
         self.size = surface.get_size()
-        self._hues = _hues(scene, self._hues)
+        numbers = scene.numbers
+        if numbers is not None and max(numbers, default=1) <= ONE_HUE_EACH:  # a colour stays with its robot
+            self._hues = np.array(numbers, dtype=np.intp) - 1
+        else:
+            self._hues = robot_hues(len(scene.team), scene.adjacency, self._hues)
         entries, shown = self.legend_entries(scene), frozenset(self.visible)
         canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown, entries)
         names = {layer.name for layer in self._shown()}
@@ -210,8 +202,7 @@ class Painter:
             self._own = pygame.Surface(self.size, 0, 32)
         self.draw(self._own, scene)
         width, height = self.size
-        pixels = np.frombuffer(pygame.image.tobytes(self._own, "RGB"), dtype=np.uint8)
-        return pixels.reshape(height, width, 3)
+        return np.frombuffer(pygame.image.tobytes(self._own, "RGB"), dtype=np.uint8).reshape(height, width, 3)
 
     def _shown(self) -> list[Layer]:
         return [layer for layer in self.layers if layer.name in self.visible]

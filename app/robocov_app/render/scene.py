@@ -85,7 +85,6 @@ class MovingObstacle(NamedTuple):
 
 
 def moving_obstacles(environment: Environment, time: float) -> list[MovingObstacle]:
-    """Return the moving obstacles of a map at a time, s; the path of a loop ends where it begins."""
     found = []
     for obstacle in environment.obstacles:
         if (path := obstacle.path) is None:

@@ -55,7 +55,6 @@ class Sketch:
         return [((point[0] - x) * STROKE_FINE, (point[1] - y) * STROKE_FINE) for point in points]
 
     def path(self, points: Sequence[Pixel], colour: Colour, width: float) -> None:
-        """Draw a line of `width` pixels with round joints and ends."""
         wide = max(width * STROKE_FINE, 1.0)
         large = self._large_points(points)
         pygame.draw.lines(self.large, colour, False, large, round(wide))

@@ -36,10 +36,7 @@ class Kept(Generic[Arguments]):
 
 
 def kept(most_bytes: int) -> Callable[[Callable[Arguments, pygame.Surface]], Kept[Arguments]]:
-    """Let a function keep pictures of up to so many bytes together.
-
-    A count of pictures would not do: at a high magnification a single disc takes megabytes.
-    """
+    """Let a function keep pictures of so many bytes together: magnified, a single disc takes megabytes."""
     return lambda draw: Kept(draw, most_bytes)
 
 

@@ -18,7 +18,6 @@ MAP_COLOURS = 6  # hues for larger teams, where only cells that share an edge mu
 
 
 def rgb(code: str) -> Colour:
-    """Return the colour that is written as ``RRGGBB``."""
     return int(code[0:2], 16), int(code[2:4], 16), int(code[4:6], 16)
 
 
@@ -114,9 +113,8 @@ class Theme:
     @property
     def quiet_heat(self) -> list[Colour]:
         """The `HEAT_LEVELS` colours of a grid from low to high, all quiet enough for text in ink."""
-        table = self.heat_table(200)
         rows = [round(_QUIET_PART * 199 * k / (HEAT_LEVELS - 1)) for k in range(HEAT_LEVELS)]
-        return [(int(r), int(g), int(b)) for r, g, b in table[rows]]
+        return [(int(r), int(g), int(b)) for r, g, b in self.heat_table(200)[rows]]
 
     def controller(self, name: str) -> Colour:
         return self.controllers.get(name, self.others[0])
@@ -176,12 +174,10 @@ LIGHT = _theme(0, "light", _HUES, density_strength=0.5, tint=0.25, paper_tint=0.
 # the darkest three hues would sink into the background
 _PALER = [mix(hue, (255, 255, 255), 0.38 if luminance(hue) < 0.16 else 0.0) for hue in _HUES]
 DARK = _theme(1, "dark", _PALER, density_strength=0.45, tint=0.26, paper_tint=0.19)
-
 THEMES: dict[str, Theme] = {"light": LIGHT, "dark": DARK}
 
 
 def theme_named(name: str | Theme) -> Theme:
-    """Return the theme called `name`, or that is given; raises ParameterError where there is none."""
     if isinstance(name, Theme):
         return name
     if name not in THEMES:

@@ -164,9 +164,8 @@ def _fade_onto(
     sketch = Sketch(box, _FADE_FINE)
     wide = max(1, round(width * _FADE_FINE))
     tips = np.full((len(colours), 2), np.nan)
-    edges = [0, *(np.flatnonzero(np.diff(shade)) + 1).tolist(), len(rows) - 1]
     # the older ones first: where paths cross, the newer ones are on top
-    for first, last in pairwise(edges):
+    for first, last in pairwise([0, *(np.flatnonzero(np.diff(shade)) + 1).tolist(), len(rows) - 1]):
         # slowly at first: what is half forgotten can still be followed
         part = (1.0 - max(float(shade[first]) - 0.5, 0.0) / FADE_STEPS) ** 0.7
         shades = {colour: premultiplied(colour, part) for colour in set(colours)}

@@ -125,14 +125,12 @@ def pane_layout(
     painter = _painter(records[0], film, (64, 64), pane_layers(film.colours), scale)
     if legend_of is None:
         shown = fields if painter.needs_field else None
-        moments = [
-            (each, row) for each in records for row in (0, len(each) - 1) if not row or each.conditions
-        ]
+        ends = ((each, row) for each in records for row in (0, len(each) - 1))
+        moments = [(each, row) for each, row in ends if not row or each.conditions]
         legend_of = [record_scene(record, row, fields=shown) for record, row in moments]
     # the longest first: its order is kept, and mostly nothing is missing
     found = sorted((painter.legend_entries(scene) for scene in legend_of), key=len)[::-1]
-    entries = united(found, LegendEntry.key)
-    header = legend_picture(entries, width, film.colour_theme, scale, film.layers()[0])
+    header = legend_picture(united(found, LegendEntry.key), width, film.colour_theme, scale, film.layers()[0])
     if size is None:
         height = len(header) + rows * pane_height + (rows - 1) * GAP
         width, height = width + width % 2, height + height % 2
@@ -187,8 +185,7 @@ def film_fields(
     for record in (run.record for run in runs):
         result = momentary(float(record.time[-1]), record.positions[-1], record.working[-1])
         if result is not None:
-            reached = result.distances[np.isfinite(result.distances)]
-            farthest = max(farthest, float(reached.max(initial=0.0)))
+            farthest = max(farthest, float(result.distances[np.isfinite(result.distances)].max(initial=0.0)))
     return Fields(cost, round_limit(FILM_SCALE * farthest))
 
 

@@ -176,7 +176,6 @@ class FilmOptions(LayerOptions):
             encoder()
 
     def picture_size(self) -> tuple[int, int] | None:
-        """Return the size that was asked for (width, height), None when none was."""
         return None if self.size is None else parsed_size("--size", self.size, (320, 240), (7680, 4320))
 
     def film_size(self) -> tuple[int, int]:

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from robocov.errors import OutputError, ParameterError, reason, shown
 from robocov.files.atomic import written
 
-Frame: TypeAlias = NDArray[np.uint8]
-"""An RGB picture, (height, width, 3), 0 to 255."""
+Frame: TypeAlias = NDArray[np.uint8]  # RGB, (height, width, 3), 0 to 255
 
 
 def png_bytes(frame: Frame) -> bytes:
@@ -124,10 +123,9 @@ def encoder() -> str:
 
 def film_command(path: Path, size: tuple[int, int], fps: float, *, streamed: bool = False) -> list[str]:
     """Return the encoder's command: raw RGB frames in, an MP4 film out, playable while `streamed`."""
-    ffmpeg = encoder()
     flags = "+frag_keyframe+empty_moov+default_base_moof" if streamed else "+faststart"
     return [
-        *(ffmpeg, "-y", "-nostdin", "-loglevel", "error"),
+        *(encoder(), "-y", "-nostdin", "-loglevel", "error"),
         *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", f"{fps:g}", "-i", "-"),
         *("-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "18", "-tune", "animation"),
         # players take bt709 for high definition and bt601 otherwise unless the film says which

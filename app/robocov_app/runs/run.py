@@ -43,19 +43,13 @@ def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: 
     rate = COST_RATE
     if stop.requested and record.time[-1] > 0:
         rate = min(rate, STOPPED_SAMPLES / float(record.time[-1]))
-    total = len(sample_moments(record, rate))
-    with progress("coverage cost", total, quiet=quiet) as update:
+    with progress("coverage cost", len(sample_moments(record, rate)), quiet=quiet) as update:
         history = cost_history(record, cost, rate, counting(update))
     return Run(record, history, summarise(record, history))
 
 
 def saved_run(
-    spec: RunSpec,
-    cost: CoverageCost,
-    result: ResultFolder,
-    part: str,
-    options: RunOptions,
-    stop: Interruption,
+    spec: RunSpec, cost: CoverageCost, into: ResultFolder, part: str, options: RunOptions, stop: Interruption
 ) -> Run:
     """Simulate and evaluate up to the end or to Ctrl-C, and save the numbers in a part of a folder."""
     simulation, quiet = spec.simulation(), options.json
@@ -69,11 +63,11 @@ def saved_run(
             return stop.requested
 
         record = spec.record(simulation, every=options.record_every, watch=watch)
-    record.save(result.new / part)
-    result.keep()  # what took long is safe, whatever happens to the evaluation
+    record.save(into.new / part)
+    into.keep()  # what took long is safe, whatever happens to the evaluation
     run = evaluated(record, cost, stop, quiet=quiet)
-    save_numbers(run, result.new / part, options.lattice)
-    result.keep()
+    save_numbers(run, into.new / part, options.lattice)
+    into.keep()
     return run
 
 

@@ -41,10 +41,7 @@ class Roster(NamedTuple):
 
 
 def load_saved(path: Path) -> list[Saved]:
-    """Return the runs of a comparison, or a single run, by the folder or the JSON file in it.
-
-    Of a comparison that was killed, those that are there.
-    """
+    """Return a run, or those of a comparison (if it was killed, those there), by the folder or its JSON."""
     folder = path.parent if path.name in ("run.json", "comparison.json") and not path.is_dir() else path
     settle(folder)
     if (path := folder / "comparison.json").is_file():

@@ -135,8 +135,7 @@ class Executor(ABC):
 
 _STARTS = 3  # how often a process may end before it has begun
 _LAST_WORDS = 4000  # characters of the complaints of a process that ended that are kept
-_OUTSIDE = -getattr(signal, "SIGKILL", 9)
-"""The status of a process that was ended from outside: by a user, or because memory ran out."""
+_OUTSIDE = -getattr(signal, "SIGKILL", 9)  # status of what a user, or a lack of memory, has ended
 
 
 class LocalPool(Executor):
@@ -223,8 +222,7 @@ class _Worker:
 
 
 def processors() -> int:
-    allowed = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else ()
-    return len(allowed) or os.cpu_count() or 1
+    return len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else ()) or os.cpu_count() or 1
 
 
 PATIENCE = 10.0  # seconds that a scheduler has for an answer
@@ -290,8 +288,7 @@ class Cluster(Executor):
 
     def _hand_out(self, task: Task) -> None:
         # a result is that of this sweep alone, whatever else the cluster does
-        key = f"robocov-{uuid.uuid4().hex}"
-        future: Any = self._client.submit(perform, task, key=key, pure=False)
+        future: Any = self._client.submit(perform, task, key=f"robocov-{uuid.uuid4().hex}", pure=False)
         self._futures.add(future)
         self._awaited(task, future)
 

@@ -34,8 +34,7 @@ Scale: TypeAlias = Literal["linear", "log"]
 Method: TypeAlias = Literal["sobol", "latin-hypercube", "halton"]
 NO_LIMIT = "null"  # what stands for None where a file has no word for it
 MOST_SAMPLES = 100_000
-_SAMPLE_DIGITS = 6
-"""Digits of a sampled gain: more say nothing, and the last ones differ from one processor to the next."""
+_SAMPLE_DIGITS = 6  # of a sampled gain: more say nothing, and the last ones differ between processors
 Place: TypeAlias = tuple[str | int, ...]
 
 
@@ -209,14 +208,12 @@ def once(values: Sequence[object], path: Place) -> None:
             raise ParameterError(f"{told}; each once was wanted")
 
 
-TeamValue: TypeAlias = float | str | None
-"""A value of what is varied of team and conditions."""
+TeamValue: TypeAlias = float | str | None  # of what is varied of team and conditions
 EVENTS = {"fail": Failure, "join": Join}  # conditions that are texts: ``3@20 5@40`` are two in one run
 CONDITIONS = (*LIMITS, *EVENTS)  # the conditions that a study may sweep
 WORDS = (*EVENTS, "kinematics")
 GROUPS = "groups"  # robots that differ, as JSON: the groups of a team file
 UNITS = {**TEAM_UNITS, **CONDITION_UNITS, **dict.fromkeys((*WORDS, GROUPS), "")}
-"""Units of all that may be varied."""
 
 
 def parameter_column(name: str) -> str:
@@ -278,8 +275,7 @@ _UNLIMITED: dict[str, tuple[object, ...]] = {"message_rate": (None, NO_LIMIT)}  
 _UNLIMITED |= dict.fromkeys(("sensing_range", "communication_range"), (None, NO_LIMIT, math.inf))
 _LONGEST_NAME = 100
 _HUGE = 1e300  # what a float can hold, with some to spare
-Swept: TypeAlias = float | Sequence[float | None] | None
-"""One value, or several, each of which is tried."""
+Swept: TypeAlias = float | Sequence[float | None] | None  # one value, or several, each of which is tried
 
 
 @dataclass(frozen=True)
@@ -381,7 +377,6 @@ class Study:
             raise ParameterError(f"duration: {rows_of} of a record, but at most {MOST_ROWS:.0e} were wanted")
 
     def __len__(self) -> int:
-        """Number of runs."""
         starts = sum(len(self.starts_on(each)) for each in self.maps)
         choices = sum(len(self.gains_of(name).choices) for name in self.controllers)
         return starts * len(self.robots) * len(self.teams) * len(self.seeds) * choices
@@ -405,14 +400,13 @@ class Study:
         return controller_kind(controller, source=self.sources.get(controller))
 
     def to_json(self) -> dict[str, Any]:
+        controllers = [{"name": each, **source_json(self.sources.get(each))} for each in self.controllers]
         return {
             "format": "robocov-study",
             "version": 1,
             "runs": len(self),
             "maps": [{"name": each.name, "map": to_json(each.environment)} for each in self.maps],
-            "controllers": [
-                {"name": each, **source_json(self.sources.get(each))} for each in self.controllers
-            ],
+            "controllers": controllers,
             "gains": {name: asdict(self.gains_of(name)) for name in self.controllers},
             "sampling": None if self.sampling is None else asdict(self.sampling),
             "robots": list(self.robots),
@@ -459,7 +453,6 @@ def source_json(source: Source | None) -> dict[str, Any]:
 
 
 def _value_of(name: str, value: object, path: Place) -> TeamValue:
-    """Return a value of the team, or of a condition, as it is meant."""
     if name == "kinematics":
         if value not in KINEMATICS:
             raise ParameterError(f"{place(path)}: {shown(value)}, but {' or '.join(KINEMATICS)} was wanted")

@@ -13,8 +13,7 @@ from robocov.mapfile import bundled_maps, load_map
 from robocov_app.sweep import study
 from robocov_app.sweep.study import NO_LIMIT, Method, Place, Range, Sampling, Scale, Study, StudyMap, once
 
-Check: TypeAlias = Callable[[Any], Any]
-"""Returns a value as it is meant; raises ValueError when it is of another kind."""
+Check: TypeAlias = Callable[[Any], Any]  # returns a value as it is meant; ValueError for one of another kind
 
 
 class _Value(NamedTuple):
@@ -66,6 +65,8 @@ _GAIN = _Value(
     _Table("", {"low": _NUMBER, "high": _NUMBER, "scale": _SCALE}, ("low", "high")),
 )
 _GROUPS = _Value("tables [[team.group]]", item=_Value("a table", _of(dict)))
+_OF_TEAM = dict.fromkeys((*study.TEAM, *study.UNICYCLES), _TEAM) | {"kinematics": _TEXTS, "group": _GROUPS}
+_SAMPLING = {"method": _METHOD, "samples": _WHOLE, "seed": _WHOLE}
 _STUDY = _Table(
     "a table",
     {
@@ -77,17 +78,10 @@ _STUDY = _Table(
         **dict.fromkeys(("duration", "dt", "cost_hz", "record_hz"), _NUMBER),
         "lattice": _WHOLE,
         "metrics": _Value("true or false", _of(bool)),
-        "team": _Table(
-            "a table [team]",
-            {**dict.fromkeys((*study.TEAM, *study.UNICYCLES), _TEAM), "kinematics": _TEXTS, "group": _GROUPS},
-        ),
+        "team": _Table("a table [team]", _OF_TEAM),
         "conditions": _Table("a table [conditions]", dict.fromkeys(study.CONDITIONS, _CONDITION)),
         "gains": _Table("tables [gains.NAME]", {"*": _Table("a table of gains", {"*": _GAIN})}),
-        "sampling": _Table(
-            "a table [sampling]",
-            {"method": _METHOD, "samples": _WHOLE, "seed": _WHOLE},
-            ("method", "samples"),
-        ),
+        "sampling": _Table("a table [sampling]", _SAMPLING, ("method", "samples")),
     },
     ("maps", "controllers"),
 )

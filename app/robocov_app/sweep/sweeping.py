@@ -25,7 +25,6 @@ from robocov_app.terminal.output import json_text
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-
 PERIOD = 10.0  # seconds between two lines where there is no terminal
 
 
@@ -290,12 +289,7 @@ class Rehearsal:
 
 
 def rehearsed(
-    study: Study,
-    folder: Path,
-    *,
-    workers: int,
-    retry_failed: bool = False,
-    keep_versions: bool = False,
+    study: Study, folder: Path, *, workers: int, retry_failed: bool = False, keep_versions: bool = False
 ) -> Rehearsal:
     """Do the first run that is left, or else the first, and write nothing."""
     again = {"retry_failed": retry_failed, "keep_versions": keep_versions}

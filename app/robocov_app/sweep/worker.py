@@ -31,7 +31,7 @@ from robocov_app.toolkit.worker import Line
 
 _REMEMBERED = 4  # maps whose costs a worker keeps; tasks come map by map
 _TIDY = 1000  # steps after which garbage is collected in a long run
-FIGURES = {
+FIGURES = {  # of a run in the table, in this order: kind, unit and meaning
     "mean_distance_m": ("double", "m", "final mean distance to the nearest robot, (22) by area or ∫φ"),
     "mean_distance_over_run_m": ("double", "m", "mean of it over the time of the run"),
     "cost_m3": ("double", "m³", "coverage cost (22) at the end"),
@@ -42,13 +42,11 @@ FIGURES = {
     "path_length_m": ("double", "m", "distance travelled, mean over the robots"),
     "stuck_robots": ("int64", "", "robots at rest away from their goals at the end, null without goals"),
 }
-"""Figures of a run in the table, in this order: kind, unit and meaning."""
 TIMED = "mean_time_s"  # what it holds as well where robots are not equally fast
 EFFORT = "effort.json"  # of runs with metrics: computing time differs each time, so the table has it not
 POSITION, CELL = 20, 5  # bytes that are told of a position, and of a cell of a map
 _ONE_AT_A_TIME = threading.Lock()
-_RESULTS = 3
-"""Counted up whenever the same inputs give other results: 3 since only robots in contact are substepped."""
+_RESULTS = 3  # goes up when the same inputs give other results: since robots in contact alone are substepped
 
 
 @cache
@@ -92,11 +90,8 @@ def perform(task: Task) -> Outcome:
             content["controller"] |= source_json(task.source)
             kept, arrays = record.thinned(task.record_hz), io.BytesIO()
             np.savez_compressed(arrays, **{name: getattr(kept, name) for name in kept.arrays})
-            files = {
-                "run.json": json_text(content).encode(),
-                "record.npz": arrays.getvalue(),
-                "cost.csv": csv_text(*cost_table(history)).encode(),
-            }
+            files = {"run.json": json_text(content).encode(), "record.npz": arrays.getvalue()}
+            files["cost.csv"] = csv_text(*cost_table(history)).encode()
             if task.metrics:
                 figures |= finite(figures_of(record, history))
                 files[EFFORT] = json_text(effort).encode()
@@ -122,8 +117,7 @@ class Performing:
 def failed(message: str, details: str) -> Outcome:
     # one line of what files can hold, whatever a controller of a user's says
     message = " ".join(message.split()).encode(errors="replace").decode()
-    content = {"error": message, "traceback": details}
-    return Outcome({"error.json": json_text(content).encode()}, {}, message)
+    return Outcome({"error.json": json_text({"error": message, "traceback": details}).encode()}, {}, message)
 
 
 def simulated(task: Task, environment: Environment) -> Record:

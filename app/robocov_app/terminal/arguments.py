@@ -33,15 +33,10 @@ _WORDING: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     (r"^Missing from robocov \w+: (\S+).*$", r"\1: this option is required"),
     (r"^Unrecognized options: (.*)$", r"unknown option \1"),
 )
-
-
 _FIRST = ("map", "controller", "controllers", "out", "robots", "gains", "duration", "seed", "start", "video")
-_LAST = ("json", "overwrite")
-"""Options that the help lists first, and last."""
-
+_LAST = ("json", "overwrite")  # the help ends with these, as it begins with those
 _WORD = r"[A-Za-z][A-Za-z0-9_-]*"
-_JSON_WORDS = frozenset(("null", "true", "false", "NaN", "Infinity"))
-"""Words that are JSON values, not words of an option."""
+_JSON_WORDS = frozenset(("null", "true", "false", "NaN", "Infinity"))  # no words of an option
 
 
 def _choices(text: str) -> str:
@@ -75,14 +70,12 @@ def _for_readers(kind: type[T]) -> type[T]:
 
 
 def _default_hint(label: str) -> str:
-    """Return what the help says of a default value."""
     with contextlib.suppress(ValueError):
         label = f"{float(label):.4g}" if "." in label else label
     return "" if label in ("", "None", "False") else f"(default: {label})"
 
 
 def groups_of(kind: Any) -> list[Any]:
-    """Return the groups of options that a class of options has."""
     return [each.default_factory for each in fields(kind) if is_dataclass(each.default_factory)]
 
 
@@ -130,7 +123,6 @@ def parsed_size(option: str, text: str, least: tuple[int, int], most: tuple[int,
 
 
 def window_size(text: str | None) -> tuple[int, int] | None:
-    """Return the size in pixels of a window that was asked for, None when none was."""
     return None if text is None else parsed_size("--size", text, (900, 600), (7680, 4320))
 
 

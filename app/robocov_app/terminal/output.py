@@ -50,7 +50,6 @@ def listed(folder: Path) -> str:
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write `content` as JSON; whole or not at all."""
     with written(path) as part:
         part.write_text(json_text(content), encoding="utf-8")
 
@@ -60,14 +59,12 @@ def json_text(content: Any) -> str:
 
 
 def write_csv(path: Path, header: str, rows: Iterable[Iterable[object]]) -> None:
-    """Write rows under a header; numbers keep all their digits."""
     with written(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
         file.write(csv_text(header, rows))
 
 
 def csv_text(header: str, rows: Iterable[Iterable[object]]) -> str:
-    lines = [header, *(",".join(map(str, row)) for row in rows)]
-    return "\n".join(lines) + "\n"
+    return "\n".join([header, *(",".join(map(str, row)) for row in rows)]) + "\n"
 
 
 def finite(content: Any) -> Any:

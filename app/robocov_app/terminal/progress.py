@@ -15,8 +15,14 @@ def progress(label: str, total: int, *, quiet: bool = False) -> Iterator[Callabl
     if quiet:
         yield lambda done: None
     elif sys.stderr.isatty():
-        with _bar(label, total) as update:
-            yield update
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        words = TextColumn(f"{label:<12}", markup=False)
+        left = TimeRemainingColumn(elapsed_when_finished=True)
+        with Progress(words, BarColumn(), MofNCompleteColumn(), left, console=Console(stderr=True)) as bar:
+            task = bar.add_task(label, total=total)
+            yield lambda done: bar.update(task, completed=done)
     else:
         began, reached = time.perf_counter(), 0
 
@@ -51,17 +57,6 @@ def counting(update: Callable[[int], None]) -> Callable[[], None]:
     """Return what counts one more each time, for an `update` of `progress`."""
     numbers = count(1)
     return lambda: update(next(numbers))
-
-
-@contextmanager
-def _bar(label: str, total: int) -> Iterator[Callable[[int], None]]:
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    words, left = TextColumn(f"{label:<12}", markup=False), TimeRemainingColumn(elapsed_when_finished=True)
-    with Progress(words, BarColumn(), MofNCompleteColumn(), left, console=Console(stderr=True)) as bar:
-        task = bar.add_task(label, total=total)
-        yield lambda done: bar.update(task, completed=done)
 
 
 def tell_of_compiling() -> None:

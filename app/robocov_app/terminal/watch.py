@@ -4,12 +4,8 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-INTERVAL = 0.25
-"""Seconds between two looks at the files. A look costs microseconds, and a save is noticed at once."""
-
-SETTLED = 0.1
-"""Seconds for which a file must be as it is: editors write in pieces, or remove a file and rename another."""
-
+INTERVAL = 0.25  # s between two looks at the files: a look costs microseconds, and a save is noticed at once
+SETTLED = 0.1  # s for which a file must be as it is: editors write in pieces, or remove and rename
 LONGEST = 2.0  # seconds after which a file that never settles counts as changed all the same
 
 

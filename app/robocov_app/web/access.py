@@ -12,7 +12,6 @@ def link_to(host: str, port: int, token: str) -> str:
 
 
 def token_in(address: str) -> str:
-    """Return the token of a link, empty for none."""
     return (parse_qs(urlsplit(address).query).get("token") or [""])[0]
 
 

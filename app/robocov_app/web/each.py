@@ -99,7 +99,6 @@ class Sessions:
             await writer.wait_closed()
 
     async def _session_of(self, head: bytes) -> _Session | str:
-        """Return the window that a request is for, or an answer."""
         first, *lines = head.decode("latin-1").split("\r\n")
         given = token_in(first.partition(" ")[2].partition(" ")[0])
         cookies = cookies_of(line[7:].strip() for line in lines if line[:7].lower() == "cookie:")

@@ -9,8 +9,7 @@ from pygame.event import Event
 
 from robocov_app.toolkit import clipboard
 
-SMALLEST, LARGEST, MOST_PIXELS = 200, 7680, 4096 * 2304
-"""Least and greatest width and height of a page, and its greatest area, in pixels."""
+SMALLEST, LARGEST, MOST_PIXELS = 200, 7680, 4096 * 2304  # a page's sides, and its area, in pixels
 
 _Pixel = Annotated[float, Field(ge=-1e5, le=1e5)]
 _Turn = Annotated[float, Field(ge=-100.0, le=100.0)]
@@ -120,17 +119,8 @@ class Uploaded(_Message):
 
 OfHands = PointerMoved | ButtonChanged | WheelTurned | KeyChanged | TextTyped | TextPasted | Left
 """Messages of hands to a window."""
-
 Message = OfHands | PageChanged | PictureShown | Control | Named
-
-_MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="kind")])
-
-
-def message_of(text: str) -> Message:
-    """Return what a page tells; ValueError where that is none of the messages above."""
-    return _MESSAGES.validate_json(text)
-
-
+MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="kind")])
 _NAMED_ALIKE = [
     *("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"),
     *("Escape", "Backspace", "Tab", "Delete", "Insert", *(f"F{k}" for k in range(1, 13))),
@@ -186,7 +176,6 @@ class Hands:
 
 
 def modifiers(held: int) -> int:
-    """Return pygame's modifiers of those that a message tells."""
     return sum(mask for k, mask in enumerate(_MODIFIERS) if held >> k & 1)
 
 

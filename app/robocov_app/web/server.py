@@ -58,7 +58,6 @@ MOST_WAITING = 5000  # messages that wait for the window
 MOST_PAGES = 100
 NARROW = 700  # width of a page, in pixels of CSS, below which the panel is hidden
 IN_FLIGHT = 2  # pictures that are on their way to a page, at most
-
 _CURSORS = {
     pygame.SYSTEM_CURSOR_HAND: "pointer",
     pygame.SYSTEM_CURSOR_CROSSHAIR: "crosshair",
@@ -71,8 +70,6 @@ _CURSORS = {
     pygame.SYSTEM_CURSOR_WAIT: "wait",
     pygame.SYSTEM_CURSOR_NO: "not-allowed",
 }
-
-
 HEADER = struct.Struct("<I6H")
 """Number of the picture; its width and height; left, top, width and height of what is different."""
 
@@ -265,15 +262,11 @@ class WebDisplay:
         nonce = secrets.token_urlsafe(12)
         page = files("robocov_app.web").joinpath("page.html").read_text("utf-8").replace("{nonce}", nonce)
         framed = "*" if self._known(given) else "'none'"  # notebooks frame it: who does knows the token
-        policy = (
+        headers = {"Referrer-Policy": "no-referrer", "Cache-Control": "no-store"}
+        headers["Content-Security-Policy"] = (
             f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; img-src data:; "
             f"connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {framed}"
         )
-        headers = {
-            "Content-Security-Policy": policy,
-            "Referrer-Policy": "no-referrer",
-            "Cache-Control": "no-store",
-        }
         if self._known(given):  # of no path: it is that of the page, also behind a proxy
             headers["Set-Cookie"] = f"{self._cookie}={given}; HttpOnly; SameSite=Strict"
         return _answer(line, page.encode(), "text/html; charset=utf-8", headers)
@@ -289,9 +282,7 @@ class WebDisplay:
         return _answer(line, body, "application/octet-stream", headers)
 
     def _secret(self, request: Request) -> str:
-        """Return the token that came with a request: in its address, else as a cookie."""
-        cookies = cookies_of(request.headers.get_all("Cookie"))
-        return token_in(request.path) or cookies.get(self._cookie, "")
+        return token_in(request.path) or cookies_of(request.headers.get_all("Cookie")).get(self._cookie, "")
 
     def _known(self, token: str) -> bool:
         return same(token, self.token) or same(token, self.watch_token)
@@ -341,7 +332,7 @@ class WebDisplay:
                     elif len(text) > LONGEST:
                         raise ValueError
                     else:
-                        self._take(page, events.message_of(text))
+                        self._take(page, events.MESSAGES.validate_json(text))
                 except ValueError:
                     await page.line.close(1008, "not understood")
 
@@ -395,17 +386,13 @@ class WebDisplay:
                 await page.changed.wait()
                 page.changed.clear()
                 picture = self._picture  # before what is told, which is never older then
+                first = self._control
                 people = [
-                    {
-                        "number": one.number,
-                        "name": one.name,
-                        "asks": one.asks,
-                        "controls": one is self._control,
-                    }
+                    {"number": one.number, "name": one.name, "asks": one.asks, "controls": one is first}
                     for one in self._pages
                 ]
                 told = self._told | {"people": people, "you": page.number, "teacher": page.teacher}
-                if page is not self._control:
+                if page is not first:
                     told.pop("copied", None)  # the clipboard is of the one who controls alone
                 if told != page.told:
                     page.told = told

@@ -23,7 +23,7 @@ from robocov.mapfile import load_map
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.input import key_of
 from robocov_app.web.confined import OutsideError, confined
-from robocov_app.web.events import Hands, PageChanged, PictureShown, message_of
+from robocov_app.web.events import MESSAGES, Hands, PageChanged, PictureShown
 
 pytest.importorskip("websockets")
 
@@ -70,9 +70,8 @@ def test_a_picture_without_a_change_is_empty():
     ],
 )
 def test_keys_have_the_names_that_the_window_knows(key, held, name):
-    event = next(
-        Hands().events(message_of(json.dumps({"kind": "key", "key": key, "down": True, "held": held})))
-    )
+    told = json.dumps({"kind": "key", "key": key, "down": True, "held": held})
+    event = next(Hands().events(MESSAGES.validate_json(told)))
     assert key_of(event) == name
 
 
@@ -88,7 +87,7 @@ KINDS = st.sampled_from("move button wheel key text leave blur page shown what".
 @given(st.builds(lambda kind, more: {**more, "kind": kind}, KINDS, st.dictionaries(FIELDS, SCRAPS)))
 def test_whatever_a_page_tells_is_understood_or_refused(told):
     try:
-        message = message_of(json.dumps(told))
+        message = MESSAGES.validate_json(json.dumps(told))
     except ValueError:
         return
     if not isinstance(message, PageChanged | PictureShown):

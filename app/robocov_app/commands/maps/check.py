@@ -138,8 +138,7 @@ def report_lines(report: MapReport, former: MapReport | None = None) -> Iterator
     former = report if former is None else former
     rows, was, told = _rows(report), _rows(former), []
     for title, value in rows.items():
-        same = was.get(title) == value
-        told.append((title, value if same else f"{value}, was {was.get(title, 'none')}"))
+        told.append((title, value if was.get(title) == value else f"{value}, was {was.get(title, 'none')}"))
     told += [(title, f"none, was {value}") for title, value in was.items() if title not in rows]
     for warning in report.warnings:
         told.append(("warning", warning if warning in former.warnings else f"{warning} (new)"))

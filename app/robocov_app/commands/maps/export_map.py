@@ -45,8 +45,7 @@ def command(options: Arguments) -> None:
     if options.format is not None and options.format not in EXPORTERS:
         known = ", ".join(EXPORTERS)
         raise InputError(f"--format: {one_line(options.format)!r}, but one of {known} was wanted")
-    chosen = exporter(options.out, options.format)
-    for file in chosen.files(options.out, options.write):
+    for file in exporter(options.out, options.format).files(options.out, options.write):
         require_fresh(file, "another -o", overwrite=options.overwrite, source=Path(options.map), read="map")
     report = export_map(load_map(options.map), options.out, format=options.format, options=options.write)
     for line in report.warnings:

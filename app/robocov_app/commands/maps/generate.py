@@ -18,11 +18,8 @@ from robocov_app.terminal.output import require_fresh, tell
 from robocov_app.terminal.progress import progress
 
 KindName: TypeAlias = Literal["polygons", "blocks", "rooms", "mazes", "caves"]
-
 MOST = 10_000  # maps that are generated in one call at most
-
 _SIDE = 10.0
-
 _SETTLED = ("kind", "seed", "obstacles", "area", "gap", "side", "width", "height", "count")
 """Options that say what maps are like, and how many; a study has settled them."""
 
@@ -121,7 +118,6 @@ def _facts(row: dict[str, Any]) -> str:
 
 
 def check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
-    """Make the folder for the maps, or make sure that no file is lost."""
     if folder:
         if out is None:
             raise InputError("--out: a folder for the maps was wanted with --count and --study")

@@ -61,8 +61,7 @@ def command(options: Arguments) -> None:
     if options.preview is not None:
         check_figure_path(options.preview)
         require_fresh(options.preview, "another --preview", overwrite=options.overwrite, source=options.file)
-    quiet = options.json or not sys.stderr.isatty()
-    with progress("importing", 3, quiet=quiet) as done:
+    with progress("importing", 3, quiet=options.json or not sys.stderr.isatty()) as done:
         environment, report, foreign = import_map(
             options.file, format=options.format, options=options.read, shaping=options.shaping
         )

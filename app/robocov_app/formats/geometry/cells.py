@@ -63,8 +63,7 @@ class Grid:
             # where they contain one centre it is that cell, however both ways of counting have rounded
             narrow = np.ceil(at[ends + 1]) - np.ceil(at[ends]) <= 1
             ends = ends[(line[ends] == line[ends + 1]) & narrow]
-            middle = np.rint((at[ends] + at[ends + 1]) / 2).astype(np.intp)
-            cells[line[ends], middle] = True
+            cells[line[ends], np.rint((at[ends] + at[ends + 1]) / 2).astype(np.intp)] = True
         return found
 
     def _crossings(self, area: BaseGeometry, finer: int = 1, across: bool = False) -> tuple[IntArray, Array]:
@@ -142,8 +141,7 @@ def _lost(environment: Environment, grid: Grid, free: BoolArray) -> str:
         row, column = np.argwhere(islands[windows[k]] == k + 1)[0]
         places.append((column + windows[k][1].start, row + windows[k][0].start))
     centres = (np.array(places, dtype=float).reshape(-1, 2) + 0.5) * grid.cell + grid.origin
-    owner = shapely.STRtree(parts).nearest(shapely.points(centres))
-    pieces = np.bincount(owner, minlength=len(parts))
+    pieces = np.bincount(shapely.STRtree(parts).nearest(shapely.points(centres)), minlength=len(parts))
     words = []
     if (pieces == 0).any():
         gone = int((pieces == 0).sum())

@@ -23,27 +23,21 @@ from robocov_app.formats.geometry.simplify import rays, sharpened, simplified
 
 _CRUMB = 1e-4  # obstacles and parts that are smaller, in m², come of rounding
 DEFAULT_TOLERANCE = 0.02  # by how much walls of vector formats may move, in metres
-# coordinates are rounded to a tenth of a millimetre, or to a hundredth of a cell if that is finer
-_GRID = 1e-4
-# obstacles smaller than this, in m², are perhaps noise: so many of them are worth a word
-_TINY, _MANY = 0.01, 10
+_GRID = 1e-4  # to so many metres coordinates are rounded, or to a hundredth of a cell if that is finer
+_TINY, _MANY = 0.01, 10  # obstacles smaller than this, in m², are perhaps noise: so many are worth a word
 # where less of the free area stays than the first, or a part of more than the second does not, it is said how
 # to choose: so many of the largest parts that are left out are named, with a place in each
 _LITTLE, _CONSIDERABLE, _OFFERED = 0.5, 0.1, 3
 # of maps with more vertices it takes too long to say where robots do not pass, and the narrowest passage
 _SOON, _MOST_VERTICES = 10_000, 20_000
-# most obstacles and vertices of a map that is made: it takes seconds to make one that has as many
-MAX_OBSTACLES, MAX_KEPT = 8_000, 50_000
-# circles and walls of a drawing that stay such; with more, all become polygons: to compare takes seconds
-MOST_PRIMITIVES = 5_000
+MAX_OBSTACLES, MAX_KEPT = 8_000, 50_000  # obstacles, vertices of a map: to make as many takes seconds
+MOST_PRIMITIVES = 5_000  # circles and walls that stay such; of more, to compare takes seconds
 _Obstacle = TypeVar("_Obstacle", bound=env.Obstacle)
 _MOST_ROBOTS = 1000  # of a file, so many are looked at
 _ZERO = 1e-100  # coordinates nearer to zero, in metres, are zero; as of map files
-# squares that are looked at more closely, at each size, and sides that rays cross to tell which are inside
-_SQUARES, _MOST_RAYS = 1024, 5_000_000
+_SQUARES, _MOST_RAYS = 1024, 5_000_000  # squares of each size that are cut; sides that rays may cross
 _QUARTERS = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])
-# width, in tolerances, below which a difference counts as a wall that moved, not as one that was lost
-_SLIVER = 2.0
+_SLIVER = 2.0  # tolerances of width below which a difference is a wall that moved, not one that was lost
 
 
 @dataclass(frozen=True)
@@ -115,10 +109,8 @@ class _Shaper:
         self._require_few(sum(len(part.interiors) for part in parts), "obstacles", MAX_OBSTACLES)
         self._require_room(parts)
         tolerance = self._tolerance()
-        drawn = (
-            MultiPolygon([sharpened(part, tolerance) for part in parts]) if foreign.cut_corners else before
-        )
-        simple = simplified(drawn, tolerance, cell, self.radius)
+        drawn = [sharpened(part, tolerance) for part in parts] if foreign.cut_corners else parts
+        simple = simplified(MultiPolygon(drawn), tolerance, cell, self.radius)
         self.changed += simple.changed
         base = None
         if outer is not None:
@@ -130,10 +122,9 @@ class _Shaper:
         self._require_few(shapely.count_coordinates(free), "vertices", MAX_KEPT)
         moved, by = moved_walls(before, free)
         if by >= 1e-3:
-            self.changed.append(
-                f"walls moved by at most {by:.2g} m; {square_metres(moved, 2)} changed sides, "
-                f"{100 * moved / free.area:.2g} % of the free area"
-            )
+            part = f"{100 * moved / free.area:.2g} % of the free area"
+            walls = f"walls moved by at most {by:.2g} m; {square_metres(moved, 2)} changed sides"
+            self.changed.append(f"{walls}, {part}")
         boundary, solid = bounded(free, base, hull=shaping.hull, margin=shaping.margin, digits=digits)
         if outer is not None:
             solid = _without_slivers(solid, shapely.difference(outer, read), tolerance)
@@ -234,10 +225,8 @@ class _Shaper:
         kept: list[Polygon] = parts[stays].tolist()
         left: list[Polygon] = parts[~stays].tolist()
         if not kept:
-            raise MapError(
-                f"{self.where}: no part of the free space is larger than {area[0]:.3g} m², "
-                f"but one of at least {self.specks:g} m² was wanted"
-            )
+            found = f"no part of the free space is larger than {area[0]:.3g} m²"
+            raise MapError(f"{self.where}: {found}, but one of at least {self.specks:g} m² was wanted")
         if left:
             largest = f" (the largest {square_metres(left[0].area, 3)})" if len(left) > 1 else ""
             drop(f"{counted(len(left), 'separate part')} of the free space, {_squared(left)}{largest}")
@@ -291,10 +280,8 @@ class _Shaper:
 
     def _require_few(self, count: int, what: str, most: int) -> None:
         if count > most:
-            raise MapError(
-                f"{self.where}: {count} {what}, but at most {most} were wanted: --specks AREA drops small "
-                "obstacles, --simplify METRES draws walls with fewer vertices"
-            )
+            ways = "--specks AREA drops small obstacles, --simplify METRES draws walls with fewer vertices"
+            raise MapError(f"{self.where}: {count} {what}, but at most {most} were wanted: {ways}")
 
     def _require_room(self, parts: list[Polygon]) -> None:
         widest = 0.0
@@ -304,10 +291,8 @@ class _Shaper:
             if widest >= self.clearance:
                 return
         wanted, most = self.clearance / (1 + env.START_GAP), widest / (1 + env.START_GAP)
-        raise MapError(
-            f"{self.where}: no place is wide enough for a robot of radius {wanted:g} m "
-            f"(the widest is for one of {most:.3g} m): is the scale right?"
-        )
+        found = f"(the widest is for one of {most:.3g} m): is the scale right?"
+        raise MapError(f"{self.where}: no place is wide enough for a robot of radius {wanted:g} m {found}")
 
     def _obstacles(self, solid: list[Polygon]) -> list[env.PolygonObstacle]:
         """Return `solid` as obstacles, the largest first, without what is too small for a map."""
@@ -316,10 +301,8 @@ class _Shaper:
             thin = counted(len(solid) - len(kept), "obstacle")
             self.dropped.append(f"{thin} thinner than {SMALLEST * 1000:g} mm")
         kept.sort(key=lambda part: (-round(part.area, 6), part.bounds))
-        return [
-            env.PolygonObstacle(self._ring(part.exterior), (*map(self._ring, part.interiors),))
-            for part in kept
-        ]
+        ring = self._ring
+        return [env.PolygonObstacle(ring(part.exterior), (*map(ring, part.interiors),)) for part in kept]
 
     def _ring(self, ring: BaseGeometry) -> Ring:
         """Return a closed ring as a map has it: counter-clockwise from its leftmost vertex."""
@@ -412,8 +395,7 @@ def _place_in(part: Polygon) -> tuple[float, float]:
 
 
 def _squared(parts: list[Polygon]) -> str:
-    area = sum(part.area for part in parts)
-    return f"{square_metres(area, 3)}{' together' if len(parts) > 1 else ''}"
+    return f"{square_metres(sum(part.area for part in parts), 3)}{' together' if len(parts) > 1 else ''}"
 
 
 def _without_slivers(solid: list[Polygon], before: BaseGeometry, tolerance: float) -> list[Polygon]:
@@ -481,9 +463,8 @@ def compare(foreign: ForeignMap, environment: Environment, report: ImportReport)
     before = before if before.is_valid else made_valid(before)
     everything = [before, after, environment.region.polygon, foreign.boundary or before]
     lost, opened = _changed(before, after, report.tolerance), _changed(after, before, report.tolerance)
-    region = shapely.GeometryCollection(everything).convex_hull
     gap = env.narrowest_gap(after) if report.vertices_kept <= _MOST_VERTICES else None
-    return Comparison(before, after, lost, opened, region, gap)
+    return Comparison(before, after, lost, opened, shapely.GeometryCollection(everything).convex_hull, gap)
 
 
 def _changed(first: BaseGeometry, second: BaseGeometry, tolerance: float) -> MultiPolygon:

@@ -9,14 +9,12 @@ import shapely
 from robocov.arrays import Array, IntArray, ranges
 from robocov.environment import SAGITTA
 
-# largest distance between a curve and the line that stands for it, in metres: as of round obstacles
-TOLERANCE = SAGITTA
+TOLERANCE = SAGITTA  # m between a curve and the line that stands for it at most: as of round obstacles
 # steps between two breaks at first; and what of the tolerance the middle of a step may be away, which need
 # not be where the curve is farthest
 _FIRST, _SAFE = 8, 0.8
 _LEAST = 8  # points of a whole ellipse at least, however small it is
-# of one call. A circle of 10 000 km, the farthest that coordinates go, has 222 thousand.
-MOST_POINTS = 250_000
+MOST_POINTS = 250_000  # of one call; a circle of 10 000 km, as far as coordinates go, has 222 thousand
 
 
 def beziers(control: Array, tolerance: float, most: int = MOST_POINTS) -> tuple[Array, IntArray]:

@@ -6,8 +6,7 @@ import numpy as np
 
 from robocov.arrays import Array
 
-# its corners, counter-clockwise; the middle is the origin
-UNIT_SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+UNIT_SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # about the origin
 
 
 def frame(x: float, y: float, turn: float) -> Array:

@@ -14,8 +14,7 @@ from robocov.arrays import Array, BoolArray
 from robocov.environment import GRID
 from robocov.errors import MapError
 
-# the first ring with the others as holes, or what SVG calls ``fill-rule``
-Rule: TypeAlias = Literal["holes", "evenodd", "nonzero"]
+Rule: TypeAlias = Literal["holes", "evenodd", "nonzero"]  # holes in the first ring, or SVG's ``fill-rule``
 DIGITS = 6  # decimals of metres by default: the free space is known to a micrometre
 # edges may cross each other so often in a file, those of all its shapes together. A ring of some kB can cross
 # itself millions of times, and to find all of these places takes minutes and gigabytes.
@@ -56,10 +55,8 @@ class Crossings:
                     break
         self.count += estimate
         if self.count > MAX_CROSSINGS:
-            raise MapError(
-                f"{self.where}: its lines cross each other some {self.count:.1g} times, but at most "
-                f"{MAX_CROSSINGS} times was wanted"
-            )
+            found = f"its lines cross each other some {self.count:.1g} times"
+            raise MapError(f"{self.where}: {found}, but at most {MAX_CROSSINGS} times was wanted")
 
 
 def edges_of(lines: Iterable[BaseGeometry]) -> Array:
@@ -114,9 +111,7 @@ def united(areas: Sequence[BaseGeometry]) -> BaseGeometry:
     union = shapely.union_all(areas)
     corners = shapely.points(shapely.get_coordinates(areas))
     shapely.prepare(union)
-    if shapely.dwithin(union, corners, GRID).all():
-        return union
-    return shapely.union_all(areas, grid_size=GRID)
+    return union if shapely.dwithin(union, corners, GRID).all() else shapely.union_all(areas, grid_size=GRID)
 
 
 def _has_three(ring: Array) -> bool:
@@ -171,7 +166,6 @@ def polygons_of(geometry: BaseGeometry) -> MultiPolygon:
 
 
 def filled(geometry: BaseGeometry) -> Polygon:
-    """Return the largest polygon in `geometry`, without its holes."""
     return Polygon(polygons(geometry)[0].exterior)
 
 
@@ -199,10 +193,8 @@ def bounded(
     parts = list(free.geoms)
     if given is not None:
         base = filled(rounded(shapely.union(given, free), digits))
-    elif len(parts) > 1:
-        base = free.convex_hull
     else:
-        base = Polygon(parts[0].exterior)
+        base = free.convex_hull if len(parts) > 1 else Polygon(parts[0].exterior)
     if hull:
         base = base.convex_hull
     if margin > 0.0:

@@ -21,8 +21,7 @@ from robocov.errors import MapError
 from robocov_app.formats.base import ForeignMap, square_metres
 from robocov_app.formats.files import require_coordinate, require_vertices
 
-# `FREE`, `BLOCKED` or `UNKNOWN` for each cell, (rows, columns), the top row first as in pictures
-Cells: TypeAlias = NDArray[np.uint8]
+Cells: TypeAlias = NDArray[np.uint8]  # `FREE`, `BLOCKED` or `UNKNOWN`, (rows, columns), the top row first
 FREE, BLOCKED, UNKNOWN = 0, 1, 2
 RIM = 2  # around the known cells so many are solid where a map is cut to them
 NECK = 1 / 32  # cut at corners where obstacles touch, off each side of the two free cells, in cells
@@ -57,8 +56,7 @@ def foreign_map(
     def placed(points: Array) -> Array:
         return _placed(points, cell, origin, yaw)
 
-    corners = placed(np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]], float))
-    for value in corners.ravel().tolist():
+    for value in placed(np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]], float)).ravel().tolist():
         require_coordinate(value, f"{where}: a corner of the grid")
     number = [int(np.count_nonzero(cells == kind)) for kind in (FREE, BLOCKED, UNKNOWN)]
     share = [_share(each, cells.size) for each in number]
@@ -84,8 +82,7 @@ def foreign_map(
         free &= main
         # around the known cells and a rim, without holes
         wide = ndimage.binary_dilation(np.pad(main, RIM), structure=_TOUCHING, iterations=RIM)
-        around = _traced(wide, where, lambda points: placed(points - RIM))
-        boundary = Polygon(around.geoms[0].exterior)
+        boundary = Polygon(_traced(wide, where, lambda points: placed(points - RIM)).geoms[0].exterior)
     outline = _traced(free, where, placed)
     return ForeignMap(
         name=name,
@@ -191,10 +188,8 @@ def _corners(free: BoolArray, where: str) -> list[Any]:
         count += int(np.count_nonzero(corners)) + 3 * int(np.count_nonzero(twins))
         require_vertices(count, where)
         row, column = corners.nonzero()
-        sides = (
-            each[corners] for each in (south_west ^ north_west, north_west ^ north_east, twins, north_east)
-        )
-        found.append((column, row + low, *sides))
+        facts = (south_west ^ north_west, north_west ^ north_east, twins, north_east)
+        found.append((column, row + low, *(each[corners] for each in facts)))
     column, row, west, north, twin, north_east = map(np.concatenate, zip(*found, strict=True))
     second = ranges(np.zeros_like(row), 1 + twin) == 1
     column, row, west, north, twin, north_east = (

@@ -23,10 +23,8 @@ Kind: TypeAlias = Literal["polygon", "line", "point"]
 THICKNESS = 0.1  # width of walls that are drawn as lines without one, in metres
 BOUNDARY = "boundary"  # a shape of this name, id, class or layer is the boundary
 AROUND = 1.0  # room left around the shapes where none of them is the boundary, in metres
-# a boundary holds more than this part of the other shapes; walls that are one leave so much of it open
-_MOST = 0.5
-# shapes that are farther from each other, in metres, are of no map: unions of such take seconds
-_FARTHEST_PARTS = 10.0 * LARGEST
+_MOST = 0.5  # a boundary holds more of the other shapes; walls that are one leave so much of it open
+_FARTHEST_PARTS = 10.0 * LARGEST  # m; shapes farther from each other are of no map: unions take seconds
 _SHOWN = 20  # names that are listed where one is wrong
 _DIGITS = 9
 
@@ -238,7 +236,6 @@ class Shapes:
 
     @property
     def paths(self) -> list[BaseGeometry]:
-        """The lines without their width."""
         return [shapely.linestrings(line.points) for line in self.lines]
 
     @property
@@ -283,10 +280,8 @@ class Shapes:
             if not good.all():
                 x, y = ring[int(np.argmin(good.all(axis=1)))].tolist()
                 place = f"{self.where}: {at}" if at else self.where
-                raise MapError(
-                    f"{place}: a point at [{x:g}, {y:g}] m, but coordinates from {-FARTHEST:.0f} to "
-                    f"{FARTHEST:.0f} m were wanted"
-                )
+                wanted = f"coordinates from {-FARTHEST:.0f} to {FARTHEST:.0f} m were wanted"
+                raise MapError(f"{place}: a point at [{x:g}, {y:g}] m, but {wanted}")
         return [np.round(ring, _DIGITS) + 0.0 for ring in rings]
 
     def foreign_map(
@@ -361,9 +356,8 @@ class Shapes:
         if boundary and boundary.words and solid:
             notes.append(f"the boundary is {boundary.words}")
         many = counted(int((~around).sum()), "closed outline")
-        if not around.all() and (
-            boundary is None or boundary.words
-        ):  # else the format says what all of it is
+        told = boundary is None or boundary.words  # else the format says what all of it is
+        if told and not around.all():
             notes.append(f"{many} taken as solid (--outlines free: as free space)")
         elif not solid and len(self.outlines) > 1:
             many = counted(len(self.outlines), "closed outline")
@@ -432,9 +426,8 @@ class Shapes:
             # walls as one shape have rooms as holes
             if outline.area.area < _MOST * _filled(outline):
                 return None
-        if inner and not (
-            shapely.covers(outline.area, inner).all() if wholly else _holds(outline.area, inner)
-        ):
+        wholly |= not inner
+        if not (shapely.covers(outline.area, inner).all() if wholly else _holds(outline.area, inner)):
             return None
         called = f", {shown(outline.labels[0])}," if outline.labels else ""
         words = f"the largest closed outline{called} of {_filled(outline):.4g} m²"

@@ -25,22 +25,21 @@ from robocov.arrays import Array, BoolArray, IntArray, beginnings, ranges
 from robocov.errors import counted
 from robocov_app.formats.geometry.raster import NECK
 
-# by so much of it the area of an outline, of an obstacle or a free part, may change; and of all that is free
-KEPT_OUTLINE, KEPT_AREA = 0.1, 0.02
+KEPT_OUTLINE, KEPT_AREA = 0.1, 0.02  # parts of an outline's area, and of all that is free, that may change
 _BLOCKS = 16  # a thing of fewer cells stays as it is: what it is like, its cells say best
 # halvings of the tolerance around a place until everything stays there; rounds until all of a wall that is
 # wrong stays, and until everything does everywhere, as it does after so many times the vertices
 _HALVINGS, _PATIENCE, _ROUNDS, _WORK = 3, 24, 60, 1_000_000
-# from this tolerance on, in cells, stairs are drawn as lines; and one through fewer middles says little
-_MIDDLES, _FEW = 0.75, 3
+_MIDDLES, _FEW = 0.75, 3  # cells of tolerance from which on stairs are lines; middles that make a line
 _UNBALANCED = 0.02  # from this part of it on, the area that a ring lost is given back to it
 # of a thing with the area of a square of so many tolerances and more, all of the tolerance is left out; of
 # smaller ones less is, but always so much, in cells
 _SIZES, _FINEST = 16, 0.4
-# of the angle between lines: the cosine up to which it is right, the sine up to which they meet nowhere
-_RIGHT, _SQUARE = 1e-5, 0.2
-# in tolerances: what counts as a short edge, and how far from the corner its run may be; and the sine of the
-# angle below which two walls count as parallel
+_RIGHT, _SQUARE = (
+    1e-5,
+    0.2,
+)  # of angles: cosines up to which one is right, sines up to which lines do not meet
+# in tolerances: a short edge, and how far its run may be from the corner; and the sine of parallel walls
 _SHORT, _NEAR, _PARALLEL = 1.5, 2.0, 0.1
 _CHUNK = 2048  # sides that are looked at together for gaps, which bounds the memory
 _MOST_GAPS, _MOST_RAYS = 200_000, 300_000_000  # looked at; sides that rays cross to tell what is inside
@@ -175,8 +174,7 @@ class Outline(Rings):
         stays |= path._extremes() | (allowed == 0.0) | (np.arange(len(allowed)) % _LONGEST == 0)
         # small things have few corners to lose
         finest = 0.0 if self.cell is None else _FINEST * self.cell
-        most = np.maximum(np.sqrt(np.abs(self.areas)) / _SIZES, finest)
-        kept, begin = path._kept(allowed, stays, most)
+        kept, begin = path._kept(allowed, stays, np.maximum(np.sqrt(np.abs(self.areas)) / _SIZES, finest))
         drawing = Rings(path.points[kept], begin, path.source[kept])
         return drawing if self.cell is None else _fitted(path, kept, drawing, allowed[kept])
 
@@ -225,8 +223,7 @@ class Outline(Rings):
             return Rings(points, drawing.begin, np.arange(len(points), dtype=float))
         twice = np.arange(len(points)).repeat(1 + neck)
         second = np.append(False, twice[1:] == twice[:-1])
-        towards = np.where(second, drawing.after[twice], drawing.before[twice])
-        way = points[towards] - points[twice]
+        way = points[np.where(second, drawing.after[twice], drawing.before[twice])] - points[twice]
         length = np.maximum(np.hypot(*way.T), 1e-300)
         part = np.where(neck[twice], np.minimum(NECK * self.cell / length, 0.4), 0.0)
         begin = np.searchsorted(twice, drawing.begin)
@@ -321,8 +318,7 @@ class _Check:
         far &= allowed > 0.0
         was, now, ring = self.outline.areas, drawing.areas, self.outline.ring
         off = np.abs(now - was) > KEPT_OUTLINE * np.abs(was)
-        fresh = np.unique(ring[allowed == self.tolerance])
-        self.found["outline"] += int(np.count_nonzero(off[fresh]))
+        self.found["outline"] += int(np.count_nonzero(off[np.unique(ring[allowed == self.tolerance])]))
         wrong = off[ring] & (allowed > 0.0)
         if not (wrong.any() or far.any()) and abs(now.sum() - was.sum()) > KEPT_AREA * was.sum():
             self.found["area"] += 1
@@ -337,8 +333,7 @@ class _Check:
         after, sides = drawing.after, shapely.linestrings(drawing.ends)
         one, other = STRtree(sides).query(sides, predicate="intersects")
         apart = (one < other) & (after[one] != other) & (after[other] != one)
-        across = drawing.vertex[np.append(one[apart], other[apart])]
-        wrong = np.isin(self.side, across)
+        wrong = np.isin(self.side, drawing.vertex[np.append(one[apart], other[apart])])
         wrong |= wrong[outline.after]
         wrong &= allowed > 0.0
         if (allowed[wrong] == self.tolerance).any():
@@ -364,8 +359,7 @@ class _Check:
         for pair, place in zip(*closed, strict=True):
             about = np.concatenate([*(of_sides[k] for k in pair), first[drawing.after[pair]]])
             loose = about[self.allowed[about] > 0.0]
-            away = np.hypot(*(outline.points[loose] - place).T)
-            near = loose[away <= self.width + 3 * self.tolerance]
+            near = loose[np.hypot(*(outline.points[loose] - place).T) <= self.width + 3 * self.tolerance]
             wrong[near if len(near) else loose] = True
         self.found["narrow place"] += len(closed[0])
         return wrong
@@ -383,14 +377,12 @@ def _fitted(path: Rings, kept: IntArray, drawing: Rings, allowed: Array) -> Ring
     # a line for each side: a point of it, and its direction
     foot = np.where(stairs[:, None], foot, points)
     along = np.where(stairs[:, None], along, chord)
-
     meeting, sine = _meeting(foot[before], along[before], foot, along)
     # lines that hardly turn have no good meeting: half-way between them
     flat = (_foot(points, foot[before], along[before]) + _foot(points, foot, along)) / 2
     move = np.where(np.abs(sine)[:, None] > _SQUARE, meeting, flat) - points
     move[~(stairs | stairs[before])] = 0.0
     move[np.hypot(*move.T) > 2 * allowed] = 0.0
-
     # neither end of the side may be one that stays
     both = np.minimum(allowed, allowed[after])
     long = length > 4 * both
@@ -516,6 +508,5 @@ def closed_gaps(
     windows = shapely.box(*(places - reach).T, *(places + reach).T)
     before = [shapely.intersection(paths[pairs[:, k]], windows) for k in (0, 1)]
     # where nothing is left of a wall it was further away
-    was = np.nan_to_num(shapely.distance(*before), nan=np.inf)
-    lost = was > width * _CLEARLY
+    lost = np.nan_to_num(shapely.distance(*before), nan=np.inf) > width * _CLEARLY
     return pairs[lost], places[lost]

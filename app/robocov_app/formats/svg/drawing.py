@@ -49,8 +49,7 @@ _SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
 _PICTURES = ("text", "image", "foreignObject", "video", "iframe", "canvas")
 _CAPS: dict[str, Literal["square", "round"]] = {"square": "square", "round": "round"}
 _JOINS: dict[str, Literal["bevel", "round"]] = {"bevel": "bevel", "round": "round"}
-# where lengths grow by more different factors in different directions, a stroke has no one width
-_EVEN = 1.0 + 1e-6
+_EVEN = 1.0 + 1e-6  # ratio of the growth of lengths in two directions up to which a stroke has one width
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
@@ -66,16 +65,16 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     if options.scale is None and everything:
         x, y, right, top = shapely.total_bounds(everything)
         if max(right - x, top - y) < _SMALLEST:
+            hint = "--scale METRES says what a unit is, as in --scale 0.01"
+            wanted = f"at least {_SMALLEST:g} m was wanted: {hint}"
             raise MapError(
-                f"{shapes.where}: {right - x:.3g} x {top - y:.3g} m at its own scale, but at least "
-                f"{_SMALLEST:g} m was wanted: --scale METRES says what a unit is, as in --scale 0.01"
+                f"{shapes.where}: {right - x:.3g} x {top - y:.3g} m at its own scale, but {wanted}"
             )
     own = "at its own scale" if options.scale is None else f"a unit is {options.scale:g} m"
     shapes.notes = [own, *drawing.notes()]
     texts = {each.tag: one_line(" ".join(each.text.split())) for each in root.children if each.text.strip()}
     name = texts.get("title", "")[:80] or name_of_map(path)
-    text = texts.get("desc", "")[:1000] or "Imported from SVG."
-    return shapes.foreign_map(name, text, solid=True)
+    return shapes.foreign_map(name, texts.get("desc", "")[:1000] or "Imported from SVG.", solid=True)
 
 
 def _page(given: dict[str, str], scale: float | None) -> tuple[Array, float, float]:
@@ -113,8 +112,7 @@ def _labels(element: Element, *, outer: tuple[str, ...] = (), inner: tuple[str, 
     """Return the labels of an element among others, the innermost first, each once."""
     given = element.attributes
     names = (given.get("id", ""), given.get("label", ""), *given.get("class", "").split())
-    own = [name.strip() for name in names if name.strip()]
-    return tuple(dict.fromkeys([*inner, *own, *outer]))
+    return tuple(dict.fromkeys([*inner, *filter(None, map(str.strip, names)), *outer]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,11 +166,10 @@ class _Drawing:
             self._draw(child, _Place(matrix, style, _labels(self.root), width, height))
 
     def notes(self) -> list[str]:
-        strange = "style rules of other kinds than tag, .class and #id not applied"
         counts = {
             "dashed strokes taken as whole": self.dashed,
             "clip paths and masks not applied": self.clipped,
-            strange: self.sheet.strange,
+            "style rules of other kinds than tag, .class and #id not applied": self.sheet.strange,
         }
         curves = [f"curves flattened to within {1000 * TOLERANCE:g} mm"] if self.shapes.vertices else []
         return curves + [f"{count} {words}" for words, count in counts.items() if count]
@@ -238,7 +235,6 @@ class _Drawing:
             self._draw(child, place)
 
     def _inside(self, element: Element, place: _Place) -> tuple[list[Element], _Place]:
-        """Return what a group holds or uses, and its place."""
         given, target = element.attributes, self._target(element)
         if element.tag in ("use", "svg"):
             x, y = place.lengths(element, "x", "y")
@@ -331,8 +327,7 @@ class _Drawing:
                 points = np.array(values[: len(values) // 2 * 2]).reshape(-1, 2)
                 return [(points, element.tag == "polygon")] if len(points) > 1 else []
             case "line":
-                ends = place.lengths(element, "x1", "y1", "x2", "y2")
-                return [(np.array(ends).reshape(2, 2), False)]
+                return [(np.array(place.lengths(element, "x1", "y1", "x2", "y2")).reshape(2, 2), False)]
             case "rect":
                 return [(ring, True) for ring in _rectangle(element, place, tolerance)]
             case "circle":
@@ -419,9 +414,8 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     )
     with written(path) as part:
         part.write_text(page, encoding="utf-8")
-    written_boundary = Polygon([(pen.rounded(x), pen.rounded(y)) for x, y in environment.boundary])
     obstacles = [with_numbers(obstacle, pen.rounded).polygon for obstacle in environment.obstacles]
-    area = free_area(written_boundary, obstacles)
+    area = free_area(Polygon([(pen.rounded(x), pen.rounded(y)) for x, y in environment.boundary]), obstacles)
     notes = [f"1 mm is {scale:g} m: {(high - low)[0] / scale:.6g} x {(high - low)[1] / scale:.6g} mm"]
     notes += [] if options.scale is None else [f"to import it again: --scale {scale:g}"]
     dropped = not_held(environment, names=False)

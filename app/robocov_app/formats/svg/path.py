@@ -21,8 +21,7 @@ NUMBER = re.compile(rf"[\s,]*+({_DECIMAL})", re.ASCII)
 _LENGTH = re.compile(rf"\s*+({_DECIMAL})\s*+([A-Za-z]*+|%)\s*+", re.ASCII)
 _FUNCTION = re.compile(r"[\s,]*([A-Za-z]+)\s*\(([^()]*)\)")
 _LARGEST = 1e30
-# user units in a unit of length (CSS Values 4, section 6.2)
-_PIXELS = {
+_PIXELS = {  # user units in a unit of length (CSS Values 4, section 6.2)
     "": 1.0, "px": 1.0, "in": 96.0, "cm": 96 / 2.54, "mm": 96 / 25.4, "q": 96 / 101.6, "pt": 4 / 3, "pc": 16.0
 }  # fmt: skip
 PIXEL = 0.0254 / 96  # a user unit in metres, where nothing says otherwise
@@ -95,8 +94,7 @@ def transform(text: str) -> Array:
     return matrix
 
 
-_FUNCTIONS: dict[str, tuple[tuple[int, ...], Callable[..., Array]]] = {
-    # how many numbers each takes, and its matrix
+_FUNCTIONS: dict[str, tuple[tuple[int, ...], Callable[..., Array]]] = {  # counts of numbers, and matrix
     "matrix": ((6,), affine),
     "translate": ((1, 2), lambda x, y=0.0: affine(e=x, f=y)),
     "translatex": ((1,), lambda x: affine(e=x)),
@@ -127,8 +125,7 @@ def fitted(box: tuple[float, float, float, float], width: float, height: float, 
     return affine(scale, d=scale, e=left, f=top) @ affine(e=-box[0], f=-box[1])
 
 
-# commands of all paths of a file, repeated ones without their letter too; vertices of polylines are none
-MOST_DRAWS = 150_000
+MOST_DRAWS = 150_000  # commands of all paths, with or without their letter; vertices of polylines are none
 _COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])", re.ASCII)
 _FLAG = re.compile(r"[\s,]*([01])")
 _ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
@@ -291,14 +288,12 @@ class _Pen:
         sweep = math.copysign(math.tau - sweep if given[3] else sweep, 1.0 if given[4] else -1.0)
         u, v = turn * rx, turn * (1j * ry)
         centre = (self.at + end) / 2 + u * middle.real + v * middle.imag
-        begin = cmath.phase(place - middle)
-        self._arcs.append((len(self.vertices), centre, u, v, begin, sweep))
+        self._arcs.append((len(self.vertices), centre, u, v, cmath.phase(place - middle), sweep))
         self._line(end)
 
 
 Style: TypeAlias = Mapping[str, str]  # properties by name, as they are written
-# attributes that elements inherit from groups, with their defaults (SVG 2, section 13)
-INHERITED = {
+INHERITED = {  # by elements from groups, with their defaults (SVG 2, section 13)
     "fill": "black", "fill-opacity": "1", "fill-rule": "nonzero",
     "stroke": "none", "stroke-opacity": "1", "stroke-width": "1", "stroke-dasharray": "none",
     "stroke-linecap": "butt", "stroke-linejoin": "miter", "stroke-miterlimit": "4",
@@ -310,8 +305,7 @@ _IMPORTANT = re.compile(r"!\s*important\s*$", re.IGNORECASE)
 _HARMLESS = re.compile(r"@(?:charset|font-face|keyframes|media|namespace|page)\b", re.IGNORECASE)
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _AT_RULE_PARTS = re.compile(r"[{};]")
-# characters of style sheets, rules in them, and pairs of a rule and an element that are looked at
-MOST_TEXT, MOST_RULES, MOST_WORK = 1_000_000, 10_000, 500_000
+MOST_TEXT, MOST_RULES, MOST_WORK = 1_000_000, 10_000, 500_000  # letters, rules, rules looked at
 
 
 class _Rule(NamedTuple):
@@ -343,9 +337,8 @@ class StyleSheet:
             before, brace, body = rule.rpartition("{")
             if not brace:
                 continue
-            selectors = before.rpartition("{")[2]
             properties = _by_importance(declarations(body))
-            for selector in selectors.split(","):
+            for selector in before.rpartition("{")[2].split(","):
                 self._add(selector.strip(), properties)
 
     def of(self, element: Element) -> dict[str, str]:
@@ -396,7 +389,6 @@ class StyleSheet:
 
 
 def declarations(text: str) -> dict[str, str]:
-    """Return the properties of a ``style`` attribute or of the body of a rule."""
     pairs = (part.partition(":") for part in text.split(";") if ":" in part)
     return {name.strip().lower(): value.strip() for name, _, value in pairs}
 
@@ -409,7 +401,6 @@ def _by_importance(properties: dict[str, str]) -> tuple[dict[str, str], dict[str
 
 
 def inherited(parent: Style, own: Style) -> dict[str, str]:
-    """Return the inherited properties of an element, from those of its parent and its own."""
     return {
         name: parent[name] if (value := own.get(name, "inherit")) in ("inherit", "unset") else value
         for name in INHERITED
@@ -417,9 +408,7 @@ def inherited(parent: Style, own: Style) -> dict[str, str]:
 
 
 def is_painted(style: Style, what: str) -> bool:
-    """Return whether ``fill`` or ``stroke`` is there: neither none nor transparent."""
-    paint = style[what].lower()
-    return paint not in ("none", "transparent") and not _is_zero(style[f"{what}-opacity"])
+    return style[what].lower() not in ("none", "transparent") and not _is_zero(style[f"{what}-opacity"])
 
 
 def is_hidden(own: Style) -> bool:
