@@ -51,14 +51,12 @@ class ViewerCanvas:
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
         self.layout, self.theme = layout, theme
-        self._environment = self.viewer.session.environment
-        several = len(layout.panes) > 1
-        self._painters = []
+        self._environment, self._painters = self.viewer.session.environment, []
         for _, _, width, height in layout.panes:
             layers = standard_layers()
-            if several:  # they share the time, which stands in the window's own status line
+            if len(layout.panes) > 1:  # they share the time, which stands in the window's own status line
                 layers = [layer for layer in pane_layers() if layer.name != "status"]
-            painter = Painter(self.viewer.session.environment, (width, height), theme, layers, layout.scale)
+            painter = Painter(self._environment, (width, height), theme, layers, layout.scale)
             if self._camera is not None:
                 painter.camera = self._camera.within(painter.camera.view)
             self._painters.append(painter)
@@ -71,8 +69,7 @@ class ViewerCanvas:
 
     def zoom(self, factor: float, at: tuple[float, float]) -> None:
         pane = self.pane_at(at) or 0
-        left, top, _, _ = self.layout.panes[pane]
-        camera = self._painters[pane].camera
+        (left, top, _, _), camera = self.layout.panes[pane], self._painters[pane].camera
         whole = np.ptp(np.reshape(self.viewer.session.environment.region.bounds, (2, 2)), axis=0).max()
         # neither a dot nor a single wall's paint
         factor = float(np.clip(camera.zoom * factor, 20.0 / whole, 2e4)) / camera.zoom
@@ -93,9 +90,7 @@ class ViewerCanvas:
         return next((pane for pane, box in enumerate(self.layout.panes) if inside(box, pixel)), None)
 
     def to_world(self, pixel: tuple[float, float], pane: int) -> Point:
-        left, top, _, _ = self.layout.panes[pane]
-        place = np.array([pixel[0] - left, pixel[1] - top])
-        x, y = self._painters[pane].camera.to_world(place).tolist()
+        x, y = self._painters[pane].camera.to_world(np.subtract(pixel, self.layout.panes[pane][:2])).tolist()
         return x, y
 
     def to_pixel(self, point: Point, pane: int = 0) -> tuple[float, float]:
@@ -109,9 +104,8 @@ class ViewerCanvas:
     def robot_at(self, pixel: tuple[float, float], pane: int) -> int | None:
         if pane >= len(self._scenes):
             return None
-        scene = self._scenes[pane]
+        scene, point = self._scenes[pane], np.array(self.to_world(pixel, pane))
         canvas = self._canvas(pygame.Surface((1, 1)), pane, scene)
-        point = np.array(self.to_world(pixel, pane))
         far = np.hypot(*(scene.now.positions - point).T) * canvas.camera.zoom
         radii = np.array(drawn_radii(canvas, scene)) + 3.0 * self.layout.scale
         near = [(float(far[row]), scene.number(row)) for row in np.flatnonzero(far <= radii).tolist()]
@@ -150,9 +144,8 @@ class ViewerCanvas:
         numbers, scans = setup.numbers, list[tuple[Array, Array]]()
         selected = numbers.index(viewer.selected) if viewer.selected in numbers else None
         if "scan" in viewer.shown:  # of the robot that is asked about, else of all unless they are many
-            scans = self._scans(
-                pane, setup, snapshot, range(len(numbers)) if selected is None else [selected]
-            )
+            rows = range(len(numbers)) if selected is None else [selected]
+            scans = self._scans(pane, setup, snapshot, rows)
         path = known.path if known is not None and viewer.cursor is not None else None
         look: dict[str, Any] = {"field": field, "field_limit": self._limit, "cost": self._caption_cost(pane)}
         look |= {"selected": selected, "scans": scans, "sensed": pane.sensed, "path": path}
@@ -175,8 +168,7 @@ class ViewerCanvas:
             return []
         ranges, places = setup.team.sensing_range, snapshot.positions
         reach = np.where(np.isfinite(ranges), ranges, FAR_SCAN).tolist()
-        scan = pane.simulation.sensor.scan
-        return [(places[row], scan(places[row], rays, reach[row])[1]) for row in rows]
+        return [(places[row], pane.simulation.sensor.scan(places[row], rays, reach[row])[1]) for row in rows]
 
     def _canvas(self, surface: pygame.Surface, pane: int, scene: Scene) -> Canvas:
         camera, hues = self._painters[pane].camera, robot_hues(len(scene.team))
@@ -212,9 +204,8 @@ class ViewerCanvas:
             for part in getattr(shape, "geoms", [shape]):
                 corners = canvas.camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
                 page = pygame.Surface(surface.get_size(), pygame.SRCALPHA, 32)
-                red, green, blue = (round(c * 0.35) for c in self.theme.obstacle)
                 rim = np.rint(np.clip(corners, -1e4, 1e4)).tolist()
-                pygame.draw.polygon(page, (red, green, blue, 89), rim)
+                pygame.draw.polygon(page, (*(round(c * 0.35) for c in self.theme.obstacle), 89), rim)
                 surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
                 canvas.outline(corners, accent, canvas.width(1.5))
         if not preview.line:
@@ -244,15 +235,13 @@ class ViewerCanvas:
             if pane == self.viewer.active:
                 bar = pygame.Rect(rect.topleft, (rect.width, max(2, round(3 * scale))))
                 screen.fill(theme.controller(self.viewer.session.panes[pane].law.name), bar)
-        x, y, wide, high = self.layout.legend
-        entries = self._legend_entries()
-        key = (tuple(entry.key() for entry in entries), wide, theme.name, scale)
+        (x, y, wide, high), entries = self.layout.legend, self._legend_entries()
+        key = tuple(entry.key() for entry in entries), wide, theme.name, scale
         if self._strip is None or self._strip[0] != key:
             page = pygame.Surface((wide, max(high, 1)), 0, 32)
             page.fill(theme.background)
             camera, shown = self._painters[0].camera, frozenset(self.viewer.shown)
-            canvas = Canvas(page, camera, theme, scale, robot_hues(1), shown)
-            page.blit(legend_strip(entries, canvas), (0, 0))
+            page.blit(legend_strip(entries, Canvas(page, camera, theme, scale, robot_hues(1), shown)), (0, 0))
             self._strip = key, page
         screen.blit(self._strip[1], (x, y), pygame.Rect(0, 0, wide, high))
 
@@ -260,10 +249,10 @@ class ViewerCanvas:
         if len(self._scenes) < 2:
             return 0
         kept = self.layout.size, self.layout.scale, len(self.layout.panes), frozenset(self.viewer.shown)
-        entries = self._legend_entries()
         page = pygame.Surface((self.layout.arena[2], 1))
         canvas = Canvas(page, self._painters[0].camera, self.theme, self.layout.scale, robot_hues(1))
-        rows = max(len(legend_rows(canvas, entries)), 1, self._rows[1] if self._rows[0] == kept else 1)
+        needed, before = len(legend_rows(canvas, self._legend_entries())), self._rows
+        rows = max(needed, 1, before[1] if before[0] == kept else 1)
         self._rows = kept, rows
         return rows
 

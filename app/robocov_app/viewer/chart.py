@@ -24,9 +24,8 @@ LEFT, RIGHT, TOP, BOTTOM = 52, 70, 26, 20  # pixels at scale 1 round the plot
 SHORTEST = 10.0  # seconds that the axis shows at least
 REFRESHED = 0.1  # seconds after which growing curves are drawn anew
 _GRASP = 6.0  # pixels at scale 1 from a ghost curve within which a click enters its branch
-_GLYPHS = dict(
-    zip(["obstacle", "robot", "failure", "law", "limits", "hand", "density"], "■+×◆◆●▲", strict=True)
-)
+_TOUCHES = "obstacle", "robot", "failure", "law", "limits", "hand", "density"
+_GLYPHS = dict(zip(_TOUCHES, "■+×◆◆●▲", strict=True))
 
 
 def time_axis(end: float) -> float:
@@ -37,8 +36,7 @@ def time_axis(end: float) -> float:
     """
     if end <= 0.96 * SHORTEST:
         return SHORTEST
-    step = round_length(max(end / 4.0, 1.0)) / 2.0 if end < 40.0 else round_length(end / 5.0)
-    step = max(step, 5.0)
+    step = max(round_length(max(end / 4.0, 1.0)) / 2.0 if end < 40.0 else round_length(end / 5.0), 5.0)
     return float(np.ceil((end * 1.03 + 1e-9) / step) * step)
 
 
@@ -67,15 +65,13 @@ class Chart:
         self._place: Callable[[Array, Array], Array]
         self._key: object = None
         self._samples: object = None
-        self._drawn_at = -1.0
-        self._wanted = DISTANCE
+        self._drawn_at, self._wanted = -1.0, DISTANCE
         self._other: Box | None = None
         self._ghosts: list[tuple[int, Array]] = []
         self.hover: tuple[int, int] | None = None  # where the cursor is in the window
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        self.layout, self.theme = layout, theme
-        self._page = None
+        self.layout, self.theme, self._page = layout, theme, None
 
     @property
     def plotted(self) -> Plotted:
@@ -86,11 +82,10 @@ class Chart:
         return any(len(pane.curves["time"]) for pane in self.viewer.session.panes)
 
     def switch(self) -> str:
-        wanted = TIME if self.plotted is DISTANCE else DISTANCE
-        if wanted is TIME and not self._timed:
+        if not self._timed:
             return "all robots are equally fast: the mean time goes as the mean distance"
-        self._wanted, self._page = wanted, None
-        return f"plotted: {wanted.title[:1].lower()}{wanted.title[1:]}"
+        self._wanted, self._page = TIME if self.plotted is DISTANCE else DISTANCE, None
+        return f"plotted: {self._wanted.title[:1].lower()}{self._wanted.title[1:]}"
 
     def offers(self, at: tuple[int, int]) -> bool:
         return self._other is not None and inside(self._other, at)
@@ -116,8 +111,7 @@ class Chart:
 
     def time_at(self, x: float) -> float:
         left, right, end = self._span
-        time = (x - left) / max(right - left, 1.0) * end
-        return float(np.clip(time, 0.0, self.viewer.session.end))
+        return float(np.clip((x - left) / max(right - left, 1.0) * end, 0.0, self.viewer.session.end))
 
     def column(self, time: Any) -> Any:
         left, right, end = self._span
@@ -133,8 +127,7 @@ class Chart:
         # curves grow sixty times a second, which nobody sees
         old = self.viewer.now - self._drawn_at >= REFRESHED
         if self._page is None or rest != self._key or (old and samples != self._samples):
-            _, _, width, height = layout.chart
-            self._page = pygame.Surface((width, height + layout.track[3]), 0, 32)
+            self._page = pygame.Surface((layout.chart[2], layout.chart[3] + layout.track[3]), 0, 32)
             self._key, self._samples, self._drawn_at = rest, samples, self.viewer.now
             canvas = flat_canvas(self._page, self.theme, layout.scale)
             self._plot(canvas)
@@ -163,16 +156,14 @@ class Chart:
         some = np.concatenate([v for v in values if len(v)] or [np.array([np.nan])])
         low, high, step = value_axis(float(some.min()), float(some.max()))
 
-        def place(time: Array, value: Array) -> Array:
-            return np.column_stack(
-                [self.column(time), bottom - (bottom - top) * (value - low) / (high - low)]
-            )
+        def place(time: Array, cost: Array) -> Array:
+            return np.column_stack([self.column(time), bottom + (top - bottom) * (cost - low) / (high - low)])
 
-        self._place, note = place, partial(canvas.text, size=theme.small_text, colour=theme.faint)
+        self._place, faint = place, mix(theme.panel, theme.ink, 0.12)
+        note = partial(canvas.text, size=theme.small_text, colour=theme.faint)
         for mark in np.arange(low, high, step):
             y = bottom - (bottom - top) * (mark - low) / (high - low)
-            line = pygame.Rect(round(left), round(y), round(right - left), 1)
-            canvas.surface.fill(mix(theme.panel, theme.ink, 0.12), line)
+            canvas.surface.fill(faint, (round(left), round(y), round(right - left), 1))
             note(f"{mark:.6g}", (left - 7 * scale, y), anchor="right")
         for mark in np.arange(0.0, end + 1e-9, max(round_length(end / 6.0), 1.0)):
             note(f"{mark:g} s", (self.column(mark), height - 0.5 * BOTTOM * scale), anchor="middle")
@@ -202,15 +193,13 @@ class Chart:
             curve = pane.curves[what.name]
             points = _thinned(place(curve.time, curve.value))
             if len(points) > 1:
-                ends = np.hstack([points[:-1], points[1:]])
-                canvas.segments(ends, colours[pane.number], canvas.width(1.8))
+                canvas.segments(np.hstack([points[:-1], points[1:]]), colours[pane.number], canvas.width(1.8))
 
     def _offer(self, canvas: Canvas, left: float) -> None:
         """Name the other quantity beside the title, where there are two: a click plots it."""
-        self._other = None
+        scale, size, self._other = self.layout.scale, self.theme.small_text, None
         if not self._timed:
             return
-        scale, size = self.layout.scale, self.theme.small_text
         words, left = f"{(DISTANCE if self.plotted is TIME else TIME).short} ›", left + 16 * scale
         canvas.text(words, (left, 0.5 * TOP * scale), colour=self.theme.faint, size=size)
         (x, y, _, _), wide = self.layout.chart, canvas.text_width(words, size)
@@ -223,9 +212,7 @@ class Chart:
         canvas = flat_canvas(chart, theme, scale)
         (_, right, _), colours = self._span, curve_colours(session.panes, theme)
         time, known = session.compared(self.plotted.name)
-        if not known:
-            return
-        best = min(known.values())
+        best = min(known.values(), default=0.0)
         panes = [pane for pane in session.panes if pane.number in known]
         panes.sort(key=lambda pane: -known[pane.number])
         values = np.array([known[pane.number] for pane in panes])
@@ -254,25 +241,21 @@ class Chart:
         pygame.draw.rect(canvas.surface, mix(theme.panel, theme.ink, 0.13), box, border_radius=thick)
         canvas.text("time", (12 * scale, middle), colour=theme.faint, size=theme.small_text)
         words, colour = ("live", theme.start) if session.live else ("past", theme.final)
-        thinned = session.live and session.history.thinned
+        beside, size, thinned = right + 9 * scale, theme.small_text, session.live and session.history.thinned
         if thinned:
             words = "live · past thinned"
-            if right + 9 * scale + canvas.text_width(words, size=theme.small_text) > self.layout.track[2]:
-                words = "thinned"
-        at = right + 9 * scale, middle
-        canvas.text(words, at, colour=colour, bold=not thinned, size=theme.small_text)
+            fits = beside + canvas.text_width(words, size=size) <= self.layout.track[2]
+            words = words if fits else "thinned"
+        canvas.text(words, (beside, middle), colour=colour, bold=not thinned, size=size)
 
     def _rule(self, screen: pygame.Surface, x: float, colour: Colour, top: int) -> None:
-        """Draw an upright line through the plot, which begins at a row of the surface."""
         height, scale = self.layout.chart[3], self.layout.scale
-        line = pygame.Rect(round(x), round(top + TOP * scale), 1, round(height - (TOP + BOTTOM) * scale))
-        screen.fill(colour, line)
+        screen.fill(colour, (round(x), round(top + TOP * scale), 1, round(height - (TOP + BOTTOM) * scale)))
 
     def _cursor(self, screen: pygame.Surface) -> None:
         theme, scale, session = self.theme, self.layout.scale, self.viewer.session
         canvas = flat_canvas(screen, theme, scale)
-        middle = self.layout.track[1] + 0.5 * self.layout.track[3]
-        thick = max(4, round(5 * scale))
+        middle, thick = self.layout.track[1] + 0.5 * self.layout.track[3], max(4, round(5 * scale))
         x, begin = self.column(session.time), round(self.column(0.0))
         bars = [(self.column(session.end), mix(theme.panel, theme.ink, 0.4))]
         if not session.live:
@@ -290,10 +273,8 @@ class Chart:
 
     def _hovered(self, screen: pygame.Surface) -> None:
         over, theme, scale, session = self.hover, self.theme, self.layout.scale, self.viewer.session
-        left, right, _ = self._span
-        if over is None or not left <= over[0] <= right:
-            return
-        if not (inside(self.layout.chart, over) or inside(self.layout.track, over)):
+        (left, right, _), boxes = self._span, (self.layout.chart, self.layout.track)
+        if over is None or not left <= over[0] <= right or not any(inside(box, over) for box in boxes):
             return
         time = self.time_at(over[0])
         near = [event for event in session.events if abs(self.column(event.time) - over[0]) < 5 * scale]
@@ -339,5 +320,4 @@ def _thinned(points: Array) -> Array:
     if len(points) < 400:
         return points
     columns = np.rint(points[:, 0] * 1.5)
-    keep = np.append(columns[1:] != columns[:-1], True)
-    return np.asarray(points[keep])
+    return np.asarray(points[np.append(columns[1:] != columns[:-1], True)])

@@ -15,22 +15,16 @@ from robocov_app.viewer.tools import Tool
 
 # headings of the help, in their order
 GROUPS = ("Run", "Time", "Compare", "Touch", "Tools", "View", "Keep", "Help", "Show")
-_LAYER_KEYS = {
-    **{
-        name: f"{modifier}{key}"
-        for modifier, names in {
-            "": "cells centroids trajectories velocities force_attraction force_repulsion_robots "
-            "force_repulsion_obstacle force_viscosity force_resultant links",
-            "shift+": "distances geodesic_cells path scan sensed sensing communication obstacle_points goals "
-            "starts",
-            "alt+": "obstacles boundary grid robots failed selection legend scale_bar status colour_bar",
-        }.items()
-        for key, name in zip("1234567890", names.split(), strict=True)
-    },
-    "density": "alt+d",
-}
-_TOOLS = {"v": "hand", "p": "polygon", "w": "wall", "c": "circle", "g": "brush", "x": "eraser"}
-_TOOL_KEYS = {name: key for key, name in {**_TOOLS, "a": "robot", "d": "failure", "m": "ruler"}.items()}
+_NUMBERED = (
+    "cells centroids trajectories velocities force_attraction force_repulsion_robots "
+    "force_repulsion_obstacle force_viscosity force_resultant links "
+    "distances geodesic_cells path scan sensed sensing communication obstacle_points goals starts "
+    "obstacles boundary grid robots failed selection legend scale_bar status colour_bar"
+)
+_NUMBER_KEYS = [f"{modifier}{digit}" for modifier in ("", "shift+", "alt+") for digit in "1234567890"]
+_LAYER_KEYS = {**dict(zip(_NUMBERED.split(), _NUMBER_KEYS, strict=True)), "density": "alt+d"}
+_TOOLS = "hand polygon wall circle brush eraser robot failure ruler"
+_TOOL_KEYS = dict(zip(_TOOLS.split(), "vpwcgxadm", strict=True))
 REPEATS = True
 
 
@@ -46,7 +40,6 @@ class Row(NamedTuple):
 
 
 def grouped(rows: dict[str, Iterable[Row]]) -> list[Command]:
-    """Return commands from their rows by group."""
     return [
         Command(name, title, group, run, tuple(filter(None, keys.split(", "))), repeats=repeats, takes=takes)
         for group, each in rows.items()
@@ -66,9 +59,6 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
     def save(name: object) -> None:
         viewer.save_session(Path(str(name)) if name else None)
 
-    def open_session(name: str) -> None:
-        viewer.open_session(Path(name))
-
     def next_seed() -> None:
         viewer.restart(seed=viewer.session.scenario.seed + 1)
 
@@ -81,8 +71,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
     def enter(branch: str) -> None:
         viewer.session.enter(viewer.session.document.branch(branch).node)
 
-    start = Takes("start", options=viewer.starts)
-    law = Takes("controller", options=lambda: viewer.laws)
+    start, law = Takes("start", options=viewer.starts), Takes("controller", options=lambda: viewer.laws)
     ask_next, speeds = viewer.ask_next, [speed_words(each).rstrip("×") for each in SPEEDS]
 
     def tool_row(tool: Tool) -> Row:
@@ -132,9 +121,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
         "Compare": [
             Row("law", "Next controller in this pane", viewer.next_law, "o"),
             Row("pane:add", "Compare with one more controller", viewer.add_pane, "k"),
-            Row(
-                "pane:remove", "Remove this pane", lambda: viewer.session.remove_pane(viewer.pane), "shift+k"
-            ),
+            Row("pane:remove", "Remove this pane", viewer.remove_pane, "shift+k"),
             Row("pane:next", "Next pane", viewer.next_pane, "`"),
             Row("controller", "Controller", viewer.use_law, takes=law),
         ],
@@ -161,7 +148,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("save:session", "Save the session", viewer.save_session, "ctrl+s"),
             Row("recover", "Recover a session", viewer.recover, "ctrl+shift+o"),
             Row("save:map", "Save the map", viewer.save_map, "ctrl+shift+s"),
-            Row("open", "Open a session", open_session, takes=Takes("file", options=files)),
+            Row("open", "Open a session", viewer.open_session, takes=Takes("file", Path, files)),
             Row("save", "Save the session as", save, takes=Takes("file")),
         ],
         "Tools": map(tool_row, viewer.tools.values()),
@@ -172,8 +159,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
 
 def parameter_commands(viewer: Presenter) -> Iterator[Command]:
     for each in viewer.parameters():
-        run = partial(viewer.set_parameter, each.name)
-        words = tuple(getattr(each, "offered", ()))
+        run, words = partial(viewer.set_parameter, each.name), tuple(getattr(each, "offered", ()))
         takes = Takes(f"now {each.words()}", each.read, lambda words=words: words)  # type: ignore[misc]
         plain = each.name.removeprefix("team.")
         yield Command(plain, f"Set {each.label}", "Run", run, takes=takes)

@@ -45,9 +45,8 @@ class Costs:
         self.lattice = lattice  # sites along a side
         self._worker: Worker[Known | _Sites] = DirectWorker(CostService(), _CostWire())
         if not direct:
-            self._worker = LatestWorker(
-                "robocov_app.viewer.costs:CostService", "computes the cost", _CostWire
-            )
+            service = "robocov_app.viewer.costs:CostService"
+            self._worker = LatestWorker(service, "computes the cost", _CostWire)
         self._map: CostQuestion | None = None
         self._asked: CostQuestion | None = None
         self._number, self._ready = 0, False
@@ -80,8 +79,7 @@ class Costs:
         What was asked about the pane before and is not yet on its way is forgotten. `aside`: for a curve; it
         does not become what is known of the pane.
         """
-        # it keeps its place among the panes that wait, so that each has its turn
-        if self._map is not None:
+        if self._map is not None:  # it keeps its place among the panes that wait, so that each has its turn
             asked = replace(self._map, time=time, positions=np.array(at), point=point, speeds=speeds)
             self._waiting[pane] = replace(asked, aside=aside)
 
@@ -186,8 +184,8 @@ class CostService:
 
     def __init__(self) -> None:
         self._cost: CoverageCost | None = None
-        self._momentary: MomentaryCost | None = None
         self._told: CoverageCost | None = None
+        self._momentary: MomentaryCost | None = None
 
     def __call__(self, questions: list[CostQuestion], line: Line) -> _Answer:
         maps = [question for question in questions if question.environment is not None]
@@ -220,8 +218,7 @@ class CostService:
                 line.tell((done, (now - began) * (1.0 - done) / done))
 
         self._momentary = None
-        known = before is not None and before.lattice == asked.lattice
-        if before is not None and known and before.environment.same_place(environment):
+        if before and before.lattice == asked.lattice and before.environment.same_place(environment):
             self._cost = before.with_density(environment)
         else:
             self._cost = CoverageCost(environment, asked.lattice, progress=tell)
@@ -241,8 +238,7 @@ def _evaluated(momentary: MomentaryCost, question: CostQuestion) -> _Answer:
     if question.point is not None:
         with suppress(RobocovError):  # the point is not free
             path = momentary.at(now).path(positions[momentary.counted(now, positions)], question.point)
-    # half as long on the way
-    indices = {name: getattr(result, name).astype(np.int32) for name in _INDICES}
+    indices = {name: getattr(result, name).astype(np.int32) for name in _INDICES}  # half as long on the way
     same: dict[str, Any] = dict.fromkeys(["weights", "environment", "sites"])
     same |= dict.fromkeys(["points", "corners"], np.empty((0, 2)))
     return _Answer(None, now, replace(result, **indices, **same), path, travel_time)

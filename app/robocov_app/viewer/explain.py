@@ -55,9 +55,8 @@ def report_on(viewer: Presenter, number: int) -> Report:
         x, y = setup.failed[number]
         verdict = f"failed: it stands at ({x:.2f}, {y:.2f}) m, and the others see it as an obstacle"
         return Report(f"Robot {number}", verdict, ())
-    names, recent = setup.numbers, session.recent(pane, number)
-    robot = session.snapshot(pane), setup.team, setup.solid, names.index(number)
-    return explain(*robot, names=names, recent=recent)
+    robot = session.snapshot(pane), setup.team, setup.solid, setup.numbers.index(number)
+    return explain(*robot, names=setup.numbers, recent=session.recent(pane, number))
 
 
 def explain(
@@ -122,15 +121,13 @@ class _Case:
         self.aim = _aim(snapshot.decision, environment, here, robot)
         point = _row(snapshot.seen.obstacle_points, robot)
         self.sensing = point is not None
-        self.solid = _solid(environment, here, point, self.radius)
-        self.others = []
+        self.solid, self.others = _solid(environment, here, point, self.radius), []
         for j in snapshot.seen.neighbours.of(robot).tolist():
             offset = (_row(snapshot.positions, j) or 0j) - here
             gap = abs(offset) - self.radius - float(team.radius[j])
             self.others.append(_Thing(f"robot {names[j]}", offset, gap))
         self.others.sort(key=lambda other: abs(other.offset))
-        self.forces = _terms(snapshot.decision, robot)
-        self.drag = -self.viscosity * self.velocity
+        self.forces, self.drag = _terms(snapshot.decision, robot), -self.viscosity * self.velocity
         self.resultant = sum(self.forces.values(), self.drag)
         # whether that is too little to move a robot visibly from rest
         largest = max(map(abs, self.forces.values()), default=0.0)
@@ -159,9 +156,8 @@ def _aim(decision: Decision, environment: Environment, here: complex, robot: int
     if (goal := _row(decision.goals, robot)) is None:
         return None
     centroid = decision.cells is not None and goal == _row(decision.cells.centroid, robot)
-    point = shapely.Point(goal.real, goal.imag)
+    point, hidden = shapely.Point(goal.real, goal.imag), ""
     way = shapely.LineString([(here.real, here.imag), (goal.real, goal.imag)])
-    hidden = ""
     if not environment.boundary_polygon.intersects(point):
         hidden = "outside the map"
     elif not environment.free.intersects(point):
@@ -206,8 +202,7 @@ def _motion(case: _Case, recent: Array | None) -> str:
     speed = abs(case.velocity)
     path = np.empty((0, 2)) if recent is None else recent[np.isfinite(recent).all(axis=1)]
     walked = float(np.hypot(*np.diff(path, axis=0).T).sum())
-    starting = not case.balanced and not case.held_by and walked < _SWAY
-    rest = "starting" if starting else "rest"
+    rest = "starting" if not case.balanced and not case.held_by and walked < _SWAY else "rest"
     if len(path) < 2:
         return "moving" if speed > SLOW else rest
     if walked > 3.0 * max(_SWAY, float(np.hypot(*np.ptp(path, axis=0)))):
@@ -301,8 +296,7 @@ def _cause(case: _Case, kind: str, vector: complex) -> str:
     if kind == "repulsion_robots" and case.others and not none:
         far = 1.5 * abs(case.others[0].offset)
         nearest = [thing for thing in case.others[:2] if abs(thing.offset) <= far]
-        cause = " and ".join(thing.there for thing in nearest)
-        cause += f" ({_robots(len(case.others))} in range)"
+        cause = f"{' and '.join(thing.there for thing in nearest)} ({_robots(len(case.others))} in range)"
         away = len(nearest) == 1 and _along(vector, nearest[0].offset) < -0.9
     elif kind == "repulsion_obstacle" and case.solid:
         cause, away = case.solid.there, _along(vector, case.solid.offset) < -0.9

@@ -1,9 +1,9 @@
 """A film of the window while it is used: written beside it, and readable even if the window is killed."""
 
 import queue
-import subprocess
 import threading
 from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen
 
 import numpy as np
 import pygame
@@ -27,14 +27,12 @@ class Film:
         self.path, self._patient = path, patient
         self.frames = self.left_out = 0
         self._size = size[0] // 2 * 2, size[1] // 2 * 2
-        self._due, nothing = 0.0, subprocess.DEVNULL
+        self._due = 0.0
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             command = film_command(path, self._size, FPS, streamed=True)
             path.open("xb").close()  # a new file, and through no link
-            self._process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=nothing, stderr=nothing, start_new_session=True
-            )
+            self._process = Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=DEVNULL, start_new_session=True)
         except OSError as error:
             raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
         self._queue: queue.Queue[bytes | None] = queue.Queue(_WAITING)
@@ -62,7 +60,6 @@ class Film:
             raise OutputError(f"{self.path}: the film's encoder failed")
 
     def _fitted(self, screen: pygame.Surface) -> bytes:
-        """Return the pixels in the film's size, on black where the shape is another."""
         width, height = screen.get_size()
         if (width // 2 * 2, height // 2 * 2) == self._size:
             screen = screen.subsurface(pygame.Rect(0, 0, *self._size))

@@ -1,8 +1,6 @@
 """A branch of a session made again without a window: records, costs, pictures and a film of the whole story.
 
-A record has one map, one controller and one team. So a story with touches has a part for each: from the touch
-(its last change, where it took time) to the next. Without touches there is one part, and the folder is that
-which ``robocov run`` or ``robocov compare`` would write.
+A story without touches has one part, and the folder is that of ``robocov run`` or ``robocov compare``.
 """
 
 import json
@@ -51,16 +49,15 @@ STRIP = 30  # height of a film's strip with what was done, px at scale 1
 
 @dataclass(eq=False)
 class Part:
-    """A stretch of a story with the same map, team and controllers in all panes."""
+    """A stretch of a story from touch to touch, as a record has it: with one map, team and controller."""
 
     node: Node
     begin: int  # step
     setups: dict[int, PaneSetup]
     recorders: dict[int, Recorder]
     scenes: list[Scene]  # of its beginning, and of the story's end, one for each pane: what a legend explains
-    touched: list[list[int]] = field(
-        default_factory=list
-    )  # between which steps which robot was moved by hand
+    # between which steps which robot was moved by hand
+    touched: list[list[int]] = field(default_factory=list)
     ends: int = 0
 
 
@@ -150,9 +147,8 @@ def save_story(
     document: Document, node: Node, end: int, result: ResultFolder, options: RunOptions, stop: Interruption
 ) -> dict[str, Any]:
     root = document.path(node)[0]
-    parts, dt = parts_of(document, node, end), root.begun.dt
+    parts, dt, told, rows = parts_of(document, node, end), root.begun.dt, [], []
     several, histories = len(parts) > 1, list[History]()
-    told, rows = [], []
     for k, part in enumerate(parts, 1):
         folder = f"{k:02d}-{_file_name(part.node.words)}" if several else ""
         records = records_of_part(part, root)
@@ -171,7 +167,7 @@ def save_story(
             history = evaluated(bare, costs[-1], stop, quiet=options.json).history
             runs[name] = Run(record, history, summarise(record, history))
             save_numbers(runs[name], place, options.lattice)
-            histories.append((part.begin * dt, name, runs[name].history))
+            histories.append((part.begin * dt, name, history))
             mean = runs[name].summary["mean_distance_m"]
             rows.append({"part": k, "controller": name, "mean_distance_m": mean})
         if len(records) > 1:
@@ -182,8 +178,7 @@ def save_story(
         told.append({"folder": folder, **times, "words": part.node.words})
         result.keep()
     if several:
-        content = {"format": "robocov-story", "version": 1, "parts": told}
-        write_json(result.new / STORY, content)
+        write_json(result.new / STORY, {"format": "robocov-story", "version": 1, "parts": told})
         header = "controller," + cost_table(histories[0][2])[0]
         lines: list[tuple[object, ...]] = []
         for begin, name, history in histories:
@@ -206,13 +201,11 @@ def story_frames(
     All panes have the same layout and one legend, of whatever the story shows, also where some are left out.
     """
     theme, painters = film.colour_theme, dict[int, Painter]()
-    widest = max(parts, key=lambda part: len(part.setups))
-    root = document.path(node)[0]
+    widest, root = max(parts, key=lambda part: len(part.setups)), document.path(node)[0]
     count, dt = len(widest.setups), root.begun.dt
     layers = partial(standard_layers if count == 1 else pane_layers, film.colours)
     width, height = film.film_size()
-    strip = round(STRIP * scale_for((width, height)))
-    layout = None
+    strip, layout = round(STRIP * scale_for((width, height))), None
     if count > 1:
         scenes = [scene for part in parts for scene in part.scenes]
         layout = pane_layout(records_of_part(widest, root), film, (width, height - strip), legend_of=scenes)
@@ -239,9 +232,8 @@ def story_frames(
 
 
 def _caption(words: str, size: tuple[int, int], theme: Theme) -> Frame:
-    strip = pygame.Surface(size, 0, 32)
+    strip, text = pygame.Surface(size, 0, 32), round(0.5 * size[1])
     strip.fill(theme.panel)
-    text = round(0.5 * size[1])
     picture = label(shortened(words, text, size[0] - 2 * text, True), text, theme.ink, True)
     strip.blit(picture, picture.get_rect(midleft=(text, size[1] // 2)))
     return pixels(strip)
@@ -249,9 +241,8 @@ def _caption(words: str, size: tuple[int, int], theme: Theme) -> Frame:
 
 def _scene(pane: Pane, histories: list[History], name: str) -> Scene:
     known: list[float] = []
-    for begin, of, history in histories:
-        if of == name:
-            known += history.mean_distance[begin + history.time <= pane.time + 1e-9].tolist()
+    for begin, _, history in (each for each in histories if each[1] == name):
+        known += history.mean_distance[begin + history.time <= pane.time + 1e-9].tolist()
     cost = cost_label(mean_label(pane.setup.environment), known[-1], None) if known else ""
     return pane.scene(pane.setup, pane.simulation.snapshot, pane.trail.until(pane.time), cost=cost)
 

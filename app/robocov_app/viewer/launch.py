@@ -88,8 +88,7 @@ class Launcher:
                     window.viewer.workspace.close()
                     window.viewer.costs.close()
         finally:
-            # the window is gone; what is still being saved is waited for
-            if keeper is not None:
+            if keeper is not None:  # the window is gone; what is still being saved is waited for
                 keeper.finish()
                 for words, bad in keeper.poll():
                     if bad:
@@ -97,14 +96,12 @@ class Launcher:
 
     @property
     def _alone(self) -> bool:
-        """Whether the window needs no screen, and remembers nothing."""
         return self.headless or self.served
 
     def _opened(self, settings: Settings) -> Window:
-        layers = standard_layers()
-        self._usual = {layer.name for layer in layers if layer.default}
+        self._usual = {layer.name for layer in standard_layers() if layer.default}
         if settings.shown is not None:
-            self._usual = {layer.name for layer in layers} & set(settings.shown)
+            self._usual = {layer.name for layer in standard_layers()} & set(settings.shown)
         shown = (self._usual | self.also) - self.without
         scale = self.scale or settings.scale or (1.0 if self._alone else screen_scale())
         size = self.size or (settings.width, settings.height)
@@ -116,9 +113,8 @@ class Launcher:
             self.session.clock.budget = FRAME_BUDGET
         costs = Costs(self.lattice, direct=self.headless)
         try:
-            kept_in = None if self._alone else autosave_folder()
-            known = self.session, costs, shown, self.folder, self.map_name, self.laws
-            viewer = Presenter(*known, kept_in, self.file)
+            kept_in, known = None if self._alone else autosave_folder(), (self.map_name, self.laws)
+            viewer = Presenter(self.session, costs, shown, self.folder, *known, kept_in, self.file)
             viewer.theme = self.theme or settings.theme
             viewer.fade, viewer.suggests, viewer.recent = settings.fade, settings.suggests, [*settings.recent]
             window = Window(viewer, size, scale, patient=self.headless)
@@ -133,7 +129,6 @@ class Launcher:
         return window
 
     def _settings_of(self, window: Window, before: Settings) -> Settings:
-        """Return how a window looks, but for layers that options showed or hid."""
         viewer, (width, height) = window.viewer, window.windowed or window.screen.get_size()
         look = {name: getattr(viewer, name) for name in ("theme", "fade", "suggests")}
         shown = viewer.shown - (self.also - self._usual) | (self.without & self._usual)

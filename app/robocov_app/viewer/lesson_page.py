@@ -18,11 +18,9 @@ Spot = tuple[pygame.Rect, Callable[[], object]]
 def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, tour: LessonPlayer) -> None:
     scale, title = layout.scale, f"{tour.number + 1}  {tour.chapter.title}"
     left, top, width, height = layout.arena
-    size, bold = round(14 * scale), round(15.5 * scale)
-    wide = min(width - 40 * scale, 800 * scale)
+    size, bold, wide = round(14 * scale), round(15.5 * scale), min(width - 40 * scale, 800 * scale)
     lines = wrapped(" ".join([tour.chapter.text, *tour.asks]), size, wide - 44 * scale)
-    high = (44 + 20 * len(lines)) * scale
-    box = pygame.Rect(0, 0, round(wide), round(high))
+    box = pygame.Rect(0, 0, round(wide), round((44 + 20 * len(lines)) * scale))
     box.midbottom = round(left + width / 2), round(top + height - 44 * scale)
     card(screen, box, theme, scale)
     x, thick = box.left + round(22 * scale), max(2, round(2 * scale))
@@ -37,10 +35,9 @@ def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Les
 
 def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: LessonPlayer) -> list[Spot]:
     """Show a lesson in place of the panel; return where a click answers, or goes to a chapter."""
-    scale = layout.scale
-    spots: list[Spot] = []
+    scale, spots = layout.scale, list[Spot]()
     left, top, width, height = layout.panel
-    screen.fill(theme.panel, pygame.Rect(layout.panel))
+    screen.fill(theme.panel, layout.panel)
     canvas = flat_canvas(screen, theme, scale)
     x, y, wide = left + 20 * scale, top + 18 * scale, width - 40 * scale
     screen.blit(label("LESSON", round(11 * scale), theme.faint, True), (round(x), round(y)))
@@ -69,8 +66,7 @@ def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Lesson
     row = min(23 * scale, max((bottom - y) / len(chapters), 15 * scale))
     y = max(y, bottom - row * len(chapters))
     for k, chapter in enumerate(chapters):
-        now = k == tour.number
-        colour = theme.ink if now else theme.faint
+        now, colour = k == tour.number, theme.ink if k == tour.number else theme.faint
         fill = theme.final if k <= tour.number else mix(theme.panel, theme.ink, 0.25)
         canvas.stamp(partial(sprites.dot, 3.5 * scale, fill), (x + 4 * scale, y + 8 * scale))
         words = shortened(chapter.title, small, wide - 18 * scale, now)

@@ -1,44 +1,25 @@
-"""Lessons: session files with chapters that wait for the simulation, ask, hand over, and go on.
+"""Lessons: session files with chapters that wait for the simulation, ask, hand over, and go on."""
 
-A chapter does again what was done on the way to a touch of the session. It may ask for a prediction before,
-and hand a task over afterwards. It ends by conditions of the simulation, however slow the machine is.
-"""
-
-import json
 from collections.abc import Callable
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 
 from robocov.errors import MapError, Mistake
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.file import (
-    ChapterModel,
-    ConditionModel,
-    SavedSession,
-    load_session,
-    session_of,
-)
+from robocov_app.viewer.session.file import ChapterModel, ConditionModel, SavedSession, load_session
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.workspace import Workspace
 
-FIRST = "lesson-1.robocov"  # the lesson that comes with robocov
+FIRST = Path(__file__).with_name("assets") / "lesson-1.robocov"  # the lesson that comes with robocov
 READING = 4.0  # seconds on the wall after a chapter's end, and for an answer where nobody answers
 LONGEST_TASK = 600.0  # seconds of simulation after which `check` gives a task up
-
-# layers that every chapter shows
-PLAIN = {
+PLAIN = {  # layers that every chapter shows
     *("cells", "grid", "obstacles", "boundary", "trajectories", "starts", "robots", "failed"),
     *("selection", "colour_bar", "legend", "scale_bar", "status", "caption"),
 }
 
 
-def first_lesson() -> SavedSession:
-    text = files("robocov_app.viewer").joinpath("assets", FIRST).read_text(encoding="utf-8")
-    return session_of(json.loads(text), FIRST)
-
-
-def load_lesson(path: Path) -> SavedSession:
+def load_lesson(path: Path = FIRST) -> SavedSession:
     """Return the lesson in a session file; MapError as `load_session`, or where there is none in it."""
     saved = load_session(path)
     if saved.lesson is None:
@@ -71,19 +52,15 @@ class LessonPlayer:
         self, viewer: Presenter, fit: Callable[[], None], saved: SavedSession, *, alone: bool = False
     ) -> None:
         assert saved.lesson is not None
-        self.lesson = saved.lesson
-        self._viewer, self._fit = viewer, fit
+        self.lesson, self._viewer, self._fit = saved.lesson, viewer, fit
         self.alone = alone  # nobody is there to answer or to do tasks, as in a film
         self._before = viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active
-        self._asked_before = viewer.hand.selected
-        self.session = _begun(saved)
+        self._asked_before, self.session = viewer.hand.selected, _begun(saved)
         self.session.clock.budget = viewer.session.clock.budget
         self._workspace = Workspace(self.session, None)
-        self.number, self.done = 0, False
         self.state = "plays"  # or asks, task, ended, left
         self.answer: int | None = None  # from 1
-        self._waited = 0.0
-        self.held = False
+        self.done = self.held = False
         self._begin(0)
 
     @property
@@ -100,7 +77,7 @@ class LessonPlayer:
             right = question.answers[question.right - 1]
             lines = [f"{'Right' if self.answer == question.right else 'Not quite'}: {right}", question.why]
         if chapter.task is not None and self.state in ("task", "ended"):
-            lines += ["Now you: " + chapter.task.text if self.state == "task" else chapter.task.done]
+            lines.append("Now you: " + chapter.task.text if self.state == "task" else chapter.task.done)
         return [line for line in lines if line]
 
     @property
@@ -125,11 +102,9 @@ class LessonPlayer:
             assert chapter.question is not None
             self.reply(chapter.question.right)
         elif self.state == "plays" and holds(chapter.until, session):
-            if chapter.task is not None and not self.alone:
-                self._turn("task")
-            else:
-                self._turn("ended")
-                session.playing = False
+            tries = chapter.task is not None and not self.alone
+            self._turn("task" if tries else "ended")
+            session.playing = session.playing and tries
         elif self.state == "task" and chapter.task is not None and holds(chapter.task.until, session):
             self._turn("ended")
         elif self.state == "ended" and self._waited >= self._reading and not self.held:
@@ -137,7 +112,6 @@ class LessonPlayer:
 
     @property
     def _reading(self) -> float:
-        """Seconds until the next chapter: longer where somebody has an answer to read."""
         return READING + (0.0 if self.alone else 0.25 * len(" ".join(self.asks).split()))
 
     def reply(self, answer: int) -> None:
@@ -158,19 +132,12 @@ class LessonPlayer:
         if task or self.state != "task":
             self._turn("left")
 
-    def leave_or_come_back(self) -> None:
-        if self.state == "left":
-            self._begin(self.number)
-        else:
-            self.leave(task=True)
-
     def end(self) -> None:
         viewer = self._viewer
         self._workspace.close()
         viewer.workspace, map_name, viewer.shown, viewer.tool, viewer.active = self._before
         viewer.show_session(viewer.workspace.session)
-        viewer.map_name = map_name
-        viewer.hand.selected = self._asked_before
+        viewer.map_name, viewer.hand.selected = map_name, self._asked_before
         viewer.say("the lesson has ended; what was before it is there again")
         self._fit()
         self.done = True
@@ -189,20 +156,16 @@ class LessonPlayer:
         chapter, viewer, session = self.chapter, self._viewer, self.session
         _set_out(session, chapter)
         session.playing, session.stop_when_settled = chapter.question is None, False
-        session.clock.speed = chapter.speed
-        viewer.workspace = self._workspace
+        session.clock.speed, viewer.workspace = chapter.speed, self._workspace
         viewer.show_session(session)
         viewer.map_name = session.environment.name
-        viewer.tool, viewer.active = viewer.hand, 0
-        viewer.hand.selected = chapter.robot
-        viewer.shown = PLAIN | set(chapter.show)
-        viewer.message = ""
+        viewer.tool, viewer.active, viewer.hand.selected = viewer.hand, 0, chapter.robot
+        viewer.shown, viewer.message = PLAIN | set(chapter.show), ""
         self._fit()
         self._turn("asks" if chapter.question is not None else "plays")
 
 
 def _set_out(session: Session, chapter: ChapterModel) -> None:
-    """Go to the beginning of a chapter's branch; what was done on its way will be done again."""
     target = session.document.nodes[chapter.touch]
     session.enter(session.document.path(target)[0], 0)
     session.remake()
@@ -216,8 +179,7 @@ def _begun(saved: SavedSession) -> Session:
 def checked(saved: SavedSession) -> list[tuple[str, float, bool]]:
     """Play a lesson without a window: title, simulated seconds, and whether it ended, of each chapter."""
     assert saved.lesson is not None
-    session = _begun(saved)
-    found = []
+    session, found = _begun(saved), []
     for chapter in saved.lesson.chapters:
         _set_out(session, chapter)
         while not (ended := holds(chapter.until, session)) and session.end < LONGEST_TASK:

@@ -21,17 +21,15 @@ from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
 from robocov_app.viewer.session.scenario import MOST_PANES
 
 TABS = ("parameters", "show", "robot", "keep")
-
 # layers without a check box: a picture without them is no use; they have keys all the same
 NOT_OFFERED = frozenset({"obstacles", "boundary", "robots", "failed", "selection", "caption"})
 _KEPT = (
-    (("Screenshot", "screenshot"), ("Record film", "film")),
-    (("Save session", "save:session"), ("Recover…", "recover")),
-    (("Save run", "save:run"), ("Save map", "save:map")),
-    (("◀ Branch", "branch:previous"), ("Branch ▶", "branch:next")),
-    (("Undo", "undo"), ("Redo", "redo")),
-    (("Keys", "help"), ("Commands…", "palette")),
-    (("Lesson", "tour"), ("Full screen", "fullscreen")),
+    *(("Screenshot", "screenshot"), ("Record film", "film")),
+    *(("Save session", "save:session"), ("Recover…", "recover")),
+    *(("Save run", "save:run"), ("Save map", "save:map")),
+    *(("◀ Branch", "branch:previous"), ("Branch ▶", "branch:next")),
+    *(("Undo", "undo"), ("Redo", "redo"), ("Keys", "help"), ("Commands…", "palette")),
+    *(("Lesson", "tour"), ("Full screen", "fullscreen")),
 )
 _ASKED_AGAIN = 0.25  # seconds between two looks at what there is while the simulation goes on
 _NOBODY = "Click a robot, or press Tab: it tells why it moves, and why it does not."
@@ -45,8 +43,8 @@ class Panel(SidePanel):
     ) -> None:
         self.viewer, self.titles, self._commands, self._do = viewer, titles, commands, do
         self.report: Report | None = None
-        super().__init__(TABS[0])
         self._age = 0.0
+        super().__init__(TABS[0])
 
     def show_tab(self, name: str) -> None:
         if name in TABS:
@@ -84,8 +82,7 @@ class Panel(SidePanel):
         names = {name: file for file, name in files.items()}
         ui.header("ENVIRONMENT")
         ui.row(172, 0, height=28, below=5)
-        now = files.get(viewer.map_name, viewer.map_name)
-        if (name := ui.dropdown("map", list(names), now)) is not None:
+        if (name := ui.dropdown("map", list(names), files.get(viewer.map_name, viewer.map_name))) is not None:
             viewer.attempt(partial(viewer.open_map, names[name]))
         if (start := ui.dropdown("start", viewer.starts(), session.scenario.start_name)) is not None:
             viewer.attempt(lambda: viewer.restart(start=start))
@@ -105,8 +102,7 @@ class Panel(SidePanel):
         viewer, session = self.viewer, self.viewer.session
         laws = [session.setup(pane).law for pane in session.panes]
         labels = law_labels(viewer.laws, {law.name: law.label for law in laws})
-        names = {label: name for name, label in labels.items()}
-        count = len(laws)
+        names, count = {label: name for name, label in labels.items()}, len(laws)
         ui.header("CONTROLLER" if count == 1 else "CONTROLLERS, SIDE BY SIDE")
         # of two there are three in a row, for which the third is small
         widths = {1: (0, 0), 2: (0, 24, 3, 0, 24, 3, 28)}.get(count, (0, 24, 3, 0, 24))
@@ -147,8 +143,7 @@ class Panel(SidePanel):
         ui.space(6)
 
     def _parameters(self, ui: Ui) -> None:
-        found = self.viewer.parameters()
-        law = self.viewer.session.setup(self.viewer.pane).law
+        found, law = self.viewer.parameters(), self.viewer.session.setup(self.viewer.pane).law
         team = [each for each in found if each.name.startswith("team.")]
         gains = [each for each in found if each not in team]
         groups = {f"GAINS OF {law.label.upper()}": gains, "ROBOTS": team}
@@ -198,8 +193,7 @@ class Panel(SidePanel):
             self._set(each.name, each.default)
 
     def _show(self, ui: Ui) -> None:
-        viewer = self.viewer
-        names = [name for name in self.titles if name not in NOT_OFFERED]
+        viewer, names = self.viewer, [name for name in self.titles if name not in NOT_OFFERED]
         rows = -(-len(names) // 2)
         with ui.scroll("show"):
             ui.row(0, 0, height=21, below=3)
@@ -233,7 +227,7 @@ class Panel(SidePanel):
 
     def _keep(self, ui: Ui) -> None:
         ui.row(0, 0, height=28, below=5)
-        for text, action in (each for row in _KEPT for each in row):
+        for text, action in _KEPT:
             filming = action == "film" and self.viewer.filming
             self._does(ui, "End film" if filming else text, action, chosen=filming)
 

@@ -42,26 +42,24 @@ class Parameter:
         """Return where the slider stands, 0 to 1: logarithmic, so that halves and doubles are as far."""
         if self.value is None or math.isinf(self.value):
             return 1.0
-        if self.high <= self.low or self.value <= 0.0 < self.low:
-            part = 0.0
-        elif self.low <= 0.0:
+        part = 0.0
+        if self.low <= 0.0 and self.high > self.low:
             part = (self.value - self.low) / (self.high - self.low)
-        else:
+        elif self.value > 0.0 and self.high > self.low:
             part = math.log(self.value / self.low) / math.log(self.high / self.low)
         return min(max(part, 0.0), _END if self.optional else 1.0)
 
     def at(self, place: float) -> float | None:
         if self.optional and place > _END:
             return None
-        linear, low = self.low <= 0.0, self.low
-        value = low + place * (self.high - low) if linear else low * (self.high / low) ** place
+        low, high = self.low, self.high
+        value = low + place * (high - low) if low <= 0.0 else low * (high / low) ** place
         return min(max(float(f"{value:.3g}"), self.low), self.high)
 
     def words(self) -> str:
         return "none" if self.value is None or math.isinf(self.value) else f"{self.value:.4g}"
 
     def read(self, text: str) -> float | None:
-        """Return the value that was typed; ParameterError where it is no number."""
         plain = text.strip().lower().replace(",", ".")
         if self.optional and plain in ("none", "null", "no limit", "inf", "∞", ""):
             return None
@@ -87,18 +85,16 @@ class Pick:
         return self.value
 
     def read(self, text: str) -> str:
-        """Return the word that was typed, or begun; ParameterError where it is none of them."""
         plain = text.strip().lower()
         begun = [word for word in self.offered if plain and word.lower().startswith(plain)]
-        exact = [word for word in begun if word.lower() == plain]
-        if len(exact or begun) != 1:
+        found = [word for word in begun if word.lower() == plain] or begun
+        if len(found) != 1:
             wanted = f"one of {', '.join(self.offered)} was wanted"
             raise ParameterError(f"{self.label}: {shown(text)}, but {wanted}")
-        return (exact or begun)[0]
+        return found[0]
 
 
 def gain_parameters(law: ControllerChoice) -> Iterator[Parameter | Pick]:
-    """Yield a slider for each gain of a controller that is a number, and the words of each other."""
     for name, gain in law.known.items():
         value = law.value(name)
         if isinstance(gain, Option):
@@ -115,7 +111,6 @@ def gain_parameters(law: ControllerChoice) -> Iterator[Parameter | Pick]:
 
 
 def limit_parameters(limits: TeamSpec) -> Iterator[Parameter | Pick]:
-    """Yield a slider for each limit of the team, and its kinematics; what is set, is set for all robots."""
     usual, kind = TeamSpec(), KINEMATICS[limits.track_width > 0.0]
     for name, (label, meaning, ends) in _LIMITS.items():
         if name in limits.different:

@@ -43,8 +43,7 @@ class Presenter:
     ) -> None:
         self.session, self.costs, self.shown, self.folder = session, costs, shown, folder
         self._map_names, self._kept_in = {session.environment.name: map_name}, kept_in
-        self.laws = list(dict.fromkeys([*CONTROLLERS, *laws]))
-        self.tools = toolbox()
+        self.laws, self.tools = list(dict.fromkeys([*CONTROLLERS, *laws])), toolbox()
         self.hand = cast(Hand, self.tools["hand"])
         self.tool: Tool = self.hand
         self.active = 0  # the pane that gains and controllers are chosen for
@@ -113,7 +112,6 @@ class Presenter:
         self.look_at_map()
 
     def look_at_map(self) -> None:
-        """Let the cost know when there is another map."""
         environment = self.session.environment
         # while it is painted the cost would never be ready
         if environment is not self._mapped and not self.tool.painting:
@@ -126,8 +124,7 @@ class Presenter:
         self.say(f"{self.tool.title}: {self.tool.hint}")
 
     def pause(self) -> None:
-        self.session.playing = not self.session.playing
-        self.session.stop_when_settled = False
+        self.session.playing, self.session.stop_when_settled = not self.session.playing, False
 
     def settle(self) -> None:
         session = self.session
@@ -140,8 +137,7 @@ class Presenter:
         self.session.restart(**changes)
 
     def change_speed(self, by: int) -> None:
-        k = speed_index(self.session.clock.speed) + by
-        self.set_speed(SPEEDS[min(max(k, 0), len(SPEEDS) - 1)])
+        self.set_speed(SPEEDS[min(max(speed_index(self.session.clock.speed) + by, 0), len(SPEEDS) - 1)])
 
     def set_speed(self, speed: float) -> None:
         self.session.clock.speed = speed
@@ -181,11 +177,10 @@ class Presenter:
         self.session.look_at(time)
 
     def branch(self) -> None:
+        words = "this is the present: go back first (←, or drag the time line)"
         if self.session.branch():
-            self.session.playing = True
-            self.say("goes on from here; what came after stays as a ghost curve")
-        else:
-            self.say("this is the present: go back first (←, or drag the time line)")
+            self.session.playing, words = True, "goes on from here; what came after stays as a ghost curve"
+        self.say(words)
 
     def next_law(self) -> None:
         name = _after(self.laws, self.session.setup(self.pane).law.name)
@@ -197,13 +192,15 @@ class Presenter:
         self.active = len(self.session.panes) - 1
         self.say("all begin anew, from the same starts")
 
+    def remove_pane(self) -> None:
+        self.session.remove_pane(self.pane)
+
     def next_pane(self) -> None:
         self.active = (self.active + 1) % len(self.session.panes)
 
     def undo(self) -> None:
         other = "; Alt ← leads to other branches" if self.session.document.nodes[1:] else ""
-        nothing = f"nothing to undo{other}"
-        words = self.session.undo()
+        nothing, words = f"nothing to undo{other}", self.session.undo()
         self.say(f"undone: {words}; back at {self.session.time:.1f} s" if words else nothing)
 
     def redo(self) -> None:
@@ -293,24 +290,21 @@ class Presenter:
 
     def _take(self, workspace: Workspace, view: Mapping[str, Any]) -> None:
         self.workspace.close()
-        self.workspace = workspace
+        self.workspace, self.hand.selected = workspace, None
         self.show_session(workspace.session)
         self.map_name = str(view.get("map") or self.session.environment.name)
         if isinstance(shown := view.get("shown"), list):
             self.shown = set(map(str, shown))
-        self.hand.selected = None
 
     def show_session(self, session: Session) -> None:
         session.clock.budget = self.session.clock.budget
-        session.serial = max(session.serial, self.session.serial) + 1
-        self.session = session
+        session.serial, self.session = max(session.serial, self.session.serial) + 1, session
         self.version += 1
         self.look_at_map()
 
     def enter_branch(self, by: int) -> None:
-        session = self.session
-        ends = [each.node for each in session.document.branches()]
-        now = ends.index(session.head) if session.head in ends else -1
+        ends, head = [each.node for each in self.session.document.branches()], self.session.head
+        now = ends.index(head) if head in ends else -1
         self.enter(ends[(now + by) % len(ends)].number)
 
     def enter(self, node: int) -> None:

@@ -18,8 +18,7 @@ _OFFERED = (  # kinds of touches of the document, and the words for each
 
 def facts(viewer: Presenter, frames: float, steps: float, filmed: float | None) -> list[str]:
     """Return what the line says, the most important first; `frames` and `steps` a second, `filmed` s."""
-    session = viewer.session
-    known = viewer.costs.known.get(viewer.pane.number)
+    session, known = viewer.session, viewer.costs.known.get(viewer.pane.number)
     said = [f"{'' if session.playing else 'paused · '}t = {session.time:.2f} s"]
     if known is not None:
         when = f" (at {known.time:.1f} s)" if abs(known.time - session.time) > 0.05 else ""
@@ -50,8 +49,7 @@ def cursor_words(viewer: Presenter) -> str:
     site = int(square.argmin())
     if square[site] > (1.5 * known.lattice().spacing) ** 2:
         return f"{words}: not free"
-    owner = int(result.owner[site])
-    numbers = viewer.session.setup(pane).numbers
+    owner, numbers = int(result.owner[site]), viewer.session.setup(pane).numbers
     if not 0 <= owner < len(numbers):
         return f"{words}: no robot can come"
     distance = float(result.distances[site])
@@ -64,7 +62,6 @@ def suggestion(viewer: Presenter) -> str:
     rested = session.settled or viewer.rested is session.head
     if not (viewer.suggests and rested and session.live) or session.hand is not None:
         return ""
-    tried = {node.kind for node in session.document.nodes}
-    tried |= {"pane"} if len(session.panes) > 1 else set()
+    tried = {node.kind for node in session.document.nodes} | ({"pane"} if session.panes[1:] else set())
     new = [words for kind, words in _OFFERED if kind not in tried][:3]
     return f"The team has settled. Try:\n{' · '.join(new)}" if new else ""

@@ -70,8 +70,7 @@ def edited(session: Session, environment: Environment, words: str) -> str:
     """Put a new map in place; return what to tell. StartError when there is no room for a robot any more."""
     before, radius = session.environment, session.setup(session.panes[0]).team.radius
     gone = set(before.starts) - set(environment.starts)
-    pushed = session.edit(environment, words)
-    if pushed:
+    if pushed := session.edit(environment, words):
         words += f"; {pushed} robot{'s' if pushed > 1 else ''} pushed out of the way"
     if gone:
         words += f"; it covers the start{'s' if len(gone) > 1 else ''} {', '.join(sorted(gone))}"
@@ -107,8 +106,7 @@ class Hand(Tool):
 
     def move(self, session: Session, point: Point) -> None:
         self._at = point
-        # a click is no pull
-        self._drags = self._drags or dist(self._from, point) > 0.02
+        self._drags = self._drags or dist(self._from, point) > 0.02  # a click is no pull
         # meanwhile it may have been taken out
         if self.robot is not None and self._drags and self.robot in session.setup(session.panes[0]).there:
             session.grab(self.robot, point)
@@ -126,13 +124,12 @@ class Hand(Tool):
         return edited(session, map_edits.with_replaced(session.environment, k, 1, [moved]), words)
 
     def cancel(self, session: Session) -> bool:
-        something = self.holds or self.selected is not None
-        if self.holds:
-            self.robot = self.obstacle = None
-            session.release()
-        else:
-            self.selected = None
-        return something
+        if not self.holds:
+            asked, self.selected = self.selected, None
+            return asked is not None
+        self.robot = self.obstacle = None
+        session.release()
+        return True
 
     def preview(self, session: Session) -> Preview | None:
         if (dragged := self._dragged(session)) is None:
@@ -140,7 +137,6 @@ class Hand(Tool):
         return Preview((self._from, self._at), False, dragged[1], f"{dist(self._from, self._at):.2f} m")
 
     def _dragged(self, session: Session) -> tuple[int, Obstacle] | None:
-        """Return the obstacle that is dragged somewhere: its number, and how it would be there."""
         there, k, (dx, dy) = session.environment.obstacles, self.obstacle, np.subtract(self._at, self._from)
         # meanwhile there may be another map
         if k is None or there[k : k + 1] != self._taken[k : k + 1] or np.hypot(dx, dy) < 1e-3:
@@ -159,8 +155,7 @@ class Polygon(Tool):
     _same: ClassVar[float] = 0.0  # part of a finger's width from the last point within which a press ends it
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        self._reach = reach
-        same = max(SAME, self._same * reach)
+        self._reach, same = reach, max(SAME, self._same * reach)
         ended = self.outline.press(self._snapped(session, point), point, reach, same)
         return self.finish(session) if ended else None
 
@@ -229,8 +224,7 @@ class Ruler(Tool):
     _pressed: bool = False
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        self._from = self._at = point
-        self._pressed = True
+        self._from, self._at, self._pressed = point, point, True
         return None
 
     def move(self, session: Session, point: Point) -> None:
@@ -304,10 +298,9 @@ class Brush(Tool):
         return f"the brush has a radius of {self.radius:g} m"
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        self.painting, self._at, self._shown = True, point, -1e9
+        self.painting, self._at, self._dabs = True, point, [point]
         self._boundary = session.environment.boundary
         self._stroke += 1
-        self._dabs = [point]
         self._show(session)
         return None
 
@@ -321,8 +314,7 @@ class Brush(Tool):
         spacing, begin = _SPACING * self.size(session), self._at
         away = dist(begin, point)
         for k in range(1, int(away / spacing) + 1):
-            part = k * spacing / away
-            x, y = (round(a + part * (b - a), 4) for a, b in zip(begin, point, strict=True))
+            x, y = (round(a + k * spacing / away * (b - a), 4) for a, b in zip(begin, point, strict=True))
             self._at = x, y
             self._dabs.append(self._at)
         if self._dabs and self.clock() - self._shown >= _PAUSE:
@@ -349,8 +341,7 @@ class Brush(Tool):
             return None
         turn, radius = np.linspace(0.0, 2.0 * np.pi, _RING + 1), self.size(session)
         x, y = self._at[0] + radius * np.cos(turn), self._at[1] + radius * np.sin(turn)
-        outline = tuple(zip(x.tolist(), y.tolist(), strict=True))
-        density = session.environment.density
+        outline, density = tuple(zip(x.tolist(), y.tolist(), strict=True)), session.environment.density
         value = 1.0 if density is None else float(density.value(np.array([self._at]))[0])
         return Preview(outline, False, None, f"φ {value:.2g}", marks=False)
 
@@ -393,12 +384,9 @@ def _fail(session: Session, point: Point, reach: float, number: int | None) -> s
 
 
 def toolbox() -> dict[str, Tool]:
-    fails = "click a robot to let it fail; click it again to revive it"
-    tools: list[Tool] = [
-        *(Hand(), Polygon(), Wall(), Circle(), Brush()),
-        Click("eraser", "Delete", "click an obstacle or a robot to delete it", does=_erase),
-        Click("robot", "Join", "click where a robot is to join", does=_add),
-        Click("failure", "Failure", fails, does=_fail),
-        Ruler(),
-    ]
+    erase = Click("eraser", "Delete", "click an obstacle or a robot to delete it", does=_erase)
+    join = Click("robot", "Join", "click where a robot is to join", does=_add)
+    hint = "click a robot to let it fail; click it again to revive it"
+    fail = Click("failure", "Failure", hint, does=_fail)
+    tools = Hand(), Polygon(), Wall(), Circle(), Brush(), erase, join, fail, Ruler()
     return {tool.name: tool for tool in tools}

@@ -1,6 +1,6 @@
 """The window: events in, frames out. What happens between is the presenter's and the session's."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from math import dist
 from pathlib import Path
@@ -27,7 +27,7 @@ from robocov_app.viewer.explain import report_on
 from robocov_app.viewer.film import FPS as FILM_FPS
 from robocov_app.viewer.film import Film
 from robocov_app.viewer.lesson_page import draw_caption, draw_tour
-from robocov_app.viewer.lessons import LessonPlayer, first_lesson, load_lesson
+from robocov_app.viewer.lessons import FIRST, LessonPlayer, load_lesson
 from robocov_app.viewer.panel import TABS, Panel
 from robocov_app.viewer.presenter import Presenter, plain
 from robocov_app.viewer.session.file import SUFFIX
@@ -52,15 +52,12 @@ class Pointer:
     def __init__(self, window: "Window") -> None:
         self._viewer, self._canvas, self._chart = window.viewer, window.canvas, window.chart
         self._panel, self._interrupt = window.panel, window.leave_lesson
-        self.at = (0, 0)
-        self._drag = ""
-        self._held = self._button = 0
-        self._pressed_at = (0, 0)
+        self.at = self._pressed_at = (0, 0)
+        self._drag, self._held, self._button = "", 0, 0
         self._last_click = -1.0, (0, 0)
 
     def take(self, event: pygame.event.Event, now: float) -> None:
-        if event.type != pygame.MOUSEWHEEL:
-            self.at = event.pos
+        self.at = self.at if event.type == pygame.MOUSEWHEEL else event.pos
         taken = not self._drag and self._panel.take(event)
         if event.type == pygame.MOUSEMOTION:
             self._moved(event)
@@ -81,12 +78,10 @@ class Pointer:
     def show(self) -> None:
         """Let the cursor, and a ring around the robot under it, tell what a press would do."""
         viewer, canvas, layout = self._viewer, self._canvas, self._canvas.layout
-        pane = canvas.pane_at(self.at) if viewer.cursor is not None else None
+        pane, number = canvas.pane_at(self.at) if viewer.cursor is not None else None, None
         if pane is not None:  # the cameras may have moved below it
             viewer.cursor, viewer.cursor_pane = canvas.to_world(self.at, pane), pane
-        number = None
-        if pane is not None and viewer.tool.name in _TAKES_ROBOTS:
-            number = canvas.robot_at(self.at, pane)
+            number = canvas.robot_at(self.at, pane) if viewer.tool.name in _TAKES_ROBOTS else None
         canvas.hovered = (-1, -1) if pane is None or number is None else (pane, number)
         shape = pygame.SYSTEM_CURSOR_ARROW
         if number is not None:
@@ -94,13 +89,8 @@ class Pointer:
         elif pane is not None and viewer.tool is not viewer.hand:
             shape = pygame.SYSTEM_CURSOR_CROSSHAIR
         elif inside(layout.track, self.at) or inside(layout.chart, self.at):
-            offered = self._chart.offers(self.at)
-            shape = pygame.SYSTEM_CURSOR_HAND if offered else pygame.SYSTEM_CURSOR_SIZEWE
+            shape = pygame.SYSTEM_CURSOR_HAND if self._chart.offers(self.at) else pygame.SYSTEM_CURSOR_SIZEWE
         show_cursor(shape)
-
-    def leave(self) -> None:
-        self._viewer.cursor = None
-        self._chart.hover = None
 
     def _pressed(self, event: pygame.event.Event, now: float) -> None:
         viewer, layout = self._viewer, self._canvas.layout
@@ -166,11 +156,10 @@ class Pointer:
             viewer.tool.move(viewer.session, viewer.cursor)
 
     def _released(self, event: pygame.event.Event) -> None:
-        viewer, drag = self._viewer, self._drag
         if event.button != self._button:  # another one than the one that is held
             return
+        viewer, drag, clicked = self._viewer, self._drag, dist(event.pos, self._pressed_at) < SLIP
         self._drag = ""
-        clicked = dist(event.pos, self._pressed_at) < SLIP
         if drag == "tool":
             viewer.attempt(lambda: viewer.tool.release(viewer.session, self._place(event.pos)))
         elif drag == "pan" and clicked and event.button == 3:
@@ -199,21 +188,18 @@ class Window(BaseWindow):
         screen: pygame.Surface | None = None,  # of a window that is there already
     ) -> None:
         super().__init__(size, screen)
-        self.viewer, self.scale = viewer, scale
-        self.help = False
+        self.viewer, self.scale, self.help = viewer, scale, False
         self.tour: LessonPlayer | None = None
         self.film: Film | None = None
         self.keeper = RunSaver(viewer.costs.lattice)
         self.titles = {layer.name: layer.title for layer in standard_layers()}
         pygame.display.set_caption("robocov")
         self.canvas = ViewerCanvas(viewer, theme_named(viewer.theme))
-        self.chart = Chart(viewer)
-        self.dialogs = Dialogs()
+        self.chart, self.dialogs = Chart(viewer), Dialogs()
         listed = [*viewer_commands(viewer, self.titles), *self._own_commands()]
         self.commands = Commands(listed, viewer.attempt, lambda: parameter_commands(viewer))
         self.panel = Panel(viewer, self.titles, self.commands, self.do)
-        self.pointer = Pointer(self)
-        self._patient = patient
+        self.pointer, self._patient = Pointer(self), patient
         self._arranged: tuple[object, ...] | None = None
         self._reported: tuple[object, float] = None, 0.0
         self._now = self._unfilmed = self._steps_rate = 0.0
@@ -263,8 +249,7 @@ class Window(BaseWindow):
             viewer.say(words, trouble=trouble)
         if self.tour is not None:
             self.tour.advance(seconds)
-            if self.tour.done:
-                self.tour = None
+            self.tour = None if self.tour.done else self.tour
         playing = session.playing
         try:
             slices = max(round(seconds * FPS), 1) if self.resting else 1  # a long pause is many frames
@@ -320,20 +305,18 @@ class Window(BaseWindow):
             costs.ask(pane.number, time, state.positions, speeds=state.setup.speeds, aside=True)
 
     def _arrange(self) -> None:
-        viewer, session = self.viewer, self.viewer.session
-        size = self.screen.get_size()
+        viewer, session, size = self.viewer, self.viewer.session, self.screen.get_size()
         panes = len(session.panes)
-        rows = self.canvas.shared_rows() if panes > 1 and self._arranged else 1
+        rows = max(self.canvas.shared_rows(), 1) if panes > 1 and self._arranged else 1
         low_x, low_y, high_x, high_y = session.environment.region.bounds
         aspect = (high_x - low_x) / (high_y - low_y)
-        outer = (size, self.scale, viewer.panel, viewer.theme)
-        key = (outer, panes, round(aspect, 3), max(rows, 1))
+        outer = size, self.scale, viewer.panel, viewer.theme
+        key = outer, panes, round(aspect, 3), rows
         if key == self._arranged:
             return
         before, self._arranged = self._arranged, key
-        theme = theme_named(viewer.theme)
-        layout = laid_out(size, self.scale, panes, aspect, panel=viewer.panel, legend_rows=max(rows, 1))
-        self.layout, self.theme = layout, theme
+        self.theme = theme = theme_named(viewer.theme)
+        self.layout = layout = laid_out(size, self.scale, panes, aspect, panel=viewer.panel, legend_rows=rows)
         self.canvas.arrange(layout, theme)
         self.chart.arrange(layout, theme)
         if before is None or outer != before[0]:
@@ -455,23 +438,18 @@ class Window(BaseWindow):
         self.dialogs.ask(palette(self.commands, ghost, told))
 
     def _open_file(self) -> None:
-        recent = [path for name in self.viewer.recent if (path := Path(name)).exists()]
-        endings = (SUFFIX, ".json")
-        title = "Open a session or a map"
-        self.dialogs.ask(
-            file_choice(title, self.viewer.folder, self.viewer.open_file, endings=endings, recent=recent)
-        )
+        viewer, title, endings = self.viewer, "Open a session or a map", (SUFFIX, ".json")
+        recent = [path for name in viewer.recent if (path := Path(name)).exists()]
+        self.dialogs.ask(file_choice(title, viewer.folder, viewer.open_file, endings=endings, recent=recent))
 
     def _list_branches(self) -> None:
         viewer, session = self.viewer, self.viewer.session
         session.stow()  # the curve of the present with those of the others
 
-        def lines() -> list[Option]:
-            found = []
+        def lines() -> Iterator[Option]:
             for k, each in enumerate(session.document.branches(), 1):
                 text = f"{k}  {each.words}" + ("  (here)" if each.node is session.head else "")
-                found.append(Option(text, each.told(session.scenario.dt), value=each.node.number))
-            return found
+                yield Option(text, each.told(session.scenario.dt), value=each.node.number)
 
         self.dialogs.ask(list_choice("Branches", lines, lambda option: viewer.enter(int(str(option.value)))))
 
@@ -479,18 +457,16 @@ class Window(BaseWindow):
         session = self.viewer.session
         playing, session.playing = session.playing, False
 
-        def go_on() -> None:
+        def go_on(*, lesson: bool = False) -> None:
             session.playing = playing
-
-        def begin_lesson() -> None:
-            go_on()
-            self._start_tour()
+            if lesson:
+                self._start_tour()
 
         words = (
             "A team of robots spreads over a map that it does not know. The lesson shows what holds it back "
             "and what helps, in a few minutes; it is also there later, by F2."
         )
-        answers = [Answer("Lesson 1", begin_lesson), Answer("Just let me play", go_on)]
+        answers = [Answer("Lesson 1", partial(go_on, lesson=True)), Answer("Just let me play", go_on)]
         self.dialogs.ask(Question("Welcome to robocov", words, answers, go_on))
 
     def offer_recovery(self, found: Sequence[Record]) -> None:
@@ -505,7 +481,7 @@ class Window(BaseWindow):
             later()
             viewer.attempt(lambda: viewer.recover(newest))
 
-        def throw_away() -> None:
+        def drop() -> None:
             discard(newest.folder)
             later()
             if found[1:]:
@@ -514,11 +490,7 @@ class Window(BaseWindow):
         words = f"A window ended without saving: {offer(newest)}."
         if more := len(found) - 1:
             words += f"\n{more} more {'are' if more > 1 else 'is'} kept besides."
-        answers = [
-            Answer("Recover", recover, "r"),
-            Answer("Discard", throw_away, "d"),
-            Answer("Later", later, "l"),
-        ]
+        answers = [Answer("Recover", recover, "r"), Answer("Discard", drop, "d"), Answer("Later", later, "l")]
         self.dialogs.ask(Question("Recover unsaved work?", words, answers, later))
 
     def _toggle_help(self) -> None:
@@ -530,12 +502,14 @@ class Window(BaseWindow):
     def _start_tour(self) -> None:
         if self.tour is None:
             self.start_lesson()
+        elif self.tour.state == "left":
+            self.tour.skip(0)
         else:
-            self.tour.leave_or_come_back()
+            self.tour.leave(task=True)
 
     def start_lesson(self, path: Path | None = None) -> None:
         """Play a lesson of a file, or the first; MapError as `load_lesson`."""
-        lesson = first_lesson() if path is None else load_lesson(path)
+        lesson = load_lesson(path or FIRST)
         self.tour = LessonPlayer(self.viewer, self.canvas.fit, lesson, alone=self._patient)
 
     @property
@@ -544,7 +518,6 @@ class Window(BaseWindow):
         return self.tour if self.tour is not None and self.tour.state != "left" else None
 
     def _spot(self, at: tuple[int, int]) -> Callable[[], object] | None:
-        """What a click does on the page of a lesson."""
         return next((do for box, do in self._spots if box.collidepoint(at)), None)
 
     def leave_lesson(self) -> None:
@@ -560,8 +533,7 @@ class Window(BaseWindow):
             self.film = Film(target, self.screen.get_size(), patient=self._patient)
             self.viewer.filming = True
             return f"recording {target}; F9 ends it"
-        film, self.film = self.film, None
-        self.viewer.filming = False
+        film, self.film, self.viewer.filming = self.film, None, False
         film.close()
         left_out = f", {film.left_out} frames left out" if film.left_out else ""
         return f"film saved: {film.path} ({film.frames / FILM_FPS:.1f} s{left_out})"
@@ -576,8 +548,7 @@ class Window(BaseWindow):
         elif self.dialogs.take(event):
             return
         elif event.type == pygame.DROPFILE:
-            path = Path(event.file)
-            self.viewer.attempt(lambda: self.viewer.open_file(path))
+            self.viewer.attempt(lambda: self.viewer.open_file(Path(event.file)))
         elif event.type == pygame.KEYDOWN:
             if self.tour is not None and self.tour.state == "asks" and event.unicode in tuple("1234"):
                 self.tour.reply(int(event.unicode))
@@ -593,6 +564,6 @@ class Window(BaseWindow):
         elif event.type in OF_THE_MOUSE:
             self.pointer.take(event, self._now)
         elif event.type == pygame.WINDOWLEAVE:
-            self.pointer.leave()
+            self.viewer.cursor = self.chart.hover = None
         else:
             self.panel.take(event)

@@ -16,12 +16,12 @@ from robocov.errors import MapError
 from robocov_app.cli import main
 from robocov_app.render.picture import pane_layers, standard_layers
 from robocov_app.viewer import lessons
-from robocov_app.viewer.lessons import PLAIN, checked, first_lesson, load_lesson
+from robocov_app.viewer.lessons import PLAIN, checked, load_lesson
 from robocov_app.viewer.session.file import dumped, session_json
 from robocov_app.viewer.session.session import Session
 
 LAYERS = {layer.name for layer in (*standard_layers(), *pane_layers())}
-LESSON = first_lesson().lesson
+LESSON = load_lesson().lesson
 assert LESSON is not None
 
 
@@ -57,7 +57,7 @@ def test_what_a_chapter_says_is_short_and_what_it_names_exists(chapter) -> None:
 
 @pytest.mark.slow
 def test_every_chapter_of_the_lesson_ends() -> None:
-    assert all(ended for *_, ended in checked(first_lesson()))
+    assert all(ended for *_, ended in checked(load_lesson()))
 
 
 def test_a_chapter_does_again_what_was_done_asks_and_hands_over(tmp_path: Path, capsys) -> None:

@@ -1,12 +1,8 @@
-"""Atomic changes of a session: what a touch consists of, as files have it, and what each does to a pane.
-
-Those of panes say how one is to go on; `Lockstep` carries them out in all panes or in none. Robots that do
-not fit where they are wanted go as near as they fit.
-"""
+"""Atomic changes of a session: what a touch consists of, as files have it, and what each does to a pane."""
 
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, cast
 
 import numpy as np
 from pydantic import ConfigDict, Field, WrapValidator
@@ -24,9 +20,8 @@ from robocov_app.viewer.session.scenario import MOST_ROBOTS, Law, Limits, Positi
 Robot: TypeAlias = Annotated[int, Field(strict=True, ge=1, le=1_000_000, description="Number of a robot")]
 _Pane: TypeAlias = Annotated[int, Field(strict=True, ge=0, le=100, description="Number of a pane")]
 _Count: TypeAlias = Annotated[int, Field(strict=True, ge=0)]
-Step: TypeAlias = Annotated[
-    int, Field(strict=True, ge=0, le=100_000_000, description="Control steps since time 0")
-]
+_SINCE = "Control steps since time 0"
+Step: TypeAlias = Annotated[int, Field(strict=True, ge=0, le=100_000_000, description=_SINCE)]
 _OBSTACLES = read_as(
     list[ObstacleModel],
     lambda models, _: tuple(model.built() for model in models),
@@ -51,8 +46,7 @@ _DENSITY = read_as(DensityModel | None, _density_of, _density_json)
 
 def _begun(value: object, read: Any) -> Scenario:
     try:
-        scenario: Scenario = read(value)
-        return scenario
+        return cast(Scenario, read(value))
     except MapError:
         raise
     except RobocovError as error:
@@ -141,8 +135,7 @@ class Fail(OfRobot):
     do: Literal["fail"] = field(default="fail", kw_only=True)
 
     def of(self, pane: Pane) -> Continuation:
-        row = _row(pane, self.robot)
-        if row is None:
+        if (row := _row(pane, self.robot)) is None:
             raise ParameterError(f"robot {self.robot} has failed already")
         _need_another(pane, self.robot)
         x, y = pane.simulation.positions[row].tolist()
@@ -207,8 +200,7 @@ class SetController(_Change):
     do: Literal["controller"] = field(default="controller", kw_only=True)
 
     def of(self, pane: Pane) -> Continuation:
-        setup = pane.setup
-        return Continuation(replace(setup, law=self.law) if pane.number == self.pane else setup)
+        return Continuation(replace(pane.setup, law=self.law) if pane.number == self.pane else pane.setup)
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
 
 SPRING = 60.0  # stiffness, per kg, of the spring between a hand and the robot that it drags, 1/s²
 STRONGEST = 80.0  # largest pull of the spring, per kg, m/s²
+MOST_KEPT = 160  # moments of a node that are kept while another branch is shown
 Happening: TypeAlias = tuple[int, str, str]  # step, kind and words, of robots that fail or join by themselves
 
 
@@ -31,15 +32,14 @@ class Lockstep:
     """Panes that begin as a scenario says; StartError, ParameterError when they cannot."""
 
     def __init__(self, scenario: Scenario) -> None:
-        positions = scenario.positions()
-        conditions, moving = scenario.conditions, None if scenario.given is None else scenario.moving
+        positions, conditions = scenario.positions(), scenario.conditions
         working = np.ones(len(positions), dtype=bool)
         if conditions is not None:
             conditions.check_team(len(positions))
             working = conditions.working(0.0, len(positions))
             conditions = conditions.of_robots_that_stay()
         numbers = tuple((np.flatnonzero(working) + 1).tolist())
-        moving = None if moving is None else moving[working]
+        moving = None if scenario.given is None or scenario.moving is None else scenario.moving[working]
         self.scenario = scenario  # with controllers, gains, limits and map as they were last chosen
         self.step = 0
         self.hand: tuple[int, Point] | None = None  # the robot that is dragged, and where to, m
@@ -104,14 +104,12 @@ class Lockstep:
             pane.take(setup, simulation)
 
     def _pull(self, pane: Pane) -> Array | None:
-        """Return the pull of the hand on the robots of a pane, N."""
         if self.hand is None or (row := pane.row(self.hand[0])) is None:
             return None
-        simulation = pane.simulation
+        simulation, pulls = pane.simulation, np.zeros_like(pane.simulation.positions)
         pull = SPRING * (np.array(self.hand[1]) - simulation.positions[row])
         pull -= 2.0 * np.sqrt(SPRING) * simulation.velocities[row]
         size = float(np.hypot(*pull))
-        pulls = np.zeros_like(simulation.positions)
         pulls[row] = pull * (simulation.team.mass[row] * min(1.0, STRONGEST / max(size, 1e-12)))
         return pulls
 
@@ -133,9 +131,6 @@ class Lockstep:
                 yield self.step, "failure", f"robot {number} failed"
 
 
-MOST_KEPT = 160  # moments of a node that are kept while another branch is shown
-
-
 @dataclass(eq=False)
 class Node:
     """One touch, and the time that passed after it until the next."""
@@ -151,9 +146,8 @@ class Node:
     redo: "Node | None" = field(default=None, repr=False)  # the child that was left by undo
     # the rest is remembered while another branch is shown, can be made again, and is in no file
     kept: list[Moment] = field(default_factory=list, repr=False)
-    # by pane and kind
     curves: dict[tuple[int, str], Curve] = field(default_factory=lambda: defaultdict(Curve), repr=False)
-    controllers: dict[int, ControllerChoice] = field(default_factory=dict, repr=False)  # by pane
+    controllers: dict[int, ControllerChoice] = field(default_factory=dict, repr=False)  # both by pane
     happenings: set[Happening] = field(default_factory=set, repr=False)
 
     @property
@@ -192,10 +186,9 @@ class Branch(NamedTuple):
         words = [f"{self.end * dt:.1f} s"]
         for (pane, what), curve in sorted(self.node.curves.items()):
             if what == "distance" and len(curve):
-                value = curve.at(self.end * dt)
                 # of a file that was opened the controllers are known once it has been run
                 law = self.node.controllers.get(pane)
-                words.append(f"{law.label if law else ''} {value:.3f} m".lstrip())
+                words.append(f"{law.label if law else ''} {curve.at(self.end * dt):.3f} m".lstrip())
         return " · ".join(words)
 
 
@@ -222,8 +215,7 @@ class Document:
 
     def limits(self, node: Node, step: int) -> dict[int, int]:
         """Return the last step of each node, by number, on the way to a step of one."""
-        path = self.path(node)
-        return {each.number: after.at for each, after in pairwise(path)} | {node.number: step}
+        return {each.number: after.at for each, after in pairwise(self.path(node))} | {node.number: step}
 
     def branches(self) -> list[Branch]:
         nodes = self.nodes

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache, partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
@@ -28,6 +28,8 @@ from robocov_app.viewer.session.scenario import Coordinate, Text
 
 FORMAT, VERSION, SUFFIX = "robocov-session", 1, ".robocov"
 MOST_SAMPLES = 30  # samples of a curve that stand in the file, for each touch
+# what pydantic says of a kind that there is not
+_TAG = re.compile(r"Input tag '(?P<found>.*?)' found using '(?P<key>\w+)' .* expected tags: (?P<known>.*)")
 
 
 @dataclass(frozen=True)
@@ -38,10 +40,8 @@ class _Pulled(changes.OfRobot):
     do: Literal["drag"] = field(default="drag", kw_only=True)
 
 
-_CHANGE = Annotated[
-    _Pulled | changes.Release | changes.RemovePane | Restart | changes.PaneChange | changes.MapChange,
-    Field(discriminator="do"),
-]
+_OTHER: TypeAlias = changes.Release | changes.RemovePane | Restart | changes.PaneChange | changes.MapChange
+_CHANGE = Annotated[_Pulled | _OTHER, Field(discriminator="do")]
 _WRITER: TypeAdapter[Change] = TypeAdapter(Change)
 _Box = Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
 
@@ -164,7 +164,6 @@ def save_session(path: Path, document: Document, head: Node, step: int, view: Ma
 
 
 def dumped(content: Mapping[str, Any]) -> str:
-    """Return a session as text: a line for each touch."""
     write = partial(json.dumps, ensure_ascii=False, allow_nan=False)
     touches = ",\n  ".join(map(write, content["touches"]))
     text = write({key: value for key, value in content.items() if key != "touches"}, indent=1)
@@ -189,8 +188,7 @@ def _touch_json(node: Node, maps: "_Maps") -> dict[str, Any]:
         if not (told and told[-1]["do"] == "drag" and told[-1]["robot"] == change.robot):
             told.append({"step": change.step, "do": "drag", "robot": change.robot, "path": []})
         told[-1]["path"].append([change.step, *change.to])
-    parent = None if node.parent is None else node.parent.number
-    named = {"name": node.name} if node.name else {}
+    parent, named = node.parent and node.parent.number, {"name": node.name} if node.name else {}
     head = {"parent": parent, "at": node.at, "kind": node.kind, "words": node.words, **named}
     drawn = {key: curve for key, curve in node.curves.items() if len(curve)}
     curves = {f"{pane} {what}": each.outline(MOST_SAMPLES) for (pane, what), each in drawn.items()}
@@ -212,14 +210,12 @@ def load_session(path: Path, controllers: Collection[str] = ()) -> SavedSession:
 
 
 def session_of(content: Any, where: str, controllers: Collection[str] = ()) -> SavedSession:
-    """Return a session from its JSON; MapError as `load_session`."""
     check_header(content, where, FORMAT, VERSION)
     try:
         model = SessionModel.model_validate(content, context=_Maps(where, controllers))
     except ValidationError as error:
         raise refused(error, where, _mistake) from None
-    refuse = partial(_refuse, where)
-    nodes: list[Node] = []
+    refuse, nodes = partial(_refuse, where), list[Node]()
     for touch in model.touches:
         nodes.append(_node(touch, nodes, partial(refuse, "touches", len(nodes))))
     wanted = f"the number of a touch, 0 to {len(nodes) - 1},"
@@ -238,7 +234,7 @@ def session_of(content: Any, where: str, controllers: Collection[str] = ()) -> S
 
 
 def _node(touch: TouchModel, nodes: list[Node], refuse: Callable[..., None]) -> Node:
-    first, parent = not nodes, None
+    first = not nodes
     if (touch.parent is None) != first or (touch.parent is not None and touch.parent >= len(nodes)):
         refuse("parent", value=touch.parent, wanted="null for the first, else an earlier number,")
     if first and not isinstance(touch.changes[0], Restart):
@@ -267,16 +263,14 @@ def _node(touch: TouchModel, nodes: list[Node], refuse: Callable[..., None]) -> 
 
 
 def _refuse(where: str, *path: str | int, value: object, wanted: str) -> None:
-    words = f"{shown_json(value)}, but {wanted.rstrip(',')} was wanted"
-    raise MapError.of(where, [Mistake.at(path, words)])
+    raise MapError.of(where, [Mistake.at(path, f"{shown_json(value)}, but {wanted.rstrip(',')} was wanted")])
 
 
 class _Maps:
     """The maps of a file, by number; what it is called, and what controllers it may have run."""
 
     def __init__(self, where: str = "", controllers: Collection[str] = ()) -> None:
-        self.where, self.controllers = where, controllers
-        self.maps: list[Any] = []
+        self.where, self.controllers, self.maps = where, controllers, list[Any]()
         self.environment = cache(self._environment)
 
     def number(self, environment: Environment) -> int:
@@ -307,7 +301,6 @@ class _Maps:
 
 @lru_cache(maxsize=8)
 def _map_json(environment: Environment) -> dict[str, Any]:
-    """Return a bundled map by its name, and another one whole."""
     document = to_json(environment)
     name = _bundled().get(digest := _digest(document))
     return document if name is None else {"bundled": name, "digest": digest}
@@ -322,30 +315,21 @@ def _digest(document: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()[:16]
 
 
-_TAG = re.compile(r"Input tag '(?P<found>.*?)' found using '(?P<key>\w+)' .* expected tags: (?P<known>.*)")
-"""What pydantic says of a kind that there is not."""
-
-
 def _mistake(detail: Any) -> Mistake:
-    """Return one structural error in the project's words: place, value, what was wanted."""
     steps = list(detail["loc"])
     # pydantic names the kind that it has chosen as a step of the path
     tags = [k for k in range(2, len(steps)) if steps[k - 2] in ("changes", "added", "maps", "gains")]
     path = tuple(step for k, step in enumerate(steps) if k not in tags)
-    if detail["type"] == "refused":
-        return Mistake.at(path, str(detail["msg"]))
-    if detail["type"] == "missing":
-        return Mistake.at(path, "missing")
+    if detail["type"] in ("refused", "missing"):
+        return Mistake.at(path, "missing" if detail["type"] == "missing" else str(detail["msg"]))
     if detail["type"] == "extra_forbidden":
         return Mistake.at(path, "unknown key", at_key=True)
     if detail["type"] in ("model_type", "dataclass_type"):
         return Mistake.at(path, f"{shown_json(detail['input'])}, but an object was wanted")
     if (tag := _TAG.match(str(detail["msg"]))) is not None:
-        return Mistake.at(
-            (*path, tag["key"]), f"{shown_json(tag['found'])}, but one of {tag['known']} was wanted"
-        )
+        wanted = f"one of {tag['known']} was wanted"
+        return Mistake.at((*path, tag["key"]), f"{shown_json(tag['found'])}, but {wanted}")
     words = str(detail["msg"]).removeprefix("Input should be ").replace("a valid integer", "an integer")
-    words = re.sub(
-        r".* should have (.*?)( after validation)?, not \d+", r"\1", words.replace("a valid ", "a ")
-    )
+    words = words.replace("a valid ", "a ")
+    words = re.sub(r".* should have (.*?)( after validation)?, not \d+", r"\1", words)
     return Mistake.at(path, f"{shown_json(detail['input'])}, but {words} was wanted")

@@ -33,6 +33,7 @@ _FEWEST = 300  # moments that are kept however large they are
 _KEPT = 0.75  # of the moments, so many stay at most when they are thinned
 RATE = 30.0  # most rows for each simulated second
 MOST_ROWS = 4096  # when there are so many, every second of the older half goes
+MOST_SAMPLES = 3000  # when a curve has so many, every second one of its older half goes
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +111,7 @@ class History:
 
     def __init__(self, dt: float, most_bytes: int = MOST_BYTES) -> None:
         self.dt, self.most_bytes = dt, most_bytes
-        self.moments: list[Moment] = []
-        self._sizes: list[int] = []
-        self._bytes = 0
+        self.moments, self._sizes, self._bytes = list[Moment](), list[int](), 0
         self.thinned = 0  # number of moments that are gone
 
     def __len__(self) -> int:
@@ -150,8 +149,7 @@ class History:
 
     def at(self, time: float) -> int:
         """Return the number of the last moment not after `time`, the first if there is none."""
-        step = time / self.dt + 1e-6
-        return max(bisect_right(self.moments, step, key=lambda moment: moment.step) - 1, 0)
+        return max(bisect_right(self.moments, time / self.dt + 1e-6, key=lambda moment: moment.step) - 1, 0)
 
     def until(self, k: int) -> Self:
         """Return a history of its own that ends with moment `k`."""
@@ -163,8 +161,7 @@ class History:
     def _thin(self) -> None:
         """Leave at most `_KEPT`: all of the newest, ever fewer of what is older."""
         count, steps = len(self), np.array(self.steps)
-        age = steps[-1] - steps
-        touched = np.array([True, *map(_changes, self.moments, self.moments[1:])])
+        age, touched = steps[-1] - steps, np.array([True, *map(_changes, self.moments, self.moments[1:])])
         for always in (touched, np.arange(count) == 0):
             whole, keep = count // 2, np.ones(count, dtype=bool)
             while whole > 1 and keep.sum() > _KEPT * count:
@@ -186,15 +183,12 @@ def _changes(before: Moment, after: Moment) -> bool:
 
 
 def _size(moment: Moment) -> int:
-    return sum(
-        _OVERHEAD + sum(_bytes_of(part) for part in (each.memory, each.inbox, each.steering))
-        + each.positions.nbytes + each.velocities.nbytes
-        for each in moment.states.values()
-    )  # fmt: skip
+    states = moment.states.values()
+    parts = [(each.memory, each.inbox, each.steering, each.positions, each.velocities) for each in states]
+    return sum(_OVERHEAD + sum(map(_bytes_of, each)) for each in parts)
 
 
 def _bytes_of(memory: Any, depth: int = 4) -> int:
-    """Return about how many bytes a memory takes, by the arrays in it."""
     if isinstance(memory, np.ndarray):
         return memory.nbytes
     if memory is None or depth == 0:
@@ -247,12 +241,10 @@ class Trail:
         self._count += 1
 
     def until(self, time: float) -> tuple[Array, Array]:
-        """Return positions and times up to `time`."""
         count = int(np.searchsorted(self.time, time + 1e-6, side="right"))
         return self._rows[:count], self._times[:count]
 
     def of_robots(self, before: Sequence[int], after: Sequence[int]) -> "Trail":
-        """Return it for other robots, by their numbers: nan where one was not there."""
         twin, k = Trail(len(after)), self._count
         twin._rows[:k], twin._times[:k], twin._count = of_robots(self.positions, before, after), self.time, k
         return twin
@@ -311,8 +303,7 @@ def _decision(seen: Observations, state: State) -> Decision:
     if controller is None:
         return nothing
     try:
-        # it may change what it remembers, and is asked again
-        memory = deepcopy(state.memory)
+        memory = deepcopy(state.memory)  # it may change what it remembers, and is asked again
         if memory is None:
             memory = controller.begin(state.setup.solid.region, state.setup.team)
         decision = controller.decide(seen, memory)
@@ -341,9 +332,6 @@ def sensor_in(environment: Environment) -> RangeSensor:
     return RangeSensor(solid_pieces(environment), movers(environment))
 
 
-MOST_SAMPLES = 3000  # when a curve has so many, every second one of its older half goes
-
-
 @dataclass(frozen=True)
 class Event:
     """Something that happened at a time, s; `kind`: ``obstacle``, ``robot``, ``failure``, ``law``, ..."""
@@ -357,8 +345,7 @@ class Curve:
     """The mean distance to the nearest robot, (22) by area or by ∫φ, or the mean time, at ascending times."""
 
     def __init__(self) -> None:
-        self._time: list[float] = []
-        self._value: list[float] = []
+        self._time, self._value = list[float](), list[float]()
 
     def __len__(self) -> int:
         return len(self._time)
@@ -386,8 +373,7 @@ class Curve:
             return
         if len(self._time) >= MOST_SAMPLES:
             half = MOST_SAMPLES // 2
-            self._time[:half] = self._time[:half:2]
-            self._value[:half] = self._value[:half:2]
+            self._time[:half], self._value[:half] = self._time[:half:2], self._value[:half:2]
             k = bisect_left(self._time, time)
         self._time.insert(k, time)
         self._value.insert(k, value)
@@ -398,8 +384,7 @@ class Curve:
         return [[round(time, 3) for time in times], [float(f"{value:.5g}") for value in values]]
 
     def between(self, begin: float, end: float) -> "Curve":
-        first = int(np.searchsorted(self._time, begin - 1e-6))
-        last = int(np.searchsorted(self._time, end + 1e-6, side="right"))
+        first, last = bisect_left(self._time, begin - 1e-6), bisect_right(self._time, end + 1e-6)
         part = Curve()
         part._time, part._value = self._time[first:last], self._value[first:last]
         return part

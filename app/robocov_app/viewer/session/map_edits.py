@@ -53,7 +53,6 @@ def with_replaced(
 
 
 def with_obstacle(environment: Environment, obstacle: Obstacle) -> Environment:
-    """Return the map with one obstacle more, on top of the others; MapError as `with_replaced`."""
     return with_replaced(environment, len(environment.obstacles), 0, [obstacle])
 
 
@@ -79,8 +78,7 @@ def obstacle_at(environment: Environment, point: tuple[float, float], reach: flo
 
 def snapped(environment: Environment, point: Point, reach: float) -> Point:
     """Return the corner within `reach` m of a point, else the nearest place on a wall, else the point."""
-    walls = environment.free.boundary
-    corners = shapely.get_coordinates(walls)
+    walls, corners = environment.free.boundary, shapely.get_coordinates(environment.free.boundary)
     away = np.hypot(*(corners - point).T)
     if len(away) and away.min() <= reach:
         x, y = corners[away.argmin()].tolist()
@@ -116,8 +114,7 @@ def passage_words(
     width = 2 * radius * (1 - 1e-6)  # what is just wide enough is wide enough
     known = {gap.between for gap in gaps_narrower(before.free, width)}
     new = [gap for gap in gaps_narrower(after.free, width) if gap.between not in known]
-    if new:
-        words.append(f"a gap of {100 * new[0].width:.0f} cm, too narrow for a robot")
+    words += [f"a gap of {100 * gap.width:.0f} cm, too narrow for a robot" for gap in new[:1]]
     return "; ".join(words)
 
 
@@ -127,10 +124,8 @@ def words_for(obstacle: Obstacle) -> str:
 
 
 def polygon_of(points: list[tuple[float, float]]) -> PolygonObstacle:
-    """Return the polygon with these corners. Raises MapError when they are too few, or enclose nothing."""
     ring = _rounded(points)
-    if len(ring) > 2 and ring[0] == ring[-1]:
-        ring = ring[:-1]
+    ring = ring[:-1] if len(ring) > 2 and ring[0] == ring[-1] else ring
     if len(ring) < 3 or shapely.MultiPoint(ring).convex_hull.area < SHORTEST**2:
         raise MapError("a polygon needs three corners that enclose something")
     if not shapely.Polygon(ring).is_valid:
@@ -139,7 +134,6 @@ def polygon_of(points: list[tuple[float, float]]) -> PolygonObstacle:
 
 
 def wall_of(points: list[tuple[float, float]], width: float) -> WallObstacle:
-    """Return the wall along these points. Raises MapError when it has no length."""
     line = _rounded(points)
     if len(line) < 2 or shapely.LineString(line).length < SHORTEST:
         raise MapError("a wall needs two points that are apart")
@@ -147,7 +141,6 @@ def wall_of(points: list[tuple[float, float]], width: float) -> WallObstacle:
 
 
 def circle_of(center: tuple[float, float], rim: tuple[float, float]) -> CircleObstacle:
-    """Return the circle round `center` through `rim`. Raises MapError when it has no size."""
     radius = float(np.hypot(rim[0] - center[0], rim[1] - center[1]))
     if radius < SHORTEST:
         raise MapError("a circle needs a radius: drag from its middle to its rim")
@@ -180,7 +173,6 @@ def painted_raster(environment: Environment) -> Raster:
     density = environment.density
     if isinstance(density, Raster) and density.interpolation == "bilinear" and min(density.values.shape) > 1:
         return density
-    bounds = low_x, low_y, high_x, high_y = environment.region.bounds
-    sides = high_x - low_x, high_y - low_y
+    sides = np.ptp(np.reshape(environment.region.bounds, (2, 2)), axis=0).tolist()
     columns, rows = (max(round(side / (max(sides) / CELLS)), 2) for side in sides)
-    return sampled(density, bounds, columns, rows)
+    return sampled(density, environment.region.bounds, columns, rows)

@@ -38,9 +38,7 @@ class Pane:
         self.trail = Trail(len(self.starts))
         self.trail.add(simulation.time, self.starts)
         self.curves = {"distance": Curve(), "time": Curve()}
-        self.curve = self.curves["distance"]
-        self.sensed = Sensed()
-        self._steps = 0
+        self.curve, self.sensed, self._steps = self.curves["distance"], Sensed(), 0
 
     @property
     def law(self) -> ControllerChoice:
@@ -55,7 +53,6 @@ class Pane:
         return self.simulation.time
 
     def row(self, number: int) -> int | None:
-        """Return the row of a robot by its number; None where it does not work."""
         return self.numbers.index(number) if number in self.numbers else None
 
     def step(self, pushes: Array | None = None) -> None:
@@ -92,15 +89,15 @@ class Pane:
         # the same controller goes on remembering; one without memory begins anew, as when resumed
         goes_on = setup.law == self.law and remembers(old.controller)
         controller = None if goes_on else setup.law.made()
-        if self._only_weighed(wanted):
-            return old.with_density(environment)
-        # who stays keeps what is its own
-        found = [self.row(number) for number in setup.numbers]
-        rows = np.array([-1 if row is None else row for row in found], dtype=np.intp)
+        known = attrgetter("law", "limits", "numbers", "failed")
+        alike = wanted.positions is None and known(self.setup) == known(setup)
+        if alike and setup.environment.same_place(self.setup.environment):
+            return old.with_density(environment)  # all else stays, as when it is painted
+        row_of = {number: row for row, number in enumerate(self.numbers)}  # who stays keeps what is its own
+        rows = np.array([row_of.get(number, -1) for number in setup.numbers], dtype=np.intp)
         steering = None if old.steering is None else np.where(rows[:, None] < 0, 0.0, old.steering[rows])
-        make = partial(
-            old.changed, environment=environment, controller=controller, team=team, steering=steering
-        )
+        other: dict[str, Any] = {"controller": controller, "team": team, "steering": steering}
+        make = partial(old.changed, environment=environment, **other)
         positions = old.positions if wanted.positions is None else wanted.positions
         velocities = old.velocities if wanted.velocities is None else wanted.velocities
         try:
@@ -112,12 +109,6 @@ class Pane:
         if old.inbox is not None and setup.numbers != self.numbers:
             changed = changed.remembering(changed.memory, old.inbox.rearranged(rows))
         return changed
-
-    def _only_weighed(self, wanted: Continuation) -> bool:
-        """Return whether nothing is wanted to be otherwise but the density, as when it is painted."""
-        known = attrgetter("law", "limits", "numbers", "failed")
-        alike = wanted.positions is None and known(self.setup) == known(wanted.setup)
-        return alike and wanted.setup.environment.same_place(self.setup.environment)
 
     def take(self, setup: PaneSetup, simulation: Simulation) -> None:
         before, after = self.numbers, setup.numbers
@@ -134,15 +125,13 @@ def begun(
     """Return a simulation that begins so, or goes on `later`; StartError, ParameterError as `Simulation`."""
     law, steering = setup.law, later.pop("steering", None)
     spec = RunSpec(
-        setup.solid, law.name, law.gains,
-        team=setup.team, positions=positions, velocities=velocities, steering=steering, dt=dt,
-        conditions=setup.conditions,
+        setup.solid, law.name, law.gains, team=setup.team, positions=positions, velocities=velocities,
+        steering=steering, dt=dt, conditions=setup.conditions,
     )  # fmt: skip
     return spec.simulation(law.made(), **later)
 
 
 def resumed(state: State, dt: float, step: int) -> Simulation:
-    """Return the simulation that goes on from a state; ParameterError when its controller is gone."""
     later: dict[str, Any] = {"steering": state.steering, "steps": step, "resumed": True}
     simulation = begun(state.setup, state.positions, dt, state.velocities, **later)
     return simulation.remembering(simulation.memory if state.memory is None else state.memory, state.inbox)

@@ -32,6 +32,8 @@ class LostController(ControllerChoice):
 
     title: str = ""  # what people called it
     reason: str = ""  # why it cannot be had
+    stands_in: bool = False  # at the end of such a run, as its own controller, until somebody wants to go on
+    summary = "stands for a controller that is not there any more"
 
     @property
     def label(self) -> str:
@@ -42,22 +44,15 @@ class LostController(ControllerChoice):
         return {}
 
     def made(self) -> Controller:
+        if self.stands_in:
+            return self
         raise ParameterError(f"this run can be looked at, but not gone on with: {self.reason}")
-
-
-class _StandIn(LostController):
-    """Both choice and controller at the end of the run of a lost one, until somebody wants to go on."""
-
-    summary = "stands for a controller that is not there any more"
-
-    def made(self) -> Controller:
-        return self
 
     def begin(self, region: Region, team: Team) -> None:
         """Nothing is remembered."""
 
     def decide(self, seen: Observations, memory: None) -> Decision:
-        super().made()
+        replace(self, stands_in=False).made()
         raise AssertionError
 
 
@@ -75,16 +70,15 @@ def replayed_session(saved: Sequence[Saved], controllers: Sequence[str] = ()) ->
     first, dt = records[0], control_dt(records[0])
     limits, environment = TeamSpec.of(first.team, rosters[0].numbers), rosters[0].environment
     laws = [law_of(record, controllers) for record in records]
-    robots, given, moving = len(first.team), np.array(first.positions[0]), np.array(first.velocities[0])
-    start, seed = first.start if first.start in environment.starts else None, first.seed or 0
-    choice = tuple(map(_standing, laws)), robots, start, seed
+    given, moving = np.array(first.positions[0]), np.array(first.velocities[0])
+    start = first.start if first.start in environment.starts else None
+    choice = tuple(map(_standing, laws)), len(first.team), start, first.seed or 0
     scenario = Scenario(environment, *choice, limits, dt, given, moving, first.conditions)
-    session, casts = Session(scenario), list[PaneSetup]()
-    for law, roster in zip(laws, rosters, strict=True):
-        casts.append(PaneSetup(environment, law, limits, roster.numbers, roster.failed))
+    session, states = Session(scenario), list[list[State]]()
+    for record, law, roster in zip(records, laws, rosters, strict=True):
+        states.append(_states_of(record, PaneSetup(environment, law, limits, roster.numbers, roster.failed)))
     needed = len(first) * len(records) * (_OF_A_MOMENT + first.positions[0].nbytes * 2)
     history = History(dt, MOST_BYTES + min(needed, MOST_OF_RECORDS))
-    states = [_states_of(record, cast) for record, cast in zip(records, casts, strict=True)]
     scenario = replace(scenario, laws=tuple(laws))
     for k in range(len(first)):
         now = {pane: each[k] for pane, each in enumerate(states)}
@@ -111,13 +105,11 @@ def _paced(record: Record) -> Record:
     steps = round(gap / record.dt)
     if steps <= 1 or abs(gap / record.dt - steps) > 1e-6:
         return record
-    return replace(
-        record, dt=steps * record.dt, session={**record.session, "control_dt_s": control_dt(record)}
-    )
+    session = {**record.session, "control_dt_s": control_dt(record)}
+    return replace(record, dt=steps * record.dt, session=session)
 
 
 def law_of(record: Record, controllers: Sequence[str] = ()) -> ControllerChoice:
-    """Return the controller of a record: a built-in one, or the one of `controllers` that is called as it."""
     kind = record.controller.rpartition(":")[2]
     known = [name for name in controllers if name.rpartition(":")[2] == kind]
     name, gains = record.controller, dict(record.gains)
@@ -137,10 +129,8 @@ def law_of(record: Record, controllers: Sequence[str] = ()) -> ControllerChoice:
 
 def _check(saved: Sequence[Saved]) -> None:
     if not 1 <= len(saved) <= MOST_PANES:
-        raise InputError(
-            f"{saved[0].folder.parent}: {len(saved)} runs, but the window has room for {MOST_PANES}; "
-            f"--frames and --video show all"
-        )
+        known = f"{len(saved)} runs, but the window has room for {MOST_PANES}; --frames and --video show all"
+        raise InputError(f"{saved[0].folder.parent}: {known}")
     first = saved[0].record
     for each in saved:
         record, where = each.record, each.folder
@@ -155,25 +145,19 @@ def _check(saved: Sequence[Saved]) -> None:
             ("conditions", record.conditions, first.conditions),
         ):
             if mine != others:
-                raise InputError(
-                    f"{where}: {what}: {mine}, but {others} as in {saved[0].folder} was wanted; "
-                    f"--frames and --video show both"
-                )
+                wanted = f"{others} as in {saved[0].folder} was wanted; --frames and --video show both"
+                raise InputError(f"{where}: {what}: {mine}, but {wanted}")
 
 
 def _standing(law: ControllerChoice) -> ControllerChoice:
-    if not isinstance(law, LostController):
-        return law
-    return _StandIn(law.name, law.gains, law.title, law.reason)
+    return replace(law, stands_in=True) if isinstance(law, LostController) else law
 
 
 def _states_of(record: Record, cast: PaneSetup) -> list[State]:
-    arrays = record.positions, record.velocities, record.forces, record.goals
+    arrays, states = (record.positions, record.velocities, record.forces, record.goals), []
     fixed = [np.broadcast_to(array, array.shape) for array in arrays]  # nobody can change them
-    states = []
-    for k, (memory, there) in enumerate(
-        zip(_memories_of(record, cast.law), _circumstances_of(record, cast), strict=True)
-    ):
+    remembered = zip(_memories_of(record, cast.law), _circumstances_of(record, cast), strict=True)
+    for k, (memory, there) in enumerate(remembered):
         rows = slice(None) if there is cast else np.flatnonzero(record.working[k])
         positions, velocities, forces, goals = (array[k][rows] for array in fixed)
         decision = Decision(forces, None if np.isnan(record.goals[k]).all() else goals)
@@ -192,9 +176,8 @@ def _circumstances_of(record: Record, cast: PaneSetup) -> Iterator[PaneSetup]:
     for places, working, there in zip(record.positions, record.working, record.present, strict=True):
         key = working.tobytes() + there.tobytes()
         if key not in known:
-            failed = {
-                cast.numbers[row]: tuple(places[row].tolist()) for row in np.flatnonzero(there & ~working)
-            }
+            wrecks = np.flatnonzero(there & ~working)
+            failed = {cast.numbers[row]: tuple(places[row].tolist()) for row in wrecks}
             numbers = tuple(cast.numbers[row] for row in np.flatnonzero(working))
             known[key] = replace(cast, numbers=numbers, failed={**cast.failed, **failed}, conditions=rest)
         yield known[key]
@@ -223,8 +206,7 @@ def _put(pane: Pane, saved: Saved, history: History) -> None:
     state = last.states[pane.number]
     standing = replace(state.setup, law=_standing(state.setup.law))
     pane.simulation = resumed(state._replace(setup=standing), history.dt, last.step)
-    pane.setup = state.setup
-    pane.starts = record.positions[0][record.working[-1]]
+    pane.setup, pane.starts = state.setup, record.positions[0][record.working[-1]]
     for k in range(0, len(record), max(1, round(SENSED_EVERY * history.dt / record.dt))):
         numbers = history[k].states[pane.number].setup.numbers
         pane.sensed.add(k * record.dt, numbers, record.obstacle_points[k][record.working[k]])

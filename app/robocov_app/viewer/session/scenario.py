@@ -62,11 +62,8 @@ def _known(law: "ControllerChoice", info: Any) -> "ControllerChoice":
 Text: TypeAlias = Annotated[str, Field(strict=True, max_length=10_000)]
 Coordinate: TypeAlias = Annotated[float, Field(strict=True, ge=-1e6, le=1e6, allow_inf_nan=False)]
 Position: TypeAlias = Annotated[tuple[Coordinate, Coordinate], Field(description="[x, y] in metres")]
-_GAINS = read_as(
-    dict[str, Annotated[float, Field(strict=True)] | Annotated[str, Field(strict=True)] | None],
-    lambda gains, _: gains,
-    lambda gains, _: dict(gains),
-)
+_VALUE: TypeAlias = Annotated[float, Field(strict=True)] | Annotated[str, Field(strict=True)] | None
+_GAINS = read_as(dict[str, _VALUE], lambda gains, _: gains, lambda gains, _: dict(gains))
 _LIMIT = read_as(
     Annotated[float | None, Field(strict=True, ge=0, le=1e9, description="null: no limit")],
     lambda value, _: np.inf if value is None else value,
@@ -100,12 +97,9 @@ class ControllerChoice:
     gains: Annotated[Mapping[str, Value], _GAINS] = field(default_factory=dict)
 
     def made(self) -> Controller:
-        """Return the controller; ParameterError as `make_controller`."""
         return make_controller(self.name, self.gains)
 
-    # kept, for to look at a controller in a file is to run that file
-
-    @cached_property
+    @cached_property  # for to look at a controller in a file is to run that file
     def label(self) -> str:
         return str(controller_kind(self.name).label)
 
@@ -128,12 +122,10 @@ class ControllerChoice:
 
     @property
     def words(self) -> str:
-        """How a branch that was left with it is called."""
         gains = [f"{name} {_said(value)}" for name, value in self.plain().gains.items()]
         return ", ".join([self.label, *gains])
 
     def words_since(self, before: Self) -> str:
-        """Return which gains differ from those before, as people write them."""
         changed = [name for name in self.known if self.value(name) != before.value(name)]
         return ", ".join(f"{name} = {_said(self.value(name))}" for name in changed)
 
@@ -217,14 +209,11 @@ class Scenario:
 
     def __post_init__(self) -> None:
         if not 1 <= self.robots <= MOST_ROBOTS:
-            raise ParameterError(
-                f"robots: {shown(self.robots)}, but a whole number from 1 to {MOST_ROBOTS} was wanted"
-            )
+            wanted = f"a whole number from 1 to {MOST_ROBOTS} was wanted"
+            raise ParameterError(f"robots: {shown(self.robots)}, but {wanted}")
         if self.conditions is not None and self.conditions.talks and self.robots > MOST_THAT_TALK:
-            raise ParameterError(
-                f"robots: {self.robots}, but at most {MOST_THAT_TALK} were wanted where messages "
-                f"may be lost or late: the window remembers all of them, of all moments"
-            )
+            why = "where messages may be lost or late: the window remembers all of them, of all moments"
+            raise ParameterError(f"robots: {self.robots}, but at most {MOST_THAT_TALK} were wanted {why}")
         if not 1 <= len(self.laws) <= MOST_PANES:
             raise ParameterError(f"controllers: {len(self.laws)}, but 1 to {MOST_PANES} were wanted")
 
@@ -238,6 +227,5 @@ class Scenario:
         """Return the starts, (robots, 2) m; StartError when there is no room for the team."""
         if self.given is not None:
             return self.given
-        start = self.environment.start(self.start)
         radius = float(self.limits.team(self.robots).radius.max())  # room for the largest
-        return start.sample(self.robots, seed=self.seed, radius=radius)
+        return self.environment.start(self.start).sample(self.robots, seed=self.seed, radius=radius)

@@ -1,9 +1,6 @@
-"""The session: panes in lockstep with their whole past, every way to touch them, and to take touches back.
+"""The session: panes in lockstep with their whole past, every way to touch them, and to take touches back."""
 
-What the user does is a tree of touches (`Document`). The present is a `Lockstep` at some step of its `head`,
-the past is kept moments. Whatever fails leaves all as it was: a new state is built, then taken over.
-"""
-
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
 from operator import attrgetter
@@ -71,21 +68,18 @@ class Session:
 
     def _go_on(self, head: Node, run: Lockstep, history: History) -> None:
         self.head = head  # where in the document the present is
-        self._run, self.history = run, history
-        self.clock.dt = run.scenario.dt
+        self._run, self.history, self.clock.dt = run, history, run.scenario.dt
         self._cursor: int | None = None
-        self._waited = 0
         self._gesture: tuple[object, float] | None = None
         self._rebuilt: dict[int, tuple[object, Trail]] = {}
         self._ghosts: list[Ghost] | None = None
-        self.settled = False
+        self._waited, self.settled = 0, False
         self.serial += 1
 
     def recall(self, history: History) -> None:
         """Take over a past that was recorded, and look at its beginning; the panes are at its end."""
         self.history, last = history, history.last
-        self._run.step = self.head.end = last.step
-        self._run.scenario = last.scenario
+        self._run.step, self._run.scenario, self.head.end = last.step, last.scenario, last.step
         self.recorded_until = last.step * history.dt
         self._cursor = 0 if len(history) > 1 else None
         self.serial += 1
@@ -130,11 +124,9 @@ class Session:
 
     @property
     def can_be_made_again(self) -> bool:
-        """Whether the document is all that there is: no record that nothing repeats."""
         return self.recorded_until is None or self.repeatable
 
     def require_document(self) -> None:
-        """Make sure that everything can be made again; ParameterError says why it cannot."""
         if not self.can_be_made_again:
             raise ParameterError("this began with a recorded run, which cannot be made again")
         for pane in self.panes:
@@ -197,8 +189,7 @@ class Session:
 
     def recent(self, pane: Pane, number: int) -> Array:
         """Return where a robot was during the last seconds before the moment looked at, (k, 2) m."""
-        last, first = self._number, self.history.at(self.time - SETTLED_WINDOW)
-        places = []
+        last, first, places = self._number, self.history.at(self.time - SETTLED_WINDOW), []
         for k in range(first, last + 1, max(1, (last - first) // 30)):
             state = self.history[k].states.get(pane.number)
             if state is not None and number in state.setup.numbers:
@@ -220,15 +211,14 @@ class Session:
 
     def step(self) -> None:
         self.playing = False
-        if self._cursor is not None:
-            self._look(self._cursor + 1)
-        else:
+        if self._cursor is None:
             self._advance()
+        else:
+            self._look(self._cursor + 1)
 
     def look_at(self, time: float) -> None:
-        cursor = self.history.at(time)
         self.release()
-        self._look(cursor)
+        self._look(self.history.at(time))
 
     def look_by(self, moments: int) -> None:
         self.release()
@@ -253,8 +243,7 @@ class Session:
         except RobocovError:
             self.playing = False
             raise
-        if self.stop_when_settled and self.settled:
-            self.playing = False
+        self.playing = self.playing and not (self.stop_when_settled and self.settled)
         return self.playing
 
     def _advance(self) -> None:
@@ -267,15 +256,13 @@ class Session:
             self.settled = self._has_settled()
 
     def _has_settled(self) -> bool:
-        """Whether no robot of any pane got anywhere for a while, as `metrics.settled_at` says it."""
         if self.hand is not None or self.end < SETTLED_WINDOW:
             return False
         before = self.history[self.history.at(self.end - SETTLED_WINDOW)]
         for pane in self.panes:
             state = before.states[pane.number]
-            if state.setup is not pane.setup:
-                return False
-            if np.hypot(*(pane.simulation.positions - state.positions).T).max() >= SETTLED_DISTANCE:
+            alike, places = state.setup is pane.setup, pane.simulation.positions
+            if not alike or np.hypot(*(places - state.positions).T).max() >= SETTLED_DISTANCE:
                 return False
         return True
 
@@ -309,8 +296,7 @@ class Session:
 
     def remake(self, seconds: float = np.inf) -> None:
         """Go on with making a branch again for so many seconds, by default to its end."""
-        began = perf_counter()
-        remaking, self._remaking = self._remaking, None
+        began, remaking, self._remaking = perf_counter(), self._remaking, None
         for _ in remaking or ():
             if perf_counter() - began > seconds:
                 self._remaking = remaking
@@ -318,8 +304,7 @@ class Session:
 
     def undo(self) -> str | None:
         """Go back to right before the newest touch; return what it was, None if there is none."""
-        node, parent = self.head, self.head.parent
-        if parent is None:
+        if (parent := (node := self.head).parent) is None:
             return None
         parent.redo = node
         self.enter(parent, node.at)
@@ -371,13 +356,12 @@ class Session:
         self._go_on(head, run, history)
 
     def stow(self) -> None:
-        """Remember moments and curves of the present branch in its nodes."""
-        moments: dict[int, list[Moment]] = {}
+        moments = defaultdict[int, list[Moment]](list)
         for moment in self.history.moments:
-            moments.setdefault(moment.node, []).append(moment)
+            moments[moment.node].append(moment)
         path, dt = self.document.path(self.head), self.scenario.dt
         for node, after in zip(path, [*path[1:], None], strict=True):
-            now = moments.get(node.number, [])
+            now = moments[node.number]
             later = node.kept if after is None or not now else []
             kept = [*now, *(each for each in later if each.step > self._run.step)]
             node.kept = kept[:: -max(-(-len(kept) // MOST_KEPT), 1)][::-1]  # the last among them
@@ -393,10 +377,8 @@ class Session:
         root = self.document.path(self.head)[0]
         for branch in self.document.branches():
             path, number = self.document.path(branch.node), branch.node.number
-            if path[0] is not root:
-                continue
             theirs = self.document.limits(branch.node, branch.end)
-            for pane, law in branch.node.controllers.items():
+            for pane, law in branch.node.controllers.items() if path[0] is root else ():
                 for what in ("distance", "time"):
                     curve = Curve()
                     for node in path:
@@ -410,8 +392,7 @@ class Session:
     def do(self, change: Touch, kind: str, words: str, gesture: object = None) -> None:
         """Carry a change out from the moment looked at; changes of one `gesture`, not None, are one touch."""
         self.remake()
-        self._script = []
-        let_go = False
+        self._script, let_go = [], False
         if self._cursor is None:
             self._run.apply(change)
         else:
@@ -434,8 +415,7 @@ class Session:
                 self.head.changes.insert(0, Release(step=run.step))
         self._gesture = None if gesture is None else (gesture, self.end)
         self.revision += 1
-        self._ghosts = None
-        self.settled = False
+        self._ghosts, self.settled = None, False
         self.history.amend(run.moment(self.head.number))
 
     def restart(self, **changed: object) -> None:
@@ -461,10 +441,9 @@ class Session:
             return
         if law.name != before.name:
             self.do(change, "law", f"{law.label} takes over")
-        else:
-            words = law.words_since(before)
-            gesture = "gain", pane.number, words.partition(" = ")[0]
-            self.do(change, "law", f"{law.label}: {words}", gesture)
+            return
+        words = law.words_since(before)
+        self.do(change, "law", f"{law.label}: {words}", ("gain", pane.number, words.partition(" = ")[0]))
 
     def set_limits(self, limits: TeamSpec) -> None:
         if limits != self.setup(self.panes[0]).limits:
@@ -510,8 +489,7 @@ class Session:
 
     def add_robot(self, point: Point) -> int:
         new = self.setup(self.panes[0]).there[-1] + 1
-        at = float(point[0]), float(point[1])
-        self.do(changes.Join(new, at), "robot", f"robot {new} joined")
+        self.do(changes.Join(new, (float(point[0]), float(point[1]))), "robot", f"robot {new} joined")
         return new
 
     def remove_robot(self, number: int) -> None:
@@ -530,7 +508,6 @@ class Session:
 
 
 def _sensed_in(history: History, pane: int) -> Sensed:
-    """Return what a pane's robots have sensed, as far as kept moments tell."""
     found = Sensed()
     for k in range(0, len(history), max(1, len(history) // MOST_SENSED)):
         time, state = history.time(k), history[k].states[pane]
@@ -541,7 +518,6 @@ def _sensed_in(history: History, pane: int) -> Sensed:
 
 
 def _anew(before: Scenario, after: Scenario) -> str:
-    """Return in words what is different where a run begins anew."""
     words = [f"{law.label} compared" for law in after.laws[len(before.laws) :]]
     if after.environment is not before.environment:
         words.append(f"map {after.environment.name}")

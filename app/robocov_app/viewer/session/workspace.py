@@ -8,6 +8,7 @@ from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from subprocess import DEVNULL
 from time import monotonic
 from typing import Any
 
@@ -23,6 +24,7 @@ from robocov_app.viewer.session.session import Session
 
 KIND = "robocov-session-draft"
 _PAUSE = 0.9  # seconds between two copies of a session that goes on
+_ERRORS = "errors.txt"
 
 
 class Workspace:
@@ -33,8 +35,7 @@ class Workspace:
     ) -> None:
         self.session, self.path = session, path
         self._saved = -1 if resumed is not None else session.revision
-        self._kept: tuple[int, int] | None = None
-        self._when = -_PAUSE
+        self._kept, self._when = (-1, -1), -_PAUSE  # revision and step of the last copy, and its time, s
         self._autosaver = autosave.Autosaver(folder, KIND, path, resumed)
 
     @property
@@ -42,11 +43,9 @@ class Workspace:
         return self.session.revision != self._saved
 
     def keep(self, view: Mapping[str, Any]) -> None:
-        """Keep a copy aside where something has happened since the last; to be called in every frame."""
         state = self.session.revision, self.session.step_now
-        if not self.unsaved or state == self._kept or monotonic() - self._when < _PAUSE:
-            return
-        if not self.session.can_be_made_again:
+        wanted = self.unsaved and state != self._kept and self.session.can_be_made_again
+        if not wanted or monotonic() - self._when < _PAUSE:
             return
         self._kept, self._when = state, monotonic()
         self.session.stow()
@@ -85,9 +84,6 @@ def recovered(
     return Workspace(Session.opened(saved), folder, work.path, work.folder), saved.view
 
 
-_ERRORS = "errors.txt"
-
-
 @dataclass
 class _Job:
     target: Path
@@ -99,19 +95,15 @@ class RunSaver:
     """Has runs saved by other processes. No call but `finish` waits for them."""
 
     def __init__(self, lattice: int) -> None:
-        self._lattice = lattice
-        self._jobs: list[_Job] = []
-        self._said: list[tuple[str, bool]] = []
+        self._lattice, self._jobs, self._said = lattice, list[_Job](), list[tuple[str, bool]]()
 
     def save(self, session: Session, folder: Path, map_name: str = "") -> str:
         """Begin to save the story up to the present in a new folder; raises as `require_document`."""
         session.require_document()
-        name = (
-            map_name.replace("\\", "/").rpartition("/")[2].removesuffix(".json") or session.environment.name
-        )
+        named = map_name.replace("\\", "/").rpartition("/")[2].removesuffix(".json")
         laws = [pane.law.name for pane in session.panes]
         what = folder_names(laws)[0] if len(laws) == 1 else "comparison"
-        stem = re.sub(r"[^\w.-]+", "-", name).strip(".-")[:64] or "map"
+        stem = re.sub(r"[^\w.-]+", "-", named or session.environment.name).strip(".-")[:64] or "map"
         target = _made(folder, f"{stem}-{what}")
         temporary = tempfile.TemporaryDirectory(prefix="robocov-")
         file = Path(temporary.name) / f"session{SUFFIX}"
@@ -120,9 +112,8 @@ class RunSaver:
         command += ["--out", str(target.resolve()), "--lattice", str(self._lattice)]
         if own := own_controllers(session.document):
             command += ["--controller", ",".join(own)]
-        nothing = subprocess.DEVNULL
         with file.with_name(_ERRORS).open("wb") as errors:
-            process = subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=errors)
+            process = subprocess.Popen(command, stdin=DEVNULL, stdout=DEVNULL, stderr=errors)
         self._jobs.append(_Job(target, process, temporary))
         return f"saving the run: {target}/"
 
@@ -137,12 +128,11 @@ class RunSaver:
     def finish(self) -> None:
         try:
             for k, job in enumerate(self._jobs):
-                try:
+                with suppress(subprocess.TimeoutExpired):
                     job.process.wait(0.5)
-                except subprocess.TimeoutExpired:
-                    if k == 0:
-                        sys.stderr.write("saving runs; Ctrl-C gives up\n")
-                    job.process.wait()
+                if k == 0 and job.process.poll() is None:
+                    sys.stderr.write("saving runs; Ctrl-C gives up\n")
+                job.process.wait()
         except BaseException:
             for job in self._jobs:
                 job.process.kill()
