@@ -38,7 +38,7 @@ from robocov_app.toolkit.layout import Layout, inside
 
 def map_words(editor: Editor) -> str:
     sketch, measurement = editor.sketch, editor.measurement
-    unsaved = "● " if editor.document.unsaved else ""
+    unsaved = "● " if editor.document.history.unsaved else ""
     said = [f"{unsaved}{editor.document.title}", counted(len(sketch.obstacles), "obstacle")]
     if measurement is not None:
         said.append(f"{measurement.free_area:.2f} m² free")

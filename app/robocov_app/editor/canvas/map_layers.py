@@ -11,7 +11,6 @@ import pygame
 import shapely
 from PIL import Image, ImageOps
 from pygame import Rect, Surface
-from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov_app.editor.model.background import Background
@@ -34,7 +33,7 @@ class Outline:
     outer: list[bool]  # which of them are outer rings
     lines: list[Array]  # (k, 2) m; of what covers nothing
     bounds: Array  # (4,) m
-    geometry: BaseGeometry
+    geometry: shapely.Geometry
 
     @cached_property
     def name_place(self) -> tuple[float, float, float, float]:
@@ -49,14 +48,14 @@ class Outline:
         return best
 
 
-def _cut(geometry: BaseGeometry, axis: int, at: float) -> Iterable[BaseGeometry]:
+def _cut(geometry: shapely.Geometry, axis: int, at: float) -> Iterable[shapely.Geometry]:
     low_x, low_y, high_x, high_y = geometry.bounds
     ends = [(low_x - 1.0, at), (high_x + 1.0, at)] if axis == 0 else [(at, low_y - 1.0), (at, high_y + 1.0)]
     parts = shapely.get_parts(shapely.intersection(geometry, shapely.LineString(ends)))
     return [part for part in parts if part.length > 0.0]
 
 
-def outline_of(geometry: BaseGeometry) -> Outline:
+def outline_of(geometry: shapely.Geometry) -> Outline:
     rings: list[Array] = []
     outer: list[bool] = []
     lines: list[Array] = []

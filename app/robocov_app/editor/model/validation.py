@@ -62,8 +62,7 @@ def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiP
             validate(draft_document(sketch), "map")
             check_rules(environment, "map")
         except MapError as error:
-            otherwise = Problem(in_words(str(error), sketch), None)
-            found = list(_space_faults(sketch, free, set())) or [otherwise]
+            found = list(_space_faults(sketch, free, set())) or [Problem(in_words(str(error), sketch), None)]
     found += _warnings(sketch, free, radius, {problem.of for problem in found})
     for k, problem in enumerate(found):
         if problem.of is not None and problem.words[0] in ": ":

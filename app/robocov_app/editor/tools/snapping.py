@@ -1,19 +1,16 @@
 """Snapping of the cursor: grid, vertices, edges, angles, alignment; never beyond its reach."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import chain, combinations, islice
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, Self, TypeAlias, get_args
 
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
-from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, WallObstacle
@@ -40,7 +37,11 @@ class Targets:
             else:
                 owners.add(each)
         points, rims, centres = list[Point](), list(more), list[Point]()
-        edges, walls, circles = list[tuple[Point, Point]](), list[BaseGeometry](), list[BaseGeometry]()
+        edges, walls, circles = (
+            list[tuple[Point, Point]](),
+            list[Any](),
+            list[Any](),
+        )
         for owner in sketch.owners:
             if owner in owners:
                 continue
@@ -116,8 +117,7 @@ class Snapper:
         """Return what to snap to; None as long as that is being worked out."""
         look = frozenset(without), tuple(more)
         coming = self._latest.of(sketch, look, lambda: self._pool.submit(Targets, sketch, *look))
-        at_once = coming.done() or self.patient or vertex_count(sketch) < MANY
-        return coming.result() if at_once else None
+        return coming.result() if coming.done() or self.patient or vertex_count(sketch) < MANY else None
 
     def close(self) -> None:
         self._pool.shutdown(cancel_futures=True)
@@ -128,7 +128,7 @@ def vertex_count(sketch: Sketch) -> int:
     return sum(len(getattr(shape, "vertices", getattr(shape, "points", ()))) for shape in shapes)
 
 
-def _outline(geometries: list[BaseGeometry]) -> tuple[Array, Array]:
+def _outline(geometries: list[shapely.Geometry]) -> tuple[Array, Array]:
     rings = shapely.get_rings(np.array(geometries, dtype=object))
     points, ring = shapely.get_coordinates(rings, return_index=True)
     is_edge = ring[1:] == ring[:-1]
@@ -205,7 +205,7 @@ class _Line:
     def at(self, along: float) -> Point:
         return self.through[0] + along * self.direction[0], self.through[1] + along * self.direction[1]
 
-    def crossing(self, other: _Line) -> Point | None:
+    def crossing(self, other: Self) -> Point | None:
         (ux, uy), (vx, vy) = self.direction, other.direction
         across = ux * vy - uy * vx
         if abs(across) < _PARALLEL:
@@ -232,8 +232,7 @@ class _Line:
         return None if beyond else place
 
     def shown(self, at: Point) -> Guide:
-        line = self.guide if self.kind == "edge" else (*self.guide, at)
-        return Guide(self.kind, line, self.words)
+        return Guide(self.kind, self.guide if self.kind == "edge" else (*self.guide, at), self.words)
 
 
 def snapped(point: Point, targets: Targets, snapping: Snapping, origin: Point | None = None) -> Snap:

@@ -12,6 +12,7 @@ from robocov_app.editor.edits.clipboard import copied, pasted
 from robocov_app.editor.edits.create import anywhere_added
 from robocov_app.editor.edits.fixes import fixed, unreachable_filled
 from robocov_app.editor.edits.transform import bounds_of
+from robocov_app.editor.model import require
 from robocov_app.editor.model.coordinates import angle_of, length_of, point_of, size_of
 from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner
@@ -35,16 +36,8 @@ Row = tuple[str, str, str, Run]  # name, title and keys of a command, separated 
 _Number = TypeVar("_Number", int, float)
 
 
-def require(there: object, words: str) -> None:
-    """Raise MapError with these words where something is missing."""
-    if not there:
-        raise MapError(words)
-
-
 def selected(editor: Editor) -> Selection:
-    selection = whole(editor.selection)
-    require(selection, "nothing is selected: click something first, or press Ctrl A")
-    return selection
+    return require(whole(editor.selection), "nothing is selected: click something first, or press Ctrl A")
 
 
 def align(editor: Editor, side: transform.Side) -> None:
@@ -76,8 +69,7 @@ def back(editor: Editor) -> None:
 
 
 def delete(editor: Editor) -> None:
-    selection = editor.selection
-    require(selection, "nothing is selected: click something first")
+    selection = require(editor.selection, "nothing is selected: click something first")
     act = vertices.deleted if selection.vertices else properties.deleted
     editor.change(act(editor.sketch, vertices_or_things(selection)))
 
@@ -113,8 +105,8 @@ def level(editor: Editor) -> None:
 
 
 def nudge(editor: Editor, steps: int, x: int, y: int) -> None:
-    selection = editor.selection
-    require(selection, "nothing is selected: arrows move what is; Ctrl and arrows move the sheet")
+    missing = "nothing is selected: arrows move what is; Ctrl and arrows move the sheet"
+    selection = require(editor.selection, missing)
     by = steps * editor.grid
     editor.change(move(editor, x * by, y * by, vertices_or_things(selection)), drag=("nudge", selection))
 
@@ -155,10 +147,9 @@ def trim(editor: Editor, edit: Edit, length: float | None = None) -> None:
 
 
 def extend(editor: Editor) -> None:
-    if editor.cursor is None:
-        raise MapError("move the mouse to where the wall is to go on to")
+    cursor = require(editor.cursor, "move the mouse to where the wall is to go on to")
     vertex = one_vertex(editor)
-    to = editor.snapped(editor.cursor, REACH * editor.pixel, place_of(editor.sketch, vertex)).point
+    to = editor.snapped(cursor, REACH * editor.pixel, place_of(editor.sketch, vertex)).point
     editor.change(vertices.extended(editor.sketch, vertex, to))
 
 
@@ -182,8 +173,7 @@ def widen(editor: Editor, factor: float) -> None:
 
 
 def next_start(editor: Editor) -> None:
-    names = editor.start_names
-    require(names, "the map has no start yet: S draws one")
+    names = require(editor.start_names, "the map has no start yet: S draws one")
     now = editor.start_name
     name = names[(names.index(now) + 1) % len(names)] if now in names else names[0]
     editor.start = name

@@ -12,6 +12,7 @@ from PIL import Image, UnidentifiedImageError
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, map_file
 from robocov_app.editor.edits.properties import underlaid
+from robocov_app.editor.model import require
 from robocov_app.editor.model.background import picture_laid
 from robocov_app.editor.model.document import SUFFIX, Autosave, ChangedError, Document, opened_elsewhere
 from robocov_app.editor.model.sketch import Sketch
@@ -43,7 +44,7 @@ class FileCommands:
             then()
             document.close(discard=True)
 
-        if not document.unsaved:
+        if not document.history.unsaved:
             discard()
             return
         save = partial(self.save, then=lambda: self.leave(then))
@@ -93,8 +94,8 @@ class FileCommands:
         if own is not None and own.exists() and path.exists() and path.samefile(own):
             self.reload()
             return
-        if opened_elsewhere(self.drafts, path):
-            raise MapError(f"{path.name}: another editor has it open")
+        alone = not opened_elsewhere(self.drafts, path=path)
+        require(alone, f"{path.name}: another editor has it open")
         found = opened(path, self.drafts)
         if isinstance(found, Document):
             self.leave(lambda: self._put(found, heading(found)))
@@ -113,8 +114,7 @@ class FileCommands:
         self.editor.dialogs.ask(ImportDialog(path, importer, worker, put))
 
     def recover(self, draft: Autosave) -> None:
-        words = f"recovered: {draft.words()}"
-        self.leave(lambda: self._put(Document.recovered(draft, self.drafts), words))
+        self.leave(lambda: self._put(Document.recovered(draft, self.drafts), f"recovered: {draft.words()}"))
 
     def remember(self, path: Path) -> None:
         name = os.path.abspath(path)  # noqa: PTH100 - resolves no links, as people know the path
@@ -174,10 +174,10 @@ class FileCommands:
 
     def look(self) -> None:
         editor = self.editor
-        if isinstance(asked := editor.asked, ImportDialog) and (imported := asked.poll()) is not None:
+        if isinstance(asked := editor.dialogs.asked, ImportDialog) and (imported := asked.poll()) is not None:
             editor.dialogs.close()
             editor.attempt(lambda: asked.call(imported))
-        if editor.asked is not None:
+        if editor.dialogs.asked is not None:
             return
         state = editor.document.look(editor.now)
         if state == "gone":
@@ -188,8 +188,7 @@ class FileCommands:
             editor.ask("The file has changed", words, *answers)
 
     def reload(self) -> str:
-        if self.editor.document.path is None:
-            raise MapError("the map has no file yet")
+        require(self.editor.document.path, "the map has no file yet")
         self.editor.document.reload()
         self.editor.measurement = None
         return f"read again: {self.editor.document.title}"

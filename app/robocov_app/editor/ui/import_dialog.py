@@ -9,7 +9,6 @@ import numpy as np
 import pygame
 import shapely
 from pygame import Rect, Surface
-from shapely.geometry.base import BaseGeometry
 
 from robocov.errors import RobocovError
 from robocov_app.editor.ui.importing import Imported, options_of
@@ -257,7 +256,7 @@ def _maps(
 
 
 def _fill(
-    surface: Surface, camera: Camera, area: BaseGeometry, inside: Sequence[int], holes: Sequence[int]
+    surface: Surface, camera: Camera, area: shapely.Geometry, inside: Sequence[int], holes: Sequence[int]
 ) -> None:
     """Fill polygons; what lies in the hole of another is smaller, and drawn after it."""
     parts = [part for part in shapely.get_parts(area).tolist() if part.geom_type == "Polygon"]

@@ -15,6 +15,7 @@ from robocov_app.editor.edits import properties, transform
 from robocov_app.editor.edits.density import density_label
 from robocov_app.editor.edits.fixes import TITLES
 from robocov_app.editor.edits.transform import bounds_of
+from robocov_app.editor.model import require
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.coordinates import angle_of, length_of, point_of
 from robocov_app.editor.model.selection import Selection, numbered_name, place_of, points_of
@@ -43,9 +44,7 @@ def number(value: float | None) -> str:
 def _box(editor: Editor) -> tuple[float, float, float, float]:
     """Return the place of a vertex, a centre, or a box's lower left corner, and the box's sides, m."""
     sketch, selection = editor.preview
-    if (bounds := bounds_of(sketch, whole(selection))) is None:
-        raise MapError("nothing is selected")
-    x, y, high_x, high_y = bounds
+    x, y, high_x, high_y = require(bounds_of(sketch, whole(selection)), "nothing is selected")
     sides = high_x - x, high_y - y
     if len(selection.vertices) == 1:
         x, y = place_of(sketch, *selection.vertices)
@@ -87,9 +86,7 @@ def _shown_note(editor: Editor) -> str:
 
 
 def _picture(editor: Editor) -> Background:
-    if editor.sketch.background is None:
-        raise MapError("there is no picture under the map: Ctrl B takes one")
-    return editor.sketch.background
+    return require(editor.sketch.background, "there is no picture under the map: Ctrl B takes one")
 
 
 def _lay(editor: Editor, drag: str | None = None, **changes: float) -> None:
@@ -99,8 +96,7 @@ def _lay(editor: Editor, drag: str | None = None, **changes: float) -> None:
 
 def _set_scale(editor: Editor, text: str) -> None:
     scale = length_of(text, now=_picture(editor).scale)
-    if not scale > 0.0:
-        raise MapError("a pixel must be larger than 0 m")
+    require(scale > 0.0, "a pixel must be larger than 0 m")
     _lay(editor, scale=scale)
 
 
@@ -197,7 +193,7 @@ class Panel(SidePanel):
 
     def update(self) -> None:
         editor = self.editor
-        (sketch, selection), unsaved = editor.preview, editor.document.unsaved
+        (sketch, selection), unsaved = editor.preview, editor.document.history.unsaved
         shows = (editor.version, self.tab, id(sketch), selection, id(editor.measurement), unsaved)
         if shows != self._drawn:
             self._drawn, self.ui.stale = shows, True
@@ -209,7 +205,7 @@ class Panel(SidePanel):
     def _page(self, ui: Ui) -> None:
         ui.inset(12, 8, 12)
         document = self.editor.document
-        ui.header(f"{document.title}{', not saved' if document.unsaved else ''}")
+        ui.header(f"{document.title}{', not saved' if document.history.unsaved else ''}")
         for row in _FILE:
             self._buttons(ui, row)
         ui.header("TOOLS")
