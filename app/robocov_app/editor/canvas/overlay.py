@@ -20,7 +20,6 @@ from robocov_app.editor.tools.snapping import Guide
 from robocov_app.editor.tools.tool import Handle, Preview
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry
-from robocov_app.render.sprites import Pixel
 from robocov_app.render.theme import Colour, Theme, mix
 from robocov_app.toolkit.overlay import tag
 
@@ -57,7 +56,7 @@ def _disc(
     canvas.stamp(partial(sprites.disc, radius * canvas.scale, fill, ring, width, edge, text), at)
 
 
-def dashed(canvas: Canvas, points: Iterable[Pixel], colour: Colour, dash: float = 4.0) -> None:
+def dashed(canvas: Canvas, points: Iterable[sprites.Pixel], colour: Colour, dash: float = 4.0) -> None:
     for a, b in pairwise(points):
         canvas.dashes(a, b, colour, canvas.width(1.0), dash=dash)
 

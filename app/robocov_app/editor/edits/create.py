@@ -150,8 +150,7 @@ def door_opened(sketch: Sketch, key: int, point: Point, width: float) -> Change:
 
 def wall_opened(sketch: Sketch, key: int, a: Point, b: Point) -> Change:
     """Open a wall between the places on it that are nearest to two points."""
-    line = _line(sketch, key)
-    begin, end = sorted(line.project(shapely.Point(place)) for place in (a, b))
+    begin, end = sorted(_line(sketch, key).project(shapely.Point(place)) for place in (a, b))
     door_width(end - begin)
     return _opened(sketch, key, begin, end)
 

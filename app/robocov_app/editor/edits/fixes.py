@@ -12,8 +12,7 @@ from shapely.ops import substring
 
 from robocov.environment import SAGITTA, Obstacle, Point, PointsStart, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.edits import boolean, properties, transform
-from robocov_app.editor.edits.vertices import with_places
+from robocov_app.editor.edits import boolean, properties, transform, vertices
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import distinct, outlines, rectangle, rounded
 from robocov_app.editor.model.measurement import reach_of
@@ -97,7 +96,7 @@ def _start_moved(sketch: Sketch, name: str, where: Geometry, radius: float) -> C
     require(not room.is_empty, "a robot fits nowhere")
     vertex = Vertex(name, 0, number)
     way = shapely.shortest_line(room, shapely.Point(place_of(sketch, vertex)))
-    after = with_places(sketch, {vertex: rounded(way.coords[0])})
+    after = vertices.with_places(sketch, {vertex: rounded(way.coords[0])})
     return Change(after, Selection.of(name), f"start “{name}”{spot} moved to where a robot fits")
 
 

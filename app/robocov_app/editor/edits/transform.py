@@ -9,9 +9,8 @@ from typing import Any, Final, Literal, Self, TypeAlias
 import numpy as np
 import shapely
 
-from robocov import environment as env
 from robocov.density import Gaussians, WeightedPolygons
-from robocov.environment import Point, Ring
+from robocov.environment import CircleObstacle, DiscStart, Point, PolygonObstacle, Ring
 from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits.create import added
@@ -79,10 +78,10 @@ class Affine:
     def thing(self, thing: Any) -> Any:
         """Return where a thing or a density goes; stretched, circles become polygons, walls keep width."""
         factor = self.factor
-        if factor is None and isinstance(thing, env.DiscStart):
+        if factor is None and isinstance(thing, DiscStart):
             raise MapError("a start that is a disc stays one: scale it by the same factor both ways")
-        if factor is None and isinstance(thing, env.CircleObstacle):
-            thing = env.PolygonObstacle(thing.polygon.exterior.coords[:-1], (), thing.name, thing.path)
+        if factor is None and isinstance(thing, CircleObstacle):
+            thing = PolygonObstacle(thing.polygon.exterior.coords[:-1], (), thing.name, thing.path)
         found: dict[str, Any] = {}
         for name, value in ((field.name, getattr(thing, field.name)) for field in fields(thing)):
             if name in ("vertices", "points", "positions"):
@@ -237,7 +236,7 @@ def levelled(sketch: Sketch, a: Point, b: Point) -> Change:
 
 def box_of(sketch: Sketch, owner: Owner) -> Box | None:
     # a typed size is that of a circle, not of the polygon that stands for it
-    round_one = isinstance(sketch.thing(owner), env.CircleObstacle)
+    round_one = isinstance(sketch.thing(owner), CircleObstacle)
     if isinstance(owner, int) and owner != BOUNDARY and not round_one:
         covered = sketch.item(owner).geometry
         return None if covered.is_empty else covered.bounds
@@ -246,10 +245,9 @@ def box_of(sketch: Sketch, owner: Owner) -> Box | None:
 
 
 def bounds_of(sketch: Sketch, selection: Selection) -> Box | None:
-    owners = selection.owners
-    boxes = []
+    owners, boxes = selection.owners, list[Box]()
     if len(owners) > _MANY:  # all at once
-        sharp = [k for k in selection.items if not isinstance(sketch.item(k).shape, env.CircleObstacle)]
+        sharp = [k for k in selection.items if not isinstance(sketch.item(k).shape, CircleObstacle)]
         rows = shapely.bounds(sketch.geometries[[sketch.places[key] for key in sharp]])
         boxes = [(a, b, c, d) for a, b, c, d in rows[np.isfinite(rows).all(axis=1)].tolist()]
         owners = owners - frozenset(sharp)

@@ -18,7 +18,6 @@ from robocov_app.editor.model.parser import parse_sketch, sketch_of
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch, draft_document, sketch_text
 from robocov_app.toolkit import autosave
-from robocov_app.toolkit.autosave import Autosaver
 
 
 @dataclass
@@ -174,8 +173,7 @@ class ChangedError(OutputError):
 
 def read_sketch(path: Path) -> tuple[Sketch, OnDisk]:
     path = path.absolute()
-    # the stamp of before: what changes while it is read is noticed at the next look
-    stamp = _stamp(path)
+    stamp = _stamp(path)  # the stamp of before: what changes while it is read is noticed at the next look
     content = read_bytes(path)
     return parse_sketch(content, str(path), path.parent), OnDisk.of(path, content, stamp)
 
@@ -236,7 +234,7 @@ class Document:
         self.path, self.disk, self.stem = path, disk, stem  # stem: of a map without a file
         self.state: State = "same"
         self._looked, self._over = 0.0, False
-        self.autosaver = Autosaver(drafts, KIND, path, resumed)
+        self.autosaver = autosave.Autosaver(drafts, KIND, path, resumed)
         self.flush, self.close = self.autosaver.flush, self.autosaver.close
         self._kept: Sketch | None = sketch if saved else None
         self.keep()

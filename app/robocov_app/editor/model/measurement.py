@@ -105,8 +105,7 @@ def _arcs(parts: Array, free: MultiPolygon) -> IntArray:
     before[first] = np.append(first[1:], len(ring)) - 1
     counts = np.zeros(len(parts), dtype=np.intp)
     np.add.at(counts, of[ring[off & ~off[before]]], 1)
-    # an outline that touches no wall at all
-    np.add.at(counts, of[np.logical_and.reduceat(off, first)], 1)
+    np.add.at(counts, of[np.logical_and.reduceat(off, first)], 1)  # an outline that touches no wall at all
     return counts
 
 

@@ -216,7 +216,6 @@ def draft_document(sketch: Sketch) -> dict[str, Any]:
 
 
 def sketch_text(sketch: Sketch) -> str:
-    """Return the text of the file of a sketch, as `robocov.mapfile.dump_map` has it."""
     return dump_document(draft_document(sketch))
 
 

@@ -58,8 +58,7 @@ def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiP
         environment = sketch.unchecked()
         free = environment.free
         try:
-            # whatever the rules are, these are they
-            validate(draft_document(sketch), "map")
+            validate(draft_document(sketch), "map")  # whatever the rules are, these are they
             check_rules(environment, "map")
         except MapError as error:
             found = list(_space_faults(sketch, free, set())) or [Problem(in_words(str(error), sketch), None)]

@@ -329,8 +329,7 @@ class SelectTool(Tool):
             return
         self.begun = self.drag = None
         if not event.ctrl:
-            # on the edge, but at a round place
-            to = context.snapped(edge.point, event.reach).point
+            to = context.snapped(edge.point, event.reach).point  # on the edge, but at a round place
             edge = edge_at(context.sketch, to, ON_EDGE, [edge.of]) or edge
         context.change(vertices.inserted(context.sketch, edge))
 

@@ -67,8 +67,7 @@ class Targets:
             "middle": (lows + highs) / 2,
         }
         self._places = {kind: (cKDTree(at), at) for kind, at in kinds.items() if len(at)}
-        # walls and circles are found by what they look like, too
-        around = _outline([*walls, *circles])
+        around = _outline([*walls, *circles])  # walls and circles are found by what they look like, too
         self.starts, self.ends = np.concatenate([lows, around[0]]), np.concatenate([highs, around[1]])
         low, high = np.minimum(self.starts, self.ends), np.maximum(self.starts, self.ends)
         self._edges = shapely.STRtree(shapely.box(*low.T, *high.T))
@@ -252,8 +251,7 @@ def snapped_move(points: Sequence[Point], dx: float, dy: float, targets: Targets
         at = x + dx, y + dy
         rank, snap = _Candidates(at, targets, snapping if k == 0 else of_others).best()
         by = dx + snap.point[0] - at[0], dy + snap.point[1] - at[1]
-        # what rounding adds is not to add to the reach
-        away = math.hypot(by[0] - dx, by[1] - dy)
+        away = math.hypot(by[0] - dx, by[1] - dy)  # what rounding adds is not to add to the reach
         if snap.guides and away <= snapping.reach and (best is None or (rank, away) < best[0]):
             best = (rank, away), Snap(by, snap.guides)
     return best[1] if best else Snap((dx, dy))
@@ -313,8 +311,7 @@ class _Candidates:
         lines += islice(self.edges(), 4) if "edge" in self.how.to else ()
         for k, line in enumerate(lines):
             for other in lines[:k]:
-                # where two edges cross is a matter of its own
-                both_edges = line.kind == other.kind == "edge"
+                both_edges = line.kind == other.kind == "edge"  # where two edges cross is a matter of its own
                 place = None if both_edges else line.crossing(other)
                 if place is not None:
                     yield Snap(place, (other.shown(place), line.shown(place)))

@@ -7,11 +7,8 @@ from typing import TypeVar
 from robocov.environment import Point, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov_app.editor.canvas.canvas import REACH, EditorCanvas
-from robocov_app.editor.edits import boolean, density, paths, properties, transform, vertices
+from robocov_app.editor.edits import boolean, create, density, fixes, paths, properties, transform, vertices
 from robocov_app.editor.edits.clipboard import copied, pasted
-from robocov_app.editor.edits.create import anywhere_added
-from robocov_app.editor.edits.fixes import fixed, unreachable_filled
-from robocov_app.editor.edits.transform import bounds_of
 from robocov_app.editor.model import require
 from robocov_app.editor.model.coordinates import angle_of, length_of, point_of, size_of
 from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of
@@ -20,7 +17,7 @@ from robocov_app.editor.tools.density import DensityTool
 from robocov_app.editor.tools.draw import MeasureTool
 from robocov_app.editor.tools.snapping import SNAPS
 from robocov_app.editor.ui.editor import SHOWN, Editor
-from robocov_app.editor.ui.file_commands import FileCommands
+from robocov_app.editor.ui.file_commands import OPENED, PICTURES, FileCommands
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.command import Command, Takes
 
@@ -195,7 +192,7 @@ def make_areas(editor: Editor) -> None:
 
 def fix_problem(editor: Editor) -> None:
     for problem in [editor.problem] if editor.problem is not None else editor.problems:
-        if (change := fixed(editor.sketch, problem, editor.radius)) is not None:
+        if (change := fixes.fixed(editor.sketch, problem, editor.radius)) is not None:
             editor.change(change)
             return
     raise MapError("there is nothing that can be mended by itself")
@@ -264,14 +261,14 @@ def _move(editor: Editor, text: str) -> None:
 
 def _place(editor: Editor, text: str) -> None:
     selection = selected(editor)
-    bounds = bounds_of(editor.sketch, selection)
+    bounds = transform.bounds_of(editor.sketch, selection)
     x, y = point_of(text, last=bounds[:2] if bounds else None)
     editor.change(transform.placed(editor.sketch, selection, x, y))
 
 
 def _scale(editor: Editor, text: str) -> None:
     selection = selected(editor)
-    require(bounds_of(editor.sketch, selection), "there is nothing to scale")
+    require(transform.bounds_of(editor.sketch, selection), "there is nothing to scale")
     factor = length_of(text if text.endswith("%") else f"*{text.lstrip('*x')}", now=1.0)
     editor.change(transform.scaled(editor.sketch, selection, factor))
 
@@ -337,17 +334,18 @@ def editor_commands(
     def switch_theme() -> None:
         editor.theme = "dark" if editor.theme == "light" else "light"
 
-    fill_unreachable = of_map(unreachable_filled, lambda: editor.radius)
+    fill_unreachable = of_map(fixes.unreachable_filled, lambda: editor.radius)
+    ask_picture = partial(documents.ask_path, "Picture under the map", documents.underlay, PICTURES)
     no_picture = of_map(properties.underlaid, lambda: None)
     table: tuple[str | Row, ...] = (  # the headings of groups, and below each its commands
         "File",
         ("new", "New map", "ctrl+n", documents.new),
-        ("open", "Open a map", "ctrl+o", documents.ask_open),
+        ("open", "Open a map", "ctrl+o", partial(documents.ask_path, "Open a map", documents.open, OPENED)),
         ("recent", "Open a recent or bundled map", "ctrl+shift+o", documents.ask_recent),
         ("save", "Save", "ctrl+s", documents.save),
         ("save:as", "Save as", "ctrl+shift+s", documents.ask_name),
         ("export", "Export to another format", "ctrl+e", documents.ask_export),
-        ("background", "Picture under the map", "ctrl+b", documents.ask_picture),
+        ("background", "Picture under the map", "ctrl+b", ask_picture),
         ("background:none", "Take the picture under the map away", "", no_picture),
         ("reload", "Read the file again", "ctrl+r", documents.reload),
         ("try", "Try it in the demo, and back", "f5", of_window["try"]),
@@ -436,7 +434,7 @@ def editor_commands(
         ("problem:next", "Go to the next problem", "f8, n", does(next_problem)),
         ("problem:fix", "Mend the problem that is shown", "shift+f8", does(fix_problem)),
         "Robots",
-        ("start:uniform", "A start anywhere in the free space", "shift+u", of_map(anywhere_added)),
+        ("start:uniform", "A start anywhere in the free space", "shift+u", of_map(create.anywhere_added)),
         ("start:next", "Next start of the map", "shift+n", does(next_start)),
         ("start:default", "Make it the default start", "shift+d", does(make_default)),
         ("more", "One robot more", "shift+=, shift++", partial(editor.add_robots, 1)),

@@ -90,15 +90,14 @@ class TeamThread:
         self._asked: tuple[object, ...] = ()
         self._answer: Future[Team] | None = None
 
-    def ask(self, sketch: Sketch, start: str | None, robots: int, seed: int, radius: float) -> None:
+    def ask(self, sketch: Sketch, start: str | None, robots: int, seed: int, radius: float) -> Team | None:
+        """Ask for a team; return it once, as soon as it is there."""
         team = sketch, start, robots, seed, radius
         if self._asked != team:
             self._asked = team
             if self._answer is not None:
                 self._answer.cancel()
             self._answer = self._pool.submit(placed, *team)
-
-    def poll(self) -> Team | None:
         if self._answer is None or not self._answer.done():
             return None
         answer, self._answer = self._answer.result(), None
@@ -116,13 +115,14 @@ class Editor(Workspace):
     ) -> None:
         super().__init__(document)
         self.readings, self.folder = readings, folder
+        self.selector = SelectTool()
         tools = (  # in the order in which they are shown
-            *(SelectTool(), PanTool(), draw.PolygonTool(), draw.RectangleTool(), draw.CircleTool()),
+            *(self.selector, PanTool(), draw.PolygonTool(), draw.RectangleTool(), draw.CircleTool()),
             *(draw.WallTool(), draw.DoorTool(), draw.BoundaryTool(), draw.MeasureTool(), draw.DiscTool()),
             *(draw.PlacesTool(), DensityTool(), MotionPathTool(), ReferenceImageTool()),
         )
         self.tools: dict[str, Tool] = {tool.name: tool for tool in tools}
-        self.tool: Tool = self.tools["select"]
+        self.tool: Tool = self.selector
         self.theme: str = settings.theme
         self.panel = True
         self.shown, self.snaps = set(settings.shown) & set(SHOWN), set(settings.snaps) & set(SNAPS)
@@ -137,10 +137,6 @@ class Editor(Workspace):
         self.typed = ""
         self.moves_since: float | None = None  # s; since when obstacles that move are shown moving
         self._about: tuple[object, float] | None = None
-
-    @property
-    def selector(self) -> SelectTool:
-        return self.tools["select"]  # type: ignore[return-value]
 
     @property
     def preview(self) -> tuple[Sketch, Selection]:

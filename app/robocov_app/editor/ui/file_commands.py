@@ -26,7 +26,7 @@ from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Worker
 Act: TypeAlias = Callable[[], object]
 _PATIENCE = 2.0  # seconds after which an import with settings that have changed since is given up
 _CANCEL = ("Cancel", "c", lambda: None)
-_OPENED = (SUFFIX, *(suffix for importer in IMPORTERS.values() for suffix in importer.suffixes))
+OPENED = (SUFFIX, *(suffix for importer in IMPORTERS.values() for suffix in importer.suffixes))
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
 
 
@@ -66,13 +66,7 @@ class FileCommands:
         words = "a new map: 10 x 10 m; B draws another boundary"
         self.leave(lambda: self._put(Document.new(self.drafts), words))
 
-    def ask_open(self) -> None:
-        self._ask_path("Open a map", self.open, _OPENED)
-
-    def ask_picture(self) -> None:
-        self._ask_path("Picture under the map", self.underlay, PICTURES)
-
-    def _ask_path(
+    def ask_path(
         self, title: str, call: Callable[[Path], object], endings: Sequence[str], text: str = ""
     ) -> None:
         def chosen(path: Path) -> None:
@@ -94,8 +88,8 @@ class FileCommands:
         if own is not None and own.exists() and path.exists() and path.samefile(own):
             self.reload()
             return
-        alone = not opened_elsewhere(self.drafts, path=path)
-        require(alone, f"{path.name}: another editor has it open")
+        if opened_elsewhere(self.drafts, path=path):
+            raise MapError(f"{path.name}: another editor has it open")
         found = opened(path, self.drafts)
         if isinstance(found, Document):
             self.leave(lambda: self._put(found, heading(found)))
@@ -130,7 +124,7 @@ class FileCommands:
         folder = self.editor.folder
         suggested = self.editor.document.suggested(folder)
         text = suggested.name if suggested.parent == folder else str(suggested)
-        self._ask_path("Save as", lambda path: self._save(path, then), [SUFFIX], text)
+        self.ask_path("Save as", lambda path: self._save(path, then), [SUFFIX], text)
 
     def _save(self, path: Path, then: Act | None, *, over: bool = False, spoil: bool = False) -> str | None:
         editor = self.editor
@@ -160,7 +154,7 @@ class FileCommands:
         suffixes = [suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes]
         title = f"Export to a file ending in {', '.join(suffixes)}"
         suggested = self.editor.document.suggested(self.editor.folder)
-        self._ask_path(title, self._export, suffixes, f"{suggested.stem}.svg")
+        self.ask_path(title, self._export, suffixes, f"{suggested.stem}.svg")
 
     def _export(self, path: Path, *, over: bool = False) -> str | None:
         if path.exists() and not over:

@@ -131,8 +131,8 @@ class EditorWindow(BaseWindow):
         if not self.drag:
             self.documents.look()
             if "robots" in editor.shown:
-                self.team.ask(editor.sketch, editor.start_name, editor.robots, editor.seed, editor.radius)
-                if (team := self.team.poll()) is not None:
+                wanted = editor.start_name, editor.robots, editor.seed, editor.radius
+                if (team := self.team.ask(editor.sketch, *wanted)) is not None:
                     self.canvas.team = team
                     editor.say(team.words, trouble=True)
         if not (self.drag and editor.readings.busy):
@@ -194,7 +194,8 @@ class EditorWindow(BaseWindow):
         self.editor.panel = True
         self._arrange()
         self.panel.show_tab(tab)
-        self.panel.focus(field)
+        self.panel.ui.run(None, None)
+        self.panel.ui.set_focus(field)
 
     def open_menu(self, pixel: tuple[int, int]) -> None:
         editor = self.editor
