@@ -243,7 +243,7 @@ def opening(folder: Path, path: Path | None = None, **more: object) -> AbstractC
 def test_settings_are_remembered(places: Path) -> None:
     with opening(places) as window:
         window.editor.theme = "dark"
-        window.editor.attempt(lambda: run_typed(window.editor, "grid", "0.25"))
+        window.editor.attempt(lambda: run_typed(window.editor, "0.25", "grid"))
         window.editor.snaps.discard("edges")
         window.panel.show_tab("snap")
         window.documents.remember(places / "x.json")

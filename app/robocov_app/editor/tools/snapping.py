@@ -37,11 +37,7 @@ class Targets:
             else:
                 owners.add(each)
         points, rims, centres = list[Point](), list(more), list[Point]()
-        edges, walls, circles = (
-            list[tuple[Point, Point]](),
-            list[Any](),
-            list[Any](),
-        )
+        edges, walls, circles = list[tuple[Point, Point]](), list[Any](), list[Any]()
         for owner in sketch.owners:
             if owner in owners:
                 continue

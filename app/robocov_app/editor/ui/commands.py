@@ -504,7 +504,7 @@ TYPED: dict[str, tuple[str, RunWith]] = {
 
 def typed_commands(editor: Editor) -> list[Command]:
     def run(word: str, text: str) -> None:
-        editor.carry_out(lambda: run_typed(editor, word, text))
+        editor.carry_out(lambda: run_typed(editor, text, word))
 
     return [
         Command(word, f"{word} {example}", "", partial(run, word), takes=Takes(example))
@@ -512,7 +512,7 @@ def typed_commands(editor: Editor) -> list[Command]:
     ]
 
 
-def run_typed(editor: Editor, word: str, text: str) -> None:
+def run_typed(editor: Editor, text: str, word: str) -> None:
     """Do what was typed, as ``rotate 30``; raises a MapError when that means nothing, or cannot be done."""
     require(text.strip(), f"{word}: a value was wanted after it")
     TYPED[word][1](editor, text.strip())

@@ -102,10 +102,7 @@ def _turn(editor: Editor, text: str) -> None:
 
 
 def _typed(word: str, tip: str) -> Field:
-    def take(editor: Editor, text: str) -> None:
-        run_typed(editor, word, text)
-
-    return Field(lambda editor: number(getattr(editor, KEPT[word])), take, tip)
+    return Field(lambda editor: number(getattr(editor, KEPT[word])), partial(run_typed, word=word), tip)
 
 
 def _titled(name: str, tip: str) -> Field:
