@@ -18,12 +18,9 @@ FORMAT = "robocov-clipboard"  # what the copied text says that it is
 
 
 def copied(sketch: Sketch, selection: Selection) -> str:
-    part = Sketch(
-        name=sketch.name,
-        boundary=sketch.boundary if selection.boundary else None,
-        obstacles=tuple(selection.items_in(sketch)),
-        starts=tuple((name, spec) for name, spec in sketch.starts if name in selection.starts),
-    )
+    starts = tuple((name, spec) for name, spec in sketch.starts if name in selection.starts)
+    part = Sketch(sketch.name, obstacles=tuple(selection.items_in(sketch)), starts=starts)
+    part = replace(part, boundary=sketch.boundary) if selection.boundary else part
     anything = part.boundary is not None or part.obstacles or part.starts
     require(anything, "select obstacles, starts or the boundary to copy")
     return dump_document({**draft_document(part), "format": FORMAT})

@@ -37,10 +37,8 @@ class DrawTool(Tool):
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         """Return what to show of the points, the last of which is the cursor."""
         closed = self.closes and len(points) > 2
-        words = bearing_words(points[-2], points[-1]) + (
-            f"   {shapely.Polygon(points).area:.2f} m²" if closed else ""
-        )
-        return Preview(points, closed, True, words=words)
+        area = f"   {shapely.Polygon(points).area:.2f} m²" if closed else ""
+        return Preview(points, closed, True, words=bearing_words(points[-2], points[-1]) + area)
 
     def placed(self, event: PointerEvent) -> Point:
         return event.constrained(self.origin)

@@ -506,10 +506,8 @@ def typed_commands(editor: Editor) -> list[Command]:
     def run(word: str, text: str) -> None:
         editor.carry_out(lambda: run_typed(editor, text, word))
 
-    return [
-        Command(word, f"{word} {example}", "", partial(run, word), takes=Takes(example))
-        for word, (example, _) in TYPED.items()
-    ]
+    rows = [(word, said) for word, (said, _) in TYPED.items()]
+    return [Command(word, f"{word} {said}", "", partial(run, word), takes=Takes(said)) for word, said in rows]
 
 
 def run_typed(editor: Editor, text: str, word: str) -> None:
