@@ -144,11 +144,6 @@ class EditorCanvas:
         x, y = self.camera.to_pixels(np.array(point)).tolist()
         return x, y
 
-    @property
-    def reach(self) -> float:
-        """Width of a finger, m."""
-        return REACH * self.layout.scale / self.camera.zoom
-
     def problem_at(self, pixel: Point) -> Problem | None:
         found = self.editor.problems if "problems" in self.editor.shown else ()
         places, reach = overlay.badge_places(found, self._view()), 10 * self.layout.scale

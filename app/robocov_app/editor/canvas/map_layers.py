@@ -208,11 +208,9 @@ class Sheet:
         """Return the page with a sketch, without the obstacles that are being dragged."""
         left, top, width, height = view.camera.view
         view = replace(view, camera=view.camera.within((left + BIAS, top + BIAS, width, height)))
-        look = (
-            *(view.camera.zoom, view.camera.view, view.theme.name, view.scale, view.size, view.grid),
-            *(view.shown & {"grid", "names", "picture"}, view.folder, sketch.background),
-            *(sketch.boundary, sketch.density),
-        )
+        of_view = (view.camera.zoom, view.camera.view, view.theme.name, view.scale, view.size, view.grid)
+        shown, below = view.shown & {"grid", "names", "picture"}, (view.folder, sketch.background)
+        look = (*of_view, shown, *below, sketch.boundary, sketch.density)
         items = {i.key: i for i in sketch.obstacles if i.key not in lifted and not i.hidden}
         boxes = self._boxes(view, items) if look == self._look else None
         if self._page is None or self._page.get_size() != view.size:

@@ -57,18 +57,15 @@ class Targets:
                 pairs = [(k, (k + 1) % count) for k in range(count if closed else count - 1)]
                 edges += [(line[a], line[b]) for a, b in pairs if a not in gone and b not in gone]
         lows, highs = np.array(edges, dtype=float).reshape(-1, 2, 2).transpose(1, 0, 2)
-        kinds = {
-            "vertex": np.concatenate([as_array([*points, *rims]), _outline(walls)[0]]),
-            "centre": as_array(centres),
-            "middle": (lows + highs) / 2,
-        }
+        marks = np.concatenate([as_array([*points, *rims]), _outline(walls)[0]])
+        kinds = {"vertex": marks, "centre": as_array(centres), "middle": (lows + highs) / 2}
         self._places = {kind: (cKDTree(at), at) for kind, at in kinds.items() if len(at)}
         around = _outline([*walls, *circles])  # walls and circles are found by what they look like, too
         self.starts, self.ends = np.concatenate([lows, around[0]]), np.concatenate([highs, around[1]])
         low, high = np.minimum(self.starts, self.ends), np.maximum(self.starts, self.ends)
         self._edges = shapely.STRtree(shapely.box(*low.T, *high.T))
         # what is in line counts of vertices and centres, sorted along each axis
-        marks = np.concatenate([kinds["vertex"], kinds["centre"]])
+        marks = np.concatenate([marks, kinds["centre"]])
         self._sorted = tuple(marks[np.argsort(marks[:, axis], kind="stable")] for axis in (0, 1))
 
     def nearest(self, point: Point, kind: PointKind, reach: float) -> Point | None:

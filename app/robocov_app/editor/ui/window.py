@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pygame
 
-from robocov_app.editor.canvas.canvas import EditorCanvas
+from robocov_app.editor.canvas.canvas import REACH, EditorCanvas
 from robocov_app.editor.model.geometry import point_words
 from robocov_app.editor.model.hit_test import owners_at
 from robocov_app.editor.model.selection import Selection
@@ -200,7 +200,7 @@ class EditorWindow(BaseWindow):
     def open_menu(self, pixel: tuple[int, int]) -> None:
         editor = self.editor
         if self.canvas.over(pixel):
-            there = owners_at(editor.sketch, self.canvas.to_world(pixel), 0.5 * self.canvas.reach)
+            there = owners_at(editor.sketch, self.canvas.to_world(pixel), 0.5 * REACH * editor.pixel)
             if not (editor.selection.vertices or any(each in editor.selection.owners for each in there)):
                 editor.select(Selection.of(*there[:1]))
         found = [self.commands[name] if name else None for name in offered(editor)]
@@ -291,7 +291,7 @@ class EditorWindow(BaseWindow):
             self.canvas.zoom(WHEEL ** wheel_notches(event), self.at)
 
     def _aim(self, pixel: tuple[int, int]) -> PointerEvent:
-        raw, reach = self.canvas.to_world(pixel), self.canvas.reach
+        raw, reach = self.canvas.to_world(pixel), REACH * self.editor.pixel
         editor, tool, held, point = self.editor, self.editor.tool, pygame.key.get_mods(), raw
         ctrl = bool(held & (pygame.KMOD_CTRL | pygame.KMOD_META))
         if tool.snaps:
