@@ -287,10 +287,8 @@ def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> Non
     lost.flush()
     lost.close(discard=False)
     with opening(places) as window:
-        assert (
-            isinstance(window.editor.dialogs.asked, Question)
-            and "Recover" in window.editor.dialogs.asked.title
-        )
+        asked = window.editor.dialogs.asked
+        assert isinstance(asked, Question) and "Recover" in asked.title
         Hands(window).key("r")
         assert len(window.editor.sketch.obstacles) == 1 and window.editor.document.history.unsaved
     # the window went without a decision: it is offered again

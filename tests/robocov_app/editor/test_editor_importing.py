@@ -200,10 +200,8 @@ def test_what_is_open_is_not_lost(hands: Hands, plan: Path) -> None:
     hands.type("0.1")
     hands.key("return")
     hands.frames(2)
-    assert (
-        isinstance(hands.editor.dialogs.asked, Question)
-        and hands.editor.dialogs.asked.title == "Save the changes?"
-    )
+    asked = hands.editor.dialogs.asked
+    assert isinstance(asked, Question) and asked.title == "Save the changes?"
     hands.key("escape")
     assert hands.sketch.name == "mine"
 
