@@ -16,7 +16,7 @@ from robocov_app.editor.model.document import FIRST_SHEET, Document
 from robocov_app.editor.model.measurement import measurement_worker
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.editor import Editor
+from robocov_app.editor.ui.editor import Editor, EditorSettings
 from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.toolkit.dialogs import Choice
 from robocov_app.toolkit.window import display
@@ -55,7 +55,7 @@ def opened_editor(
     with display(headless=True):
         if document is None:
             document = Document(sketch if sketch is not None else sheet(), drafts)
-        editor = Editor(document, readings or measurement_worker(direct=True), folder)
+        editor = Editor(document, readings or measurement_worker(direct=True), folder, EditorSettings())
         editor.theme = theme
         hands = Hands(EditorWindow(editor, size, scale, drafts, patient=True))
         hands.settle()
@@ -130,10 +130,10 @@ class Hands(Driver):
 
     def refused(self) -> str:
         """Return why the dialog that is open refuses what was typed, which stays; and leave it."""
-        asked = self.editor.asked
+        asked = self.editor.dialogs.asked
         assert isinstance(asked, Choice) and asked.trouble, "nothing was refused"
         self.key("escape")
-        assert self.editor.asked is None
+        assert self.editor.dialogs.asked is None
         return asked.trouble
 
     def select(self, *keys: Any) -> None:

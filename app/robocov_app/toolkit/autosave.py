@@ -94,8 +94,7 @@ class Autosaver:
         if discard or not self._holds:
             with suppress(OSError):
                 (self._place / _FILE).unlink()
-            # where files that are open cannot be removed, the lock goes first
-            self._lock.close()
+            self._lock.close()  # where files that are open cannot be removed, the lock goes first
             shutil.rmtree(self._place, ignore_errors=True)
         self._lock.close()
         self._place = None

@@ -197,8 +197,7 @@ class Choice(Dialog):
         return True
 
     def wheel(self, notches: float) -> None:
-        last = max(len(self.options(self.text)) - 1, 0)
-        self.chosen = min(max(self.chosen - round(notches), 0), last)
+        self.chosen = min(max(self.chosen - round(notches), 0), max(len(self.options(self.text)) - 1, 0))
         self.top = min(max(self.top, self.chosen - ROWS + 1), self.chosen)
 
 

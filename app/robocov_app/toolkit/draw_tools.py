@@ -35,8 +35,7 @@ class Outline:
     def release(self, point: Point, raw: Point, reach: float, *, clicked: bool = False) -> bool:
         """End a drag; a hand that shakes in a click has drawn nothing, unless two points are wanted."""
         dragging, self.dragging = self.dragging, False
-        # meanwhile a key may have taken the point back
-        if not dragging or not self.points or clicked:
+        if not dragging or not self.points or clicked:  # meanwhile a key may have taken the point back
             return False
         self.at = point
         return self.most == 2 or dist(self._pressed, raw) >= reach

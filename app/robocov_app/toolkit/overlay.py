@@ -87,8 +87,7 @@ def draw_status(screen: Surface, box: Box, theme: Theme, scale: float, facts: li
     room, kept = width - 44 * scale - canvas.text_width(hint, size), list(facts)
     while len(kept) > 1 and canvas.text_width("    ".join(kept), size) > room:
         kept.pop()
-    words = shortened("    ".join(kept), canvas.text_size(size), room)
-    canvas.text(words, (left + 12 * scale, y), size=size)
+    canvas.text(shortened("    ".join(kept), canvas.text_size(size), room), (left + 12 * scale, y), size=size)
     canvas.text(hint, (left + width - 12 * scale, y), size=size, colour=theme.faint, anchor="right")
 
 

@@ -364,15 +364,11 @@ class Ui:
         event = self._event if self.focus == key else None
         return key_of(event) if event is not None and event.type == pygame.KEYDOWN else ""
 
-    def _note(
-        self, kind: str, key: str, rect: Rect, text: str, value: object, tip: str = "", why: str = ""
-    ) -> None:
+    def _note(self, kind: str, key: str, rect: Rect, text: str, value: object, tip: str, why: str) -> None:
         tip = f"{tip}: {why}" if tip and why else tip or why
         self.shown[f"{kind}:{key}"] = Shown(kind, key, rect.clip(self._clip), text, value, tip, not why)
 
-    def _clicks(
-        self, kind: str, key: str, rect: Rect, text: str, value: object, tip: str = "", why: str = ""
-    ) -> bool:
+    def _clicks(self, kind: str, key: str, rect: Rect, text: str, value: object, tip: str, why: str) -> bool:
         self._note(kind, key, rect, text, value, tip, why)
         if why:
             return False
@@ -416,8 +412,7 @@ class Ui:
         self, text: str, rect: Rect, colour: Colour, size: float, *, bold: bool = False, at: str = "left"
     ) -> None:
         if self.surface is not None and text and self._draws(rect):
-            words = shortened(text, self.px(size), rect.width, bold)
-            picture = label(words, self.px(size), colour, bold)
+            picture = label(shortened(text, self.px(size), rect.width, bold), self.px(size), colour, bold)
             side = "center" if at == "center" else f"mid{at}"
             self.surface.blit(picture, picture.get_rect(**{side: getattr(rect, side)}))
 
@@ -429,7 +424,7 @@ class Ui:
     def label(self, text: str, *, key: str = "", style: str = "", tip: str = "", at: str = "left") -> None:
         """Write a word; `style` is ``header``, ``unit`` or ``bold``, `at` is ``center`` or ``right``."""
         rect = self.cell()
-        self._note("label", key or text, rect, text, None, tip)
+        self._note("label", key or text, rect, text, None, tip, "")
         faint, bold = style in ("header", "unit"), style in ("header", "bold")
         colour = self.theme.faint if faint else self.theme.ink
         self._write(text, rect, colour, SMALL if faint else TEXT, bold=bold, at=at)
@@ -486,7 +481,7 @@ class Ui:
     def area(self, key: str) -> tuple[Rect, bool]:
         """Take the next cell for a picture; return where it is, px, and whether it was clicked."""
         rect = self.cell()
-        return rect, self._clicks("area", key, rect, "", None)
+        return rect, self._clicks("area", key, rect, "", None, "", "")
 
     def tabs(
         self, key: str, names: Sequence[str], now: str, *widths: float, titles: Mapping[str, str] = {}
@@ -504,7 +499,7 @@ class Ui:
         key = f"section:{key or title}"
         self.row(height=20, below=4)
         rect = self.cell()
-        if self._clicks("section", key, rect, title, None):
+        if self._clicks("section", key, rect, title, None, "", ""):
             self._folded ^= {key}
             self.stale = True
         is_open = key not in self._folded
@@ -519,7 +514,7 @@ class Ui:
     def check(self, text: str, *, now: bool, key: str = "", tip: str = "") -> bool | None:
         """Show a check box and its words; return its new state once it was clicked."""
         key, rect = key or text, self.cell()
-        clicked = self._clicks("check", key, rect, text, now, tip)
+        clicked = self._clicks("check", key, rect, text, now, tip, "")
         if self._draws(rect):
             box = Rect(0, 0, self.px(16), self.px(16))
             box.midleft = rect.midleft
@@ -612,7 +607,7 @@ class Ui:
         if live and edit is not None and edit.text != text:
             given = edit.text
         shown = edit.text if edit is not None else text
-        self._note("entry", key, rect, shown, text, tip)
+        self._note("entry", key, rect, shown, text, tip, "")
         if self._draws(rect):
             self._draw_field(rect, edit, shown, ghost)
         return given
@@ -663,7 +658,7 @@ class Ui:
         picked = self.open_list.picked if self.open_list is not None and self.open_list.key == key else None
         if picked is not None:
             self.open_list = None
-        opened = self._clicks("menu", key, rect, now, now, tip) or self._key(key) == "down"
+        opened = self._clicks("menu", key, rect, now, now, tip, "") or self._key(key) == "down"
         if opened and picked is None:
             row = self.px(LIST_ROW)
             high = min(len(options) * row + 2, self.px(LONGEST_LIST))

@@ -135,8 +135,7 @@ class LatestWorker(Generic[_Answer]):
 
     def _write(self, process: subprocess.Popen[bytes], wire: Wire) -> None:
         assert process.stdin is not None
-        # when the process has ended, reading says so
-        with suppress(OSError), process.stdin as stream:
+        with suppress(OSError), process.stdin as stream:  # when the process has ended, reading says so
             while self._asked.wait() and self.process is process:
                 self._asked.clear()
                 if self._questions:
@@ -166,18 +165,15 @@ class DirectWorker(Generic[_Answer]):
 
     def __init__(self, service: Service, wire: Wire | None = None) -> None:
         self._service, self._wire = service, wire or Wire()
-        self._reply = Reply(0, None)
-
-    @property
-    def trouble(self) -> str:
-        return self._reply.trouble
+        self.trouble, self._answer = "", None
 
     def put(self, question: object) -> None:
-        self._reply = reply_of(self._service, [(0, self._wire.encode(question))], Line())
+        reply = reply_of(self._service, [(0, self._wire.encode(question))], Line())
+        self.trouble, self._answer = reply.trouble, reply.answer
 
     def poll(self) -> _Answer | None:
-        reply, self._reply = self._reply, Reply(0, None, self.trouble)
-        return None if reply.answer is None else self._wire.decode(reply.answer)
+        answer, self._answer = self._answer, None
+        return None if answer is None else self._wire.decode(answer)
 
     def close(self) -> None:
         """There is nothing to end."""

@@ -255,7 +255,7 @@ def test_commands_that_take_a_value_are_found_by_typing(hands: Hands) -> None:
 
 
 def palette(hands: Hands) -> Choice:
-    asked = hands.editor.asked
+    asked = hands.editor.dialogs.asked
     assert isinstance(asked, Choice)
     return asked
 

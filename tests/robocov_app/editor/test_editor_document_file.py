@@ -23,7 +23,7 @@ def changed(document: Document, radius: float = 1.0) -> None:
 def test_a_new_sheet_offers_a_boundary_and_loses_nothing(tmp_path: Path) -> None:
     document = Document.new(None)
     assert document.history.sketch.boundary == FIRST_SHEET
-    assert not document.unsaved and document.title == "Untitled"
+    assert not document.history.unsaved and document.title == "Untitled"
     assert document.suggested(tmp_path) == tmp_path / "untitled.json"
     (tmp_path / "untitled.json").write_text("")
     assert document.suggested(tmp_path) == tmp_path / "untitled-1.json"
@@ -32,20 +32,20 @@ def test_a_new_sheet_offers_a_boundary_and_loses_nothing(tmp_path: Path) -> None
 def test_saving_and_opening_again(tmp_path: Path) -> None:
     document = Document.new(None)
     changed(document)
-    assert document.unsaved
+    assert document.history.unsaved
     words = document.save(tmp_path / "plan")
-    assert words == f"saved: {tmp_path / 'plan.json'}" and not document.unsaved
+    assert words == f"saved: {tmp_path / 'plan.json'}" and not document.history.unsaved
     again = Document.opened(tmp_path / "plan.json", None)
-    assert again.title == "plan.json" and not again.unsaved
+    assert again.title == "plan.json" and not again.history.unsaved
     assert [item.shape for item in again.history.sketch.obstacles] == [PILLAR]
     assert again.history.sketch.name == document.history.sketch.name == "plan"  # nobody had named it
     document.history.do(properties.titled(document.history.sketch, "My plan"))
     document.save(tmp_path / "plan")
     assert load_map(tmp_path / "plan.json").name == "My plan"
     document.history.undo()
-    assert document.unsaved
+    assert document.history.unsaved
     document.history.redo()
-    assert not document.unsaved
+    assert not document.history.unsaved
 
 
 def test_a_bundled_map_opens_as_a_copy_and_is_never_written(tmp_path: Path) -> None:
@@ -83,11 +83,11 @@ def test_a_file_that_changes_is_noticed_once_and_can_be_reloaded_and_undone(tmp_
     assert document.look(10.5) == "same"  # not asked that often
     assert document.look(12.0) == "changed"
     assert document.look(14.0) == "same"
-    assert document.unsaved
+    assert document.history.unsaved
     with pytest.raises(ChangedError):
         document.save(tmp_path / "plan.json")
     document.reload()
-    assert document.history.sketch.obstacles[0].shape.radius == 2.0 and not document.unsaved
+    assert document.history.sketch.obstacles[0].shape.radius == 2.0 and not document.history.unsaved
     assert document.history.undo() is not None
     assert document.history.sketch == mine
 
@@ -107,7 +107,7 @@ def test_a_file_that_goes_is_noticed(tmp_path: Path) -> None:
     document = Document.new(None)
     document.save(tmp_path / "plan.json")
     (tmp_path / "plan.json").unlink()
-    assert document.look(10.0) == "gone" and document.unsaved
+    assert document.look(10.0) == "gone" and document.history.unsaved
     document.save(tmp_path / "plan.json", over=True)
     assert (tmp_path / "plan.json").exists()
 
@@ -121,7 +121,7 @@ def test_a_draft_is_kept_and_recovered_and_saving_takes_it_away(tmp_path: Path) 
     document.close(discard=False)
     (draft,) = recoverable(drafts)
     again = Document.recovered(draft, drafts)
-    assert again.unsaved and [item.shape for item in again.history.sketch.obstacles] == [PILLAR]
+    assert again.history.unsaved and [item.shape for item in again.history.sketch.obstacles] == [PILLAR]
     again.save(tmp_path / "plan.json")
     again.flush()
     again.close(discard=False)
@@ -132,8 +132,8 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     document = Document.new(None)
     with pytest.raises(RobocovError, match="no-such-folder"):
         document.save(tmp_path / "no-such-folder" / "plan.json")
-    assert not document.unsaved
-    assert document.trouble == ""
+    assert not document.history.unsaved
+    assert document.autosaver.trouble == ""
 
 
 def test_naming_a_map_at_save_keeps_what_was_undone(tmp_path):
@@ -142,11 +142,11 @@ def test_naming_a_map_at_save_keeps_what_was_undone(tmp_path):
     changed(document, 2.0)
     document.history.undo()
     document.save(tmp_path / "plan.json")
-    assert document.history.sketch.name == "plan" and not document.unsaved
+    assert document.history.sketch.name == "plan" and not document.history.unsaved
     assert document.history.redo() is not None
     assert len(document.history.sketch.obstacles) == 2 and document.history.sketch.name == "plan"
     document.history.undo()
-    assert not document.unsaved
+    assert not document.history.unsaved
     document.history.undo()
     assert document.history.sketch.name == "plan"
 

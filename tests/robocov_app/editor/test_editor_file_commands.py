@@ -37,19 +37,19 @@ def hands(tmp_path: Path) -> Iterator[Hands]:
 
 
 def asked(hands: Hands) -> str:
-    return hands.editor.asked.title if hands.editor.asked is not None else ""
+    return hands.editor.dialogs.asked.title if hands.editor.dialogs.asked is not None else ""
 
 
 def test_saving_asks_for_a_name_once(hands: Hands, tmp_path: Path) -> None:
     hands.key("ctrl+s")
-    assert asked(hands) == "Save as" and hands.editor.asked.text == "untitled.json"
+    assert asked(hands) == "Save as" and hands.editor.dialogs.asked.text == "untitled.json"
     hands.key("ctrl+a")
     hands.type("plan")
     hands.key("return")
-    assert hands.editor.asked is None and load_map(tmp_path / "plan.json").obstacles
+    assert hands.editor.dialogs.asked is None and load_map(tmp_path / "plan.json").obstacles
     hands.editor.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+s")
-    assert hands.editor.asked is None and len(load_map(tmp_path / "plan.json").obstacles) == 2
+    assert hands.editor.dialogs.asked is None and len(load_map(tmp_path / "plan.json").obstacles) == 2
     assert hands.editor.recent == [str(tmp_path / "plan.json")]
 
 
@@ -85,7 +85,7 @@ def test_a_folder_that_is_not_there_is_told_and_nothing_lost(hands: Hands) -> No
     hands.key("ctrl+a")
     hands.type("nowhere/plan.json")
     hands.key("return")
-    assert "nowhere" in hands.refused() and hands.editor.document.unsaved
+    assert "nowhere" in hands.refused() and hands.editor.document.history.unsaved
 
 
 def test_leaving_unsaved_work_asks_to_save_discard_or_stay(hands: Hands, tmp_path: Path) -> None:
@@ -116,7 +116,7 @@ def test_answers_are_clicked_too(hands: Hands) -> None:
     hands.editor.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+n")
     hands.answer("Cancel")
-    assert hands.editor.asked is None and len(hands.shapes) == 2
+    assert hands.editor.dialogs.asked is None and len(hands.shapes) == 2
     hands.key("ctrl+n")
     hands.answer("Discard")
     assert hands.shapes == []
@@ -125,13 +125,13 @@ def test_answers_are_clicked_too(hands: Hands) -> None:
 def test_opening_a_map_a_bundled_one_and_something_else(hands: Hands, tmp_path: Path) -> None:
     save_map(load_map("l-shape"), tmp_path / "ell.json")
     hands.key("ctrl+o")
-    assert isinstance(hands.editor.asked, Choice)
+    assert isinstance(hands.editor.dialogs.asked, Choice)
     hands.type("ell")
     hands.key("tab")
     hands.key("return")
     assert hands.editor.document.path == tmp_path / "ell.json" and "opened: ell.json" in hands.said
     hands.key("ctrl+shift+o")
-    assert isinstance(hands.editor.asked, Choice)
+    assert isinstance(hands.editor.dialogs.asked, Choice)
     hands.type("rooms")
     hands.key("return")
     assert hands.editor.document.path is None and len(hands.shapes) == 18
@@ -157,14 +157,14 @@ def test_a_file_that_changed_can_be_reloaded_or_kept(hands: Hands, tmp_path: Pat
     hands.window.frame(2.0)
     assert asked(hands) == "The file has changed"
     hands.key("r")
-    assert hands.shapes == [] and not hands.editor.document.unsaved
+    assert hands.shapes == [] and not hands.editor.document.history.unsaved
     hands.key("ctrl+z")
     assert len(hands.shapes) == 1
     touched(path, json.dumps({**document, "name": "Again"}))
     hands.window.frame(2.0)
     hands.window.frame(2.0)
     hands.key("k")
-    assert len(hands.shapes) == 1 and hands.editor.document.unsaved
+    assert len(hands.shapes) == 1 and hands.editor.document.history.unsaved
     hands.key("ctrl+s")
     assert len(load_map(path).obstacles) == 1
     path.unlink()
@@ -197,7 +197,7 @@ def test_a_map_is_exported_by_its_suffix_and_nothing_is_replaced_unasked(
     hands: Hands, tmp_path: Path
 ) -> None:
     hands.key("ctrl+e")
-    assert hands.editor.asked.text == "untitled.svg"
+    assert hands.editor.dialogs.asked.text == "untitled.svg"
     hands.key("return")
     first = (tmp_path / "untitled.svg").read_text()
     assert "<svg" in first and "exported" in hands.said and hands.editor.document.path is None
@@ -214,7 +214,7 @@ def test_a_map_is_exported_by_its_suffix_and_nothing_is_replaced_unasked(
     assert "unknown format" in hands.refused()
     hands.editor.change(create.polygon_drawn(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
     hands.key("ctrl+e")
-    assert hands.editor.trouble and hands.editor.asked is None
+    assert hands.editor.trouble and hands.editor.dialogs.asked is None
 
 
 def test_a_map_is_never_saved_under_another_formats_suffix(hands: Hands, tmp_path: Path) -> None:
@@ -243,7 +243,7 @@ def opening(folder: Path, path: Path | None = None, **more: object) -> AbstractC
 def test_settings_are_remembered(places: Path) -> None:
     with opening(places) as window:
         window.editor.theme = "dark"
-        window.editor.attempt(lambda: run_typed(window.editor, "grid", "0.25"))
+        window.editor.attempt(lambda: run_typed(window.editor, "0.25", "grid"))
         window.editor.snaps.discard("edges")
         window.panel.show_tab("snap")
         window.documents.remember(places / "x.json")
@@ -287,12 +287,13 @@ def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> Non
     lost.flush()
     lost.close(discard=False)
     with opening(places) as window:
-        assert isinstance(window.editor.asked, Question) and "Recover" in window.editor.asked.title
+        asked = window.editor.dialogs.asked
+        assert isinstance(asked, Question) and "Recover" in asked.title
         Hands(window).key("r")
-        assert len(window.editor.sketch.obstacles) == 1 and window.editor.document.unsaved
+        assert len(window.editor.sketch.obstacles) == 1 and window.editor.document.history.unsaved
     # the window went without a decision: it is offered again
     with opening(places) as window:
-        assert window.editor.asked is not None
+        assert window.editor.dialogs.asked is not None
         Hands(window).key("l")
         offer(window, recoverable(places / "drafts"))
         Hands(window).key("d")
@@ -318,7 +319,7 @@ def test_a_file_that_another_editor_has_open_is_not_opened_twice(places: Path) -
 
 def test_a_new_name_is_a_new_map(places: Path) -> None:
     with opening(places, places / "fresh.json") as window:
-        assert window.editor.document.title == "fresh.json" and not window.editor.document.unsaved
+        assert window.editor.document.title == "fresh.json" and not window.editor.document.history.unsaved
         window.editor.attempt(window.documents.save)
         window.documents.leaving = True
     assert load_map(places / "fresh.json").area == 100.0
@@ -371,13 +372,13 @@ def test_a_map_of_another_format_asks_how_it_is_to_be_imported(places: Path) -> 
     plan = {"id": "flat", "bbox": {"min": [0, 0], "max": [4, 3]}, "verts": [[0, 0], [4, 0], [4, 3], [0, 3]]}
     (places / "flat.json").write_text(json.dumps({**plan, "room_num": 1, "room_category": {}}))
     with opening(places, places / "flat.json") as window:
-        asked = window.editor.asked
+        asked = window.editor.dialogs.asked
         assert isinstance(asked, ImportDialog) and asked.path.name == "flat.json"
         asked.accepted = True
         end = time.monotonic() + 60.0
-        while window.editor.asked is not None and time.monotonic() < end:
+        while window.editor.dialogs.asked is not None and time.monotonic() < end:
             window.frame(0.01)
-        assert window.editor.document.path is None and window.editor.document.unsaved
+        assert window.editor.document.path is None and window.editor.document.history.unsaved
         assert window.editor.sketch.environment().free_area == 12.0
         window.documents.leaving = True
 
@@ -404,7 +405,7 @@ def test_a_draft_is_not_saved_over_a_valid_map_unasked(hands: Hands, tmp_path: P
     (path,) = tmp_path.glob("*.json")
     hands.editor.change(create.boundary_drawn(hands.sketch, [(0, 0), (5, 5), (5, 0), (0, 5)]))
     hands.key("ctrl+s")
-    assert hands.editor.asked is not None and "valid map" in hands.editor.asked.words
+    assert hands.editor.dialogs.asked is not None and "valid map" in hands.editor.dialogs.asked.words
     hands.key("c")
     load_map(path)
     hands.key("ctrl+s")
@@ -413,4 +414,4 @@ def test_a_draft_is_not_saved_over_a_valid_map_unasked(hands: Hands, tmp_path: P
         load_map(path)
     hands.editor.change(create.boundary_drawn(hands.sketch, [(0, 0), (6, 6), (6, 0), (0, 6)]))
     hands.key("ctrl+s")
-    assert hands.editor.asked is None and not hands.editor.document.unsaved
+    assert hands.editor.dialogs.asked is None and not hands.editor.document.history.unsaved

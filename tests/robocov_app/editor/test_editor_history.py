@@ -75,7 +75,7 @@ def test_a_drag_is_one_step():
     for k in range(1, 30):
         assert history.do(transform.moved(before, selection, 0.1 * k, 0.0), drag="drag 1")
     assert history.past == ("circle moved", "circle drawn")
-    history.break_drag()
+    history.broken = True
     history.do(transform.moved(history.sketch, selection, 1.0, 0.0), drag="drag 1")
     assert len(history.past) == 3
     history.undo()
@@ -131,7 +131,7 @@ def test_saved_is_what_the_file_holds_wherever_one_goes():
     assert history.unsaved
     history.redo()
     assert not history.unsaved
-    history.mark_unsaved()
+    history.saved = None
     assert history.unsaved
     assert History(Sketch(), saved=False).unsaved
     assert not History(Sketch()).unsaved

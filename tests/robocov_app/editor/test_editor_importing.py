@@ -126,8 +126,8 @@ def hands(tmp_path: Path) -> Iterator[Hands]:
 def shown(hands: Hands) -> tuple[ImportDialog, Any]:
     """Return the dialog, and its widgets by kind and name."""
     hands.frames(2)
-    assert isinstance(hands.editor.asked, ImportDialog)
-    return hands.editor.asked, hands.window.dialogs._ui.shown
+    assert isinstance(hands.editor.dialogs.asked, ImportDialog)
+    return hands.editor.dialogs.asked, hands.window.dialogs._ui.shown
 
 
 def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(hands: Hands, plan: Path) -> None:
@@ -144,9 +144,9 @@ def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(hands: Hands, p
     hands.click(*asked.cameras[0].to_pixels(np.array((15.0, 3.0))).tolist())
     hands.key("return")
     hands.frames(2)
-    assert hands.editor.asked is None
+    assert hands.editor.dialogs.asked is None
     assert (
-        hands.editor.document.unsaved
+        hands.editor.document.history.unsaved
         and hands.editor.document.path is None
         and hands.editor.document.title == "plan"
     )
@@ -176,7 +176,7 @@ def test_widgets_of_options_and_buttons(hands: Hands, plan: Path) -> None:
     assert "unknown" not in asked.given, "an option without a default can be left again"
     before = hands.sketch
     hands.click(*view["button:cancel"].rect.center)
-    assert hands.editor.asked is None and hands.sketch is before
+    assert hands.editor.dialogs.asked is None and hands.sketch is before
 
 
 def test_what_cannot_be_imported_is_told_and_not_taken(hands: Hands, plan: Path) -> None:
@@ -184,12 +184,12 @@ def test_what_cannot_be_imported_is_told_and_not_taken(hands: Hands, plan: Path)
     asked, _ = shown(hands)
     hands.key("return")
     hands.frames(2)
-    assert hands.editor.asked is asked and "--cell" in asked.trouble
+    assert hands.editor.dialogs.asked is asked and "--cell" in asked.trouble
     hands.type("0.1")
     hands.frames(2)
-    assert hands.editor.asked is asked, "an old Enter counts no more"
+    assert hands.editor.dialogs.asked is asked, "an old Enter counts no more"
     hands.key("escape")
-    assert hands.editor.asked is None
+    assert hands.editor.dialogs.asked is None
 
 
 def test_what_is_open_is_not_lost(hands: Hands, plan: Path) -> None:
@@ -200,7 +200,8 @@ def test_what_is_open_is_not_lost(hands: Hands, plan: Path) -> None:
     hands.type("0.1")
     hands.key("return")
     hands.frames(2)
-    assert isinstance(hands.editor.asked, Question) and hands.editor.asked.title == "Save the changes?"
+    asked = hands.editor.dialogs.asked
+    assert isinstance(asked, Question) and asked.title == "Save the changes?"
     hands.key("escape")
     assert hands.sketch.name == "mine"
 
@@ -210,7 +211,7 @@ def test_closing_the_window_leaves_it(hands: Hands, plan: Path) -> None:
     shown(hands)
     hands.post(pygame.QUIT)
     hands.settle()
-    assert hands.editor.asked is None and hands.window.closed
+    assert hands.editor.dialogs.asked is None and hands.window.closed
 
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720)])

@@ -223,7 +223,7 @@ def test_what_is_saved_moves_in_a_run(tmp_path: Path) -> None:
 def test_a_command_and_buttons_change_it(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(MOVING)) as hands:
         hands.editor.select(Selection.of(0))
-        run_typed(hands.editor, "speed", "0.75")
+        run_typed(hands.editor, "0.75", "speed")
         assert led(hands.sketch).speed == 0.75
         hands.push("tab:object")
         hands.push("path:repeat")

@@ -113,7 +113,7 @@ def test_closing_the_window_while_trying_asks_about_what_is_unsaved(tmp_path: Pa
         hands.post(pygame.QUIT)
         hands.settle()
         hands.settle()
-        assert hands.window.trial is None and hands.editor.asked is not None and not hands.window.closed
+        assert hands.window.trial is None and hands.window.dialogs.open and not hands.window.closed
         hands.key("d")
         assert hands.window.closed
 

@@ -9,14 +9,7 @@ from robocov_app.editor.edits.create import free_name
 from robocov_app.editor.edits.paths import path_words
 from robocov_app.editor.edits.transform import Affine
 from robocov_app.editor.model import geometry
-from robocov_app.editor.model.geometry import (
-    ANGLE,
-    at_round_angle,
-    bearing_words,
-    distance,
-    length_words,
-    ring_area,
-)
+from robocov_app.editor.model.geometry import ANGLE, at_round_angle, bearing_words, distance, length_words
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import in_words, place_words
 from robocov_app.editor.tools.tool import PointerEvent, Tool
@@ -67,15 +60,7 @@ def test_points_and_angles_are_exact_where_they_are_round() -> None:
     assert geometry.angle_to_level((1.0, 1.0), (1.0, 3.0)) == 0.0
     assert geometry.angle_to_level((0.0, 0.0), (1.0, 1.0)) == -45.0
     assert at_round_angle((0.0, 0.0), (3.0, 0.1)) == (3.0, 0.0)
-    assert ring_area([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)]) == 2.0
     assert Affine.turn(90.0, about=(1.0, 0.0)).ring([(2.0, 0.0)]) == ((1.0, 1.0),)
-
-
-@given(st.lists(POINTS, min_size=3, max_size=8))
-def test_the_area_of_a_ring_does_not_depend_on_where_it_begins_or_which_way_it_runs(ring) -> None:
-    area = ring_area(ring)
-    assert abs(ring_area(ring[1:] + ring[:1]) - area) < 1e-6 * (1 + area)
-    assert abs(ring_area(ring[::-1]) - area) < 1e-6 * (1 + area)
 
 
 def test_a_plain_tool_does_nothing() -> None:

@@ -219,7 +219,7 @@ def test_wheel_and_right_button_zoom_and_pan(hands: Hands) -> None:
     center = hands.window.canvas.camera.center
     hands.drag((300, 300), (330, 310), (360, 320), button=3)
     moved = hands.window.canvas.camera.center
-    assert moved[0] < center[0] and hands.editor.asked is None
+    assert moved[0] < center[0] and hands.editor.dialogs.asked is None
     hands.key("f")
     assert hands.window.canvas.camera.zoom == pytest.approx(zoom)
 
@@ -256,34 +256,34 @@ def test_the_map_cannot_be_lost_from_sight(hands: Hands) -> None:
 
 def test_the_menu_offers_what_applies_and_does_it(hands: Hands) -> None:
     hands.click_at((3, 3), button=3)
-    menu = hands.editor.asked
+    menu = hands.editor.dialogs.asked
     assert isinstance(menu, Menu) and hands.editor.selection == Selection.of(0)
     hands.window.draw()
     names = [action.name if action else "" for action in menu.commands]
     row = names.index("duplicate")
     hands.key("down", times=sum(1 for name in names[: row + 1] if name))
     hands.key("return")
-    assert len(hands.shapes) == 3 and hands.editor.asked is None
+    assert len(hands.shapes) == 3 and hands.editor.dialogs.asked is None
     hands.click_at((9.5, 5), button=3)
     hands.window.draw()
     assert not hands.editor.selection
-    assert "paste" in [action.name for action in hands.editor.asked.commands if action]
+    assert "paste" in [action.name for action in hands.editor.dialogs.asked.commands if action]
     hands.click(*hands.window.dialogs._ui.shown["option:select:all"].rect.center)
-    assert hands.editor.asked is None and hands.editor.selection
+    assert hands.editor.dialogs.asked is None and hands.editor.selection
     hands.click_at((3, 3), button=3)
     hands.key("escape")
-    assert hands.editor.asked is None
+    assert hands.editor.dialogs.asked is None
     hands.click_at((3, 3), button=3)
     hands.post(pygame.DROPFILE, file="nowhere.txt")
     hands.settle()
-    assert hands.editor.asked is None and "nowhere.txt" in hands.said
+    assert hands.editor.dialogs.asked is None and "nowhere.txt" in hands.said
 
 
 def test_a_right_click_ends_what_is_being_drawn(hands: Hands) -> None:
     hands.key("p")
     hands.click_all((5, 1), (6, 1), (6, 2))
     hands.click_at((6, 2), button=3)
-    assert len(hands.shapes) == 3 and hands.editor.asked is None
+    assert len(hands.shapes) == 3 and hands.editor.dialogs.asked is None
 
 
 # palette, help, look
@@ -298,9 +298,9 @@ def test_the_palette_does_actions_and_commands(hands: Hands) -> None:
     hands.command("rotate 90")
     assert "turned" in hands.said or "rotated" in hands.said
     hands.key("/")
-    assert isinstance(hands.editor.asked, Choice) and hands.editor.asked.text == ""
+    assert isinstance(hands.editor.dialogs.asked, Choice) and hands.editor.dialogs.asked.text == ""
     hands.key("escape")
-    assert hands.editor.asked is None
+    assert hands.editor.dialogs.asked is None
 
 
 @pytest.mark.parametrize(("size", "scale"), [((900, 600), 1.0), ((1280, 720), 1.0), ((1920, 1080), 1.5)])

@@ -59,7 +59,7 @@ def test_what_has_changed_is_enough_to_know_the_whole(data):
     questions = []
     for _ in range(4):
         questions.append(wire.encode((sketch, 0.2)))
-        assert [item.key for item in questions[-1].changed] == [
+        assert [item.key for item in questions[-1][0].obstacles] == [
             item.key for item in sketch.obstacles if known.get(item.key) is not item
         ]
         known = {item.key: item for item in sketch.obstacles}

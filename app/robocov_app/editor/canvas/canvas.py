@@ -14,8 +14,7 @@ from robocov.errors import counted
 from robocov_app.editor.canvas import overlay
 from robocov_app.editor.canvas.map_layers import Sheet, View, beyond
 from robocov_app.editor.canvas.overlay import legend_entries
-from robocov_app.editor.edits.paths import goes, moving
-from robocov_app.editor.edits.transform import bounds_of
+from robocov_app.editor.edits import paths, transform
 from robocov_app.editor.model.geometry import distance
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
@@ -23,14 +22,12 @@ from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.select import Moving
 from robocov_app.editor.tools.tool import KNOB, frame_of, handles
 from robocov_app.editor.ui.editor import Editor, Team
-from robocov_app.render import annotations, sprites
+from robocov_app.render import annotations, heatmaps, marks, sprites
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density import range_label, value_range
 from robocov_app.render.fonts import shortened
-from robocov_app.render.heatmaps import density_entry
 from robocov_app.render.layout import fitted_radii
-from robocov_app.render.marks import READABLE
 from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import Colour, Theme, mix
 from robocov_app.toolkit.layout import Layout, inside
@@ -38,7 +35,7 @@ from robocov_app.toolkit.layout import Layout, inside
 
 def map_words(editor: Editor) -> str:
     sketch, measurement = editor.sketch, editor.measurement
-    unsaved = "● " if editor.document.unsaved else ""
+    unsaved = "● " if editor.document.history.unsaved else ""
     said = [f"{unsaved}{editor.document.title}", counted(len(sketch.obstacles), "obstacle")]
     if measurement is not None:
         said.append(f"{measurement.free_area:.2f} m² free")
@@ -94,21 +91,16 @@ class EditorCanvas:
             if density is not None and not density.uniform and sketch.boundary:
                 x, y = zip(*sketch.boundary, strict=True)
                 span = value_range(density, (min(x), min(y), max(x), max(y)))
-                self.entries.append(density_entry(range_label(span)))
+                self.entries.append(heatmaps.density_entry(range_label(span)))
         rows = max(len(annotations.legend_rows(canvas, self.entries)), 1)
         key = (canvas.surface.get_width(), canvas.scale, editor.document, "legend" in editor.shown)
         # while things come and go the legend does not become lower again: the map is not to jump
         self._rows = max(rows, self._rows) if key == self._rows_for else rows
         self._rows_for = key
 
-    @property
-    def _bounds(self) -> tuple[float, float, float, float]:
-        return self.editor.sketch.bounds or EMPTY
-
     def fit(self, selection: Selection | None = None) -> None:
-        """Show what is selected, or the whole map."""
-        bounds = bounds_of(self.editor.sketch, selection) if selection else None
-        low_x, low_y, high_x, high_y = bounds or self._bounds
+        bounds = transform.bounds_of(self.editor.sketch, selection) if selection else None
+        low_x, low_y, high_x, high_y = bounds or self.editor.sketch.bounds or EMPTY
         grow_x, grow_y = max(0.2 - (high_x - low_x), 0) / 2, max(0.2 - (high_y - low_y), 0) / 2  # m
         grown = (low_x - grow_x, low_y - grow_y, high_x + grow_x, high_y + grow_y)
         self._look(Camera.fit(grown, self._view_box(), MARGIN * self.layout.scale))
@@ -116,8 +108,7 @@ class EditorCanvas:
     def go_to(self, problem: Problem | None) -> None:
         if problem is None or problem.where is None or problem.where.is_empty:
             return
-        spot = problem.where.representative_point()
-        edge = round(80 * self.layout.scale)
+        spot, edge = problem.where.representative_point(), round(80 * self.layout.scale)
         if not Rect(self.camera.view).inflate(-edge, -edge).collidepoint(self.to_pixel((spot.x, spot.y))):
             self._look(replace(self.camera, center=(spot.x, spot.y)))
 
@@ -125,7 +116,7 @@ class EditorCanvas:
         """Magnify what is under a pixel of the window: by default under the cursor, or in the middle."""
         if at is None:
             at = self.at if self.at is not None and self.over(self.at) else self.camera.middle
-        low_x, low_y, high_x, high_y = self._bounds
+        low_x, low_y, high_x, high_y = self.editor.sketch.bounds or EMPTY
         whole = max(high_x - low_x, high_y - low_y, 1.0)
         # neither a dot nor a single wall's paint
         factor = float(np.clip(self.camera.zoom * factor, 20.0 / whole, 2e4)) / self.camera.zoom
@@ -133,7 +124,7 @@ class EditorCanvas:
 
     def pan(self, dx: float, dy: float) -> None:
         camera = self.camera.panned(dx, dy)
-        low_x, low_y, high_x, high_y = self._bounds
+        low_x, low_y, high_x, high_y = self.editor.sketch.bounds or EMPTY
         far_x, far_y = (STAYS * side / camera.zoom for side in camera.view[2:])
         low, high = (low_x - far_x, low_y - far_y), (high_x + far_x, high_y + far_y)
         x, y = np.clip(camera.center, low, high).tolist()
@@ -152,11 +143,6 @@ class EditorCanvas:
     def to_pixel(self, point: Point) -> Point:
         x, y = self.camera.to_pixels(np.array(point)).tolist()
         return x, y
-
-    @property
-    def reach(self) -> float:
-        """Width of a finger, m."""
-        return REACH * self.layout.scale / self.camera.zoom
 
     def problem_at(self, pixel: Point) -> Problem | None:
         found = self.editor.problems if "problems" in self.editor.shown else ()
@@ -197,8 +183,7 @@ class EditorCanvas:
             editor.say(self.sheet.underlaid.trouble, trouble=True)
             self.sheet.underlaid.trouble = ""
         screen.set_clip(clip)
-        # words keep to the canvas
-        canvas = view.canvas(screen.subsurface(box))
+        canvas = view.canvas(screen.subsurface(box))  # words keep to the canvas
         canvas.surface.set_clip(clip)
         if carried is not None:
             self._carry(screen, view, carried)
@@ -264,13 +249,13 @@ class EditorCanvas:
 
     def _draw_paths(self, canvas: Canvas, sketch: Sketch) -> None:
         theme, since = canvas.theme, self.editor.moves_since
-        for key in moving(sketch):
+        for key in paths.moving(sketch):
             item = sketch.item(key)
             path = item.shape.path
             assert path is not None
             chosen = key in self.editor.selection.items
             overlay.draw_path(canvas, path, theme.final if chosen else mix(theme.background, theme.ink, 0.6))
-            if since is not None and goes(path):
+            if since is not None and paths.goes(path):
                 shift = path.shift(self.editor.now - since)
                 moved = shapely.transform(item.geometry, lambda places, by=shift: places + by)
                 overlay.draw_ghost(canvas, moved)
@@ -279,7 +264,7 @@ class EditorCanvas:
         theme, scale = canvas.theme, canvas.scale
         places = canvas.camera.to_pixels(np.array(team.places))
         true = np.full(len(places), team.radius * canvas.camera.zoom)
-        fitted = fitted_radii(places, true, 2.4 * scale, min(READABLE * scale, 400.0))
+        fitted = fitted_radii(places, true, 2.4 * scale, min(marks.READABLE * scale, 400.0))
         radii = np.minimum(fitted, true.clip(3.0))
         edge = mix(theme.background, theme.ink, 0.55)
         for k, (at, radius) in enumerate(zip(places.tolist(), radii.tolist(), strict=True)):

@@ -11,16 +11,13 @@ import pygame
 import shapely
 from PIL import Image, ImageOps
 from pygame import Rect, Surface
-from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.sketch import Item, Sketch
+from robocov_app.render import fonts, heatmaps, surface_cache
 from robocov_app.render.camera import Camera, round_length
 from robocov_app.render.canvas import FAR, Canvas
-from robocov_app.render.fonts import shortened
-from robocov_app.render.heatmaps import draw_shading
-from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import LIGHT, Colour, Theme, mix, robot_hues
 
 _FORGOTTEN = 4  # how many times more outlines than obstacles are kept, those of what was undone among them
@@ -34,7 +31,7 @@ class Outline:
     outer: list[bool]  # which of them are outer rings
     lines: list[Array]  # (k, 2) m; of what covers nothing
     bounds: Array  # (4,) m
-    geometry: BaseGeometry
+    geometry: shapely.Geometry
 
     @cached_property
     def name_place(self) -> tuple[float, float, float, float]:
@@ -49,14 +46,14 @@ class Outline:
         return best
 
 
-def _cut(geometry: BaseGeometry, axis: int, at: float) -> Iterable[BaseGeometry]:
+def _cut(geometry: shapely.Geometry, axis: int, at: float) -> Iterable[shapely.Geometry]:
     low_x, low_y, high_x, high_y = geometry.bounds
     ends = [(low_x - 1.0, at), (high_x + 1.0, at)] if axis == 0 else [(at, low_y - 1.0), (at, high_y + 1.0)]
     parts = shapely.get_parts(shapely.intersection(geometry, shapely.LineString(ends)))
     return [part for part in parts if part.length > 0.0]
 
 
-def outline_of(geometry: BaseGeometry) -> Outline:
+def outline_of(geometry: shapely.Geometry) -> Outline:
     rings: list[Array] = []
     outer: list[bool] = []
     lines: list[Array] = []
@@ -74,7 +71,7 @@ class Outlines:
 
     def __init__(self) -> None:
         self._known: dict[int, tuple[Item, Outline]] = {}
-        self._bounds: Latest[Array] = Latest()
+        self._bounds: surface_cache.Latest[Array] = surface_cache.Latest()
 
     def of(self, item: Item) -> Outline:
         known = self._known.get(id(item))
@@ -143,7 +140,6 @@ class ReferenceImage:
         self._shrunk, self.trouble = 1.0, ""
 
     def draw(self, page: Surface, background: Background, folder: Path, camera: Camera, clip: Rect) -> None:
-        """Draw the picture on a page; `folder` is where its path counts from."""
         path = folder / background.path
         if path != self._of:
             self._of, self._picture, self.trouble = path, None, ""
@@ -206,17 +202,15 @@ class Sheet:
         self._look: object = None
         self._camera: Camera | None = None
         self._drawn: dict[int, Item] = {}
-        self._beyond: Latest[shapely.Geometry] = Latest()
+        self._beyond: surface_cache.Latest[shapely.Geometry] = surface_cache.Latest()
 
     def page(self, view: View, sketch: Sketch, lifted: frozenset[int] = frozenset()) -> Surface:
         """Return the page with a sketch, without the obstacles that are being dragged."""
         left, top, width, height = view.camera.view
         view = replace(view, camera=view.camera.within((left + BIAS, top + BIAS, width, height)))
-        look = (
-            *(view.camera.zoom, view.camera.view, view.theme.name, view.scale, view.size, view.grid),
-            *(view.shown & {"grid", "names", "picture"}, view.folder, sketch.background),
-            *(sketch.boundary, sketch.density),
-        )
+        of_view = (view.camera.zoom, view.camera.view, view.theme.name, view.scale, view.size, view.grid)
+        shown, below = view.shown & {"grid", "names", "picture"}, (view.folder, sketch.background)
+        look = (*of_view, shown, *below, sketch.boundary, sketch.density)
         items = {i.key: i for i in sketch.obstacles if i.key not in lifted and not i.hidden}
         boxes = self._boxes(view, items) if look == self._look else None
         if self._page is None or self._page.get_size() != view.size:
@@ -282,7 +276,7 @@ class Sheet:
             self._grid(page, view, box, fine=picture is None or not picture.shown)
         density = sketch.density
         if density is not None and not density.uniform and sketch.boundary is not None and ring is not None:
-            draw_shading(canvas, density, np.asarray(sketch.boundary, dtype=float))
+            heatmaps.draw_shading(canvas, density, np.asarray(sketch.boundary, dtype=float))
         # what robots take for free although it lies outside the boundary: it is in their hull
         fill = mix(outside_colour(theme), theme.obstacle, 0.55)
         for part in shapely.get_parts(self._beyond.of(sketch.boundary, None, lambda: beyond(sketch))):
@@ -359,7 +353,7 @@ class Sheet:
             if not name or (high_y - low_y) * zoom < size + 4 or (high_x - low_x) * zoom < 3 * size:
                 continue
             x, y, room, high = outline.name_place
-            words = shortened(name, size, room * zoom - _ROOM * canvas.scale)
+            words = fonts.shortened(name, size, room * zoom - _ROOM * canvas.scale)
             if high * zoom > size + 2 and (words == name or len(words) > LEAST_LETTERS):
                 at = canvas.camera.to_pixels(np.array([x, y])).tolist()
                 canvas.text(words, at, size=canvas.theme.small_text, colour=colour, anchor="middle")
@@ -401,8 +395,7 @@ def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], colour: Colour)
     following = np.arange(1, len(corners) + 1)
     following[np.array(ends) - 1] = [0, *ends[:-1]]
     edges = np.hstack([corners, corners[following]])
-    # what lies beside the page would only take time
-    clip = canvas.surface.get_clip()
+    clip = canvas.surface.get_clip()  # what lies beside the page would only take time
     low, high = np.minimum(edges[:, :2], edges[:, 2:]), np.maximum(edges[:, :2], edges[:, 2:])
     seen = (high[:, 0] >= clip.left - 2) & (low[:, 0] <= clip.right + 2)
     seen &= (high[:, 1] >= clip.top - 2) & (low[:, 1] <= clip.bottom + 2)

@@ -8,7 +8,6 @@ import numpy as np
 import pygame
 import shapely
 from pygame import Rect, Surface
-from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import DiscStart, Gap, ObstaclePath, Point, PointsStart, StartSpec
@@ -21,7 +20,6 @@ from robocov_app.editor.tools.snapping import Guide
 from robocov_app.editor.tools.tool import Handle, Preview
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry
-from robocov_app.render.sprites import Pixel
 from robocov_app.render.theme import Colour, Theme, mix
 from robocov_app.toolkit.overlay import tag
 
@@ -58,7 +56,7 @@ def _disc(
     canvas.stamp(partial(sprites.disc, radius * canvas.scale, fill, ring, width, edge, text), at)
 
 
-def dashed(canvas: Canvas, points: Iterable[Pixel], colour: Colour, dash: float = 4.0) -> None:
+def dashed(canvas: Canvas, points: Iterable[sprites.Pixel], colour: Colour, dash: float = 4.0) -> None:
     for a, b in pairwise(points):
         canvas.dashes(a, b, colour, canvas.width(1.0), dash=dash)
 
@@ -114,8 +112,7 @@ def draw_start(
         ((x, y),) = pixels(canvas, (spec.center,)).tolist()
         radius = spec.radius * canvas.camera.zoom
         if radius < MOST_RADIUS:
-            ring = partial(sprites.ring, round(2 * radius) / 2, theme.start, width * scale)
-            canvas.stamp(ring, (x, y))
+            canvas.stamp(partial(sprites.ring, round(2 * radius) / 2, theme.start, width * scale), (x, y))
         else:
             sides = int(min(radius, 720))
             angle = np.arange(sides) * (2 * np.pi / sides)
@@ -154,7 +151,7 @@ def draw_path(canvas: Canvas, path: ObstaclePath, colour: Colour) -> None:
         canvas.stamp(partial(sprites.dot, 2.5 * canvas.scale, colour), at)
 
 
-def draw_ghost(canvas: Canvas, geometry: BaseGeometry) -> None:
+def draw_ghost(canvas: Canvas, geometry: shapely.Geometry) -> None:
     colour = canvas.theme.final
     for ring in outline_of(geometry).rings:
         corners = canvas.camera.to_pixels(ring)
@@ -189,8 +186,7 @@ def draw_preview(canvas: Canvas, preview: Preview, at: Point | None) -> None:
     if preview.box is not None:
         _draw_selecting(canvas, preview.box, touched=preview.touched)
     if preview.words and at is not None:
-        place = at[0] + 18 * scale, at[1] - 22 * scale
-        tag(canvas.surface, preview.words, place, canvas.theme, scale)
+        tag(canvas.surface, preview.words, (at[0] + 18 * scale, at[1] - 22 * scale), canvas.theme, scale)
 
 
 def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:

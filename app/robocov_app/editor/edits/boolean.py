@@ -99,8 +99,7 @@ def repaired(sketch: Sketch, selection: Selection) -> Change:
     require(shapes or redrawn, "there is nothing to repair: no outline crosses itself")
     words = f"{counted(len(shapes) + redrawn, 'outline')} repaired"
     change = replace_obstacles(replace(sketch, boundary=boundary), shapes, words)
-    selected = replace(change.selection, boundary=redrawn and boundary is not None)
-    return replace(change, selection=selected)
+    return replace(change, selection=replace(change.selection, boundary=redrawn and boundary is not None))
 
 
 def _union(items: Sequence[Item]) -> shapely.Geometry:

@@ -7,8 +7,7 @@ from robocov.errors import MapError
 from robocov.files.strictjson import parse
 from robocov.mapfile import dump_document
 from robocov.mapfile.models import HEAD
-from robocov_app.editor.edits.create import added
-from robocov_app.editor.edits.transform import bounds_of, moved
+from robocov_app.editor.edits import create, transform
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import middle_of
 from robocov_app.editor.model.parser import sketch_of
@@ -19,12 +18,9 @@ FORMAT = "robocov-clipboard"  # what the copied text says that it is
 
 
 def copied(sketch: Sketch, selection: Selection) -> str:
-    part = Sketch(
-        name=sketch.name,
-        boundary=sketch.boundary if selection.boundary else None,
-        obstacles=tuple(selection.items_in(sketch)),
-        starts=tuple((name, spec) for name, spec in sketch.starts if name in selection.starts),
-    )
+    starts = tuple((name, spec) for name, spec in sketch.starts if name in selection.starts)
+    part = Sketch(sketch.name, obstacles=tuple(selection.items_in(sketch)), starts=starts)
+    part = replace(part, boundary=sketch.boundary) if selection.boundary else part
     anything = part.boundary is not None or part.obstacles or part.starts
     require(anything, "select obstacles, starts or the boundary to copy")
     return dump_document({**draft_document(part), "format": FORMAT})
@@ -37,17 +33,17 @@ def pasted(sketch: Sketch, text: str, at: Point | None = None, grid: float | Non
     new_boundary = part.boundary is not None and sketch.boundary is None
     if part.boundary is not None and not (new_boundary or shapes or part.starts):
         shapes.append((PolygonObstacle(part.boundary), ""))
-    after, new = added(sketch, shapes, part.starts)
+    after, new = create.added(sketch, shapes, part.starts)
     selection = replace(new, boundary=new_boundary)
     require(selection, "there is nothing to paste in what was copied")
     after = replace(after, boundary=part.boundary) if new_boundary else after
-    bounds = bounds_of(after, selection)
+    bounds = transform.bounds_of(after, selection)
     by = [0.0, 0.0]
     if at is not None and bounds is not None:
         by = [to - middle for to, middle in zip(at, middle_of(bounds), strict=True)]
         by = [grid * round(each / grid) for each in by] if grid else by
     # by nothing too: what is pasted lies on tenths of millimetres, as far as maps reach
-    after = moved(after, selection, by[0], by[1]).sketch
+    after = transform.moved(after, selection, by[0], by[1]).sketch
     return Change(after, selection, f"{selection.words(after)} pasted")
 
 

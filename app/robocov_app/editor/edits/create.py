@@ -150,8 +150,7 @@ def door_opened(sketch: Sketch, key: int, point: Point, width: float) -> Change:
 
 def wall_opened(sketch: Sketch, key: int, a: Point, b: Point) -> Change:
     """Open a wall between the places on it that are nearest to two points."""
-    line = _line(sketch, key)
-    begin, end = sorted(line.project(shapely.Point(place)) for place in (a, b))
+    begin, end = sorted(_line(sketch, key).project(shapely.Point(place)) for place in (a, b))
     door_width(end - begin)
     return _opened(sketch, key, begin, end)
 
@@ -160,11 +159,8 @@ def _opened(sketch: Sketch, key: int, begin: float, end: float) -> Change:
     """Take what lies between two lengths along a wall away; the pieces keep its name and note."""
     line, wall = _line(sketch, key), sketch.item(key).shape
     assert isinstance(wall, env.WallObstacle)
-    pieces = [
-        replace(wall, points=tuple(map(rounded, substring(line, low, high).coords)))
-        for low, high in ((0.0, begin), (end, line.length))
-        if high - low >= SMALLEST
-    ]
+    left = [(low, high) for low, high in ((0.0, begin), (end, line.length)) if high - low >= SMALLEST]
+    pieces = [replace(wall, points=tuple(map(rounded, substring(line, *part).coords))) for part in left]
     require(pieces, f"nothing would be left of the {sketch.display_name(key)}")
     words = f"door of {end - begin:.3g} m opened in {sketch.display_name(key)}"
     return replace_obstacles(sketch, {key: pieces}, words)

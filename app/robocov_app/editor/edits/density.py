@@ -10,8 +10,7 @@ from robocov.density import HEAVIEST, Density, Gaussian, Gaussians, Raster, Weig
 from robocov.environment import Point, PolygonObstacle, Ring
 from robocov.errors import MapError, counted
 from robocov.mapfile.models import LARGEST
-from robocov_app.editor.edits.create import SHORTEST
-from robocov_app.editor.edits.transform import Affine
+from robocov_app.editor.edits import create, transform
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import distinct, point_near, ring_near, tenths
 from robocov_app.editor.model.selection import Change, Selection
@@ -71,7 +70,7 @@ def removed(sketch: Sketch, number: int) -> Change:
 
 
 def moved(sketch: Sketch, number: int, dx: float, dy: float) -> Change:
-    return _changed(sketch, number, Affine.shift(dx, dy).thing(_feature(sketch, number)), "moved")
+    return _changed(sketch, number, transform.Affine.shift(dx, dy).thing(_feature(sketch, number)), "moved")
 
 
 def peak_sized(sketch: Sketch, number: int, sigma: float) -> Change:
@@ -176,13 +175,13 @@ def _name(feature: Feature) -> str:
 
 def _sound(area: WeightedArea) -> WeightedArea:
     polygon = shapely.Polygon(area.vertices, area.holes) if len(area.vertices) >= 3 else shapely.Polygon()
-    if not polygon.is_valid or polygon.area < SHORTEST**2:
+    if not polygon.is_valid or polygon.area < create.SHORTEST**2:
         raise MapError("an area needs three corners that enclose something, and an outline without crossings")
     return replace(area, weight=_weight(area.weight, least=0.0))
 
 
 def _sigma(sigma: float) -> float:
-    require(SHORTEST <= sigma <= LARGEST, "a hot spot needs a size: drag from its middle outwards")
+    require(create.SHORTEST <= sigma <= LARGEST, "a hot spot needs a size: drag from its middle outwards")
     return tenths(sigma)
 
 

@@ -7,14 +7,12 @@ from typing import Any, Final
 
 import numpy as np
 import shapely
-from shapely import LineString, MultiPolygon
-from shapely.geometry.base import BaseGeometry
+from shapely import Geometry, LineString, MultiPolygon
 from shapely.ops import substring
 
 from robocov.environment import SAGITTA, Obstacle, Point, PointsStart, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.edits import boolean, properties, transform
-from robocov_app.editor.edits.vertices import with_places
+from robocov_app.editor.edits import boolean, properties, transform, vertices
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import distinct, outlines, rectangle, rounded
 from robocov_app.editor.model.measurement import reach_of
@@ -72,20 +70,20 @@ def unreachable_filled(sketch: Sketch, radius: float) -> Change:
     return _filled(sketch, _beyond(free, reached[0], [*reached[1:], untouched, *list(free.geoms)[1:]]))
 
 
-def _filled(sketch: Sketch, where: BaseGeometry) -> Change:
+def _filled(sketch: Sketch, where: Geometry) -> Change:
     shapes = outlines(where.buffer(_OVER, join_style="mitre", mitre_limit=2.0))
     require(shapes, "there is nothing to fill")
     after, keys = sketch.added(shapes)
     return Change(after, Selection.of(*keys), "filled what cannot be reached")
 
 
-def _beyond(free: MultiPolygon, largest: BaseGeometry, others: list[BaseGeometry]) -> BaseGeometry:
+def _beyond(free: MultiPolygon, largest: Geometry, others: list[Geometry]) -> Geometry:
     """Return those parts of the free space that hold any of some places, without the largest part."""
     parts = shapely.get_parts(free - largest.buffer(SAGITTA))
     return shapely.union_all(parts[shapely.intersects(parts, shapely.union_all(others).buffer(-SAGITTA))])
 
 
-def _start_moved(sketch: Sketch, name: str, where: BaseGeometry, radius: float) -> Change:
+def _start_moved(sketch: Sketch, name: str, where: Geometry, radius: float) -> Change:
     """Move the spot at the last of some points, or a disc, to where a robot fits that is nearest."""
     room = examined(sketch, radius)[1].buffer(-radius - _SPARE)
     spec, number, spot = sketch.start(name), 0, ""
@@ -98,7 +96,7 @@ def _start_moved(sketch: Sketch, name: str, where: BaseGeometry, radius: float) 
     require(not room.is_empty, "a robot fits nowhere")
     vertex = Vertex(name, 0, number)
     way = shapely.shortest_line(room, shapely.Point(place_of(sketch, vertex)))
-    after = with_places(sketch, {vertex: rounded(way.coords[0])})
+    after = vertices.with_places(sketch, {vertex: rounded(way.coords[0])})
     return Change(after, Selection.of(name), f"start “{name}”{spot} moved to where a robot fits")
 
 

@@ -8,8 +8,7 @@ from typing import Any
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, one_line
 from robocov.mapfile.models import LARGEST, SMALLEST
-from robocov_app.editor.edits import vertices
-from robocov_app.editor.edits.create import label_of, text_of
+from robocov_app.editor.edits import create, vertices
 from robocov_app.editor.model import require
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.geometry import outlines, tenths
@@ -28,7 +27,7 @@ def deleted(sketch: Sketch, selection: Selection) -> Change:
 
 def renamed(sketch: Sketch, owner: Owner, name: str) -> Change:
     """Name an obstacle or a start; an empty name takes an obstacle's name away."""
-    name = label_of(name)
+    name = create.label_of(name)
     words = f"{sketch.display_name(owner)} renamed to “{name}”"
     require(owner != BOUNDARY, "the boundary has no name; the map has one")
     if isinstance(owner, str):
@@ -43,7 +42,7 @@ def renamed(sketch: Sketch, owner: Owner, name: str) -> Change:
 
 def noted(sketch: Sketch, selection: Selection, note: str) -> Change:
     require(selection.items, "select obstacles first: notes are written to them")
-    note = text_of(note, "a note")
+    note = create.text_of(note, "a note")
     words = f"note on {Selection(items=selection.items).words(sketch)}{'' if note else ' taken away'}"
     return replace(_marked(sketch, selection, "", note=note), words=words)
 
@@ -52,7 +51,7 @@ def grouped(sketch: Sketch, selection: Selection, name: str = "") -> Change:
     """Put the selected obstacles into a group, a new one without a name: a click selects all of it."""
     require(len(selection.items) >= 2, "select two or more obstacles to group")
     taken = {item.group for item in sketch.obstacles}
-    name = label_of(name) or next(each for k in count(1) if (each := f"group {k}") not in taken)
+    name = create.label_of(name) or next(each for k in count(1) if (each := f"group {k}") not in taken)
     return _marked(sketch, selection, f"grouped as “{name}”", group=name)
 
 
@@ -85,11 +84,11 @@ hidden = partial(_marked, words="hidden", hidden=True)  # in the editor; robots 
 def titled(sketch: Sketch, name: str | None = None, description: str | None = None) -> Change:
     after, words = sketch, "map described"
     if name is not None:
-        name = label_of(name)
+        name = create.label_of(name)
         require(name, "a map needs a name")
         after, words = replace(after, name=name), f"map named “{name}”"
     if description is not None:
-        after = replace(after, description=text_of(description, "a description"))
+        after = replace(after, description=create.text_of(description, "a description"))
     return Change(after, Selection(), words)
 
 

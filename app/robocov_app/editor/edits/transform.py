@@ -1,19 +1,16 @@
 """Edits of where things are: moved, turned, scaled, mirrored, copied, aligned, distributed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import product
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Final, Literal, Self, TypeAlias
 
 import numpy as np
 import shapely
 
-from robocov import environment as env
 from robocov.density import Gaussians, WeightedPolygons
-from robocov.environment import Point, Ring
+from robocov.environment import CircleObstacle, DiscStart, Point, PolygonObstacle, Ring
 from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits.create import added
@@ -47,20 +44,20 @@ class Affine:
     y0: float = 0.0
 
     @classmethod
-    def shift(cls, dx: float, dy: float) -> Affine:
+    def shift(cls, dx: float, dy: float) -> Self:
         return cls(x0=dx, y0=dy)
 
     @classmethod
-    def turn(cls, degrees: float, about: Point) -> Affine:
+    def turn(cls, degrees: float, about: Point) -> Self:
         """Return the counter-clockwise rotation about a point, exact at quarters of a turn."""
         cos, sin = geometry.cos_sin(degrees)
         return cls(cos, -sin, sin, cos)._about(about)
 
     @classmethod
-    def stretch(cls, fx: float, fy: float, about: Point) -> Affine:
+    def stretch(cls, fx: float, fy: float, about: Point) -> Self:
         return cls(fx, 0.0, 0.0, fy)._about(about)
 
-    def _about(self, point: Point) -> Affine:
+    def _about(self, point: Point) -> Self:
         x, y = point
         return replace(self, x0=x - self.xx * x - self.xy * y, y0=y - self.yx * x - self.yy * y)
 
@@ -81,10 +78,10 @@ class Affine:
     def thing(self, thing: Any) -> Any:
         """Return where a thing or a density goes; stretched, circles become polygons, walls keep width."""
         factor = self.factor
-        if factor is None and isinstance(thing, env.DiscStart):
+        if factor is None and isinstance(thing, DiscStart):
             raise MapError("a start that is a disc stays one: scale it by the same factor both ways")
-        if factor is None and isinstance(thing, env.CircleObstacle):
-            thing = env.PolygonObstacle(thing.polygon.exterior.coords[:-1], (), thing.name, thing.path)
+        if factor is None and isinstance(thing, CircleObstacle):
+            thing = PolygonObstacle(thing.polygon.exterior.coords[:-1], (), thing.name, thing.path)
         found: dict[str, Any] = {}
         for name, value in ((field.name, getattr(thing, field.name)) for field in fields(thing)):
             if name in ("vertices", "points", "positions"):
@@ -165,15 +162,14 @@ def mirrored(sketch: Sketch, selection: Selection, axis: str) -> Change:
 
 
 def duplicated(sketch: Sketch, selection: Selection, dx: float = 0.0, dy: float = 0.0) -> Change:
-    whole = Selection(items=selection.items, starts=selection.starts).within(sketch)
-    require(whole, "select obstacles or starts to copy")
+    chosen = Selection(items=selection.items, starts=selection.starts).within(sketch)
+    whole = require(chosen, "select obstacles or starts to copy")
     return Change(*_copied(sketch, whole, Affine.shift(dx, dy)), f"{whole.words(sketch)} duplicated")
 
 
 def arrayed(sketch: Sketch, selection: Selection, columns: int, rows: int, dx: float, dy: float) -> Change:
     """Copy the selected obstacles into columns and rows, (dx, dy) m apart, the originals in a corner."""
-    whole = Selection(items=selection.items)
-    require(whole, "select obstacles to copy")
+    whole = require(Selection(items=selection.items), "select obstacles to copy")
     require(columns >= 1 and rows >= 1 and columns * rows >= 2, "two columns or rows at least were wanted")
     if columns * rows * len(whole.items) > _MOST_COPIES:
         raise MapError(f"that makes more than {_MOST_COPIES} obstacles")
@@ -240,7 +236,7 @@ def levelled(sketch: Sketch, a: Point, b: Point) -> Change:
 
 def box_of(sketch: Sketch, owner: Owner) -> Box | None:
     # a typed size is that of a circle, not of the polygon that stands for it
-    round_one = isinstance(sketch.thing(owner), env.CircleObstacle)
+    round_one = isinstance(sketch.thing(owner), CircleObstacle)
     if isinstance(owner, int) and owner != BOUNDARY and not round_one:
         covered = sketch.item(owner).geometry
         return None if covered.is_empty else covered.bounds
@@ -249,10 +245,9 @@ def box_of(sketch: Sketch, owner: Owner) -> Box | None:
 
 
 def bounds_of(sketch: Sketch, selection: Selection) -> Box | None:
-    owners = selection.owners
-    boxes = []
+    owners, boxes = selection.owners, list[Box]()
     if len(owners) > _MANY:  # all at once
-        sharp = [k for k in selection.items if not isinstance(sketch.item(k).shape, env.CircleObstacle)]
+        sharp = [k for k in selection.items if not isinstance(sketch.item(k).shape, CircleObstacle)]
         rows = shapely.bounds(sketch.geometries[[sketch.places[key] for key in sharp]])
         boxes = [(a, b, c, d) for a, b, c, d in rows[np.isfinite(rows).all(axis=1)].tolist()]
         owners = owners - frozenset(sharp)
@@ -286,14 +281,13 @@ def _each_moved(sketch: Sketch, by: Mapping[Owner, float], *, along_x: bool) -> 
 
 
 def _change(sketch: Sketch, selection: Selection, affine: Affine, words: str) -> Change:
-    selection = selection.within(sketch)  # an undo in the middle of a drag may have taken things away
-    require(selection, "select something first")
+    # an undo in the middle of a drag may have taken things away
+    selection = require(selection.within(sketch), "select something first")
     return Change(_placed(sketch, selection, affine), selection, f"{selection.words(sketch)} {words}")
 
 
 def _placed(sketch: Sketch, selection: Selection, affine: Affine) -> Sketch:
-    owners = selection.owners
-    single = [vertex for vertex in selection.vertices if vertex.of not in owners]
+    single = [vertex for vertex in selection.vertices if vertex.of not in selection.owners]
     places = dict(zip(single, affine.ring([place_of(sketch, vertex) for vertex in single]), strict=True))
     things = selection.items | selection.starts
     sketch = sketch.with_things({owner: affine.thing(sketch.thing(owner)) for owner in things})
@@ -303,10 +297,7 @@ def _placed(sketch: Sketch, selection: Selection, affine: Affine) -> Sketch:
 
 
 def _bounds(sketch: Sketch, selection: Selection) -> Box:
-    bounds = bounds_of(sketch, selection)
-    if bounds is None:
-        raise MapError("select something first")
-    return bounds
+    return require(bounds_of(sketch, selection), "select something first")
 
 
 def _middle(sketch: Sketch, selection: Selection) -> Point:

@@ -79,10 +79,9 @@ def deleted(sketch: Sketch, selection: Selection) -> Change:
     after = sketch
     for owner, gone in _by_ring(sketch, selection.vertices).items():
         thing, rings = sketch.thing(owner), []
-        if isinstance(thing, env.DiscStart):
-            raise MapError("the points of a disc cannot be deleted: delete the start itself")
-        if isinstance(thing, env.CircleObstacle):
-            raise MapError("the points of a circle cannot be deleted: delete the circle itself")
+        if isinstance(thing, env.DiscStart | env.CircleObstacle):
+            what, whole = ("disc", "start") if isinstance(owner, str) else ("circle", "circle")
+            raise MapError(f"the points of a {what} cannot be deleted: delete the {whole} itself")
         least = {env.PointsStart: 1, env.WallObstacle: 2}.get(type(thing), 3)
         for number, ring in enumerate(sketch.ring_points(owner)):
             kept = tuple(point for k, point in enumerate(ring) if k not in gone[number])
@@ -171,8 +170,7 @@ def _arc(ring: Ring, k: int, length: float, segments: int) -> Array:
     """Return the (segments + 1, 2) points of the arc that touches both edges so far from a corner."""
     before, corner, after = (complex(*ring[i % len(ring)]) for i in (k - 1, k, k + 1))
     back, on = (before - corner) / abs(before - corner), (after - corner) / abs(after - corner)
-    # the centre is where the normals at both ends meet: on the bisector
-    half = cmath.phase(on / back) / 2.0
+    half = cmath.phase(on / back) / 2.0  # the centre is where the normals at both ends meet: on the bisector
     bisector = (back + on) / abs(back + on)
     center = corner + length / math.cos(half) * bisector
     spoke, end = length * back + corner - center, length * on + corner - center
@@ -286,8 +284,7 @@ def _fewer(ring: Ring, tolerance: float, closed: bool) -> Ring:
     kept = set(line.coords)
     if len(kept) < 3 or not shapely.MultiPoint(list(kept)).convex_hull.area > 0.0:
         return ring
-    # in the order in which they were
-    return tuple(point for point in ring if point in kept)
+    return tuple(point for point in ring if point in kept)  # in the order in which they were
 
 
 def _straight(ring: Ring, degrees: float, closed: bool) -> Ring:

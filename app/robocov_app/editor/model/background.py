@@ -1,7 +1,5 @@
 """The picture under a sketch, and the other marks that the editor keeps in a map's free keys."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -50,7 +48,7 @@ class Background:
         return {name: plain(value) for name, value in asdict(self).items()} | {"shown": self.shown}
 
     @classmethod
-    def of_document(cls, document: Any) -> Background | None:
+    def of_document(cls, document: Any) -> "Background | None":
         """Return the picture that stands in a map; None where that is something else."""
         if not isinstance(document, dict) or set(document) != {item.name for item in fields(cls)}:
             return None

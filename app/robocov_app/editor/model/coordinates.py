@@ -41,8 +41,7 @@ def point_of(text: str, *, last: Point | None = None) -> Point:
     """Return a place, m: ``3,2 1,5``, ``320 cm; 1.5 m``, ``2<45``; from `last` ``@2<45``, ``+0.5 0``."""
     typed = _clean(text)
     relative = typed[:1] in ("@", "+")
-    if relative and last is None:
-        raise MapError(f"{shown(text)}: there is no point before that it could be relative to")
+    require(last or not relative, f"{shown(text)}: there is no point before that it could be relative to")
     length, sign, angle = typed.removeprefix("@").strip().partition("<")
     if sign:
         x, y = _polar(_length(length.strip()), _angle(angle), text)
@@ -116,8 +115,7 @@ def _pair(typed: str, signs: str) -> tuple[float, float]:
     parted += [re.split(r"\s*;\s*", typed), re.split(r"\s*,\s+|\s+,\s*", typed)]
     if "." in typed:
         parted.append(re.split(r"\s*,\s*", typed))
-    # the unit of a length may stand apart from it
-    parted.append(re.split(r"\s+(?=[+\-.,\d])", typed))
+    parted.append(re.split(r"\s+(?=[+\-.,\d])", typed))  # the unit of a length may stand apart from it
     fits = [parts for parts in parted if len(parts) == 2 and all(map(_LENGTH.fullmatch, parts))]
     a, b = fits[0] if fits else ("", "")
     return _length(a), _length(b)

@@ -1,7 +1,5 @@
 """The map that is open: its history, its file, and the copy that is kept aside."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -10,7 +8,7 @@ from functools import partial
 from hashlib import sha256
 from itertools import chain, count
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, Self, TypeAlias
 
 from robocov.errors import MapError, OutputError, counted, one_line
 from robocov.files.atomic import writable, written
@@ -20,7 +18,6 @@ from robocov_app.editor.model.parser import parse_sketch, sketch_of
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch, draft_document, sketch_text
 from robocov_app.toolkit import autosave
-from robocov_app.toolkit.autosave import Autosaver
 
 
 @dataclass
@@ -38,14 +35,14 @@ class History:
         self.selection = Selection()
         self._done: list[_Step] = []
         self._undone: list[_Step] = []
-        self._saved = sketch if saved else None
-        self._broken = False
+        self.saved = sketch if saved else None  # what the file holds; None where that is none of it
+        self.broken = False  # whether the next change stands alone, as after the mouse was released
 
     def do(self, change: Change, *, drag: Hashable | None = None) -> bool:
         """Take a change, merged with the last of the same `drag`; return whether it changed anything."""
         before, done = Change(self.sketch, self.selection, change.words), self._done
-        merges = drag is not None and not self._broken and bool(done) and done[-1].drag == drag
-        self._broken, self.selection = False, change.selection
+        merges = drag is not None and not self.broken and bool(done) and done[-1].drag == drag
+        self.broken, self.selection = False, change.selection
         if change.sketch == self.sketch:
             return False
         if merges:
@@ -70,7 +67,7 @@ class History:
 
     def _go_to(self, state: Change) -> Change:
         self.sketch, self.selection = state.sketch, state.selection
-        self._broken = True
+        self.broken = True
         return state
 
     def replace_all(self, change: Callable[[Sketch], Sketch]) -> None:
@@ -92,25 +89,30 @@ class History:
     def future(self) -> tuple[str, ...]:
         return tuple(step.after.words for step in reversed(self._undone))
 
-    def break_drag(self) -> None:
-        """Let the next change stand alone, as when the mouse is released."""
-        self._broken = True
-
     def mark_saved(self) -> None:
-        self._saved = self.sketch
-        self._broken = True
-
-    def mark_unsaved(self) -> None:
-        """Remember that no file holds any of it, as when the file has changed or gone."""
-        self._saved = None
+        self.saved = self.sketch
+        self.broken = True
 
     @property
     def unsaved(self) -> bool:
         """Whether something would be lost; undoing back to what was saved makes it false again."""
-        return self._saved is not self.sketch and self._saved != self.sketch
+        return self.saved is not self.sketch and self.saved != self.sketch
 
 
 KIND = "robocov-draft"
+
+
+@dataclass(frozen=True)
+class OnDisk:
+    """A file as it was when it was read or written."""
+
+    path: Path  # absolute
+    digest: str  # SHA-256 of its content
+    stamp: tuple[int, int]  # (size, time of change in ns); what can be asked of the file quickly
+
+    @classmethod
+    def of(cls, path: Path, content: bytes, stamp: tuple[int, int] | None) -> Self:
+        return cls(path, sha256(content).hexdigest(), stamp or (-1, 0))
 
 
 @dataclass(frozen=True)
@@ -130,8 +132,7 @@ class Autosave:
     def words(self, now: datetime | None = None) -> str:
         """Return what to offer: "“Office”, 12 obstacles, today 14:03, not saved to office.json"."""
         now = now or datetime.now().astimezone()
-        days = (now.date() - self.when.date()).days
-        day = {0: "today", 1: "yesterday"}.get(days, f"{self.when:%Y-%m-%d}")
+        day = {0: "today", 1: "yesterday"}.get((now.date() - self.when.date()).days, f"{self.when:%Y-%m-%d}")
         where = "never saved" if self.path is None else f"not saved to {self.path.name}"
         what = f"“{one_line(self.name)}”, {counted(self.obstacles, 'obstacle')}"
         return f"{what}, {day} {self.when:%H:%M}, {where}"
@@ -140,14 +141,6 @@ class Autosave:
 def content(sketch: Sketch, disk: OnDisk | None) -> dict[str, Any]:
     file = disk and {"digest": disk.digest, "stamp": list(disk.stamp)}
     return {"disk": file, "sketch": draft_document(sketch)}
-
-
-def recoverable(folder: Path | None) -> tuple[Autosave, ...]:
-    return autosave.recoverable(folder, KIND, _autosave)
-
-
-def opened_elsewhere(folder: Path | None, path: Path) -> bool:
-    return autosave.opened_elsewhere(folder, KIND, path)
 
 
 def _autosave(record: autosave.Record) -> Autosave | None:
@@ -169,6 +162,8 @@ def _autosave(record: autosave.Record) -> Autosave | None:
     return Autosave(record.folder, path, sketch.name, record.when, len(sketch.obstacles), known)
 
 
+recoverable = partial(autosave.recoverable, kind=KIND, read=_autosave)
+opened_elsewhere = partial(autosave.opened_elsewhere, kind=KIND)  # asked by `path=`
 State: TypeAlias = Literal["same", "changed", "gone"]
 
 
@@ -176,23 +171,9 @@ class ChangedError(OutputError):
     """A file is not as it was when it was read or written last, or there is one that was not known of."""
 
 
-@dataclass(frozen=True)
-class OnDisk:
-    """A file as it was when it was read or written."""
-
-    path: Path  # absolute
-    digest: str  # SHA-256 of its content
-    stamp: tuple[int, int]  # (size, time of change in ns); what can be asked of the file quickly
-
-    @classmethod
-    def of(cls, path: Path, content: bytes, stamp: tuple[int, int] | None) -> OnDisk:
-        return cls(path, sha256(content).hexdigest(), stamp or (-1, 0))
-
-
 def read_sketch(path: Path) -> tuple[Sketch, OnDisk]:
     path = path.absolute()
-    # the stamp of before: what changes while it is read is noticed at the next look
-    stamp = _stamp(path)
+    stamp = _stamp(path)  # the stamp of before: what changes while it is read is noticed at the next look
     content = read_bytes(path)
     return parse_sketch(content, str(path), path.parent), OnDisk.of(path, content, stamp)
 
@@ -253,18 +234,18 @@ class Document:
         self.path, self.disk, self.stem = path, disk, stem  # stem: of a map without a file
         self.state: State = "same"
         self._looked, self._over = 0.0, False
-        self._autosaver = Autosaver(drafts, KIND, path, resumed)
-        self.flush, self.close = self._autosaver.flush, self._autosaver.close
+        self.autosaver = autosave.Autosaver(drafts, KIND, path, resumed)
+        self.flush, self.close = self.autosaver.flush, self.autosaver.close
         self._kept: Sketch | None = sketch if saved else None
         self.keep()
 
     @classmethod
-    def new(cls, drafts: Path | None, path: Path | None = None) -> Document:
+    def new(cls, drafts: Path | None, path: Path | None = None) -> Self:
         """Return an empty map with the boundary that is offered; `path` is not there yet."""
         return cls(Sketch(boundary=FIRST_SHEET), drafts, path)
 
     @classmethod
-    def opened(cls, path: Path, drafts: Path | None) -> Document:
+    def opened(cls, path: Path, drafts: Path | None) -> Self:
         """Return the map in a file; one that comes with robocov as a copy, which has no file yet."""
         sketch, disk = read_sketch(path)
         if is_bundled(path):
@@ -272,12 +253,8 @@ class Document:
         return cls(sketch, drafts, path.resolve(), disk)
 
     @classmethod
-    def recovered(cls, kept: Autosave, drafts: Path | None) -> Document:
+    def recovered(cls, kept: Autosave, drafts: Path | None) -> Self:
         return cls(kept.sketch(), drafts, kept.path, kept.disk, resumed=kept.folder, saved=False)
-
-    @property
-    def unsaved(self) -> bool:
-        return self.history.unsaved
 
     @property
     def title(self) -> str:
@@ -316,14 +293,10 @@ class Document:
 
     def keep(self) -> None:
         before, self._kept = self._kept, self.history.sketch
-        if before is not self._kept and self.unsaved:
-            self._autosaver.keep(partial(content, self._kept, self.disk))
+        if before is not self._kept and self.history.unsaved:
+            self.autosaver.keep(partial(content, self._kept, self.disk))
         elif before is not self._kept:
-            self._autosaver.settle(self.path)
-
-    @property
-    def trouble(self) -> str:
-        return self._autosaver.trouble
+            self.autosaver.settle(self.path)
 
     def look(self, now: float) -> State:
         """Return whether the file has changed on the disk, news only once; `now` is any clock, s."""
@@ -333,7 +306,7 @@ class Document:
         before, self.state = self.state, state_of(self.disk)
         if self.state in ("same", before):
             return "same"
-        self.history.mark_unsaved()
+        self.history.saved = None
         return self.state
 
     def reload(self) -> None:
@@ -350,7 +323,7 @@ class Document:
         self.state, self._over = "same", False
         self.history.mark_saved()
         self._kept = self.history.sketch
-        self._autosaver.settle(self.path)
+        self.autosaver.settle(self.path)
 
 
 def is_bundled(path: Path) -> bool:

@@ -119,10 +119,6 @@ def _is_crumb(part: shapely.Geometry) -> bool:
     return not min(high_x - low_x, high_y - low_y) >= SMALLEST  # of what is empty these are no numbers
 
 
-def ring_area(points: Sequence[Point]) -> float:
-    return float(Polygon(points).area)
-
-
 def bearing_words(a: Point, b: Point) -> str:
     """Return length and direction from one point to another: "2.40 m  ∠ 90°"."""
     angle = bearing(a, b)

@@ -1,7 +1,7 @@
 """Measurements of a sketch: free area, parts, narrowest gap, and where robots cannot pass."""
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 import shapely
@@ -105,8 +105,7 @@ def _arcs(parts: Array, free: MultiPolygon) -> IntArray:
     before[first] = np.append(first[1:], len(ring)) - 1
     counts = np.zeros(len(parts), dtype=np.intp)
     np.add.at(counts, of[ring[off & ~off[before]]], 1)
-    # an outline that touches no wall at all
-    np.add.at(counts, of[np.logical_and.reduceat(off, first)], 1)
+    np.add.at(counts, of[np.logical_and.reduceat(off, first)], 1)  # an outline that touches no wall at all
     return counts
 
 
@@ -133,13 +132,8 @@ def _polygons(geometry: shapely.Geometry) -> list[Polygon]:
     return [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon)]
 
 
-class Question(NamedTuple):
-    """Request to measure a sketch beside the window, in a process that is told only what has changed."""
-
-    rest: Sketch  # without its obstacles
-    order: tuple[int, ...]  # the keys of its obstacles
-    changed: tuple[Item, ...]  # those that differ from what the process knows by the same key
-    radius: float  # m
+# a sketch with those obstacles only that the process does not know, the keys of all, and a radius, m
+Question: TypeAlias = tuple[Sketch, tuple[int, ...], float]
 
 
 class MeasurementWire(Wire):
@@ -152,7 +146,7 @@ class MeasurementWire(Wire):
         sketch, radius = question
         changed = tuple(item for item in sketch.obstacles if self._known.get(item.key) is not item)
         self._known = {item.key: item for item in sketch.obstacles}
-        return Question(replace(sketch, obstacles=()), tuple(self._known), changed, radius)
+        return replace(sketch, obstacles=changed), tuple(self._known), radius
 
 
 class Measuring:
@@ -164,11 +158,10 @@ class Measuring:
         self._known: dict[int, Item] = {}
 
     def __call__(self, questions: list[Question], line: Line) -> Measurement:
-        for question in questions:
-            self._known |= {item.key: item for item in question.changed}
-            self._known = {key: self._known[key] for key in question.order}
-        last = questions[-1]
-        return measure(replace(last.rest, obstacles=tuple(self._known.values())), last.radius)
+        for sketch, order, _ in questions:
+            known = self._known | {item.key: item for item in sketch.obstacles}
+            self._known = {key: known[key] for key in order}
+        return measure(replace(sketch, obstacles=tuple(self._known.values())), questions[-1][2])
 
 
 def measurement_worker(*, direct: bool = False) -> Worker[Measurement]:

@@ -130,11 +130,8 @@ def replace_obstacles(sketch: Sketch, shapes: Mapping[Any, Sequence[Obstacle]], 
 
 
 def points_of(sketch: Sketch, owner: Owner) -> tuple[tuple[Vertex, Point], ...]:
-    return tuple(
-        (Vertex(owner, ring, index), point)
-        for ring, points in enumerate(sketch.ring_points(owner))
-        for index, point in enumerate(points)
-    )
+    rings = enumerate(sketch.ring_points(owner))
+    return tuple((Vertex(owner, ring, k), at) for ring, points in rings for k, at in enumerate(points))
 
 
 def exists(sketch: Sketch, vertex: Vertex) -> bool:

@@ -1,11 +1,9 @@
 """A map in the making, valid or not: a value; every edit makes another, which shares what did not change."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, Self, TypeAlias
 
 import numpy as np
 import shapely
@@ -69,7 +67,7 @@ class Sketch:
         return hash((self.name, self.boundary, self.obstacles))
 
     @classmethod
-    def from_environment(cls, environment: env.Environment) -> Sketch:
+    def from_environment(cls, environment: env.Environment) -> Self:
         """Return the sketch of a map, with keys 0, 1, ... in the order of its obstacles."""
         shapes, free_keys = environment.obstacles, dict(environment.extra)
         marks, background, extra = taken_apart(free_keys, [shape.name for shape in shapes])
@@ -143,7 +141,7 @@ class Sketch:
         closed = not isinstance(thing, env.WallObstacle)
         return tuple((k, points, closed) for k, points in enumerate(self.ring_points(owner)))
 
-    def with_rings(self, owner: Owner, rings: Iterable[Sequence[Point]]) -> Sketch:
+    def with_rings(self, owner: Owner, rings: Iterable[Sequence[Point]]) -> Self:
         """Return the sketch with other vertices for something that `ring_points` has, but circles."""
         line, *holes = map(tuple, rings)
         if owner == BOUNDARY:
@@ -169,27 +167,26 @@ class Sketch:
     def fresh_key(self) -> int:
         return max(self.places, default=-1) + 1
 
-    def added(self, shapes: Iterable[Obstacle | tuple[Obstacle, str]]) -> tuple[Sketch, tuple[int, ...]]:
+    def added(self, shapes: Iterable[Obstacle | tuple[Obstacle, str]]) -> tuple[Self, tuple[int, ...]]:
         """Return the sketch with more obstacles on top, each a shape or one with a note; and their keys."""
         pairs = [each if isinstance(each, tuple) else (each, "") for each in shapes]
         items = [Item(k, *pair) for k, pair in enumerate(pairs, self.fresh_key)]
         return replace(self, obstacles=(*self.obstacles, *items)), tuple(item.key for item in items)
 
-    def with_things(self, things: Mapping[Any, Any]) -> Sketch:
+    def with_things(self, things: Mapping[Any, Any]) -> Self:
         """Return the sketch with other obstacles by their keys, and other or more starts by their names."""
-        changed = {
-            k: shape for k, shape in things.items() if isinstance(k, int) and shape != self.item(k).shape
-        }
+        shapes = {key: shape for key, shape in things.items() if isinstance(key, int)}
+        changed = {key: shape for key, shape in shapes.items() if shape != self.item(key).shape}
         items = [replace(i, shape=changed[i.key]) if i.key in changed else i for i in self.obstacles]
         starts = dict(self.starts) | {name: spec for name, spec in things.items() if isinstance(name, str)}
         return replace(self, obstacles=tuple(items), starts=tuple(starts.items()))
 
-    def without(self, owners: Iterable[Owner]) -> Sketch:
+    def without(self, owners: Iterable[Owner]) -> Self:
         gone = frozenset(owners)
         obstacles = tuple(item for item in self.obstacles if item.key not in gone)
         return replace(self, obstacles=obstacles, starts=tuple(s for s in self.starts if s[0] not in gone))
 
-    def named(self, name: str) -> Sketch:
+    def named(self, name: str) -> Self:
         """Return the sketch with a name if nobody has given it one."""
         name = "".join(char for char in " ".join(name.split()) if char.isprintable())[:100]
         return replace(self, name=name) if self.name == Sketch.name and name else self
@@ -218,7 +215,6 @@ def draft_document(sketch: Sketch) -> dict[str, Any]:
 
 
 def sketch_text(sketch: Sketch) -> str:
-    """Return the text of the file of a sketch, as `robocov.mapfile.dump_map` has it."""
     return dump_document(draft_document(sketch))
 
 

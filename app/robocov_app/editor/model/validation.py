@@ -58,12 +58,10 @@ def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiP
         environment = sketch.unchecked()
         free = environment.free
         try:
-            # whatever the rules are, these are they
-            validate(draft_document(sketch), "map")
+            validate(draft_document(sketch), "map")  # whatever the rules are, these are they
             check_rules(environment, "map")
         except MapError as error:
-            otherwise = Problem(in_words(str(error), sketch), None)
-            found = list(_space_faults(sketch, free, set())) or [otherwise]
+            found = list(_space_faults(sketch, free, set())) or [Problem(in_words(str(error), sketch), None)]
     found += _warnings(sketch, free, radius, {problem.of for problem in found})
     for k, problem in enumerate(found):
         if problem.of is not None and problem.words[0] in ": ":

@@ -4,13 +4,14 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from math import copysign
 
-from robocov import environment as env
-from robocov.environment import Point
+import shapely
+
+from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, counted
 from robocov_app.editor.edits import create
 from robocov_app.editor.model import require
 from robocov_app.editor.model.coordinates import length_of, next_point_of, size_of
-from robocov_app.editor.model.geometry import bearing_words, distance, length_words, rectangle, ring_area
+from robocov_app.editor.model.geometry import bearing_words, distance, length_words, rectangle
 from robocov_app.editor.model.selection import Change
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace
@@ -36,8 +37,8 @@ class DrawTool(Tool):
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         """Return what to show of the points, the last of which is the cursor."""
         closed = self.closes and len(points) > 2
-        words = bearing_words(points[-2], points[-1]) + (f"   {ring_area(points):.2f} m²" if closed else "")
-        return Preview(points, closed, True, words=words)
+        area = f"   {shapely.Polygon(points).area:.2f} m²" if closed else ""
+        return Preview(points, closed, True, words=bearing_words(points[-2], points[-1]) + area)
 
     def placed(self, event: PointerEvent) -> Point:
         return event.constrained(self.origin)
@@ -137,7 +138,7 @@ class WallTool(DrawTool):
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         line = points if distance(points[-2], points[-1]) > SAME else points[:-1]
-        shapes = (env.WallObstacle(line, context.wall_width),) if len(line) > 1 else ()
+        shapes = (WallObstacle(line, context.wall_width),) if len(line) > 1 else ()
         words = f"{bearing_words(points[-2], points[-1])}   {length_words(context.wall_width)} wide"
         return Preview(points, False, True, shapes, words=words)
 
@@ -174,7 +175,7 @@ class MeasureTool(DrawTool):
         words = f"{bearing_words(points[-2], points[-1])}   Δx {bx - ax:.2f}  Δy {by - ay:.2f}"
         if len(points) > 2:
             whole = sum(distance(a, b) for a, b in pairwise(points))
-            words += f"   {length_words(whole)} in all, {ring_area(points):.2f} m²"
+            words += f"   {length_words(whole)} in all, {shapely.Polygon(points).area:.2f} m²"
         return Preview(tuple(points), False, True, words=words)
 
 
@@ -189,7 +190,7 @@ class PlacesTool(DrawTool):
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         words = f"{counted(len(points) - 1, 'robot')}; Enter ends it"
-        return Preview(start=env.PointsStart(points[:-1]), words=words)
+        return Preview(start=PointsStart(points[:-1]), words=words)
 
 
 class BoundaryTool(DrawTool):
@@ -233,7 +234,7 @@ class RectangleTool(DrawTool):
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         (ax, ay), (bx, by) = points
         wide, high, ring = abs(bx - ax), abs(by - ay), rectangle(*points)
-        shapes = (env.PolygonObstacle(ring),) if min(wide, high) > SAME else ()
+        shapes = (PolygonObstacle(ring),) if min(wide, high) > SAME else ()
         words = f"{length_words(wide)} x {length_words(high)}   {wide * high:.2f} m²"
         return Preview(ring, True, shapes=shapes, words=words)
 
@@ -254,7 +255,7 @@ class CircleTool(DrawTool):
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         radius = distance(*points)
-        shapes = (env.CircleObstacle(points[0], radius),) if radius > SAME else ()
+        shapes = (CircleObstacle(points[0], radius),) if radius > SAME else ()
         return Preview(points, shapes=shapes, words=f"radius {length_words(radius)}")
 
 
@@ -268,7 +269,7 @@ class DiscTool(CircleTool):
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         radius = distance(*points)
-        start = env.DiscStart(points[0], radius) if radius > SAME else None
+        start = DiscStart(points[0], radius) if radius > SAME else None
         return Preview(points, start=start, words=f"radius {length_words(radius)}")
 
 

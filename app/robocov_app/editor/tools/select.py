@@ -87,8 +87,7 @@ class Moving(Drag):
             self.change = self._made(dx, dy)
         else:
             self.offset = (dx, dy)
-        far = geometry.length_words(math.hypot(dx, dy))
-        self.words = f"Δx {dx + 0.0:.2f}  Δy {dy + 0.0:.2f}   {far}"
+        self.words = f"Δx {dx + 0.0:.2f}  Δy {dy + 0.0:.2f}   {geometry.length_words(math.hypot(dx, dy))}"
 
     def _made(self, dx: float, dy: float) -> Change | None:
         act = transform.duplicated if self.copies else transform.moved
@@ -103,8 +102,7 @@ class Moving(Drag):
         """Move by a length towards the cursor, or by what was typed: ``0.5 -2`` or ``2<45``."""
         text = text.strip()
         two = len(text.split()) > 1 or "<" in text or ";" in text
-        relative = f"@{text}" if two and text[0] not in "@+" else text
-        to = next_point_of(relative, self._begun, self._at)
+        to = next_point_of(f"@{text}" if two and text[0] not in "@+" else text, self._begun, self._at)
         self._move(to[0] - self._begun[0], to[1] - self._begun[1])
 
 
@@ -331,8 +329,7 @@ class SelectTool(Tool):
             return
         self.begun = self.drag = None
         if not event.ctrl:
-            # on the edge, but at a round place
-            to = context.snapped(edge.point, event.reach).point
+            to = context.snapped(edge.point, event.reach).point  # on the edge, but at a round place
             edge = edge_at(context.sketch, to, ON_EDGE, [edge.of]) or edge
         context.change(vertices.inserted(context.sketch, edge))
 

@@ -1,19 +1,16 @@
 """Snapping of the cursor: grid, vertices, edges, angles, alignment; never beyond its reach."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import chain, combinations, islice
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, Self, TypeAlias, get_args
 
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
-from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, WallObstacle
@@ -40,7 +37,7 @@ class Targets:
             else:
                 owners.add(each)
         points, rims, centres = list[Point](), list(more), list[Point]()
-        edges, walls, circles = list[tuple[Point, Point]](), list[BaseGeometry](), list[BaseGeometry]()
+        edges, walls, circles = list[tuple[Point, Point]](), list[Any](), list[Any]()
         for owner in sketch.owners:
             if owner in owners:
                 continue
@@ -60,19 +57,15 @@ class Targets:
                 pairs = [(k, (k + 1) % count) for k in range(count if closed else count - 1)]
                 edges += [(line[a], line[b]) for a, b in pairs if a not in gone and b not in gone]
         lows, highs = np.array(edges, dtype=float).reshape(-1, 2, 2).transpose(1, 0, 2)
-        kinds = {
-            "vertex": np.concatenate([as_array([*points, *rims]), _outline(walls)[0]]),
-            "centre": as_array(centres),
-            "middle": (lows + highs) / 2,
-        }
+        marks = np.concatenate([as_array([*points, *rims]), _outline(walls)[0]])
+        kinds = {"vertex": marks, "centre": as_array(centres), "middle": (lows + highs) / 2}
         self._places = {kind: (cKDTree(at), at) for kind, at in kinds.items() if len(at)}
-        # walls and circles are found by what they look like, too
-        around = _outline([*walls, *circles])
+        around = _outline([*walls, *circles])  # walls and circles are found by what they look like, too
         self.starts, self.ends = np.concatenate([lows, around[0]]), np.concatenate([highs, around[1]])
         low, high = np.minimum(self.starts, self.ends), np.maximum(self.starts, self.ends)
         self._edges = shapely.STRtree(shapely.box(*low.T, *high.T))
         # what is in line counts of vertices and centres, sorted along each axis
-        marks = np.concatenate([kinds["vertex"], kinds["centre"]])
+        marks = np.concatenate([marks, kinds["centre"]])
         self._sorted = tuple(marks[np.argsort(marks[:, axis], kind="stable")] for axis in (0, 1))
 
     def nearest(self, point: Point, kind: PointKind, reach: float) -> Point | None:
@@ -116,8 +109,7 @@ class Snapper:
         """Return what to snap to; None as long as that is being worked out."""
         look = frozenset(without), tuple(more)
         coming = self._latest.of(sketch, look, lambda: self._pool.submit(Targets, sketch, *look))
-        at_once = coming.done() or self.patient or vertex_count(sketch) < MANY
-        return coming.result() if at_once else None
+        return coming.result() if coming.done() or self.patient or vertex_count(sketch) < MANY else None
 
     def close(self) -> None:
         self._pool.shutdown(cancel_futures=True)
@@ -128,7 +120,7 @@ def vertex_count(sketch: Sketch) -> int:
     return sum(len(getattr(shape, "vertices", getattr(shape, "points", ()))) for shape in shapes)
 
 
-def _outline(geometries: list[BaseGeometry]) -> tuple[Array, Array]:
+def _outline(geometries: list[shapely.Geometry]) -> tuple[Array, Array]:
     rings = shapely.get_rings(np.array(geometries, dtype=object))
     points, ring = shapely.get_coordinates(rings, return_index=True)
     is_edge = ring[1:] == ring[:-1]
@@ -205,7 +197,7 @@ class _Line:
     def at(self, along: float) -> Point:
         return self.through[0] + along * self.direction[0], self.through[1] + along * self.direction[1]
 
-    def crossing(self, other: _Line) -> Point | None:
+    def crossing(self, other: Self) -> Point | None:
         (ux, uy), (vx, vy) = self.direction, other.direction
         across = ux * vy - uy * vx
         if abs(across) < _PARALLEL:
@@ -232,8 +224,7 @@ class _Line:
         return None if beyond else place
 
     def shown(self, at: Point) -> Guide:
-        line = self.guide if self.kind == "edge" else (*self.guide, at)
-        return Guide(self.kind, line, self.words)
+        return Guide(self.kind, self.guide if self.kind == "edge" else (*self.guide, at), self.words)
 
 
 def snapped(point: Point, targets: Targets, snapping: Snapping, origin: Point | None = None) -> Snap:
@@ -253,8 +244,7 @@ def snapped_move(points: Sequence[Point], dx: float, dy: float, targets: Targets
         at = x + dx, y + dy
         rank, snap = _Candidates(at, targets, snapping if k == 0 else of_others).best()
         by = dx + snap.point[0] - at[0], dy + snap.point[1] - at[1]
-        # what rounding adds is not to add to the reach
-        away = math.hypot(by[0] - dx, by[1] - dy)
+        away = math.hypot(by[0] - dx, by[1] - dy)  # what rounding adds is not to add to the reach
         if snap.guides and away <= snapping.reach and (best is None or (rank, away) < best[0]):
             best = (rank, away), Snap(by, snap.guides)
     return best[1] if best else Snap((dx, dy))
@@ -314,8 +304,7 @@ class _Candidates:
         lines += islice(self.edges(), 4) if "edge" in self.how.to else ()
         for k, line in enumerate(lines):
             for other in lines[:k]:
-                # where two edges cross is a matter of its own
-                both_edges = line.kind == other.kind == "edge"
+                both_edges = line.kind == other.kind == "edge"  # where two edges cross is a matter of its own
                 place = None if both_edges else line.crossing(other)
                 if place is not None:
                     yield Snap(place, (other.shown(place), line.shown(place)))

@@ -191,7 +191,6 @@ class Tool:
 
     @property
     def busy(self) -> bool:
-        """Whether something is half done."""
         return self.begun is not None or bool(self.clicked)
 
     @property

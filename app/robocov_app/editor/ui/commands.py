@@ -7,11 +7,9 @@ from typing import TypeVar
 from robocov.environment import Point, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov_app.editor.canvas.canvas import REACH, EditorCanvas
-from robocov_app.editor.edits import boolean, density, paths, properties, transform, vertices
+from robocov_app.editor.edits import boolean, create, density, fixes, paths, properties, transform, vertices
 from robocov_app.editor.edits.clipboard import copied, pasted
-from robocov_app.editor.edits.create import anywhere_added
-from robocov_app.editor.edits.fixes import fixed, unreachable_filled
-from robocov_app.editor.edits.transform import bounds_of
+from robocov_app.editor.model import require
 from robocov_app.editor.model.coordinates import angle_of, length_of, point_of, size_of
 from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner
@@ -19,7 +17,7 @@ from robocov_app.editor.tools.density import DensityTool
 from robocov_app.editor.tools.draw import MeasureTool
 from robocov_app.editor.tools.snapping import SNAPS
 from robocov_app.editor.ui.editor import SHOWN, Editor
-from robocov_app.editor.ui.file_commands import FileCommands
+from robocov_app.editor.ui.file_commands import OPENED, PICTURES, FileCommands
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.command import Command, Takes
 
@@ -35,16 +33,8 @@ Row = tuple[str, str, str, Run]  # name, title and keys of a command, separated 
 _Number = TypeVar("_Number", int, float)
 
 
-def require(there: object, words: str) -> None:
-    """Raise MapError with these words where something is missing."""
-    if not there:
-        raise MapError(words)
-
-
 def selected(editor: Editor) -> Selection:
-    selection = whole(editor.selection)
-    require(selection, "nothing is selected: click something first, or press Ctrl A")
-    return selection
+    return require(whole(editor.selection), "nothing is selected: click something first, or press Ctrl A")
 
 
 def align(editor: Editor, side: transform.Side) -> None:
@@ -76,8 +66,7 @@ def back(editor: Editor) -> None:
 
 
 def delete(editor: Editor) -> None:
-    selection = editor.selection
-    require(selection, "nothing is selected: click something first")
+    selection = require(editor.selection, "nothing is selected: click something first")
     act = vertices.deleted if selection.vertices else properties.deleted
     editor.change(act(editor.sketch, vertices_or_things(selection)))
 
@@ -113,8 +102,8 @@ def level(editor: Editor) -> None:
 
 
 def nudge(editor: Editor, steps: int, x: int, y: int) -> None:
-    selection = editor.selection
-    require(selection, "nothing is selected: arrows move what is; Ctrl and arrows move the sheet")
+    missing = "nothing is selected: arrows move what is; Ctrl and arrows move the sheet"
+    selection = require(editor.selection, missing)
     by = steps * editor.grid
     editor.change(move(editor, x * by, y * by, vertices_or_things(selection)), drag=("nudge", selection))
 
@@ -155,10 +144,9 @@ def trim(editor: Editor, edit: Edit, length: float | None = None) -> None:
 
 
 def extend(editor: Editor) -> None:
-    if editor.cursor is None:
-        raise MapError("move the mouse to where the wall is to go on to")
+    cursor = require(editor.cursor, "move the mouse to where the wall is to go on to")
     vertex = one_vertex(editor)
-    to = editor.snapped(editor.cursor, REACH * editor.pixel, place_of(editor.sketch, vertex)).point
+    to = editor.snapped(cursor, REACH * editor.pixel, place_of(editor.sketch, vertex)).point
     editor.change(vertices.extended(editor.sketch, vertex, to))
 
 
@@ -182,8 +170,7 @@ def widen(editor: Editor, factor: float) -> None:
 
 
 def next_start(editor: Editor) -> None:
-    names = editor.start_names
-    require(names, "the map has no start yet: S draws one")
+    names = require(editor.start_names, "the map has no start yet: S draws one")
     now = editor.start_name
     name = names[(names.index(now) + 1) % len(names)] if now in names else names[0]
     editor.start = name
@@ -205,7 +192,7 @@ def make_areas(editor: Editor) -> None:
 
 def fix_problem(editor: Editor) -> None:
     for problem in [editor.problem] if editor.problem is not None else editor.problems:
-        if (change := fixed(editor.sketch, problem, editor.radius)) is not None:
+        if (change := fixes.fixed(editor.sketch, problem, editor.radius)) is not None:
             editor.change(change)
             return
     raise MapError("there is nothing that can be mended by itself")
@@ -274,14 +261,14 @@ def _move(editor: Editor, text: str) -> None:
 
 def _place(editor: Editor, text: str) -> None:
     selection = selected(editor)
-    bounds = bounds_of(editor.sketch, selection)
+    bounds = transform.bounds_of(editor.sketch, selection)
     x, y = point_of(text, last=bounds[:2] if bounds else None)
     editor.change(transform.placed(editor.sketch, selection, x, y))
 
 
 def _scale(editor: Editor, text: str) -> None:
     selection = selected(editor)
-    require(bounds_of(editor.sketch, selection), "there is nothing to scale")
+    require(transform.bounds_of(editor.sketch, selection), "there is nothing to scale")
     factor = length_of(text if text.endswith("%") else f"*{text.lstrip('*x')}", now=1.0)
     editor.change(transform.scaled(editor.sketch, selection, factor))
 
@@ -347,17 +334,18 @@ def editor_commands(
     def switch_theme() -> None:
         editor.theme = "dark" if editor.theme == "light" else "light"
 
-    fill_unreachable = of_map(unreachable_filled, lambda: editor.radius)
+    fill_unreachable = of_map(fixes.unreachable_filled, lambda: editor.radius)
+    ask_picture = partial(documents.ask_path, "Picture under the map", documents.underlay, PICTURES)
     no_picture = of_map(properties.underlaid, lambda: None)
     table: tuple[str | Row, ...] = (  # the headings of groups, and below each its commands
         "File",
         ("new", "New map", "ctrl+n", documents.new),
-        ("open", "Open a map", "ctrl+o", documents.ask_open),
+        ("open", "Open a map", "ctrl+o", partial(documents.ask_path, "Open a map", documents.open, OPENED)),
         ("recent", "Open a recent or bundled map", "ctrl+shift+o", documents.ask_recent),
         ("save", "Save", "ctrl+s", documents.save),
         ("save:as", "Save as", "ctrl+shift+s", documents.ask_name),
         ("export", "Export to another format", "ctrl+e", documents.ask_export),
-        ("background", "Picture under the map", "ctrl+b", documents.ask_picture),
+        ("background", "Picture under the map", "ctrl+b", ask_picture),
         ("background:none", "Take the picture under the map away", "", no_picture),
         ("reload", "Read the file again", "ctrl+r", documents.reload),
         ("try", "Try it in the demo, and back", "f5", of_window["try"]),
@@ -446,7 +434,7 @@ def editor_commands(
         ("problem:next", "Go to the next problem", "f8, n", does(next_problem)),
         ("problem:fix", "Mend the problem that is shown", "shift+f8", does(fix_problem)),
         "Robots",
-        ("start:uniform", "A start anywhere in the free space", "shift+u", of_map(anywhere_added)),
+        ("start:uniform", "A start anywhere in the free space", "shift+u", of_map(create.anywhere_added)),
         ("start:next", "Next start of the map", "shift+n", does(next_start)),
         ("start:default", "Make it the default start", "shift+d", does(make_default)),
         ("more", "One robot more", "shift+=, shift++", partial(editor.add_robots, 1)),
@@ -516,15 +504,13 @@ TYPED: dict[str, tuple[str, RunWith]] = {
 
 def typed_commands(editor: Editor) -> list[Command]:
     def run(word: str, text: str) -> None:
-        editor.carry_out(lambda: run_typed(editor, word, text))
+        editor.carry_out(lambda: run_typed(editor, text, word))
 
-    return [
-        Command(word, f"{word} {example}", "", partial(run, word), takes=Takes(example))
-        for word, (example, _) in TYPED.items()
-    ]
+    rows = [(word, said) for word, (said, _) in TYPED.items()]
+    return [Command(word, f"{word} {said}", "", partial(run, word), takes=Takes(said)) for word, said in rows]
 
 
-def run_typed(editor: Editor, word: str, text: str) -> None:
+def run_typed(editor: Editor, text: str, word: str) -> None:
     """Do what was typed, as ``rotate 30``; raises a MapError when that means nothing, or cannot be done."""
     require(text.strip(), f"{word}: a value was wanted after it")
     TYPED[word][1](editor, text.strip())

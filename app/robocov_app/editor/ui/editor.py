@@ -13,6 +13,7 @@ from robocov.environment import Point
 from robocov.errors import MapError, RobocovError
 from robocov.mapfile.models import SMALLEST
 from robocov.robots import DEFAULT_RADIUS
+from robocov_app.editor.model import require
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.editor.model.selection import Selection
@@ -25,7 +26,7 @@ from robocov_app.editor.tools.reference_image import ReferenceImageTool
 from robocov_app.editor.tools.select import PanTool, SelectTool
 from robocov_app.editor.tools.snapping import SNAPS, vertex_count
 from robocov_app.editor.tools.tool import Tool, Workspace
-from robocov_app.toolkit.dialogs import Answer, Dialog, Dialogs, Question
+from robocov_app.toolkit.dialogs import Answer, Dialogs, Question
 from robocov_app.toolkit.worker import Worker
 
 FILE = "editor.json"
@@ -89,15 +90,14 @@ class TeamThread:
         self._asked: tuple[object, ...] = ()
         self._answer: Future[Team] | None = None
 
-    def ask(self, sketch: Sketch, start: str | None, robots: int, seed: int, radius: float) -> None:
+    def ask(self, sketch: Sketch, start: str | None, robots: int, seed: int, radius: float) -> Team | None:
+        """Ask for a team; return it once, as soon as it is there."""
         team = sketch, start, robots, seed, radius
         if self._asked != team:
             self._asked = team
             if self._answer is not None:
                 self._answer.cancel()
             self._answer = self._pool.submit(placed, *team)
-
-    def poll(self) -> Team | None:
         if self._answer is None or not self._answer.done():
             return None
         answer, self._answer = self._answer.result(), None
@@ -111,22 +111,18 @@ class Editor(Workspace):
     """Editor state and the user's actions on it."""
 
     def __init__(
-        self,
-        document: Document,
-        readings: Worker[Measurement],
-        folder: Path,
-        settings: EditorSettings | None = None,
+        self, document: Document, readings: Worker[Measurement], folder: Path, settings: EditorSettings
     ) -> None:
         super().__init__(document)
-        settings = settings or EditorSettings()
         self.readings, self.folder = readings, folder
+        self.selector = SelectTool()
         tools = (  # in the order in which they are shown
-            *(SelectTool(), PanTool(), draw.PolygonTool(), draw.RectangleTool(), draw.CircleTool()),
+            *(self.selector, PanTool(), draw.PolygonTool(), draw.RectangleTool(), draw.CircleTool()),
             *(draw.WallTool(), draw.DoorTool(), draw.BoundaryTool(), draw.MeasureTool(), draw.DiscTool()),
             *(draw.PlacesTool(), DensityTool(), MotionPathTool(), ReferenceImageTool()),
         )
         self.tools: dict[str, Tool] = {tool.name: tool for tool in tools}
-        self.tool: Tool = self.tools["select"]
+        self.tool: Tool = self.selector
         self.theme: str = settings.theme
         self.panel = True
         self.shown, self.snaps = set(settings.shown) & set(SHOWN), set(settings.snaps) & set(SNAPS)
@@ -141,10 +137,6 @@ class Editor(Workspace):
         self.typed = ""
         self.moves_since: float | None = None  # s; since when obstacles that move are shown moving
         self._about: tuple[object, float] | None = None
-
-    @property
-    def selector(self) -> SelectTool:
-        return self.tools["select"]  # type: ignore[return-value]
 
     @property
     def preview(self) -> tuple[Sketch, Selection]:
@@ -221,10 +213,6 @@ class Editor(Workspace):
         if isinstance(words, str):
             self.say(words)
 
-    @property
-    def asked(self) -> Dialog | None:
-        return self.dialogs.asked
-
     def ask(self, title: str, words: str, *answers: tuple[str, str, Callable[[], object]]) -> None:
         """Ask a question with answers: their words, keys, and what they do; Escape gives the last one."""
         given = [Answer(text, partial(self.attempt, call), key) for text, key, call in answers]
@@ -262,8 +250,7 @@ class Editor(Workspace):
         self.set_length("grid", coarser[0] if by > 0 else finer[-1])
 
     def set_robots(self, count: int) -> None:
-        if not 1 <= count <= 1000:
-            raise MapError(f"robots: {count}, but 1 to 1000 were wanted")
+        require(1 <= count <= 1000, f"robots: {count}, but 1 to 1000 were wanted")
         self.robots = count
 
     def add_robots(self, by: int) -> None:

@@ -12,6 +12,7 @@ from PIL import Image, UnidentifiedImageError
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, map_file
 from robocov_app.editor.edits.properties import underlaid
+from robocov_app.editor.model import require
 from robocov_app.editor.model.background import picture_laid
 from robocov_app.editor.model.document import SUFFIX, Autosave, ChangedError, Document, opened_elsewhere
 from robocov_app.editor.model.sketch import Sketch
@@ -25,7 +26,7 @@ from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Worker
 Act: TypeAlias = Callable[[], object]
 _PATIENCE = 2.0  # seconds after which an import with settings that have changed since is given up
 _CANCEL = ("Cancel", "c", lambda: None)
-_OPENED = (SUFFIX, *(suffix for importer in IMPORTERS.values() for suffix in importer.suffixes))
+OPENED = (SUFFIX, *(suffix for importer in IMPORTERS.values() for suffix in importer.suffixes))
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
 
 
@@ -43,7 +44,7 @@ class FileCommands:
             then()
             document.close(discard=True)
 
-        if not document.unsaved:
+        if not document.history.unsaved:
             discard()
             return
         save = partial(self.save, then=lambda: self.leave(then))
@@ -65,13 +66,7 @@ class FileCommands:
         words = "a new map: 10 x 10 m; B draws another boundary"
         self.leave(lambda: self._put(Document.new(self.drafts), words))
 
-    def ask_open(self) -> None:
-        self._ask_path("Open a map", self.open, _OPENED)
-
-    def ask_picture(self) -> None:
-        self._ask_path("Picture under the map", self.underlay, PICTURES)
-
-    def _ask_path(
+    def ask_path(
         self, title: str, call: Callable[[Path], object], endings: Sequence[str], text: str = ""
     ) -> None:
         def chosen(path: Path) -> None:
@@ -93,7 +88,7 @@ class FileCommands:
         if own is not None and own.exists() and path.exists() and path.samefile(own):
             self.reload()
             return
-        if opened_elsewhere(self.drafts, path):
+        if opened_elsewhere(self.drafts, path=path):
             raise MapError(f"{path.name}: another editor has it open")
         found = opened(path, self.drafts)
         if isinstance(found, Document):
@@ -113,8 +108,7 @@ class FileCommands:
         self.editor.dialogs.ask(ImportDialog(path, importer, worker, put))
 
     def recover(self, draft: Autosave) -> None:
-        words = f"recovered: {draft.words()}"
-        self.leave(lambda: self._put(Document.recovered(draft, self.drafts), words))
+        self.leave(lambda: self._put(Document.recovered(draft, self.drafts), f"recovered: {draft.words()}"))
 
     def remember(self, path: Path) -> None:
         name = os.path.abspath(path)  # noqa: PTH100 - resolves no links, as people know the path
@@ -130,7 +124,7 @@ class FileCommands:
         folder = self.editor.folder
         suggested = self.editor.document.suggested(folder)
         text = suggested.name if suggested.parent == folder else str(suggested)
-        self._ask_path("Save as", lambda path: self._save(path, then), [SUFFIX], text)
+        self.ask_path("Save as", lambda path: self._save(path, then), [SUFFIX], text)
 
     def _save(self, path: Path, then: Act | None, *, over: bool = False, spoil: bool = False) -> str | None:
         editor = self.editor
@@ -160,7 +154,7 @@ class FileCommands:
         suffixes = [suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes]
         title = f"Export to a file ending in {', '.join(suffixes)}"
         suggested = self.editor.document.suggested(self.editor.folder)
-        self._ask_path(title, self._export, suffixes, f"{suggested.stem}.svg")
+        self.ask_path(title, self._export, suffixes, f"{suggested.stem}.svg")
 
     def _export(self, path: Path, *, over: bool = False) -> str | None:
         if path.exists() and not over:
@@ -174,10 +168,10 @@ class FileCommands:
 
     def look(self) -> None:
         editor = self.editor
-        if isinstance(asked := editor.asked, ImportDialog) and (imported := asked.poll()) is not None:
+        if isinstance(asked := editor.dialogs.asked, ImportDialog) and (imported := asked.poll()) is not None:
             editor.dialogs.close()
             editor.attempt(lambda: asked.call(imported))
-        if editor.asked is not None:
+        if editor.dialogs.asked is not None:
             return
         state = editor.document.look(editor.now)
         if state == "gone":
@@ -188,8 +182,7 @@ class FileCommands:
             editor.ask("The file has changed", words, *answers)
 
     def reload(self) -> str:
-        if self.editor.document.path is None:
-            raise MapError("the map has no file yet")
+        require(self.editor.document.path, "the map has no file yet")
         self.editor.document.reload()
         self.editor.measurement = None
         return f"read again: {self.editor.document.title}"

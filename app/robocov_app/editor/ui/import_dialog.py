@@ -9,16 +9,14 @@ import numpy as np
 import pygame
 import shapely
 from pygame import Rect, Surface
-from shapely.geometry.base import BaseGeometry
 
 from robocov.errors import RobocovError
 from robocov_app.editor.ui.importing import Imported, options_of
 from robocov_app.formats import Importer, ReadOptions, Shaping
 from robocov_app.formats.base import square_metres
+from robocov_app.render import layout, surface_cache
 from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, shortened, text_width
-from robocov_app.render.layout import columns_for
-from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import Theme
 from robocov_app.toolkit.dialogs import Dialog
 from robocov_app.toolkit.overlay import wrapped
@@ -49,7 +47,7 @@ class ImportDialog(Dialog):
         self.cameras: list[Camera] = []
         self._seen: Ui | None = None
         self._worker = worker
-        self._picture: Latest[Surface] = Latest()
+        self._picture: surface_cache.Latest[Surface] = surface_cache.Latest()
         self._ask()
 
     def set(self, name: str, text: str) -> None:
@@ -183,7 +181,7 @@ class ImportDialog(Dialog):
         """Place the two maps at the top of a box; return the height that they take, px."""
         low_x, low_y, high_x, high_y = bounds = imported.comparison.bounds
         aspect, above, gap = (high_x - low_x) / (high_y - low_y), round(_ABOVE * scale), round(20 * scale)
-        columns = columns_for(2, aspect, box.size, above)
+        columns = layout.columns_for(2, aspect, box.size, above)
         wide = (box.width - (columns - 1) * gap) // columns
         most = (box.height if columns == 2 else (box.height - gap) // 2) - above
         high = min(most, round(wide / aspect))
@@ -257,7 +255,7 @@ def _maps(
 
 
 def _fill(
-    surface: Surface, camera: Camera, area: BaseGeometry, inside: Sequence[int], holes: Sequence[int]
+    surface: Surface, camera: Camera, area: shapely.Geometry, inside: Sequence[int], holes: Sequence[int]
 ) -> None:
     """Fill polygons; what lies in the hole of another is smaller, and drawn after it."""
     parts = [part for part in shapely.get_parts(area).tolist() if part.geom_type == "Polygon"]

@@ -40,7 +40,7 @@ def editor_window(
     """
     alone = headless or served
     drafts = None if alone else autosave_folder()
-    if path is not None and not alone and opened_elsewhere(drafts, path):
+    if path is not None and not alone and opened_elsewhere(drafts, path=path):
         raise InputError(f"{path}: another editor has it open; close that one, or open a copy")
     # what is wrong with the file is told before a window flashes up
     found = Document.new(drafts) if path is None else opened(path, drafts)

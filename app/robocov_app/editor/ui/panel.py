@@ -11,10 +11,8 @@ import pygame
 from robocov.environment import CircleObstacle, DiscStart
 from robocov.errors import MapError, counted
 from robocov_app.editor.canvas.overlay import draw_badge
-from robocov_app.editor.edits import properties, transform
-from robocov_app.editor.edits.density import density_label
-from robocov_app.editor.edits.fixes import TITLES
-from robocov_app.editor.edits.transform import bounds_of
+from robocov_app.editor.edits import density, fixes, properties, transform
+from robocov_app.editor.model import require
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.coordinates import angle_of, length_of, point_of
 from robocov_app.editor.model.selection import Selection, numbered_name, place_of, points_of
@@ -43,9 +41,7 @@ def number(value: float | None) -> str:
 def _box(editor: Editor) -> tuple[float, float, float, float]:
     """Return the place of a vertex, a centre, or a box's lower left corner, and the box's sides, m."""
     sketch, selection = editor.preview
-    if (bounds := bounds_of(sketch, whole(selection))) is None:
-        raise MapError("nothing is selected")
-    x, y, high_x, high_y = bounds
+    x, y, high_x, high_y = require(transform.bounds_of(sketch, whole(selection)), "nothing is selected")
     sides = high_x - x, high_y - y
     if len(selection.vertices) == 1:
         x, y = place_of(sketch, *selection.vertices)
@@ -87,9 +83,7 @@ def _shown_note(editor: Editor) -> str:
 
 
 def _picture(editor: Editor) -> Background:
-    if editor.sketch.background is None:
-        raise MapError("there is no picture under the map: Ctrl B takes one")
-    return editor.sketch.background
+    return require(editor.sketch.background, "there is no picture under the map: Ctrl B takes one")
 
 
 def _lay(editor: Editor, drag: str | None = None, **changes: float) -> None:
@@ -99,8 +93,7 @@ def _lay(editor: Editor, drag: str | None = None, **changes: float) -> None:
 
 def _set_scale(editor: Editor, text: str) -> None:
     scale = length_of(text, now=_picture(editor).scale)
-    if not scale > 0.0:
-        raise MapError("a pixel must be larger than 0 m")
+    require(scale > 0.0, "a pixel must be larger than 0 m")
     _lay(editor, scale=scale)
 
 
@@ -109,10 +102,7 @@ def _turn(editor: Editor, text: str) -> None:
 
 
 def _typed(word: str, tip: str) -> Field:
-    def take(editor: Editor, text: str) -> None:
-        run_typed(editor, word, text)
-
-    return Field(lambda editor: number(getattr(editor, KEPT[word])), take, tip)
+    return Field(lambda editor: number(getattr(editor, KEPT[word])), partial(run_typed, word=word), tip)
 
 
 def _titled(name: str, tip: str) -> Field:
@@ -197,19 +187,15 @@ class Panel(SidePanel):
 
     def update(self) -> None:
         editor = self.editor
-        (sketch, selection), unsaved = editor.preview, editor.document.unsaved
+        (sketch, selection), unsaved = editor.preview, editor.document.history.unsaved
         shows = (editor.version, self.tab, id(sketch), selection, id(editor.measurement), unsaved)
         if shows != self._drawn:
             self._drawn, self.ui.stale = shows, True
 
-    def focus(self, name: str) -> None:
-        self.ui.run(None, None)
-        self.ui.set_focus(name)
-
     def _page(self, ui: Ui) -> None:
         ui.inset(12, 8, 12)
         document = self.editor.document
-        ui.header(f"{document.title}{', not saved' if document.unsaved else ''}")
+        ui.header(f"{document.title}{', not saved' if document.history.unsaved else ''}")
         for row in _FILE:
             self._buttons(ui, row)
         ui.header("TOOLS")
@@ -348,7 +334,7 @@ class Panel(SidePanel):
                 words = "Nothing is wrong with the map." if seen else "Being looked at …"
                 ui.words(words, colour=ui.theme.faint)
             for k, problem in enumerate(problems[:MOST_PROBLEMS]):
-                mends = problem.kind in TITLES
+                mends = problem.kind in fixes.TITLES
                 lines = wrapped(problem.words, ui.px(TEXT), ui.px(ui.wide - 44 - (66 if mends else 0)))
                 ui.row(20, 0, *([54] if mends else []), height=(TEXT + 5) * len(lines) + 8, below=2)
                 badge = ui.cell()
@@ -361,7 +347,7 @@ class Panel(SidePanel):
                         editor.select(Selection.of(problem.of).within(editor.sketch))
                     editor.version += 1
                     self._picked()
-                if mends and ui.button(TITLES[problem.kind], key=f"mend:{k}", small=True):
+                if mends and ui.button(fixes.TITLES[problem.kind], key=f"mend:{k}", small=True):
                     editor.problem = problem
                     editor.attempt(lambda: fix_problem(editor))
                     return  # these problems are of the map before
@@ -448,5 +434,5 @@ def facts(editor: Editor) -> tuple[tuple[str, str, str], ...]:
         ("Parts", parts, "Connected parts of the free space, and those that a robot can sweep"),
         ("Gap", narrowest, "The narrowest passage, against a robot's diameter"),
         ("Holds", holds, "Obstacles and their vertices"),
-        ("Density", density_label(sketch.density), counts),
+        ("Density", density.density_label(sketch.density), counts),
     )

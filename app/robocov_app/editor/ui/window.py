@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pygame
 
-from robocov_app.editor.canvas.canvas import EditorCanvas
+from robocov_app.editor.canvas.canvas import REACH, EditorCanvas
 from robocov_app.editor.model.geometry import point_words
 from robocov_app.editor.model.hit_test import owners_at
 from robocov_app.editor.model.selection import Selection
@@ -104,14 +104,14 @@ class EditorWindow(BaseWindow):
 
     def look(self) -> object:
         editor, canvas, ui = self.editor, self.canvas, self.panel.ui
-        importing = isinstance(editor.asked, ImportDialog) and editor.asked.busy
+        importing = isinstance(editor.dialogs.asked, ImportDialog) and editor.dialogs.asked.busy
         if ui.stale or editor.moves_since is not None or importing:
             return None
         return (
             *(editor.version, editor.message, editor.trouble, editor.typed, editor.readings.busy),
             *(editor.problem, editor.sketch, editor.selection, editor.measurement, editor.tool),
             *(editor.cursor, frozenset(editor.shown), editor.grid, frozenset(editor.snaps)),
-            *(canvas.team, canvas.camera, canvas.hovered, self.help, id(editor.asked)),
+            *(canvas.team, canvas.camera, canvas.hovered, self.help, id(editor.dialogs.asked)),
             *(self._arranged, pygame.display.get_caption()),
         )
 
@@ -131,22 +131,26 @@ class EditorWindow(BaseWindow):
         if not self.drag:
             self.documents.look()
             if "robots" in editor.shown:
-                self.team.ask(editor.sketch, editor.start_name, editor.robots, editor.seed, editor.radius)
-                if (team := self.team.poll()) is not None:
+                wanted = editor.start_name, editor.robots, editor.seed, editor.radius
+                if (team := self.team.ask(editor.sketch, *wanted)) is not None:
                     self.canvas.team = team
                     editor.say(team.words, trouble=True)
         if not (self.drag and editor.readings.busy):
             editor.ask_readings()
-        if editor.document.trouble:
-            editor.say(editor.document.trouble, trouble=True)
+        editor.say(editor.document.autosaver.trouble, trouble=True)
         if self.documents.leaving:
             self.closed = True
             return
         self._arrange()
         self.panel.covered = self.dialogs.open
         self.panel.update()
-        self._show_cursor()
-        caption = f"{'● ' if editor.document.unsaved else ''}{editor.document.title} · robocov edit"
+        shape = "arrow"
+        if self.canvas.over(self.at):
+            panned = self.drag == "pan" or self.held
+            shape = "hand" if self.canvas.hovered else editor.tool.shape_of_cursor(editor)
+            shape = "move" if panned else shape
+        show_cursor(_SHAPES[shape])
+        caption = f"{'● ' if editor.document.history.unsaved else ''}{editor.document.title} · robocov edit"
         if caption != pygame.display.get_caption()[0]:
             pygame.display.set_caption(caption)
 
@@ -190,12 +194,13 @@ class EditorWindow(BaseWindow):
         self.editor.panel = True
         self._arrange()
         self.panel.show_tab(tab)
-        self.panel.focus(field)
+        self.panel.ui.run(None, None)
+        self.panel.ui.set_focus(field)
 
     def open_menu(self, pixel: tuple[int, int]) -> None:
         editor = self.editor
         if self.canvas.over(pixel):
-            there = owners_at(editor.sketch, self.canvas.to_world(pixel), 0.5 * self.canvas.reach)
+            there = owners_at(editor.sketch, self.canvas.to_world(pixel), 0.5 * REACH * editor.pixel)
             if not (editor.selection.vertices or any(each in editor.selection.owners for each in there)):
                 editor.select(Selection.of(*there[:1]))
         found = [self.commands[name] if name else None for name in offered(editor)]
@@ -246,7 +251,7 @@ class EditorWindow(BaseWindow):
         if kind in OF_THE_MOUSE and kind != pygame.MOUSEWHEEL:
             self.at = event.pos
         if kind == pygame.QUIT:
-            if isinstance(self.editor.asked, ImportDialog | Menu):
+            if isinstance(self.editor.dialogs.asked, ImportDialog | Menu):
                 self.dialogs.close()
             if not self.dialogs.open:
                 self.do("quit")
@@ -255,7 +260,10 @@ class EditorWindow(BaseWindow):
         elif kind == pygame.DROPFILE:
             self.editor.attempt(lambda: self.documents.open(Path(event.file)))
         elif kind == pygame.KEYDOWN:
-            self._key_down(event)
+            # a key is for a field, for a number while something is drawn, else for a command
+            taken = self.panel.take(event) or (not self.panel.ui.busy and self._number(event))
+            if not taken and (command := self.commands.of_key(event)) is not None:
+                self.do(command.name)
             if self.trial is not None:
                 self.trial.held = event.key
             self.dialogs.swallow(event.unicode)
@@ -283,7 +291,7 @@ class EditorWindow(BaseWindow):
             self.canvas.zoom(WHEEL ** wheel_notches(event), self.at)
 
     def _aim(self, pixel: tuple[int, int]) -> PointerEvent:
-        raw, reach = self.canvas.to_world(pixel), self.canvas.reach
+        raw, reach = self.canvas.to_world(pixel), REACH * self.editor.pixel
         editor, tool, held, point = self.editor, self.editor.tool, pygame.key.get_mods(), raw
         ctrl = bool(held & (pygame.KMOD_CTRL | pygame.KMOD_META))
         if tool.snaps:
@@ -341,26 +349,12 @@ class EditorWindow(BaseWindow):
         if drag == "tool":
             aim = self._aim(event.pos)
             editor.attempt(lambda: editor.tool.release(editor, aim, clicked=not self._moved_off))
-            editor.document.history.break_drag()
+            editor.document.history.broken = True
         elif event.button == 3 and not self._moved_off:
             if editor.tool.busy:
                 editor.attempt(lambda: editor.tool.finish(editor))
             else:
                 self.open_menu(event.pos)
-
-    def _show_cursor(self) -> None:
-        canvas, editor, shape = self.canvas, self.editor, "arrow"
-        if canvas.over(self.at):
-            panned = self.drag == "pan" or self.held
-            shape = "move" if panned else "hand" if canvas.hovered else editor.tool.shape_of_cursor(editor)
-        show_cursor(_SHAPES[shape])
-
-    def _key_down(self, event: pygame.event.Event) -> None:
-        """Take a key: for a field, for a number while something is drawn, else for a command."""
-        if self.panel.take(event) or (not self.panel.ui.busy and self._number(event)):
-            return
-        if (command := self.commands.of_key(event)) is not None:
-            self.do(command.name)
 
     def _number(self, event: pygame.event.Event) -> bool:
         editor, tool, name, sign = self.editor, self.editor.tool, key_of(event), event.unicode
