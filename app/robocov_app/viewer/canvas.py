@@ -25,7 +25,7 @@ from robocov_app.render.theme import Theme, mix, robot_hues
 from robocov_app.toolkit.layout import Layout, inside
 from robocov_app.toolkit.overlay import tag
 from robocov_app.viewer.presenter import FADE, Presenter
-from robocov_app.viewer.session.history import PaneSetup
+from robocov_app.viewer.session.moments import PaneSetup
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.tools import Preview
 

@@ -17,7 +17,7 @@ from robocov_app.render.theme import Colour, Theme, mix
 from robocov_app.toolkit.layout import Box, Layout, inside
 from robocov_app.toolkit.overlay import flat_canvas, tag
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.history import DISTANCE, TIME, Plotted
+from robocov_app.viewer.session.curves import DISTANCE, TIME, Plotted
 from robocov_app.viewer.session.pane import Pane
 
 LEFT, RIGHT, TOP, BOTTOM = 52, 70, 26, 20  # pixels at scale 1 round the plot

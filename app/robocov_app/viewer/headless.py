@@ -37,8 +37,8 @@ from robocov_app.terminal.output import write_csv, write_json
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.session.changes import Place
 from robocov_app.viewer.session.document import Document, Node, replayed
-from robocov_app.viewer.session.history import PaneSetup
 from robocov_app.viewer.session.map_edits import with_obstacle
+from robocov_app.viewer.session.moments import PaneSetup
 from robocov_app.viewer.session.pane import Pane
 
 History: TypeAlias = tuple[float, str, CostHistory]  # when a part began, s, a controller's name, its cost

@@ -1,4 +1,4 @@
-"""Tools: what the mouse does on the canvas. Coordinates are metres."""
+"""Tools: what the mouse does on the canvas, and how walls that are drawn snap to others. Metres."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -8,11 +8,13 @@ from time import perf_counter
 from typing import ClassVar
 
 import numpy as np
+import shapely
 
 from robocov.environment import Environment, Obstacle, Point, Ring
 from robocov.errors import RobocovError
 from robocov_app.toolkit.draw_tools import SAME, Outline
 from robocov_app.viewer.session import map_edits
+from robocov_app.viewer.session.passages import passage_words
 from robocov_app.viewer.session.session import Session
 
 SNAPS_WITHIN = 0.6  # part of a finger's width within which corners and walls draw what is drawn
@@ -75,7 +77,7 @@ def edited(session: Session, environment: Environment, words: str) -> str:
     if gone:
         words += f"; it covers the start{'s' if len(gone) > 1 else ''} {', '.join(sorted(gone))}"
     robots = session.positions(session.panes[0])
-    passage = map_edits.passage_words(before, environment, float(radius.min()), robots)
+    passage = passage_words(before, environment, float(radius.min()), robots)
     return "; ".join(filter(None, [words, passage]))
 
 
@@ -144,6 +146,20 @@ class Hand(Tool):
         return k, map_edits.moved(there[k], float(dx), float(dy))
 
 
+def snapped(environment: Environment, point: Point, reach: float) -> Point:
+    """Return the corner within `reach` m of a point, else the nearest place on a wall, else the point."""
+    walls, corners = environment.free.boundary, shapely.get_coordinates(environment.free.boundary)
+    away = np.hypot(*(corners - point).T)
+    if len(away) and away.min() <= reach:
+        x, y = corners[away.argmin()].tolist()
+        return x, y
+    line = shapely.shortest_line(walls, shapely.Point(point))
+    if line is None or line.length > reach:
+        return point
+    x, y = shapely.get_coordinates(line)[0].tolist()
+    return x, y
+
+
 @dataclass
 class Polygon(Tool):
     """Draws a polygon, corner by corner."""
@@ -181,7 +197,7 @@ class Polygon(Tool):
         return Preview(points, len(points) > 2, None, words) if words else None
 
     def _snapped(self, session: Session, point: Point) -> Point:
-        return map_edits.snapped(session.environment, point, SNAPS_WITHIN * self._reach)
+        return snapped(session.environment, point, SNAPS_WITHIN * self._reach)
 
     def _made(self, corners: list[Point]) -> Obstacle:
         return map_edits.polygon_of(corners)

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov_app.viewer.session import history as module
-from robocov_app.viewer.session.history import MOST_SAMPLES, Curve, Event, Ghost
+from robocov_app.viewer.session import curves as module
+from robocov_app.viewer.session.curves import MOST_SAMPLES, Curve, Event, Ghost
 
 
 def drawn(*samples: tuple[float, float]) -> Curve:

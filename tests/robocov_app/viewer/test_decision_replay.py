@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from touched_run import LLOYD, RAPF, RPF, begun, stepped
 
-from robocov_app.viewer.session import history as module
-from robocov_app.viewer.session.history import replayed_snapshot
+from robocov_app.viewer.session import decision_replay as module
+from robocov_app.viewer.session.decision_replay import replayed_snapshot
 from robocov_app.viewer.session.scenario import ControllerChoice
 
 MINE = """

@@ -8,7 +8,9 @@ from driven_window import opened
 from touched_run import HALL, RAPF
 
 from robocov.environment import CircleObstacle, Environment, WallObstacle
-from robocov_app.viewer.session.map_edits import passage_words, snapped, with_obstacle
+from robocov_app.viewer.session.map_edits import with_obstacle
+from robocov_app.viewer.session.passages import passage_words
+from robocov_app.viewer.tools import snapped
 
 
 def room(*walls: WallObstacle) -> Environment:

@@ -9,7 +9,7 @@ from touched_run import HALL, LLOYD, RAPF, RPF
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError, StartError
 from robocov.observation import Decision
-from robocov_app.viewer.session.history import PaneSetup
+from robocov_app.viewer.session.moments import PaneSetup
 from robocov_app.viewer.session.pane import SENSED_EVERY, Continuation, Pane, begun, resumed
 from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 

@@ -10,7 +10,7 @@ from driven_window import opened
 
 from robocov.cost import CoverageCost
 from robocov.robots import Team
-from robocov_app.viewer.session.history import DISTANCE, TIME
+from robocov_app.viewer.session.curves import DISTANCE, TIME
 from robocov_app.viewer.session.scenario import TeamSpec
 
 MIXED = TeamSpec.of(Team.joined([Team.homogeneous(2, max_speed=1.0), Team.homogeneous(1, max_speed=0.25)]))

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from touched_run import LLOYD, RAPF, begun, stepped
 
-from robocov_app.viewer.session import history as module
-from robocov_app.viewer.session.history import MOST_ROWS, RATE, Trail, way_of
+from robocov_app.viewer.session import moments as module
+from robocov_app.viewer.session.moments import MOST_ROWS, RATE, Trail, way_of
 
 STEP = 1 / 60
 

@@ -1,134 +1,23 @@
-"""The session's document: a tree of touches, from which panes in lockstep make every moment again.
+"""The session's document: a tree of touches, from which every moment can be made again; undo goes back in it.
 
 Physics is deterministic, so a scenario and the touches with their steps *are* the run. Nothing is ever taken
 out of the tree: undo goes back to the node before, a touch in the past is one more child of its node.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import NamedTuple, Self, TypeAlias
+from typing import NamedTuple
 
-import numpy as np
-
-from robocov.arrays import Array
-from robocov.conditions import SOON
-from robocov.environment import Point
 from robocov.errors import InputError, ParameterError
-from robocov_app.viewer.session import changes
-from robocov_app.viewer.session.changes import Change, Drag, Fail, Join, Place, Release, Restart, Touch
-from robocov_app.viewer.session.history import Curve, Moment, PaneSetup
-from robocov_app.viewer.session.pane import Continuation, Pane, begun, resumed
+from robocov_app.viewer.session.changes import Change, Restart
+from robocov_app.viewer.session.curves import Curve
+from robocov_app.viewer.session.lockstep import Happening, Lockstep
+from robocov_app.viewer.session.moments import Moment
 from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
 
-SPRING = 60.0  # stiffness, per kg, of the spring between a hand and the robot that it drags, 1/s²
-STRONGEST = 80.0  # largest pull of the spring, per kg, m/s²
 MOST_KEPT = 160  # moments of a node that are kept while another branch is shown
-Happening: TypeAlias = tuple[int, str, str]  # step, kind and words, of robots that fail or join by themselves
-
-
-class Lockstep:
-    """Panes that begin as a scenario says; StartError, ParameterError when they cannot."""
-
-    def __init__(self, scenario: Scenario) -> None:
-        positions, conditions = scenario.positions(), scenario.conditions
-        working = np.ones(len(positions), dtype=bool)
-        if conditions is not None:
-            conditions.check_team(len(positions))
-            working = conditions.working(0.0, len(positions))
-            conditions = conditions.of_robots_that_stay()
-        numbers = tuple((np.flatnonzero(working) + 1).tolist())
-        moving = None if scenario.given is None or scenario.moving is None else scenario.moving[working]
-        self.scenario = scenario  # with controllers, gains, limits and map as they were last chosen
-        self.step = 0
-        self.hand: tuple[int, Point] | None = None  # the robot that is dragged, and where to, m
-        self.panes = []
-        for number, law in enumerate(scenario.laws):
-            setup = PaneSetup(scenario.environment, law, scenario.limits, numbers, {}, conditions)
-            self.panes.append(Pane(number, setup, begun(setup, positions[working], scenario.dt, moving)))
-
-    @classmethod
-    def resumed(cls, moment: Moment) -> Self:
-        run = cls.__new__(cls)
-        run.scenario, run.step, run.hand = moment.scenario, moment.step, moment.hand
-        again = {k: resumed(state, run.scenario.dt, run.step) for k, state in moment.states.items()}
-        run.panes = [Pane(k, state.setup, again[k]) for k, state in moment.states.items()]
-        return run
-
-    def moment(self, node: int = 0) -> Moment:
-        states = {pane.number: pane.state() for pane in self.panes}
-        return Moment(self.step, states, self.scenario, self.hand, node)
-
-    @property
-    def time(self) -> float:
-        return self.step * self.scenario.dt
-
-    def advance(self) -> list[Happening]:
-        for pane in self.panes:
-            _ = pane.simulation.snapshot  # a controller that fails does so before any pane has moved on
-        for pane in self.panes:
-            pane.step(self._pull(pane))
-        self.step += 1
-        return list(self._come_and_go())
-
-    def apply(self, change: Touch) -> None:
-        """Carry a change out, or nothing of it; StartError, ParameterError, MapError say why it cannot be."""
-        match change:
-            case Drag() | Release():
-                self.hand = (change.robot, change.to) if isinstance(change, Drag) else None
-                return
-            case changes.RemovePane(number):
-                if len(self.panes) == 1:
-                    raise ParameterError("the last pane stays")
-                self.panes = [pane for pane in self.panes if pane.number != number]
-            case changes.EditObstacles() | changes.Paint() | changes.SetDensity():
-                environment = change.on(self.scenario.environment)
-                self._change_all(lambda pane: Continuation(replace(pane.setup, environment=environment)))
-            case _:
-                self._change_all(change.of)
-                if self.hand is not None and (isinstance(change, Place) or not self._works(self.hand[0])):
-                    self.hand = None
-        setup, laws = self.panes[0].setup, tuple(pane.law for pane in self.panes)
-        self.scenario = replace(self.scenario, environment=setup.environment, limits=setup.limits, laws=laws)
-
-    def _works(self, robot: int) -> bool:
-        return robot in self.panes[0].numbers
-
-    def _change_all(self, wanted: Callable[[Pane], Continuation]) -> None:
-        """Let every pane go on as is wanted; if one cannot, none does."""
-        wants = [(pane, wanted(pane)) for pane in self.panes]
-        wants = [(pane, w) for pane, w in wants if w.positions is not None or w.setup is not pane.setup]
-        changed = [(pane, want.setup, pane.changed(want)) for pane, want in wants]
-        for pane, setup, simulation in changed:
-            pane.take(setup, simulation)
-
-    def _pull(self, pane: Pane) -> Array | None:
-        if self.hand is None or (row := pane.row(self.hand[0])) is None:
-            return None
-        simulation, pulls = pane.simulation, np.zeros_like(pane.simulation.positions)
-        pull = SPRING * (np.array(self.hand[1]) - simulation.positions[row])
-        pull -= 2.0 * np.sqrt(SPRING) * simulation.velocities[row]
-        size = float(np.hypot(*pull))
-        pulls[row] = pull * (simulation.team.mass[row] * min(1.0, STRONGEST / max(size, 1e-12)))
-        return pulls
-
-    def _come_and_go(self) -> Iterator[Happening]:
-        conditions = self.scenario.conditions
-        if conditions is None or not conditions.team_changes:
-            return
-        begins, ends = conditions.lives(self.scenario.robots)
-        now, before = self.time + SOON, self.time - self.scenario.dt + SOON
-        for number in (np.flatnonzero((begins > before) & (begins <= now)) + 1).tolist():
-            if number not in self.panes[0].setup.there:
-                place = next(join.place for join in conditions.joins if join.robot == number)
-                x, y = self.scenario.positions()[number - 1].tolist() if place is None else place
-                self.apply(Join(number, (x, y)))
-                yield self.step, "robot", f"robot {number} joined"
-        for number in (np.flatnonzero((ends > before) & (ends <= now)) + 1).tolist():
-            if self._works(number) and len(self.panes[0].numbers) > 1:
-                self.apply(Fail(number))
-                yield self.step, "failure", f"robot {number} failed"
 
 
 @dataclass(eq=False)

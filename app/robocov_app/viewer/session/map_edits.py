@@ -8,7 +8,6 @@ from itertools import groupby
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
 from robocov.density import Raster, sampled
 from robocov.environment import (
     CircleObstacle,
@@ -17,7 +16,6 @@ from robocov.environment import (
     Point,
     PolygonObstacle,
     WallObstacle,
-    gaps_narrower,
 )
 from robocov.errors import MapError, place
 from robocov.mapfile import from_json, to_json
@@ -74,48 +72,6 @@ def obstacle_at(environment: Environment, point: tuple[float, float], reach: flo
     if not len(away) or away.min() > reach:
         return None
     return int(np.flatnonzero(away == away.min())[-1])
-
-
-def snapped(environment: Environment, point: Point, reach: float) -> Point:
-    """Return the corner within `reach` m of a point, else the nearest place on a wall, else the point."""
-    walls, corners = environment.free.boundary, shapely.get_coordinates(environment.free.boundary)
-    away = np.hypot(*(corners - point).T)
-    if len(away) and away.min() <= reach:
-        x, y = corners[away.argmin()].tolist()
-        return x, y
-    line = shapely.shortest_line(walls, shapely.Point(point))
-    if line is None or line.length > reach:
-        return point
-    x, y = shapely.get_coordinates(line)[0].tolist()
-    return x, y
-
-
-def passage_words(
-    before: Environment, after: Environment, radius: float, robots: Array | Sequence[Point] = ()
-) -> str:
-    """Return what an edit cuts off from robots of a radius, m, and what gap it leaves too narrow for them.
-
-    `robots`: where they are, (n, 2) m.
-    """
-    words, stands = [], shapely.points(np.asarray(robots, dtype=float).reshape(-1, 2))
-    rooms = [shapely.get_parts(each.free.buffer(-radius, quad_segs=4)) for each in (before, after)]
-    inside = shapely.STRtree(rooms[0]).query(shapely.point_on_surface(rooms[1]), predicate="intersects")
-    for room in range(len(rooms[0])):  # what hung together is left where robots are, else where it is largest
-        parts = rooms[1][inside[0][inside[1] == room]]
-        left = np.array([(shapely.distance(stands, part) <= radius).any() for part in parts], dtype=bool)
-        if left.sum() > 1:
-            words.append(f"the team is parted in {left.sum()}")
-        if not left.any():
-            left = shapely.area(parts) == shapely.area(parts).max(initial=0.0)
-        lost = shapely.union_all(parts[~left])  # of places of centres
-        area = shapely.area(shapely.intersection(after.free, shapely.buffer(lost, radius)))
-        if area > radius * radius:
-            words.append(f"{area:.1f} m² cut off")
-    width = 2 * radius * (1 - 1e-6)  # what is just wide enough is wide enough
-    known = {gap.between for gap in gaps_narrower(before.free, width)}
-    new = [gap for gap in gaps_narrower(after.free, width) if gap.between not in known]
-    words += [f"a gap of {100 * gap.width:.0f} cm, too narrow for a robot" for gap in new[:1]]
-    return "; ".join(words)
 
 
 def words_for(obstacle: Obstacle) -> str:

@@ -15,7 +15,8 @@ from robocov.simulation import Simulation
 from robocov.world.relocation import relocated
 from robocov_app.render.scene import Scene, Sensed
 from robocov_app.runs.spec import RunSpec
-from robocov_app.viewer.session.history import Curve, PaneSetup, State, Trail, of_robots
+from robocov_app.viewer.session.curves import Curve
+from robocov_app.viewer.session.moments import PaneSetup, State, Trail, of_robots
 from robocov_app.viewer.session.scenario import ControllerChoice
 
 SENSED_EVERY = 3  # steps between notes of what is sensed

@@ -17,7 +17,7 @@ from robocov.observation.region import Region
 from robocov.record import Record
 from robocov.robots import Team
 from robocov_app.runs.saved import Saved, roster_of
-from robocov_app.viewer.session.history import MOST_BYTES, History, Moment, PaneSetup, State
+from robocov_app.viewer.session.moments import MOST_BYTES, History, Moment, PaneSetup, State
 from robocov_app.viewer.session.pane import SENSED_EVERY, Pane, resumed
 from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Scenario, TeamSpec
 from robocov_app.viewer.session.session import Session

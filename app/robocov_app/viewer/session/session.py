@@ -16,12 +16,14 @@ from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
 from robocov.observation import Snapshot
 from robocov_app.render.scene import Sensed
 from robocov_app.viewer.session import changes
-from robocov_app.viewer.session import history as past
 from robocov_app.viewer.session.changes import Drag, Release, Touch, map_change
 from robocov_app.viewer.session.clock import Clock
-from robocov_app.viewer.session.document import MOST_KEPT, Document, Lockstep, Node, replayed
+from robocov_app.viewer.session.curves import Curve, Event, Ghost
+from robocov_app.viewer.session.decision_replay import replayed_snapshot, sensor_in
+from robocov_app.viewer.session.document import MOST_KEPT, Document, Node, replayed
 from robocov_app.viewer.session.file import SavedSession
-from robocov_app.viewer.session.history import Curve, Event, Ghost, History, Moment, PaneSetup, State, Trail
+from robocov_app.viewer.session.lockstep import Lockstep
+from robocov_app.viewer.session.moments import History, Moment, PaneSetup, State, Trail, way_of
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Scenario, TeamSpec
 
@@ -84,7 +86,7 @@ class Session:
         self._cursor = 0 if len(history) > 1 else None
         self.serial += 1
         for pane in self.panes:
-            pane.trail, _ = past.way_of(history, pane.number, len(history) - 1)
+            pane.trail, _ = way_of(history, pane.number, len(history) - 1)
 
     @property
     def scenario(self) -> Scenario:
@@ -154,7 +156,7 @@ class Session:
                 return pane.simulation.snapshot
             except RobocovError:
                 pass
-        return past.replayed_snapshot(self._state(pane), self.time, self.scenario.dt)
+        return replayed_snapshot(self._state(pane), self.time, self.scenario.dt)
 
     def positions(self, pane: Pane) -> Array:
         """Return where the robots are at the moment that is looked at, (n, 2) m."""
@@ -167,7 +169,7 @@ class Session:
         key = self._cursor, self.serial
         kept, trail = self._rebuilt.get(pane.number, (None, pane.trail))
         if kept != key:
-            trail, _ = past.way_of(self.history, pane.number, self._number)
+            trail, _ = way_of(self.history, pane.number, self._number)
             self._rebuilt[pane.number] = key, trail
         return trail.positions, trail.time
 
@@ -344,7 +346,7 @@ class Session:
         path, limits = self.document.path(head), self.document.limits(head, run.step)
         before = {pane.number: pane for pane in self.panes} if on_the_way else {}
         for pane in run.panes:
-            pane.trail, pane.starts = past.way_of(history, pane.number, len(history) - 1)
+            pane.trail, pane.starts = way_of(history, pane.number, len(history) - 1)
             for what, curve in pane.curves.items():
                 for each in path:
                     curve.extend(each.curves[pane.number, what], limits[each.number] * run.scenario.dt)
@@ -511,7 +513,7 @@ def _sensed_in(history: History, pane: int) -> Sensed:
     found = Sensed()
     for k in range(0, len(history), max(1, len(history) // MOST_SENSED)):
         time, state = history.time(k), history[k].states[pane]
-        setup, sensor = state.setup, past.sensor_in(state.setup.solid)
+        setup, sensor = state.setup, sensor_in(state.setup.solid)
         sensor.show(time)
         found.add(time, setup.numbers, sensor.nearest(state.positions, setup.team.sensing_range))
     return found

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from touched_run import HALL, RAPF
 
 from robocov.environment import CircleObstacle
-from robocov_app.viewer.session import history as module
-from robocov_app.viewer.session.history import History, Moment, PaneSetup, State
+from robocov_app.viewer.session import moments as module
+from robocov_app.viewer.session.moments import History, Moment, PaneSetup, State
 from robocov_app.viewer.session.scenario import TeamSpec
 
 DT = 1 / 60

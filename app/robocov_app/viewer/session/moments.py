@@ -1,9 +1,8 @@
-"""The past of a run: moments that can be resumed from, trails and cost curves; bounded, thinned with age."""
+"""The past of a run: moments that can be resumed from, and trails; bounded, thinned with age."""
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from contextlib import suppress
-from copy import copy, deepcopy
+from copy import copy
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import lru_cache
 from itertools import compress
@@ -13,18 +12,10 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.conditions import Conditions
-from robocov.conditions.perception import Inbox, Perception
-from robocov.controllers import informed
-from robocov.controllers.base import Controller
+from robocov.conditions.perception import Inbox
 from robocov.environment import CircleObstacle, Environment
-from robocov.errors import ParameterError
-from robocov.observation import Decision, Observations, Snapshot
-from robocov.observation.neighbours import Neighbours
+from robocov.observation import Decision
 from robocov.robots import Team
-from robocov.sensor import RangeSensor
-from robocov.simulation import DEFAULT_DT
-from robocov.voronoi.weighted_cells import weighted_partition
-from robocov.world.solid import movers, solid_pieces
 from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
 
 MOST_BYTES = 24_000_000  # memory that the moments of a window may take
@@ -33,7 +24,6 @@ _FEWEST = 300  # moments that are kept however large they are
 _KEPT = 0.75  # of the moments, so many stay at most when they are thinned
 RATE = 30.0  # most rows for each simulated second
 MOST_ROWS = 4096  # when there are so many, every second of the older half goes
-MOST_SAMPLES = 3000  # when a curve has so many, every second one of its older half goes
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,153 +265,3 @@ def way_of(history: History, pane: int, last: int) -> tuple[Trail, Array]:
         trail.add(time, of_robots(state.positions, state.setup.numbers, numbers), always=True)
         latest = time
     return trail, np.array([starts[number] for number in numbers])
-
-
-def replayed_snapshot(state: State, time: float, dt: float = DEFAULT_DT) -> Snapshot:
-    """Return a moment as it was at a time, s; a controller that fails on it decided nothing."""
-    setup, team, positions = state.setup, state.setup.team, state.positions
-    region, density, sensor = setup.solid.region, setup.solid.density, sensor_in(setup.solid)
-    sensor.show(time)
-    points = sensor.nearest(positions, team.sensing_range)
-    neighbours = Neighbours.within(positions, team.communication_range)
-    seen = Observations(positions, state.velocities, neighbours, points, region, time, team.max_speed)
-    seen = replace(seen, density=density, steering=state.steering)
-    if (perception := _perception(setup, dt)) is not None:
-        inbox = perception.begin() if state.inbox is None else state.inbox
-        seen, _ = perception.known(seen, inbox, np.ones(len(positions), dtype=bool))
-    decision, recorded = _decision(seen, state), state.recorded
-    if recorded is not None and not np.allclose(decision.forces, recorded.forces, rtol=1e-9, atol=1e-9):
-        decision = recorded  # the controller is not what it was, or not loaded
-        if setup.law.gains.get("cells") == "time" and team.mixed_speeds:
-            cells = weighted_partition(positions, team.max_speed, region, density=density)
-            decision = replace(decision, cells=cells)
-    return Snapshot(seen, decision, None if perception is None else positions)
-
-
-def _decision(seen: Observations, state: State) -> Decision:
-    nothing, controller = Decision(np.zeros_like(seen.positions)), _controller(state.setup)
-    if controller is None:
-        return nothing
-    try:
-        memory = deepcopy(state.memory)  # it may change what it remembers, and is asked again
-        if memory is None:
-            memory = controller.begin(state.setup.solid.region, state.setup.team)
-        decision = controller.decide(seen, memory)
-        given = (decision.forces, decision.forces if decision.goals is None else decision.goals)
-        good = isinstance(decision, Decision) and all(isinstance(rows, np.ndarray) for rows in given)
-        good = good and all(rows.shape == seen.positions.shape for rows in given)
-    except (Exception, SystemExit):  # a user's controller may do anything
-        return nothing
-    return decision if good and np.isfinite(decision.forces).all() else nothing
-
-
-@lru_cache(maxsize=8)  # as many as there are panes, and some more
-def _controller(setup: PaneSetup) -> Controller | None:
-    with suppress(ParameterError):  # what a saved run was made with may be gone
-        return informed(setup.law.made(), setup.solid.static)
-    return None
-
-
-@lru_cache(maxsize=8)
-def _perception(setup: PaneSetup, dt: float) -> Perception | None:
-    return None if setup.conditions is None else Perception(setup.conditions, setup.team, dt)
-
-
-@lru_cache(maxsize=4)
-def sensor_in(environment: Environment) -> RangeSensor:
-    return RangeSensor(solid_pieces(environment), movers(environment))
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that happened at a time, s; `kind`: ``obstacle``, ``robot``, ``failure``, ``law``, ..."""
-
-    time: float
-    kind: str
-    text: str
-
-
-class Curve:
-    """The mean distance to the nearest robot, (22) by area or by ∫φ, or the mean time, at ascending times."""
-
-    def __init__(self) -> None:
-        self._time, self._value = list[float](), list[float]()
-
-    def __len__(self) -> int:
-        return len(self._time)
-
-    @property
-    def time(self) -> Array:
-        return np.array(self._time)
-
-    @property
-    def value(self) -> Array:
-        return np.array(self._value)
-
-    @property
-    def last_time(self) -> float:
-        """The time of the newest sample, s; -inf if there is none."""
-        return self._time[-1] if self._time else -np.inf
-
-    def add(self, time: float, value: float) -> None:
-        """Take a sample at any time; one of the same time is replaced."""
-        if not np.isfinite([time, value]).all():
-            return
-        k = bisect_left(self._time, time - 1e-9)
-        if k < len(self._time) and self._time[k] <= time + 1e-9:
-            self._value[k] = value
-            return
-        if len(self._time) >= MOST_SAMPLES:
-            half = MOST_SAMPLES // 2
-            self._time[:half], self._value[:half] = self._time[:half:2], self._value[:half:2]
-            k = bisect_left(self._time, time)
-        self._time.insert(k, time)
-        self._value.insert(k, value)
-
-    def outline(self, most: int) -> list[list[float]]:
-        stride = -(-len(self) // most)
-        times, values = self._time[::-stride][::-1], self._value[::-stride][::-1]
-        return [[round(time, 3) for time in times], [float(f"{value:.5g}") for value in values]]
-
-    def between(self, begin: float, end: float) -> "Curve":
-        first, last = bisect_left(self._time, begin - 1e-6), bisect_right(self._time, end + 1e-6)
-        part = Curve()
-        part._time, part._value = self._time[first:last], self._value[first:last]
-        return part
-
-    def extend(self, later: "Curve", until: float = np.inf) -> None:
-        """Append those samples of another curve that are later than the last one here, up to a time, s."""
-        for time, value in zip(later._time, later._value, strict=True):
-            if self.last_time + 1e-9 < time <= until + 1e-6:
-                self.add(time, value)
-
-    def at(self, time: float) -> float:
-        """Return the value at a time, between samples on the straight line; nan before the first."""
-        if not self._time or time < self._time[0] - 1e-6:
-            return float("nan")
-        return float(np.interp(time, self._time, self._value))
-
-
-@dataclass(frozen=True, eq=False)
-class Ghost:
-    """The rest of a curve that was left when the run was resumed from before."""
-
-    law: str  # name of the controller
-    words: str  # what was different then
-    time: Array
-    value: Array
-    of: str = "distance"  # or "time"
-    node: int = 0  # at whose end the branch ends
-
-
-class Plotted(NamedTuple):
-    """Plottable quantity. `title`, `short`: as people call it."""
-
-    name: str
-    title: str
-    short: str
-    unit: str
-
-
-DISTANCE = Plotted("distance", "Mean distance to the nearest robot", "mean distance", "m")
-TIME = Plotted("time", "Mean time until the first robot is there", "mean time", "s")
