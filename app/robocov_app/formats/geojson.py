@@ -26,8 +26,8 @@ from robocov.extras import extra
 from robocov.files.atomic import written
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import JsonFile, is_number
-from robocov_app.formats.geometry.cells import not_held
 from robocov_app.formats.geometry.polygons import DIGITS, free_area, on_grid
+from robocov_app.formats.geometry.rasterize import not_held
 from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes
 from robocov_app.formats.georeference import LocalPlane, in_metres
 

@@ -26,8 +26,8 @@ from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
-from robocov_app.formats.geometry.raster import free_area, vertices_of
 from robocov_app.formats.geometry.shapes import Line, Shapes
+from robocov_app.formats.geometry.vectorize import free_area, vertices_of
 from robocov_app.formats.picture import read_picture
 
 MOST_OBJECTS = 4_000  # robots and obstacles of a world

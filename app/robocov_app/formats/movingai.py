@@ -17,8 +17,8 @@ from robocov.errors import MapError, one_line, shown
 from robocov.files.atomic import written
 from robocov_app.formats import files
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
-from robocov_app.formats.geometry.cells import free_cells, grid_over, grid_report
-from robocov_app.formats.geometry.raster import BLOCKED, FREE, foreign_map
+from robocov_app.formats.geometry.rasterize import free_cells, grid_over, grid_report
+from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, foreign_map
 
 CELL = 1.0  # side of a cell in metres where none is given: the format has no unit
 _PASSABLE, _SOLID = b".GS", b"@O"

@@ -25,8 +25,8 @@ from robocov.files.atomic import written
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
-from robocov_app.formats.geometry.cells import free_cells, grid_over, grid_report
-from robocov_app.formats.geometry.raster import BLOCKED, FREE, UNKNOWN, foreign_map
+from robocov_app.formats.geometry.rasterize import free_cells, grid_over, grid_report
+from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, UNKNOWN, foreign_map
 
 _PIECE = 1 << 20  # bytes that are unpacked at a time
 _STRIP = 512  # rows that are converted at a time, which bounds the memory

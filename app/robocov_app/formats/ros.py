@@ -31,8 +31,8 @@ from robocov.errors import MapError, OutputError, ParameterError, one_line, show
 from robocov.files.atomic import written
 from robocov_app.formats import files
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
-from robocov_app.formats.geometry.cells import free_cells, grid_over, grid_report
-from robocov_app.formats.geometry.raster import BLOCKED, FREE, UNKNOWN, Cells, foreign_map
+from robocov_app.formats.geometry.rasterize import free_cells, grid_over, grid_report
+from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, UNKNOWN, Cells, foreign_map
 from robocov_app.formats.picture import Brightness, read_picture
 
 _OCCUPIED, _FREE = 0.65, 0.196

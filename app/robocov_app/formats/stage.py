@@ -32,8 +32,8 @@ from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
 from robocov_app.formats.geometry.polygons import polygons_of
-from robocov_app.formats.geometry.raster import free_area, vertices_of
 from robocov_app.formats.geometry.shapes import Outline, Shapes
+from robocov_app.formats.geometry.vectorize import free_area, vertices_of
 from robocov_app.formats.picture import read_picture
 
 MAX_BYTES = 5_000_000  # largest file of a world, in bytes

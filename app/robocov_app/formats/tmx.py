@@ -27,8 +27,8 @@ from robocov.errors import MapError, ParameterError, counted, listed, one_line, 
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import frame, moved
-from robocov_app.formats.geometry.raster import free_area, vertices_of
 from robocov_app.formats.geometry.shapes import Line, Shapes
+from robocov_app.formats.geometry.vectorize import free_area, vertices_of
 from robocov_app.formats.xml_tree import Element, read_xml_tree
 
 MOST_TILES, MOST_READ = 4_000_000, 16_000_000  # of a map, and of all its layers together

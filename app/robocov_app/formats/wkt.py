@@ -24,8 +24,8 @@ from robocov.files.atomic import written
 from robocov.files.strictjson import line_and_column
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import MAX_DEPTH, name_of_map, read_text
-from robocov_app.formats.geometry.cells import not_held
 from robocov_app.formats.geometry.polygons import DIGITS, decimal, on_grid, rings
+from robocov_app.formats.geometry.rasterize import not_held
 from robocov_app.formats.geometry.shapes import Figure, Shapes
 from robocov_app.formats.georeference import in_metres
 

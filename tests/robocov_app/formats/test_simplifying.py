@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 from shapely import MultiPolygon, Polygon, affinity
 
 from robocov_app.formats.geometry.conversion import rooms
-from robocov_app.formats.geometry.raster import traced
 from robocov_app.formats.geometry.simplify import (
     KEPT_OUTLINE,
     Outline,
     closed_gaps,
     simplified,
 )
+from robocov_app.formats.geometry.vectorize import traced
 
 CELL = 0.05
 

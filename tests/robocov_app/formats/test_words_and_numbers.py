@@ -10,12 +10,12 @@ from shapely import MultiPolygon, Polygon
 
 from robocov_app.formats.base import square_metres
 from robocov_app.formats.files import parse_yaml
-from robocov_app.formats.geometry.cells import _smaller
 from robocov_app.formats.geometry.curves import beziers
 from robocov_app.formats.geometry.polygons import Rule, bounded, decimal, enclosed
-from robocov_app.formats.geometry.raster import _share, traced
+from robocov_app.formats.geometry.rasterize import _smaller
 from robocov_app.formats.geometry.shapes import _many
 from robocov_app.formats.geometry.simplify import sharpened
+from robocov_app.formats.geometry.vectorize import _share, traced
 from robocov_app.formats.preview import _number
 from robocov_app.formats.svg.path import declarations, subpaths
 from robocov_app.formats.unreadable import named_kind

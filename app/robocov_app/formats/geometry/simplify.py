@@ -23,7 +23,7 @@ from shapely import MultiPolygon, Polygon, STRtree
 
 from robocov.arrays import Array, BoolArray, IntArray, beginnings, ranges
 from robocov.errors import counted
-from robocov_app.formats.geometry.raster import NECK
+from robocov_app.formats.geometry.vectorize import NECK
 
 KEPT_OUTLINE, KEPT_AREA = 0.1, 0.02  # parts of an outline's area, and of all that is free, that may change
 _BLOCKS = 16  # a thing of fewer cells stays as it is: what it is like, its cells say best

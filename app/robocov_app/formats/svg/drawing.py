@@ -29,11 +29,11 @@ from robocov.errors import MapError, one_line
 from robocov.files.atomic import written
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import MAX_VERTICES, name_of_map, require_shapes
-from robocov_app.formats.geometry.cells import not_held
 from robocov_app.formats.geometry.conversion import with_numbers
 from robocov_app.formats.geometry.curves import TOLERANCE, arc
 from robocov_app.formats.geometry.frames import moved
 from robocov_app.formats.geometry.polygons import Rule, decimal, free_area
+from robocov_app.formats.geometry.rasterize import not_held
 from robocov_app.formats.geometry.shapes import Line, Shapes
 from robocov_app.formats.svg import path as paths
 from robocov_app.formats.svg.path import affine, composed, length, numbers, stretch

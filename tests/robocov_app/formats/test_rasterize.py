@@ -15,7 +15,7 @@ from robocov.environment import CircleObstacle, Environment, PolygonObstacle, Un
 from robocov.errors import ParameterError
 from robocov_app.formats import ReadOptions, Shaping, WriteOptions, export_map, import_map
 from robocov_app.formats.geometry import cells
-from robocov_app.formats.geometry.cells import Grid, free_cells, grid_over, lost_passages, not_held
+from robocov_app.formats.geometry.rasterize import Grid, free_cells, grid_over, lost_passages, not_held
 
 points = st.tuples(*[st.integers(-64, 448).map(lambda k: k / 64)] * 2)
 
