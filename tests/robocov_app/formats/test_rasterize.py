@@ -14,7 +14,7 @@ from shapely import MultiPolygon, Polygon
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, UniformStart, WallObstacle
 from robocov.errors import ParameterError
 from robocov_app.formats import ReadOptions, Shaping, WriteOptions, export_map, import_map
-from robocov_app.formats.geometry import cells
+from robocov_app.formats.geometry import rasterize
 from robocov_app.formats.geometry.rasterize import Grid, free_cells, grid_over, lost_passages, not_held
 
 points = st.tuples(*[st.integers(-64, 448).map(lambda k: k / 64)] * 2)
@@ -147,7 +147,7 @@ def test_rooms_that_cells_lose_are_told(monkeypatch: pytest.MonkeyPatch) -> None
     grid = grid_over(environment, 0.4)
     (warning,) = lost_passages(environment, grid, free_cells(environment, grid))
     assert warning.startswith("2 separate parts of the free space are lost; cells of 0.05 m keep it")
-    monkeypatch.setattr(cells, "_MOST_TRIED", 1_000_000)
+    monkeypatch.setattr(rasterize, "_MOST_TRIED", 1_000_000)
     hair = room(obstacles=(PolygonObstacle(((3.0, 2.0), (3.5, 2.0), (3.5, 4.9995), (3.0, 4.9995))),))
     grid = grid_over(hair, 0.4)
     (warning,) = lost_passages(hair, grid, free_cells(hair, grid))
