@@ -84,7 +84,6 @@ def formats() -> str:
 
 
 def _type(of: dict[str, Any]) -> str:
-    """Return a field's type in a few words."""
     if "$ref" in of:
         return str(of["$ref"].rpartition("/")[2])
     for several in ("anyOf", "oneOf"):

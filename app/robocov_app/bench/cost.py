@@ -130,9 +130,7 @@ def _on_map(name: str, lattice: int, quick: bool) -> Iterator[Row]:
     cost = CoverageCost(load_map(name), lattice)
     for robots in [n for known, size, n in BEFORE if (known, size) == (name, lattice)]:
         places, before = Places(cost, robots), BEFORE[name, lattice, robots]
-        exact, tree = _compared(
-            cost, places, lambda cost, places: cKDTree(places.now).query(cost.points), quick
-        )
+        exact, tree = _compared(cost, places, lambda cost, at: cKDTree(at.now).query(cost.points), quick)
         faster = 10.0 if robots == 1000 else FASTER[lattice] * (2.0 if name == "campus" else 1.0)
         size: Mapping[str, int | str] = {"map": name, "lattice": lattice, "robots": robots}
         yield Row("maps", "evaluated", size, exact, TREE, tree, before / faster, before=before)

@@ -10,6 +10,7 @@ from robocov_app.figures.files import plain_style, save_figure
 from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, quiet_axes, tone
 from robocov_app.render.theme import LIGHT, Theme
 
+NOTE = "medians of calls in turn on one thread; below 1 robocov is quicker; a bar marks what is wanted"
 WIDTH = 1100
 ABOVE, ROW, LEFT, RIGHT = 92, 26, 400, 90  # pixels: for the title, for a line, for its words, for its value
 GAP = 66  # pixels between what belongs to one part and the next, for its heading
@@ -28,10 +29,7 @@ def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
     with plain_style():
         page = Page((WIDTH, height), theme, scale=1.0)
         page.text("Time as a multiple of the yardstick's", 24, 30, points=HEADING, bold=True)
-        note = (
-            "medians of calls in turn on one thread; below 1 robocov is quicker; a bar marks what is wanted"
-        )
-        page.text(note, 24, 58, colour=theme.faint)
+        page.text(NOTE, 24, 58, colour=theme.faint)
         top = float(ABOVE)
         for part, group in parts:
             _draw_part(page, HEADINGS[part], group, top)

@@ -71,9 +71,7 @@ def _circle(middle: Array, radius: float) -> Obstacle:
     return CircleObstacle(_rounded(middle[None])[0], round(radius, 2))
 
 
-def _wall_with_door(
-    across: bool, at: float, begin: float, end: float, door: float, width: float
-) -> list[Obstacle]:
+def _doorway(across: bool, at: float, begin: float, end: float, door: float, width: float) -> list[Obstacle]:
     """Return the two pieces of a wall beside its door, upright if `across`; short pieces are left out."""
     pieces = [(begin, door - width / 2.0), (door + width / 2.0, end)]
     ends = [[(at, a), (at, b)] if across else [(a, at), (b, at)] for a, b in pieces if b - a > 0.15]
@@ -99,7 +97,7 @@ def _home(rng: np.random.Generator) -> Plan:
         at = low + (high - low) * rng.uniform(0.38, 0.62)
         begin, end = (bottom, top) if across else (left, right)
         door = rng.uniform(begin + 0.8, end - 0.8)
-        walls.extend(_wall_with_door(across, at, begin, end, door, rng.uniform(0.8, 1.1)))
+        walls.extend(_doorway(across, at, begin, end, door, rng.uniform(0.8, 1.1)))
         divided(left, bottom, *((at, top) if across else (right, at)))
         divided(*((at, bottom) if across else (left, at)), right, top)
 
@@ -116,14 +114,14 @@ def _office(rng: np.random.Generator) -> Plan:
     cuts = np.linspace(0.0, width, int(rng.integers(5, 8)))
     cuts[1:-1] += rng.uniform(-0.4, 0.4, len(cuts) - 2)
     for left, right in itertools.pairwise(cuts.tolist()):
-        obstacles += _wall_with_door(False, high, left, right, rng.uniform(left + 0.7, right - 0.7), 0.9)
+        obstacles += _doorway(False, high, left, right, rng.uniform(left + 0.7, right - 0.7), 0.9)
         if right < width:
             obstacles.append(WallObstacle(_rounded([(right, high), (right, height)]), _WALL))
         if rng.random() < 0.6:
             obstacles.append(PolygonObstacle(_box(left + 0.06, height - 0.7, left + 1.2, height)))
     ways = width * rng.uniform(0.15, 0.35), width * rng.uniform(0.65, 0.85)
-    obstacles += _wall_with_door(False, low, 0.0, width / 2.0, ways[0], 1.2)
-    obstacles += _wall_with_door(False, low, width / 2.0, width, ways[1], 1.2)
+    obstacles += _doorway(False, low, 0.0, width / 2.0, ways[0], 1.2)
+    obstacles += _doorway(False, low, width / 2.0, width, ways[1], 1.2)
     for x in np.arange(2.2, width - 2.5, rng.uniform(2.9, 3.6)):
         for y in (1.3, low - 1.9):
             if rng.random() < 0.85:
@@ -179,7 +177,7 @@ def _plant(rng: np.random.Generator) -> Plan:
     width, height = rng.uniform(15.0, 19.0), rng.uniform(10.0, 13.0)
     split = width * rng.uniform(0.48, 0.58)
     gate = rng.uniform(2.0, height - 2.0)
-    obstacles = _wall_with_door(True, split, 0.0, height, gate, rng.uniform(1.4, 2.2))
+    obstacles = _doorway(True, split, 0.0, height, gate, rng.uniform(1.4, 2.2))
     for y in np.arange(2.0, height - 1.4, rng.uniform(1.9, 2.4)):
         left = rng.uniform(1.2, 2.2)
         obstacles.append(PolygonObstacle(_box(left, y, split - rng.uniform(1.2, 1.8), y + 0.7)))

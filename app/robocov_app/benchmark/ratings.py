@@ -51,10 +51,8 @@ def ratings_of(results: Sequence[Mapping[str, Any]]) -> dict[str, list[Rating]]:
     """Return the ratings by track: of each track over the runs that every result has that has the track."""
     found: dict[str, list[Rating]] = {}
     for track in suite.TRACKS:
-        own = [
-            {(row["map"], row["seed"]): row for row in each["rows"] if row["track"] == track}
-            for each in results
-        ]
+        tables = ([row for row in each["rows"] if row["track"] == track] for each in results)
+        own = [{(row["map"], row["seed"]): row for row in rows} for rows in tables]
         for label, rows in zip(labels_of(results), own, strict=True):
             some = [row for key, row in rows.items() if all(key in other for other in own if other)]
             fine = [row for row in some if "error" not in row]
@@ -82,6 +80,7 @@ HEAD = (  # columns of a track's table; `NOTES` say what they are
     *("Controller", "Knows", "Runs", "Gap, %", "95 %", "Mean", "Worst", "To 5 %, s", "∫J / J_ref, s"),
     *("Path, m", "Work, J", "Contacts", "At rest", "Rest, s", "B/s", "µs/s"),
 )
+_SHORT = ("Runs", "Gap, %", "95 %", "Worst", "To 5 %, s", "Path, m", "Contacts", "At rest", "B/s", "µs/s")
 NOTES = (
     "Gap: J / J_ref − 1 at the end, the median over runs with its 95 % interval (bootstrap that draws whole "
     "maps), mean and worst; J_ref is the best placement known, no proven optimum, so gaps may be too small; "
@@ -140,6 +139,3 @@ def summary_rows(result: Mapping[str, Any]) -> tuple[tuple[str, ...], list[tuple
         cells = dict(zip(HEAD, rating_row(ratings[0], ""), strict=True))
         rows.append((track, *(cells[name] for name in _SHORT)))
     return ("Track", *_SHORT), rows
-
-
-_SHORT = ("Runs", "Gap, %", "95 %", "Worst", "To 5 %, s", "Path, m", "Contacts", "At rest", "B/s", "µs/s")

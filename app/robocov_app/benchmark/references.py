@@ -21,7 +21,6 @@ from robocov_app.toolkit.worker import Line
 RESTARTS, SEED = 24, 0
 PRECISION = 0.002  # of the certified lower bounds
 _DIGITS = 4  # after the point of positions, in metres
-_HEAD = {"format": "robocov-benchmark-suite", "version": suite.VERSION}
 
 
 def wanted_references() -> Iterator[tuple[str, int, float]]:
@@ -103,6 +102,6 @@ def _save(path: Path, maps: Mapping[str, Any]) -> None:
     for name in suite.FAMILY_OF:
         own = dict(sorted(maps[name]["references"].items(), key=lambda item: int(item[0])))
         lines.append(f"{json.dumps(name)}: {json.dumps({**maps[name], 'references': own})}")
-    head = json.dumps({**_HEAD, "search": how})[:-1]
+    head = json.dumps({"format": "robocov-benchmark-suite", "version": suite.VERSION, "search": how})[:-1]
     with written(path) as part:
         part.write_text(head + ', "maps": {\n' + ",\n".join(lines) + "\n}}\n", encoding="utf-8")

@@ -12,8 +12,6 @@ from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
 from robocov_app.terminal.output import BOLD, RIGHT, print_table, tell
 
-_MOST_WORKERS = 1024
-
 
 @dataclass
 class Arguments(JsonOption):
@@ -47,7 +45,7 @@ class Arguments(JsonOption):
 
     def __post_init__(self) -> None:
         if self.workers is not None:
-            checked("--workers", self.workers, 1, _MOST_WORKERS)
+            checked("--workers", self.workers, 1, 1024)
         if len(self.parts) > 1:
             raise InputError(f"{self.parts[0]} and {self.parts[1]}: one of them was wanted")
 

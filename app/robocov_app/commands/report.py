@@ -70,16 +70,14 @@ def parts_of(path: Path, temporary: Path) -> list[tuple[Path, str]]:
     return [part for story in stories for part in story_folders(story)]
 
 
-def write_report(
-    options: Arguments, parts: Sequence[tuple[Path, str]], target: Path, temporary: Path
-) -> None:
+def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: Path, scratch: Path) -> None:
     """Gather the results of folders, and write the page; words tell which part of a story one is.
 
-    Results in the `temporary` folder are called by their path in it: they are gone afterwards.
+    Results in the `scratch` folder are called by their path in it: they are gone afterwards.
     """
 
     def called(folder: Path) -> str:
-        return str(folder.relative_to(temporary) if folder.is_relative_to(temporary) else folder)
+        return str(folder.relative_to(scratch) if folder.is_relative_to(scratch) else folder)
 
     from robocov_app.report.document import report
     from robocov_app.report.results import gathered, with_references

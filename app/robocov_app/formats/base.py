@@ -13,6 +13,9 @@ from robocov.environment import CircleObstacle, Environment, WallObstacle
 from robocov.errors import ParameterError, checked, counted, shown
 
 Primitive: TypeAlias = CircleObstacle | WallObstacle
+_LENGTH = (1e-6, 1e4, "m")
+_KEYS = {name: f"{name}_m" for name in ("size", "tolerance", "moved")} | {"others": "other_parts_m"}
+_KEYS |= {name: f"{name}_m2" for name in ("area", "area_read", "area_kept", "area_written", "moved_area")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +50,6 @@ class ForeignMap:
 def square_metres(area: float, digits: int = 4) -> str:
     """Return an area with so many digits, and never as a power of ten."""
     return f"{area:.0f} m²" if area >= 1000 else f"{area:.{digits}g} m²"
-
-
-_KEYS = {name: f"{name}_m" for name in ("size", "tolerance", "moved")} | {"others": "other_parts_m"}
-_KEYS |= {name: f"{name}_m2" for name in ("area", "area_read", "area_kept", "area_written", "moved_area")}
 
 
 @dataclass(frozen=True)
@@ -101,9 +100,6 @@ class ImportReport(_Report):
             f"{self.size[0]:.4g} x {self.size[1]:.4g} m, {counted(self.obstacles, 'obstacle')}",
             *self._told("repaired", "dropped", "changed", "notes"),
         ]
-
-
-_LENGTH = (1e-6, 1e4, "m")
 
 
 @dataclass(frozen=True)

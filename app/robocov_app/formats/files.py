@@ -30,6 +30,11 @@ MAX_VERTICES = 500_000  # most vertices of a foreign map
 MAX_SHAPES = 20_000  # of a drawing, of a file: each costs a quarter of a millisecond, whatever its size
 MAX_DEPTH = 32  # deepest nesting of collections, groups, blocks, lists
 HEAD = 1 << 20  # so much of a file is looked at, in bytes, to know its format
+_LONG = 400  # longest name of a file, in characters
+Value: TypeAlias = "str | list[Value] | dict[str, Value]"  # text is as it is written
+MAX_YAML_BYTES = 262_144  # which take a second to read: a map has 200, a world some thousand
+DEEPEST = 12  # deepest nesting of lists and mappings
+_MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
 
 
 def head(path: Path, most: int = HEAD) -> bytes:
@@ -85,9 +90,6 @@ def require_coordinate(value: float, where: str) -> None:
     require_length(value, where, -FARTHEST, FARTHEST)
 
 
-_MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
-
-
 def read_text(path: Path, separator: bytes) -> tuple[str, str]:
     """Return the text of a file, and what messages call it; `separator` is what stands between vertices."""
     where = one_line(path)
@@ -102,9 +104,6 @@ def read_text(path: Path, separator: bytes) -> tuple[str, str]:
 
 def name_of_map(path: Path) -> str:
     return one_line(path.stem)[:60] or "map"
-
-
-_LONG = 400  # longest name of a file, in characters
 
 
 def named_file(path: Path, name: str, what: str, at: str, notes: list[str], anywhere: bool) -> Path:
@@ -199,11 +198,6 @@ class JsonFile:
 def is_number(value: object) -> bool:
     """Return whether a JSON value is a number, of a size that can be calculated with."""
     return type(value) in (int, float) and -1e100 < value < 1e100  # type: ignore[operator]
-
-
-Value: TypeAlias = "str | list[Value] | dict[str, Value]"  # text is as it is written
-MAX_YAML_BYTES = 262_144  # which take a second to read: a map has 200, a world some thousand
-DEEPEST = 12  # deepest nesting of lists and mappings
 
 
 def parse_yaml(text: bytes, where: str) -> dict[str, Value]:

@@ -35,6 +35,7 @@ _PLURAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon
 _GEOMETRIES = ("Point", "LineString", "Polygon", *_PLURAL, "GeometryCollection")
 TYPE = re.compile(rb'"type"\s*:\s*"(?:FeatureCollection|Feature|%s)"' % "|".join(_GEOMETRIES).encode())
 _NAMES = ("name", "kind", "id")  # properties of a feature that name its shapes; its own id does too
+_FINER = 6  # so many more decimals have degrees: one is about a hundred kilometres
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
@@ -146,9 +147,6 @@ class _Found:
         if self.crs not in (None, name):
             raise self.file.refused((*at, "crs"), given, f"the same system as before, {self.crs}, was")
         self.crs = name
-
-
-_FINER = 6  # so many more decimals have degrees: one is about a hundred kilometres
 
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:

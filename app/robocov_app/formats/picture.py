@@ -41,6 +41,10 @@ _PILLOW = {  # first bytes (magic numbers) of formats that Pillow reads, by its 
     "PPM": re.compile(rb"P[14][\s#]"),
 }
 _MOST_OF_JPEG = 512  # pixels a byte: 8 x 8 take a bit at least; what is not there would be made up in grey
+CHUNK = "robocov"  # key of the text chunk that says where it belongs: JSON with ``cell_m`` and ``origin_m``
+TITLE = "Title"  # key of the text chunk with the name of what is shown
+_NOISE = 1.5  # single cells beside dark ones come of how a JPEG is saved
+_OPAQUE = 128  # less opaque pixels count as transparent, of 255
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,12 +194,6 @@ def _converted(image: Image) -> Brightness:
         if alpha is not None:
             alpha[rows] = strip[:, :, colours]
     return Brightness(level, 255 * colours, alpha, texts, lossy)
-
-
-CHUNK = "robocov"  # key of the text chunk that says where it belongs: JSON with ``cell_m`` and ``origin_m``
-TITLE = "Title"  # key of the text chunk with the name of what is shown
-_NOISE = 1.5  # single cells beside dark ones come of how a JPEG is saved
-_OPAQUE = 128  # less opaque pixels count as transparent, of 255
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:

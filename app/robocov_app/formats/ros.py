@@ -40,6 +40,8 @@ _THRESHOLDS = {"occupied_thresh": _OCCUPIED, "free_thresh": _FREE}  # as map_ser
 _KNOWN = ("image", "resolution", "origin", "negate", "mode", *_THRESHOLDS)
 _NOISE = 1.5  # in maps that robots made single cells are noise
 _SAVED_UNKNOWN = 205  # what savers write for unknown cells, of 255
+_WHITE = 254  # what map_saver writes for free cells; occupied ones are 0
+_FINER = 4  # so many by so many places of a cell, of which the solid part is its occupancy of scale and raw
 
 
 def sniff(path: Path, head: bytes) -> bool:
@@ -167,10 +169,6 @@ def _number(text: files.Value, where: str) -> float:
     if not isinstance(text, str) or not math.isfinite(value := files.number(text)):
         raise MapError(f"{where}: {shown(text)}, but a number was wanted")
     return value
-
-
-_WHITE = 254  # what map_saver writes for free cells; occupied ones are 0
-_FINER = 4  # so many by so many places of a cell, of which the solid part is its occupancy of scale and raw
 
 
 def files_of(path: Path, options: WriteOptions) -> tuple[Path, ...]:

@@ -43,6 +43,11 @@ _NO_POINT = re.compile(r"[^-+.\deE\s,]", re.ASCII)
 _BEYOND = 1e100
 _SRID = re.compile(r"SRID\s*=\s*(\d{1,9})\s*;", re.IGNORECASE)
 _COMMENT = re.compile(r"^[ \t]*(?:#|--).*$", re.MULTILINE)
+BEGIN = re.compile(
+    rb"(?:\xef\xbb\xbf)?(?:\s|(?:#|--)[^\n]*\n)*(?:SRID\s*=\s*\d+\s*;\s*)?(?:%s)(?:ZM|Z|M)?\s*(?:ZM|Z|M)?\s*(?:\(|EMPTY)"
+    % b"|".join(kind.encode() for kind in (*KINDS, *CURVED)),
+    re.IGNORECASE,
+)
 
 
 class WktText:
@@ -196,13 +201,6 @@ class WktText:
     def _refuse(self, what: str, at: int | None = None) -> NoReturn:
         line, column = line_and_column(self.text, self.at if at is None else at)
         raise MapError(f"{self.where}:{line}:{column}: {what}")
-
-
-BEGIN = re.compile(
-    rb"(?:\xef\xbb\xbf)?(?:\s|(?:#|--)[^\n]*\n)*(?:SRID\s*=\s*\d+\s*;\s*)?(?:%s)(?:ZM|Z|M)?\s*(?:ZM|Z|M)?\s*(?:\(|EMPTY)"
-    % b"|".join(kind.encode() for kind in (*KINDS, *CURVED)),
-    re.IGNORECASE,
-)
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:

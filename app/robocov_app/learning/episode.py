@@ -115,7 +115,7 @@ class SharedSimulation:
     def advance(self, actions: Array, episodes: Mapping[int, Episode]) -> dict[int, Outcome]:
         """Hold actions, (count, n, 2) N or m/s; return what came of those of some of the episodes."""
         assert self._simulation is not None
-        contact = held(self._task, self._simulation, actions.reshape(-1, 2)).reshape(self._count, -1)
+        contact = held(self._task, self._simulation, actions.reshape(-1, 2), None).reshape(self._count, -1)
         due = [run for run, episode in episodes.items() if episode.due()]
         results: dict[int, CoverageResult] = {}
         if due:
@@ -257,9 +257,7 @@ class Episode:
         return recorder.record()
 
 
-def held(
-    task: CoverageTask, simulation: Simulation, actions: Array, moments: list[Snapshot] | None = None
-) -> Array:
+def held(task: CoverageTask, simulation: Simulation, actions: Array, moments: list[Snapshot] | None) -> Array:
     """Hold actions, (n, 2) N or m/s, for the time of one decision; return the time in contact, (n,) s."""
     contact = np.zeros(len(actions))
     for _ in range(task.repeat):

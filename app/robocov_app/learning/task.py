@@ -27,6 +27,17 @@ Action: TypeAlias = Literal["force", "velocity"]
 """A force in N, or a velocity in m/s."""
 ACTIONS: tuple[Action, ...] = get_args(Action)
 FOLLOWING = 0.1  # time constant in seconds with which a robot follows a velocity that it is told
+Reward: TypeAlias = Literal["shared", "own", "level"]
+"""Sharing of rewards among robots; see `shares`."""
+REWARDS: tuple[Reward, ...] = get_args(Reward)
+MapSource: TypeAlias = str | Path | Environment | Callable[[int], Environment]
+"""A map, its name or path, or what makes one of a seed."""
+SEEDS = 2**31  # a maker of maps is given a seed below this
+_KEPT = 64  # maps with their costs that are kept at most
+Rows: TypeAlias = NDArray[np.float32]
+"""(n, size): one row for each robot."""
+MOST_NEIGHBOURS = 1000  # most neighbours that a row has room for
+MOST_ROBOTS = 10_000
 
 
 def checked_kind(what: str, given: str, known: Sequence[str]) -> None:
@@ -66,11 +77,6 @@ def actions_of(action: Action, forces: Array, velocities: Array, team: Team) -> 
     return np.asarray((forces + stiffness * velocities) / (nu + stiffness))
 
 
-Reward: TypeAlias = Literal["shared", "own", "level"]
-"""Sharing of rewards among robots; see `shares`."""
-REWARDS: tuple[Reward, ...] = get_args(Reward)
-
-
 def reference_distance(area: float, robots: int) -> float:
     """Return a mean distance in metres that no placement of so many robots in so much area goes below.
 
@@ -100,12 +106,6 @@ def shares(reward: Reward, before: CoverageResult, after: CoverageResult, part: 
             slope += result.gradient * (result.mean_distance / result.value)
     own = -0.5 * (slope * (after.positions - before.positions)).sum(axis=1)
     return np.asarray(own + (decrease - own.sum()) / n)
-
-
-MapSource: TypeAlias = str | Path | Environment | Callable[[int], Environment]
-"""A map, its name or path, or what makes one of a seed."""
-SEEDS = 2**31  # a maker of maps is given a seed below this
-_KEPT = 64  # maps with their costs that are kept at most
 
 
 @dataclass(frozen=True)
@@ -187,11 +187,6 @@ def _source(given: object, where: str) -> Environment | Callable[[int], Environm
     raise ParameterError(f"{where}: {shown(given)}, but {wanted} was wanted")
 
 
-Rows: TypeAlias = NDArray[np.float32]
-"""(n, size): one row for each robot."""
-MOST_NEIGHBOURS = 1000  # most neighbours that a row has room for
-
-
 @dataclass(frozen=True)
 class ObservationLayout:
     """Layout of an observation: its numbers and their order.
@@ -266,7 +261,7 @@ class ObservationLayout:
             robot, _, offset, distance = seen.neighbours_within(4.0 * unit)
             nearest = np.zeros((n, self.neighbours, 3))
             farthest = np.full((n, self.neighbours), np.inf)
-            _place_nearest(robot, offset, distance, unit, farthest, nearest)
+            _nearest(robot, offset, distance, unit, farthest, nearest)
             rows[:, places["neighbour"]] = nearest.reshape(n, -1)
         if self.rays:
             scans = seen.scans if scans is None else scans
@@ -289,10 +284,8 @@ def from_middle(positions: Array, region: Region) -> Array:
 
 
 @kernel
-def _place_nearest(
-    robot: IntArray, offset: Array, distance: Array, unit: float, best: Array, blocks: Array
-) -> None:
-    """Put the nearest neighbours of robots into `blocks`, (n, count, 3), their distances into `best`."""
+def _nearest(robot: IntArray, offset: Array, distance: Array, unit: float, best: Array, found: Array) -> None:
+    """Put the nearest neighbours of robots into `found`, (n, count, 3), their distances into `best`."""
     for k in range(len(robot)):
         i, place = robot[k], best.shape[1]
         # what is equally far stays in the order of the numbers
@@ -301,15 +294,12 @@ def _place_nearest(
         for later in range(best.shape[1] - 1, place, -1):
             best[i, later] = best[i, later - 1]
             for c in range(3):
-                blocks[i, later, c] = blocks[i, later - 1, c]
+                found[i, later, c] = found[i, later - 1, c]
         if place < best.shape[1]:
-            best[i, place], blocks[i, place, 2] = distance[k], 1.0
+            best[i, place], found[i, place, 2] = distance[k], 1.0
             for c in range(2):
                 # from the robot to its neighbour
-                blocks[i, place, c] = -offset[k, c] / unit
-
-
-MOST_ROBOTS = 10_000
+                found[i, place, c] = -offset[k, c] / unit
 
 
 @dataclass(frozen=True, eq=False)

@@ -116,9 +116,8 @@ def encoder() -> str:
         return str(get_ffmpeg_exe())
     if found := shutil.which("ffmpeg"):
         return found
-    raise OutputError(
-        'film: no ffmpeg was found: pip install "robocov[film]", or set IMAGEIO_FFMPEG_EXE to one'
-    )
+    ways = 'pip install "robocov[film]", or set IMAGEIO_FFMPEG_EXE to one'
+    raise OutputError(f"film: no ffmpeg was found: {ways}")
 
 
 def film_command(path: Path, size: tuple[int, int], fps: float, *, streamed: bool = False) -> list[str]:

@@ -70,9 +70,7 @@ def roster_of(record: Record) -> Roster:
     failed = {int(number): (x, y) for number, (x, y) in session.get("failed", {}).items()}
     wrecks = {wreck_name(number) for number in failed}
     shapes = environment.obstacles
-    standing = tuple(
-        each for each in shapes if not isinstance(each, CircleObstacle) or each.name not in wrecks
-    )
+    standing = tuple(one for one in shapes if not isinstance(one, CircleObstacle) or one.name not in wrecks)
     told = len(numbers), len({*numbers, *failed}), len(shapes) - len(standing)
     if told != (len(usual), len(numbers) + len(failed), len(failed)):
         return Roster(environment, usual, {})

@@ -25,6 +25,12 @@ from robocov_app.toolkit.worker import READY, asked, ended, receive, started
 
 _ENDS = 2  # workers that may end through a task before it counts as failed
 _IN_A_ROW = 20  # workers that may end one after the other without a finished run in between
+_STARTS = 3  # how often a process may end before it has begun
+_LAST_WORDS = 4000  # characters of the complaints of a process that ended that are kept
+_OUTSIDE = -getattr(signal, "SIGKILL", 9)  # status of what a user, or a lack of memory, has ended
+PATIENCE = 10.0  # seconds that a scheduler has for an answer
+_LEAST = 4  # tasks that are handed out to a cluster which has no workers yet
+_LOOK = 2.0  # seconds between two looks at how many workers there are; they may come and go
 
 
 class Lost(NamedTuple):
@@ -133,11 +139,6 @@ class Executor(ABC):
         return failed(lost.cause, lost.details)
 
 
-_STARTS = 3  # how often a process may end before it has begun
-_LAST_WORDS = 4000  # characters of the complaints of a process that ended that are kept
-_OUTSIDE = -getattr(signal, "SIGKILL", 9)  # status of what a user, or a lack of memory, has ended
-
-
 class LocalPool(Executor):
     """Processes on this machine, each of which does one task at a time; one that ends is replaced."""
 
@@ -223,11 +224,6 @@ class _Worker:
 
 def processors() -> int:
     return len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else ()) or os.cpu_count() or 1
-
-
-PATIENCE = 10.0  # seconds that a scheduler has for an answer
-_LEAST = 4  # tasks that are handed out to a cluster which has no workers yet
-_LOOK = 2.0  # seconds between two looks at how many workers there are; they may come and go
 
 
 class Cluster(Executor):

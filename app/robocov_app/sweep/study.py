@@ -35,6 +35,9 @@ Method: TypeAlias = Literal["sobol", "latin-hypercube", "halton"]
 NO_LIMIT = "null"  # what stands for None where a file has no word for it
 MOST_SAMPLES = 100_000
 _SAMPLE_DIGITS = 6  # of a sampled gain: more say nothing, and the last ones differ between processors
+_FORMAT = "robocov-task 1"  # of the digest; that the same inputs give other results is told by `made_with`
+_SHORT = 24  # characters of each name in the name of a folder
+_DIGITS = 10  # hexadecimal digits of the digest in the name of a folder
 Place: TypeAlias = tuple[str | int, ...]
 
 
@@ -482,11 +485,6 @@ def team_of(robots: int, team: Mapping[str, TeamValue]) -> Team:
     if GROUPS in team:
         return team_of_groups(json.loads(str(team[GROUPS])), ("team", "group"), values)
     return Team.homogeneous(robots, **values)
-
-
-_FORMAT = "robocov-task 1"  # of the digest; that the same inputs give other results is told by `made_with`
-_SHORT = 24  # characters of each name in the name of a folder
-_DIGITS = 10  # hexadecimal digits of the digest in the name of a folder
 
 
 @dataclass(frozen=True, slots=True)

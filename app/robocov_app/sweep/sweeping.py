@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 PERIOD = 10.0  # seconds between two lines where there is no terminal
+_PATIENCE = 0.2  # seconds between two looks at what else there is to do
+_ERRORS = 3  # different errors of runs that are told
 
 
 @dataclass
@@ -126,10 +128,6 @@ def duration(seconds: float) -> str:
         if whole >= unit:
             return f"{whole // unit} {name} {whole % unit // part} {part_name}"
     return f"{whole} s"
-
-
-_PATIENCE = 0.2  # seconds between two looks at what else there is to do
-_ERRORS = 3  # different errors of runs that are told
 
 
 @dataclass

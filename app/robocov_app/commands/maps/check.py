@@ -90,13 +90,11 @@ def watch(options: Arguments) -> None:
         output.file.flush()
 
 
-def _show(
-    output: Console, title: str, outcome: MapReport | InputError, former: MapReport | None = None
-) -> None:
+def _show(out: Console, title: str, outcome: MapReport | InputError, former: MapReport | None = None) -> None:
     told, colour = ("valid", "green") if isinstance(outcome, MapReport) else ("invalid", "red")
-    output.print(f"{title}: {told}", style=f"bold {colour}", soft_wrap=True)
+    out.print(f"{title}: {told}", style=f"bold {colour}", soft_wrap=True)
     for line in _lines(outcome, former):
-        output.print(line, soft_wrap=True)
+        out.print(line, soft_wrap=True)
 
 
 def _outcome(name: str) -> MapReport | InputError:
@@ -166,6 +164,5 @@ def _rows(report: MapReport) -> dict[str, str]:
     if report.density is not None and report.density_range is not None:
         low, high = report.density_range
         rows["density"] = f"{report.density}, {low:.4g} to {high:.4g}, mean {report.mean_density:.4g}"
-    return rows | {
-        f"start {each.name}": f"{each.kind}, room for about {each.capacity}" for each in report.starts
-    }
+    starts = {f"start {each.name}": f"{each.kind}, room for about {each.capacity}" for each in report.starts}
+    return rows | starts

@@ -66,10 +66,8 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         x, y, right, top = shapely.total_bounds(everything)
         if max(right - x, top - y) < _SMALLEST:
             hint = "--scale METRES says what a unit is, as in --scale 0.01"
-            wanted = f"at least {_SMALLEST:g} m was wanted: {hint}"
-            raise MapError(
-                f"{shapes.where}: {right - x:.3g} x {top - y:.3g} m at its own scale, but {wanted}"
-            )
+            found = f"{right - x:.3g} x {top - y:.3g} m at its own scale"
+            raise MapError(f"{shapes.where}: {found}, but at least {_SMALLEST:g} m was wanted: {hint}")
     own = "at its own scale" if options.scale is None else f"a unit is {options.scale:g} m"
     shapes.notes = [own, *drawing.notes()]
     texts = {each.tag: one_line(" ".join(each.text.split())) for each in root.children if each.text.strip()}

@@ -25,6 +25,10 @@ _PIXELS = {  # user units in a unit of length (CSS Values 4, section 6.2)
     "": 1.0, "px": 1.0, "in": 96.0, "cm": 96 / 2.54, "mm": 96 / 25.4, "q": 96 / 101.6, "pt": 4 / 3, "pc": 16.0
 }  # fmt: skip
 PIXEL = 0.0254 / 96  # a user unit in metres, where nothing says otherwise
+MOST_DRAWS = 150_000  # commands of all paths, with or without their letter; vertices of polylines are none
+_COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])", re.ASCII)
+_FLAG = re.compile(r"[\s,]*([01])")
+_ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 
 
 def number(text: str) -> float:
@@ -123,12 +127,6 @@ def fitted(box: tuple[float, float, float, float], width: float, height: float, 
     left = (width - scale * box[2]) * parts.get(align[:4].lower(), 0.5)
     top = (height - scale * box[3]) * parts.get(align[4:].lower(), 0.5)
     return affine(scale, d=scale, e=left, f=top) @ affine(e=-box[0], f=-box[1])
-
-
-MOST_DRAWS = 150_000  # commands of all paths, with or without their letter; vertices of polylines are none
-_COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])", re.ASCII)
-_FLAG = re.compile(r"[\s,]*([01])")
-_ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 
 
 def subpaths(
