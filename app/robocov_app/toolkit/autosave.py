@@ -126,13 +126,10 @@ class Autosaver:
                 self._writing, self._hurried = True, False
             (path, content), began, trouble = job, time.perf_counter(), ""
             try:
-                record = {
-                    "format": self._kind,
-                    "version": 1,
-                    "path": None if path is None else str(path.absolute()),
-                    "when": datetime.now().astimezone().isoformat(timespec="seconds"),
-                    **(content() if content is not None else {}),
-                }
+                file = None if path is None else str(path.absolute())
+                when = datetime.now().astimezone().isoformat(timespec="seconds")
+                record: dict[str, Any] = {"format": self._kind, "version": 1, "path": file, "when": when}
+                record |= content() if content is not None else {}
                 with written(self._place / _FILE) as part:
                     part.write_text(json.dumps(record, ensure_ascii=False), encoding="utf-8")
                 self._holds = content is not None

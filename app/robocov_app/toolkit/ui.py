@@ -512,7 +512,6 @@ class Ui:
         return is_open
 
     def check(self, text: str, *, now: bool, key: str = "", tip: str = "") -> bool | None:
-        """Show a check box and its words; return its new state once it was clicked."""
         key, rect = key or text, self.cell()
         clicked = self._clicks("check", key, rect, text, now, tip, "")
         if self._draws(rect):
@@ -653,7 +652,6 @@ class Ui:
         screen.set_clip(clip)
 
     def dropdown(self, key: str, options: Sequence[str], now: str, *, tip: str = "") -> str | None:
-        """Show a menu that drops down; return what was chosen of it, if that is another."""
         rect = self.cell()
         picked = self.open_list.picked if self.open_list is not None and self.open_list.key == key else None
         if picked is not None:

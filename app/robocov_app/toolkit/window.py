@@ -125,9 +125,8 @@ class BaseWindow:
         if self.remote is not None:  # it has the size of a page, which can do this by itself
             return
         # pygame's own toggle keeps the size: the window would stand in the middle of a black screen
-        windowed, self.windowed = self.windowed, None if self.windowed else self.screen.get_size()
-        full = pygame.FULLSCREEN
-        self.screen = open_window(windowed) if windowed else pygame.display.set_mode((0, 0), full)
+        before, self.windowed = self.windowed, None if self.windowed else self.screen.get_size()
+        self.screen = open_window(before) if before else pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
 
     def save_screenshot(self, folder: Path) -> str:
         target, picture = free_name(folder, "robocov", ".png"), BytesIO()

@@ -1,6 +1,5 @@
 """The canvas: one painted pane for each controller, one camera for all, and what tools show on top."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -10,7 +9,6 @@ import pygame
 
 from robocov.arrays import Array
 from robocov.environment import Environment, Point
-from robocov.observation import Snapshot
 from robocov_app.render import sprites
 from robocov_app.render.annotations import legend_rows, legend_strip
 from robocov_app.render.camera import Camera
@@ -25,7 +23,6 @@ from robocov_app.render.theme import Theme, mix, robot_hues
 from robocov_app.toolkit.layout import Layout, inside
 from robocov_app.toolkit.overlay import tag
 from robocov_app.viewer.presenter import FADE, Presenter
-from robocov_app.viewer.session.moments import PaneSetup
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.tools import Preview
 
@@ -145,7 +142,11 @@ class ViewerCanvas:
         selected = numbers.index(viewer.selected) if viewer.selected in numbers else None
         if "scan" in viewer.shown:  # of the robot that is asked about, else of all unless they are many
             rows = range(len(numbers)) if selected is None else [selected]
-            scans = self._scans(pane, setup, snapshot, rows)
+            ranges, places = setup.team.sensing_range, snapshot.positions
+            rays = min(RAYS, MOST_RAYS // len(rows))
+            reach = np.where(np.isfinite(ranges), ranges, FAR_SCAN).tolist()
+            for row in rows if rays >= 24 else ():
+                scans.append((places[row], pane.simulation.sensor.scan(places[row], rays, reach[row])[1]))
         path = known.path if known is not None and viewer.cursor is not None else None
         look: dict[str, Any] = {"field": field, "field_limit": self._limit, "cost": self._caption_cost(pane)}
         look |= {"selected": selected, "scans": scans, "sensed": pane.sensed, "path": path}
@@ -160,15 +161,6 @@ class ViewerCanvas:
         what = mean_label(session.setup(pane).environment)
         words = cost_label(what, distances[pane.number], times.get(pane.number))
         return f"{words} at {time:.1f} s" if session.time - time > _OLD else words
-
-    def _scans(
-        self, pane: Pane, setup: PaneSetup, snapshot: Snapshot, rows: Sequence[int]
-    ) -> list[tuple[Array, Array]]:
-        if (rays := min(RAYS, MOST_RAYS // len(rows))) < 24:
-            return []
-        ranges, places = setup.team.sensing_range, snapshot.positions
-        reach = np.where(np.isfinite(ranges), ranges, FAR_SCAN).tolist()
-        return [(places[row], pane.simulation.sensor.scan(places[row], rays, reach[row])[1]) for row in rows]
 
     def _canvas(self, surface: pygame.Surface, pane: int, scene: Scene) -> Canvas:
         camera, hues = self._painters[pane].camera, robot_hues(len(scene.team))

@@ -106,8 +106,7 @@ class Chart:
             names = (text_width(f"{pane.law.label}  8.888  +88.8 %", size, True) for pane in panes)
             beside = min(max(names) + 20 * scale, 0.4 * width)
         ghosts = max((float(ghost.time[-1]) for ghost in self.viewer.session.ghosts), default=0.0)
-        end = time_axis(max(self.viewer.session.end, ghosts))
-        return left + LEFT * scale, left + width - beside, end
+        return left + LEFT * scale, left + width - beside, time_axis(max(self.viewer.session.end, ghosts))
 
     def time_at(self, x: float) -> float:
         left, right, end = self._span

@@ -56,9 +56,6 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
     def branches() -> list[str]:
         return [str(k + 1) for k in range(len(viewer.session.document.branches()))]
 
-    def save(name: object) -> None:
-        viewer.save_session(Path(str(name)) if name else None)
-
     def next_seed() -> None:
         viewer.restart(seed=viewer.session.scenario.seed + 1)
 
@@ -72,6 +69,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
         viewer.session.enter(viewer.session.document.branch(branch).node)
 
     start, law = Takes("start", options=viewer.starts), Takes("controller", options=lambda: viewer.laws)
+    target = Takes("file", lambda text: Path(text) if text else None)
     ask_next, speeds = viewer.ask_next, [speed_words(each).rstrip("×") for each in SPEEDS]
 
     def tool_row(tool: Tool) -> Row:
@@ -149,7 +147,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("recover", "Recover a session", viewer.recover, "ctrl+shift+o"),
             Row("save:map", "Save the map", viewer.save_map, "ctrl+shift+s"),
             Row("open", "Open a session", viewer.open_session, takes=Takes("file", Path, files)),
-            Row("save", "Save the session as", save, takes=Takes("file")),
+            Row("save", "Save the session as", viewer.save_session, takes=target),
         ],
         "Tools": map(tool_row, viewer.tools.values()),
         "Show": map(layer_row, layers),

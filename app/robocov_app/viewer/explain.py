@@ -75,9 +75,12 @@ def explain(
     first; without it the speed alone says whether the robot is at rest.
     """
     case = _Case(snapshot, team, environment, robot, range(1, len(team) + 1) if names is None else names)
-    motion = _motion(case, recent)
-    lines = (*_forces(case), *(Line(text) for text in (*_reasons(case, motion), *_surroundings(case))))
-    return Report(f"Robot {case.name}", _verdict(case, motion), (Line(_state(case)), *lines))
+    motion, speed = _motion(case, recent), abs(case.velocity)
+    how = f"{_number(speed)} m/s {_compass(case.velocity)}" if speed >= 0.005 else "at rest"
+    x, y = (round(value, 2) + 0.0 for value in (case.position.real, case.position.imag))
+    texts = *_reasons(case, motion), *_surroundings(case)
+    lines = Line(f"at ({x:.2f}, {y:.2f}) m, {how}"), *_forces(case), *map(Line, texts)
+    return Report(f"Robot {case.name}", _verdict(case, motion), lines)
 
 
 @dataclass(frozen=True)
@@ -236,13 +239,6 @@ def _length(metres: float) -> str:
 
 def _force(newtons: float) -> str:
     return f"{1000 * newtons:.0f} mN" if NOTHING <= newtons < 0.00995 else f"{_number(newtons)} N"
-
-
-def _state(case: _Case) -> str:
-    speed = abs(case.velocity)
-    how = f"{_number(speed)} m/s {_compass(case.velocity)}" if speed >= 0.005 else "at rest"
-    x, y = (round(value, 2) + 0.0 for value in (case.position.real, case.position.imag))
-    return f"at ({x:.2f}, {y:.2f}) m, {how}"
 
 
 def _verdict(case: _Case, motion: str) -> str:

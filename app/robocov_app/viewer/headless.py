@@ -118,11 +118,9 @@ def _session_of(part: Part, setup: PaneSetup, record: Record, dt: float) -> dict
     if setup.failed or setup.numbers != tuple(range(1, len(setup.numbers) + 1)):
         said["robots"] = list(setup.numbers)
         said["failed"] = {str(number): list(place) for number, place in setup.failed.items()}
-    if part.touched:
-        said["touched"] = [
-            {"from_s": (begin - part.begin) * dt, "to_s": (end - part.begin) * dt, "robots": [robot]}
-            for begin, end, robot in part.touched
-        ]
+    for begin, end, robot in part.touched:
+        times = {"from_s": (begin - part.begin) * dt, "to_s": (end - part.begin) * dt}
+        said.setdefault("touched", []).append({**times, "robots": [robot]})
     known = part.begin == 0 or not remembers(setup.law.made())
     turned = record.steering is not None and bool(record.steering[0].any())
     repeatable = known and not part.touched and not turned

@@ -29,9 +29,8 @@ def load_lesson(path: Path = FIRST) -> SavedSession:
 
 def holds(condition: ConditionModel, session: Session) -> bool:
     pane = session.panes[0]
-    if condition.step is not None and session.step_now >= condition.step:
-        return True
-    if condition.settled and session.settled:
+    reached = condition.step is not None and session.step_now >= condition.step
+    if reached or (condition.settled and session.settled):
         return True
     if condition.mean_distance_below is not None and len(pane.curve):
         return bool(pane.curve.value[-1] < condition.mean_distance_below)
@@ -98,6 +97,7 @@ class LessonPlayer:
             return
         session, chapter = self.session, self.chapter
         self._waited += seconds
+        reading = READING + (0.0 if self.alone else 0.25 * len(" ".join(self.asks).split()))
         if self.state == "asks" and self.alone and self._waited >= READING:
             assert chapter.question is not None
             self.reply(chapter.question.right)
@@ -107,12 +107,8 @@ class LessonPlayer:
             session.playing = session.playing and tries
         elif self.state == "task" and chapter.task is not None and holds(chapter.task.until, session):
             self._turn("ended")
-        elif self.state == "ended" and self._waited >= self._reading and not self.held:
+        elif self.state == "ended" and self._waited >= reading and not self.held:
             self.skip(1)
-
-    @property
-    def _reading(self) -> float:
-        return READING + (0.0 if self.alone else 0.25 * len(" ".join(self.asks).split()))
 
     def reply(self, answer: int) -> None:
         question = self.chapter.question

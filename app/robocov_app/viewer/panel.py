@@ -14,7 +14,7 @@ from robocov_app.render.fonts import shortened
 from robocov_app.toolkit.command import Commands
 from robocov_app.toolkit.overlay import flat_canvas
 from robocov_app.toolkit.ui import SMALL, SidePanel, Ui
-from robocov_app.viewer.explain import NOTHING, Line, Report
+from robocov_app.viewer.explain import NOTHING, Report
 from robocov_app.viewer.parameters import Parameter, Pick
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
@@ -239,23 +239,16 @@ def show_report(ui: Ui, report: Report) -> None:
     ui.space(4)
     largest = max((float(np.hypot(*e.vector)) for e in report.lines if e.vector is not None), default=1.0)
     for each in report.lines:
-        if each.vector is not None:
-            _arrow(ui, each, largest)
+        size = 0.0 if each.vector is None else float(np.hypot(*each.vector))
+        if ui.surface is not None and each.vector is not None and size >= NOTHING:
+            length = 13 * ui.scale * (0.35 + 0.65 * size / max(largest, NOTHING))
+            half = np.array(each.vector) / size * (length, -length)
+            middle = np.array(ui.rest.topleft) + np.array([14, 8]) * ui.scale
+            canvas = flat_canvas(ui.surface, ui.theme, ui.scale)
+            colour = ui.theme.forces.get(each.kind, ui.theme.ink)
+            canvas.arrow((middle - half).tolist(), (middle + half).tolist(), colour, 2 * ui.scale)
         ui.words(each.text, size=11.5, indent=34.0 if each.vector is not None else 0.0)
         ui.space(3)
-
-
-def _arrow(ui: Ui, line: Line, largest: float) -> None:
-    assert line.vector is not None
-    size = float(np.hypot(*line.vector))
-    if ui.surface is None or size < NOTHING:
-        return
-    length = 13 * ui.scale * (0.35 + 0.65 * size / max(largest, NOTHING))
-    half = np.array(line.vector) / size * (length, -length)
-    middle = np.array(ui.rest.topleft) + np.array([14, 8]) * ui.scale
-    canvas = flat_canvas(ui.surface, ui.theme, ui.scale)
-    colour = ui.theme.forces.get(line.kind, ui.theme.ink)
-    canvas.arrow((middle - half).tolist(), (middle + half).tolist(), colour, 2 * ui.scale)
 
 
 def short_names(files: list[str]) -> dict[str, str]:

@@ -103,10 +103,8 @@ def gain_parameters(law: ControllerChoice) -> Iterator[Parameter | Pick]:
             continue
         number = None if isinstance(value, str) else value
         usual = min(max(gain.default if gain.default else 1.0, gain.low), gain.high)
-        if usual > 0 and gain.low >= 0:
-            low, high = max(usual / SPAN, gain.low), min(usual * SPAN, gain.high)
-        else:
-            low, high = max(gain.low, -SPAN * abs(usual)), min(gain.high, SPAN * abs(usual))
+        lowest = usual / SPAN if usual > 0 and gain.low >= 0 else -SPAN * abs(usual)
+        low, high = max(gain.low, lowest), min(gain.high, SPAN * abs(usual))
         yield Parameter(name, name, gain.unit, gain.meaning, number, gain.default, low, high, gain.optional)
 
 

@@ -77,8 +77,7 @@ def edited(session: Session, environment: Environment, words: str) -> str:
     if gone:
         words += f"; it covers the start{'s' if len(gone) > 1 else ''} {', '.join(sorted(gone))}"
     robots = session.positions(session.panes[0])
-    passage = passage_words(before, environment, float(radius.min()), robots)
-    return "; ".join(filter(None, [words, passage]))
+    return "; ".join(filter(None, [words, passage_words(before, environment, float(radius.min()), robots)]))
 
 
 @dataclass

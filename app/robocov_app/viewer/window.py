@@ -215,7 +215,6 @@ class Window(BaseWindow):
         self.viewer.costs.close()
 
     def suit(self, scale: float, theme: str, *, panel: bool | None) -> None:
-        """Take the look of where the window is shown; `panel`: to show or hide it, None to leave it."""
         viewer, self.scale = self.viewer, scale
         viewer.theme, viewer.panel = theme, viewer.panel if panel is None else panel
         viewer.version += 1
@@ -232,7 +231,6 @@ class Window(BaseWindow):
         self.pointer.show()
 
     def look(self) -> object:
-        """Return all that changes the picture without an event; None while something moves."""
         viewer, session, tour = self.viewer, self.viewer.session, self.tour
         at_rest = session.settled and session.live and not session.environment.moves
         if (session.playing and not at_rest) or self.film is not None:

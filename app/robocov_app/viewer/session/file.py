@@ -218,12 +218,12 @@ def session_of(content: Any, where: str, controllers: Collection[str] = ()) -> S
     refuse, nodes = partial(_refuse, where), list[Node]()
     for touch in model.touches:
         nodes.append(_node(touch, nodes, partial(refuse, "touches", len(nodes))))
-    wanted = f"the number of a touch, 0 to {len(nodes) - 1},"
+    wanted = f"the number of a touch, 0 to {len(nodes) - 1}"
     if model.head >= len(nodes):
         refuse("head", value=model.head, wanted=wanted)
     head = nodes[model.head]
     if not head.begin <= model.step <= head.end:
-        refuse("step", value=model.step, wanted=f"a step of the head, {head.begin} to {head.end},")
+        refuse("step", value=model.step, wanted=f"a step of the head, {head.begin} to {head.end}")
     for k, chapter in enumerate(model.lesson.chapters if model.lesson else ()):
         at, asked = partial(refuse, "lesson", "chapters", k), chapter.question
         if chapter.touch >= len(nodes):
@@ -236,7 +236,7 @@ def session_of(content: Any, where: str, controllers: Collection[str] = ()) -> S
 def _node(touch: TouchModel, nodes: list[Node], refuse: Callable[..., None]) -> Node:
     first = not nodes
     if (touch.parent is None) != first or (touch.parent is not None and touch.parent >= len(nodes)):
-        refuse("parent", value=touch.parent, wanted="null for the first, else an earlier number,")
+        refuse("parent", value=touch.parent, wanted="null for the first, else an earlier number")
     if first and not isinstance(touch.changes[0], Restart):
         refuse("changes", 0, "do", value=touch.changes[0].do, wanted='"restart"')
     made: list[Change] = []
@@ -248,11 +248,10 @@ def _node(touch: TouchModel, nodes: list[Node], refuse: Callable[..., None]) -> 
     parent = None if touch.parent is None else nodes[touch.parent]
     node = Node(len(nodes), parent, touch.at, touch.kind, touch.words, made, touch.end, touch.name)
     if parent is not None and not parent.begin <= touch.at <= parent.end:
-        wanted = f"a step of touch {touch.parent}, {parent.begin} to {parent.end},"
-        refuse("at", value=touch.at, wanted=wanted)
+        refuse("at", value=touch.at, wanted=f"a step of touch {touch.parent}, {parent.begin} to {parent.end}")
     steps = [node.begin, *(change.step for change in made)]
     if steps != sorted(steps) or steps[1] != node.begin or node.end < steps[-1]:
-        refuse("end", value=touch.end, wanted="a step from those of its changes on, in order,")
+        refuse("end", value=touch.end, wanted="a step from those of its changes on, in order")
     for name, samples in touch.curves.items():
         pane, _, what = name.partition(" ")
         if not pane.isdecimal() or what not in ("distance", "time") or len(samples) != 2:
@@ -263,7 +262,7 @@ def _node(touch: TouchModel, nodes: list[Node], refuse: Callable[..., None]) -> 
 
 
 def _refuse(where: str, *path: str | int, value: object, wanted: str) -> None:
-    raise MapError.of(where, [Mistake.at(path, f"{shown_json(value)}, but {wanted.rstrip(',')} was wanted")])
+    raise MapError.of(where, [Mistake.at(path, f"{shown_json(value)}, but {wanted} was wanted")])
 
 
 class _Maps:

@@ -80,13 +80,11 @@ class Lockstep:
                 self._change_all(lambda pane: Continuation(replace(pane.setup, environment=environment)))
             case _:
                 self._change_all(change.of)
-                if self.hand is not None and (isinstance(change, Place) or not self._works(self.hand[0])):
+                held = self.hand is not None and self.panes[0].row(self.hand[0]) is not None
+                if isinstance(change, Place) or not held:
                     self.hand = None
         setup, laws = self.panes[0].setup, tuple(pane.law for pane in self.panes)
         self.scenario = replace(self.scenario, environment=setup.environment, limits=setup.limits, laws=laws)
-
-    def _works(self, robot: int) -> bool:
-        return robot in self.panes[0].numbers
 
     def _change_all(self, wanted: Callable[[Pane], Continuation]) -> None:
         """Let every pane go on as is wanted; if one cannot, none does."""
@@ -119,6 +117,6 @@ class Lockstep:
                 self.apply(Join(number, (x, y)))
                 yield self.step, "robot", f"robot {number} joined"
         for number in (np.flatnonzero((ends > before) & (ends <= now)) + 1).tolist():
-            if self._works(number) and len(self.panes[0].numbers) > 1:
+            if number in self.panes[0].numbers and len(self.panes[0].numbers) > 1:
                 self.apply(Fail(number))
                 yield self.step, "failure", f"robot {number} failed"

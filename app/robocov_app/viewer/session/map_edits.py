@@ -9,14 +9,7 @@ import numpy as np
 import shapely
 
 from robocov.density import Raster, sampled
-from robocov.environment import (
-    CircleObstacle,
-    Environment,
-    Obstacle,
-    Point,
-    PolygonObstacle,
-    WallObstacle,
-)
+from robocov.environment import CircleObstacle, Environment, Obstacle, Point, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, place
 from robocov.mapfile import from_json, to_json
 

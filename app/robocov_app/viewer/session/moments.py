@@ -13,7 +13,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.conditions import Conditions
 from robocov.conditions.perception import Inbox
-from robocov.environment import CircleObstacle, Environment
+from robocov.environment import CircleObstacle, Environment, Point
 from robocov.observation import Decision
 from robocov.robots import Team
 from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
@@ -63,10 +63,9 @@ class PaneSetup:
 # circumstances are many and stay for long, what is derived from a map is large: only the last few are kept
 @lru_cache(maxsize=8)
 def _with_wrecks(
-    environment: Environment, places: tuple[tuple[float, float], ...], radii: tuple[float, ...]
+    environment: Environment, places: tuple[Point, ...], radii: tuple[float, ...]
 ) -> Environment:
-    wrecks = tuple(map(CircleObstacle, places, radii))
-    return replace(environment, obstacles=(*environment.obstacles, *wrecks))
+    return replace(environment, obstacles=(*environment.obstacles, *map(CircleObstacle, places, radii)))
 
 
 class State(NamedTuple):

@@ -6,11 +6,7 @@ import numpy as np
 import shapely
 
 from robocov.arrays import Array
-from robocov.environment import (
-    Environment,
-    Point,
-    gaps_narrower,
-)
+from robocov.environment import Environment, Point, gaps_narrower
 
 
 def passage_words(

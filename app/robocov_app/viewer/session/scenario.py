@@ -158,10 +158,9 @@ class TeamSpec:
         """Return a team of so many robots, or of those with such numbers; ParameterError as `Team`."""
         numbers = range(1, robots + 1) if isinstance(robots, int) else robots
         team = Team.homogeneous(len(numbers), **{name: getattr(self, name) for name in UNITS})
-        changed = {
-            name: np.array([values.get(number, getattr(self, name)) for number in numbers])
-            for name, values in self.different.items()
-        }
+        changed = dict[str, Array]()
+        for name, values in self.different.items():
+            changed[name] = np.array([values.get(number, getattr(self, name)) for number in numbers])
         return replace(team, **changed) if changed else team
 
     def radius_of(self, number: int) -> float:

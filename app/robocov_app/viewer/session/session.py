@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from operator import attrgetter
 from time import perf_counter
@@ -152,10 +153,8 @@ class Session:
     def snapshot(self, pane: Pane) -> Snapshot:
         """Return the moment that is looked at; a controller that fails on it has decided nothing."""
         if self._cursor is None:
-            try:
+            with suppress(RobocovError):
                 return pane.simulation.snapshot
-            except RobocovError:
-                pass
         return replayed_snapshot(self._state(pane), self.time, self.scenario.dt)
 
     def positions(self, pane: Pane) -> Array:
@@ -439,13 +438,11 @@ class Session:
 
     def set_law(self, pane: Pane, law: ControllerChoice) -> None:
         before, change = self.setup(pane).law, changes.SetController(pane.number, law)
-        if law == before:
-            return
         if law.name != before.name:
             self.do(change, "law", f"{law.label} takes over")
-            return
-        words = law.words_since(before)
-        self.do(change, "law", f"{law.label}: {words}", ("gain", pane.number, words.partition(" = ")[0]))
+        elif law != before:
+            words = law.words_since(before)
+            self.do(change, "law", f"{law.label}: {words}", ("gain", pane.number, words.partition(" = ")[0]))
 
     def set_limits(self, limits: TeamSpec) -> None:
         if limits != self.setup(self.panes[0]).limits:

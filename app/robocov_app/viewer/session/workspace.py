@@ -18,7 +18,6 @@ from robocov_app.runs.saved import folder_names
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit import autosave
 from robocov_app.viewer.session.changes import Restart, SetController
-from robocov_app.viewer.session.document import Document
 from robocov_app.viewer.session.file import SUFFIX, save_session, session_json, session_of
 from robocov_app.viewer.session.session import Session
 
@@ -110,7 +109,10 @@ class RunSaver:
         save_session(file, session.document, session.head, session.step_now, {})
         command = [sys.executable, "-m", "robocov_app", "run", str(file), "--json"]
         command += ["--out", str(target.resolve()), "--lattice", str(self._lattice)]
-        if own := own_controllers(session.document):
+        changes = [change for node in session.document.nodes for change in node.changes]
+        used = [law for each in changes if isinstance(each, Restart) for law in each.scenario.laws]
+        used += [each.law for each in changes if isinstance(each, SetController)]
+        if own := [name for name in dict.fromkeys(law.name for law in used) if name not in CONTROLLERS]:
             command += ["--controller", ",".join(own)]
         with file.with_name(_ERRORS).open("wb") as errors:
             process = subprocess.Popen(command, stdin=DEVNULL, stdout=DEVNULL, stderr=errors)
@@ -153,13 +155,6 @@ class RunSaver:
         with suppress(OSError):
             job.target.rmdir()  # fails, as it should, where there is something in it
         self._said.append((f"run not saved: {job.target}/: {reason}", True))
-
-
-def own_controllers(document: Document) -> list[str]:
-    changes = [change for node in document.nodes for change in node.changes]
-    laws = [law for each in changes if isinstance(each, Restart) for law in each.scenario.laws]
-    laws += [each.law for each in changes if isinstance(each, SetController)]
-    return [name for name in dict.fromkeys(law.name for law in laws) if name not in CONTROLLERS]
 
 
 def _made(folder: Path, stem: str) -> Path:
