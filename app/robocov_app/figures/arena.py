@@ -21,7 +21,7 @@ from robocov_app.figures.page import figure_of, tone
 from robocov_app.render.density import density_label, shading
 from robocov_app.render.layout import fitted_radii, line_crowding, mark_size
 from robocov_app.render.scene import CENTROID, GOAL, MovingObstacle, are_centroids, moving_obstacles
-from robocov_app.render.theme import ONE_HUE_EACH, Colour, Theme, mix, readable_on, robot_hues
+from robocov_app.render.theme import Colour, Theme, mix, readable_on, robot_hues
 
 # radius of a robot where it has room and in the densest crowd, and least size of its number, in points
 _DISC, _SMALLEST_DISC, _SMALLEST_NUMBER = 6.4, 1.7, 4.2
@@ -95,13 +95,12 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     tint = theme.paper_tint if paper else theme.tint
     areas = [k for k, outline in enumerate(outlines) if len(outline) > 2]
     style: Any = {"edgecolors": tone(theme.cell_edge), "linewidths": 0.8, "zorder": 1}
-    style["facecolors"] = [
-        tone(mix(theme.background, theme.robots[hue], tint)) for hue in hues[working[owners[areas]]].tolist()
-    ]
+    own = [theme.robots[hue] for hue in hues[working[owners[areas]]].tolist()]
+    style["facecolors"] = [tone(mix(theme.background, colour, tint)) for colour in own]
     axes.add_collection(PolyCollection([outlines[k] for k in areas], **style), autolim=False)
     ways = [record.positions[record.present[:, robot], robot] for robot in range(n)]
     style = {"capstyle": "round", "joinstyle": "round", "zorder": 4, "linewidths": 1.6 * line_crowding(n)}
-    style["colors"] = [tone(colour) for colour in _line_colours(n, hues.tolist(), theme, paper)]
+    style["colors"] = [tone(colour) for colour in theme.trails(hues.tolist(), paper)]
     axes.add_collection(LineCollection(ways, **style), autolim=False)
     # of one that joins, where it does
     begin = record.positions[np.argmax(record.present, axis=0), np.arange(n)][there]
@@ -156,12 +155,6 @@ def draw_robots(
     return drawn
 
 
-def _line_colours(n: int, hues: list[int], theme: Theme, paper: bool) -> list[Colour]:
-    if paper or n > ONE_HUE_EACH:
-        return [theme.trajectory if paper else mix(theme.trajectory, theme.background, 0.25)] * n
-    return [theme.trail(hue) for hue in hues]
-
-
 def _in_points(axes: Axes, places: Array) -> Array:
     """Return where (n, 2) m places are drawn, in points."""
     axes.apply_aspect()
@@ -169,7 +162,6 @@ def _in_points(axes: Axes, places: Array) -> Array:
 
 
 def has_goals(record: Record) -> bool:
-    """Whether the controller draws robots to goals: centroids of cells, or of another kind."""
     return bool(np.isfinite(record.goals[-1]).any())
 
 
@@ -216,7 +208,7 @@ def wreck_colour(theme: Theme) -> Colour:
 def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
     paper, n = colours == "paper", record.positions.shape[1]
     failed = record.present[-1] & ~record.working[-1]
-    line = _line_colours(n, list(range(n)), theme, paper)[0]
+    line = theme.trails(list(range(n)), paper)[0]
     aims: list[Artist] = []
     if has_goals(record):
         plus = are_centroids(record.goals[-1][record.working[-1]], record.cells().centroid)

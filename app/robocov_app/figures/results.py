@@ -228,8 +228,10 @@ def _draw_points(axes: Axes, values: Array, place: float, style: CurveStyle, the
     """Draw sorted values as points, up and down so that few hide each other."""
     if len(values) > MOST_POINTS:
         values = values[np.rint(np.linspace(0, len(values) - 1, MOST_POINTS)).astype(int)]
-    alone = len(values) < FEW
-    aside = np.zeros(len(values)) if alone else (_scattered(len(values)) - 0.5) * 1.5 * _HALF
+    alone, powers = len(values) < FEW, np.arange(1, MOST_POINTS.bit_length() + 1)
+    # van der Corput's sequence, in which neighbours lie far apart
+    scattered = (np.arange(1, len(values) + 1)[:, None] >> (powers - 1) & 1) @ 0.5**powers
+    aside = np.zeros(len(values)) if alone else (scattered - 0.5) * 1.5 * _HALF
     look: Any = {"markersize": 6.0, "alpha": 1.0} if alone else {"markersize": 3.6, "alpha": 0.65}
     rim: Any = {"markeredgecolor": tone(theme.background), "markeredgewidth": 0.4}
     axes.plot(values, place + aside, "o", color=tone(style.colour(theme)), zorder=3.5, **look, **rim)
@@ -238,16 +240,6 @@ def _draw_points(axes: Axes, values: Array, place: float, style: CurveStyle, the
 def _draw_median(axes: Axes, value: float, place: float, theme: Theme) -> None:
     ends = [place - _HALF, place + _HALF]
     axes.plot([value, value], ends, color=tone(theme.ink), linewidth=2.2, solid_capstyle="butt", zorder=5)
-
-
-def _scattered(count: int) -> Array:
-    """Return numbers from 0 to 1 of which neighbours lie far apart: van der Corput's sequence."""
-    numbers = np.zeros(count)
-    rest, part = np.arange(1, count + 1), 0.5
-    while rest.any():
-        numbers += part * (rest % 2)
-        rest, part = rest // 2, part / 2
-    return numbers
 
 
 class Dependence(NamedTuple):

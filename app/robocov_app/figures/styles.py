@@ -55,9 +55,8 @@ def styles_of(controllers: Sequence[str]) -> list[CurveStyle]:
     """Return a style for each curve: another colour, dashes and mark for each of a controller's variants."""
     count = len(VARIANTS)
     # after all colours once more with the next look each: 25 that differ
-    free = itertools.cycle(
-        CurveStyle(f"other-{k}", *VARIANTS[(k + turn) % count]) for turn in range(count) for k in range(count)
-    )
+    turns = itertools.product(range(count), repeat=2)
+    free = itertools.cycle(CurveStyle(f"other-{k}", *VARIANTS[(k + turn) % count]) for turn, k in turns)
     spare = [CurveStyle(f"other-{k}", *look) for k, look in enumerate(VARIANTS)]
     names = dict.fromkeys(controllers)
     first = {name: CurveStyle(name, *_KNOWN[name]) if name in _KNOWN else next(free) for name in names}

@@ -49,6 +49,7 @@ def clipped_segment(start: Pixel, end: Pixel) -> Sequence[Pixel]:
 
 
 Sprite: TypeAlias = Callable[[tuple[int, int]], pygame.Surface]  # for a shift in quarters of a pixel
+Placed: TypeAlias = list[tuple[pygame.Surface, tuple[int, int]]]  # pictures and their corners, px
 Glyph: TypeAlias = Callable[["Canvas", float, float], None]  # around a pixel, in 22 x 14 px at scale 1
 
 
@@ -192,10 +193,7 @@ class Canvas:
         """Put sprites at (n, 2) px, to a quarter of a pixel: number `which`, (n,), or all the first."""
         self.surface.fblits(self.placed(some, centers, which), pygame.BLEND_PREMULTIPLIED)
 
-    def placed(
-        self, some: Sequence[Sprite], centers: Array, which: IntArray | None = None
-    ) -> list[tuple[pygame.Surface, tuple[int, int]]]:
-        """Return the pictures of sprites that are to be put at (n, 2) px, and their corners."""
+    def placed(self, some: Sequence[Sprite], centers: Array, which: IntArray | None = None) -> Placed:
         far = np.add(self.surface.get_size(), 500)
         near = np.flatnonzero(((centers > -500) & (centers < far)).all(axis=1))
         # as for lines, whole numbers are the middles of pixels

@@ -50,9 +50,8 @@ def colours(way: Array, theme: Theme) -> NDArray[np.uint8]:
 
 
 def density_range(environment: Environment) -> tuple[float, float]:
-    if environment.density is None:
-        return 1.0, 1.0
-    return value_range(environment.density, environment.region.bounds)
+    density, bounds = environment.density, environment.region.bounds
+    return (1.0, 1.0) if density is None else value_range(density, bounds)
 
 
 @lru_cache(maxsize=16)

@@ -162,7 +162,9 @@ class Field:
         first = distance.argmin(axis=1)
         others = np.where(owner == owner[each, first][:, None], np.inf, distance)
         second = others.argmin(axis=1)
-        u, v = (self._heading(around[each, k], px, py) for k in (first, second))
+        sites = around[each, first], around[each, second]
+        ways = [np.stack([px - self._way_x[site], py - self._way_y[site]]) for site in sites]
+        u, v = (way / np.maximum(np.hypot(*way), 1e-12) for way in ways)
         apart = np.maximum(np.hypot(*(u - v)), _SHALLOW)
         # between places that robots reach and such that none does, there is a wall
         with np.errstate(invalid="ignore"):
@@ -183,10 +185,6 @@ class Field:
     def _distance(self, site: IntArray, x: Array, y: Array) -> Array:
         dx, dy = x - self._way_x[site], y - self._way_y[site]
         return np.asarray(np.sqrt(dx * dx + dy * dy) + self._start[site])
-
-    def _heading(self, site: IntArray, x: Array, y: Array) -> Array:
-        along = np.stack([x - self._way_x[site], y - self._way_y[site]])
-        return np.asarray(along / np.maximum(np.hypot(*along), 1e-12))
 
 
 class Fields:

@@ -118,7 +118,15 @@ def field_drawing(
 
         look = (*key, canvas.hues.tolist(), "distances" in canvas.shown)
         canvas.surface.blit(kept.of(field, look, picture), corner)
-        _cut_to_region(canvas, scene)
+        # cover what lies outside the region, one edge after the other
+        corners = camera.to_pixels(scene.environment.region.vertices)
+        far = 4.0 * (np.ptp(corners, axis=0).sum() + sum(canvas.surface.get_size()))
+        for start, stop in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            along = far * (stop - start) / max(float(np.hypot(*(stop - start))), 1e-9)
+            # pixels run downwards, so that outside is on the other hand
+            outward = np.array([-along[1], along[0]])
+            ring = [start - along, stop + along, stop + along + outward, start - along + outward]
+            canvas.polygon(np.array(ring), canvas.theme.background)
 
     return draw
 
@@ -210,17 +218,6 @@ def _marks(scene: Scene) -> list[tuple[float, str]]:
     if scene.field.largest > scene.field_limit * (1.0 + 1e-9):
         words[-1] = f"≥ {words[-1]}"
     return list(zip(marks, words, strict=True))
-
-
-def _cut_to_region(canvas: Canvas, scene: Scene) -> None:
-    corners = canvas.camera.to_pixels(scene.environment.region.vertices)
-    far = 4.0 * (np.ptp(corners, axis=0).sum() + sum(canvas.surface.get_size()))
-    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        along = far * (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
-        # pixels run downwards, so that outside is on the other hand
-        outward = np.array([-along[1], along[0]])
-        ring = [start - along, end + along, end + along + outward, start - along + outward]
-        canvas.polygon(np.array(ring), canvas.theme.background)
 
 
 def _paletted(numbers: NDArray[np.uint8], colours: NDArray[np.uint8]) -> pygame.Surface:

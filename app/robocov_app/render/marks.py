@@ -10,7 +10,7 @@ from robocov.arrays import Array
 from robocov.voronoi import VoronoiPartition
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
-from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, Sprite
+from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, Placed, Sprite
 from robocov_app.render.layers import says
 from robocov_app.render.layout import fitted_radii, mark_size
 from robocov_app.render.scene import CENTROID, GOAL, Scene, are_centroids
@@ -45,26 +45,24 @@ class Starts:
     """Green rings where the robots began; their places are kept until the view changes."""
 
     def __init__(self) -> None:
-        self._rings = Latest[list[tuple[pygame.Surface, tuple[int, int]]]]()
+        self._rings = Latest[Placed]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        def rings() -> list[tuple[pygame.Surface, tuple[int, int]]]:
+        def rings() -> Placed:
             assert scene.starts is not None
             centers = canvas.camera.to_pixels(scene.starts)
             radius = rounded(0.5 * mark_size(centers, 5.0 * canvas.scale, 9.0 * canvas.scale))
-            return canvas.placed([_start_ring(canvas, radius)], centers)
+            return canvas.placed([_ring(canvas, radius)], centers)
 
         view = canvas.camera, canvas.scale, canvas.theme.name, canvas.surface.get_size()
         canvas.surface.fblits(self._rings.of(scene.starts, view, rings), pygame.BLEND_PREMULTIPLIED)
 
 
-def _start_ring(canvas: Canvas, radius: float) -> Sprite:
+def _ring(canvas: Canvas, radius: float) -> Sprite:
     return partial(sprites.ring, radius, canvas.theme.start, min(1.6 * canvas.scale, 0.4 * radius))
 
 
-starts_legend = says(
-    "start", lambda canvas, x, y: canvas.stamp(_start_ring(canvas, 4.5 * canvas.scale), (x, y))
-)
+starts_legend = says("start", lambda canvas, x, y: canvas.stamp(_ring(canvas, 4.5 * canvas.scale), (x, y)))
 
 
 def draw_robots(canvas: Canvas, scene: Scene) -> None:

@@ -119,6 +119,11 @@ class Theme:
     def controller(self, name: str) -> Colour:
         return self.controllers.get(name, self.others[0])
 
+    def trails(self, hues: list[int], paper: bool) -> list[Colour]:
+        if paper or len(hues) > ONE_HUE_EACH:
+            return [self.trajectory if paper else mix(self.trajectory, self.background, 0.25)] * len(hues)
+        return [self.trail(hue) for hue in hues]
+
     def trail(self, hue: int) -> Colour:
         """Return the colour of a robot's trajectory: its hue, but never too pale to be followed."""
         part = 0.12
@@ -154,10 +159,7 @@ _FORCES = {
     "resultant": ("1B2330", "FFFFFF"),
 }
 _OTHERS = "8A3FA8 7A5C00 28303C 007A8A D4127E", "CF8BE8 F0A94A E8ECF2 2DD4BF FF5CA4"
-_HEAT = (
-    "FBFCFE DCE6F2 B4CBE4 86A9D3 5D84BF 3F60A2 2A3F78",
-    "141B26 1B2F4B 23486F 31668F 4B88A6 78ADB8 B8D3C8",
-)
+_HEAT = "FBFCFE DCE6F2 B4CBE4 86A9D3 5D84BF 3F60A2 2A3F78", "141B26 1B2F4B 23486F 31668F 4B88A6 78ADB8 B8D3C8"
 
 
 def _theme(look: int, name: str, robots: Iterable[Colour], **numbers: Any) -> Theme:

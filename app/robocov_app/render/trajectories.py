@@ -12,7 +12,7 @@ from robocov_app.render.layout import line_crowding
 from robocov_app.render.scene import Scene
 from robocov_app.render.sprites import Sketch, visible_box
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import ONE_HUE_EACH, Colour, mix
+from robocov_app.render.theme import Colour
 
 PIECE = 2.0  # pixels between the corners of a drawn trajectory
 SECTION = 16.0  # pixels of path that are added to the page at once; what is newer is drawn anew each time
@@ -111,7 +111,7 @@ class Trajectories:
             self._key, self._drawn = key, 0
             self._ended.clear()
             if fade and time is not None:
-                _fade_onto(self._page, canvas, trail, time, fade, pen)
+                _fade_on(self._page, canvas, trail, time, fade, pen)
                 self._drawn, continues = len(trail), True
             row = trail[self._drawn - 1 if self._drawn else 0]
             self._open = [[point] for point in bounded(canvas.camera.to_pixels(row)).tolist()]
@@ -127,13 +127,9 @@ class Trajectories:
         return len(rows) > 0
 
     def _of_robots(self, canvas: Canvas) -> list[Colour]:
-        theme, n = canvas.theme, len(canvas.hues)
-        if self.colours == "paper":
-            return [theme.trajectory] * n
-        if n > ONE_HUE_EACH:
-            return [mix(theme.trajectory, theme.background, 0.25)] * n
-        hues = canvas.hues.tolist()
-        return self._trail_colours.of(None, (theme.name, hues), lambda: [theme.trail(hue) for hue in hues])
+        hues, paper = canvas.hues.tolist(), self.colours == "paper"
+        look = canvas.theme.name, hues, paper
+        return self._trail_colours.of(None, look, lambda: canvas.theme.trails(hues, paper))
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
@@ -148,9 +144,7 @@ class Trajectories:
         return [LegendEntry("trajectory", glyph, self.colours)]
 
 
-def _fade_onto(
-    page: pygame.Surface, canvas: Canvas, trail: Array, time: Array, fade: float, pen: Pen
-) -> None:
+def _fade_on(page: pygame.Surface, canvas: Canvas, trail: Array, time: Array, fade: float, pen: Pen) -> None:
     begin, (colours, width) = int(np.searchsorted(time, time[-1] - fade)), pen
     points = bounded(canvas.camera.to_pixels(trail[begin:]))
     box = visible_box(points, 5.0 + width, page)

@@ -28,12 +28,9 @@ from robocov_app.replication.outcomes import EARLY, FIRST_MINUTE, Comparison, Ga
 from robocov_app.replication.plan import CONVEX_KINDS, Plan
 from robocov_app.replication.results import BeyondResults, Degradation
 from robocov_app.replication.step_times import StepTimes
-from robocov_app.report.groups import parted
+from robocov_app.report.groups import FEW_MAPS, parted
 
 Verdict: TypeAlias = Literal["holds", "holds partly", "does not hold", "undecided"]
-
-# a bootstrap over fewer maps has too few different samples for a 95 % interval (126 of five)
-LEAST_MAPS = 5
 
 # how verdicts are said of one claim, and of several
 VERDICTS: dict[Verdict, tuple[str, str]] = {
@@ -128,7 +125,7 @@ class Claim:
     runs: int = 0  # simulated runs that went into it
     maps: int = 0  # different maps among them
     explanation: str = "There is no run that could tell."
-    least_maps: int = LEAST_MAPS  # on fewer maps it is undecided
+    least_maps: int = FEW_MAPS  # on fewer maps it is undecided
 
     def judged(self, by: Iterable[Criterion], why: str, on: Outcomes | GainOutcomes, runs: int) -> Claim:
         """Return the claim with what `runs` runs in each of some scenarios say of it."""
@@ -193,11 +190,9 @@ def verdict_counts(claims: Sequence[Claim]) -> str:
     return f"Of {len(claims)} claims {', '.join(parts)}."
 
 
-def paper_claims(
-    convex: Outcomes, nonconvex: Outcomes, gains: Mapping[str, GainOutcomes]
-) -> tuple[Claim, ...]:
+def paper_claims(convex: Outcomes, nonconvex: Outcomes, gains: Mapping[str, GainOutcomes]) -> list[Claim]:
     rapf, rpf = same_scenarios(gains["rapf"], gains["rpf"])
-    return (
+    return [
         convex_final(convex),
         convex_spreading(convex),
         *(against_rpf(nonconvex, at, moment) for moment in ("final", "motion") for at in ("shared", "best")),
@@ -208,7 +203,7 @@ def paper_claims(
         lloyd_stuck(nonconvex),
         against_lloyd(nonconvex),
         *(gap_to_reference(nonconvex, law) for law in ("rapf-shared", "rpf-shared", "lloyd")),
-    )
+    ]
 
 
 def _both(measure: str, ours: Array, theirs: Array, maps: Sequence[str], bound: float) -> list[Criterion]:

@@ -65,8 +65,8 @@ _APART = 0.13  # heights have words where their places are so far apart, as a pa
 _LOW, _HIGH = 0.01, 100.0  # the range of heights, m
 _LIMIT = 1e-7  # so high, relative to the cell's size, a sensor is as good as on the ground
 
-# how every plot is drawn, by its name; those without a run are left out
-Plots: TypeAlias = Mapping[str, Callable[[], Figure]]
+Draw: TypeAlias = Callable[[], Figure]
+Plots: TypeAlias = Mapping[str, Draw]  # how each is drawn, by its name; those without a run are left out
 
 
 def draw_figure(number: int, runs: Mapping[str, FigureRun], first: Record, theme: Theme | str) -> Figure:
@@ -74,7 +74,13 @@ def draw_figure(number: int, runs: Mapping[str, FigureRun], first: Record, theme
     if number == 1:
         return partition_figure(first, theme)
     pair = _pair(runs, number)
-    return cost_figure(pair, theme) if number in COSTS else trajectories_figure(pair, theme)
+    if number in COSTS:
+        return cost_figure(pair, theme)
+    records = [run.record for run in pair]
+    aiming = [record for record in records if arena.has_goals(record)]
+    hidden = all((np.hypot(*(each.goals[-1] - each.positions[-1]).T) < HIDDEN).all() for each in aiming)
+    heads = [(run.record.label, f"mean distance {run.history.mean_distance[-1]:.3f} m") for run in pair]
+    return side_by_side(records, heads, theme, (CENTROID, GOAL) if hidden else ())
 
 
 def describe_figure(number: int, runs: Mapping[str, FigureRun], first: Record) -> str:
@@ -131,14 +137,6 @@ def partition_figure(first: Record, theme: Theme = LIGHT) -> Figure:
     axes.plot(*cells.centroid.T, zorder=8, clip_on=False, **dot)
     arena.draw_robots(axes, robots, first.team.radius, [theme.final] * len(robots), theme)
     return page.figure
-
-
-def trajectories_figure(runs: Sequence[FigureRun], theme: Theme = LIGHT) -> Figure:
-    records = [run.record for run in runs]
-    aiming = [record for record in records if arena.has_goals(record)]
-    hidden = all((np.hypot(*(each.goals[-1] - each.positions[-1]).T) < HIDDEN).all() for each in aiming)
-    heads = [(run.record.label, f"mean distance {run.history.mean_distance[-1]:.3f} m") for run in runs]
-    return side_by_side(records, heads, theme, (CENTROID, GOAL) if hidden else ())
 
 
 @plain_style()
@@ -225,7 +223,7 @@ def paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
         by_start.append((LABELS[law], _samples(own)))
     gaps = [("", _samples((label, claims, law) for law, label in LABELS.items()))]
     known = all(grid.complete.scenarios for grid in results.gains.values())
-    plots: dict[str, Callable[[], Figure] | None] = {
+    plots: dict[str, Draw | None] = {
         "claim-1-convex": _pairs_plot(against_lloyd, "RAPF by LA, pair by pair (1: equal)", theme),
         "claim-2-nonconvex": _pairs_plot(nonconvex, "RAPF by the other law, pair by pair (1: equal)", theme),
         "claim-3-gains": partial(gains_plot, results.gains, theme) if known else None,
@@ -252,7 +250,7 @@ def beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
     finals = (f"mean distance by φ {cost:.3f} m" for cost in results.density.costs)
     heads = list(zip(("knows φ", "ignores φ"), finals, strict=True))
     known = any(np.isfinite(each.ratio.estimate) for each in results.degradations)
-    plots: dict[str, Callable[[], Figure] | None] = {
+    plots: dict[str, Draw | None] = {
         "beyond-gaps": partial(gaps_plot, samples, theme) if samples else None,
         "beyond-pairs": _pairs_plot(duels, "ours by the other's, pair by pair (1: equal)", theme),
         "beyond-heights": partial(plot_heights, size, theme, 0.68 * DOTS),
@@ -371,9 +369,7 @@ def style_of(controller: str) -> CurveStyle:
     return style._replace(name=other) if style.name.startswith("other") else style
 
 
-def _pairs_plot(
-    rows: Iterable[tuple[str, Comparison | None, str]], label: str, theme: Theme
-) -> Callable[[], Figure] | None:
+def _pairs_plot(rows: Iterable[tuple[str, Comparison | None, str]], label: str, theme: Theme) -> Draw | None:
     """Return how pairs are drawn: words, comparison, and the controller that the style is of."""
     pairs = [Pairs(words, style_of(law), each.ratios, each.ratio) for words, each, law in rows if each]
 
@@ -398,7 +394,7 @@ def _samples(rows: Iterable[tuple[str, Outcomes, str]]) -> list[Sample]:
     return [Sample(words, style, values) for (words, _, values), style in zip(known, styles, strict=True)]
 
 
-def _boxes_plot(rows: Iterable[tuple[str, Sequence[Sample]]], theme: Theme) -> Callable[[], Figure] | None:
+def _boxes_plot(rows: Iterable[tuple[str, Sequence[Sample]]], theme: Theme) -> Draw | None:
     there = [row for row in rows if row[1]]
     label = "J/J_ref at the end (1: the centralised reference)"
     return partial(plot_final_costs, there, label, WIDE, DOTS, theme, origin=1.0) if there else None

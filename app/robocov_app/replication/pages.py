@@ -19,12 +19,13 @@ from robocov.record import Record, versions
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.statistics import RESAMPLES
 from robocov_app.replication import claims, contenders, evidence, figures, step_times, studies
-from robocov_app.replication.claims import LEAST_MAPS, Claim, Criterion, amount, described, verdict_counts
+from robocov_app.replication.claims import Claim, Criterion, amount, described, verdict_counts
 from robocov_app.replication.contenders import ASSETS, LABELS, OURS
 from robocov_app.replication.evidence import Evidence
 from robocov_app.replication.outcomes import Outcomes, Scenario
 from robocov_app.replication.plan import FULL, NON_CONVEX, ROBOTS, TEAM, Plan
 from robocov_app.replication.results import BeyondResults, FigureRun, PaperResults
+from robocov_app.report.groups import FEW_MAPS
 from robocov_app.report.pictures import run_picture
 from robocov_app.report.replay import ReplayRun, asset, replay_css, replay_js, replay_part, script
 from robocov_app.report.theme_css import theme_rules
@@ -196,7 +197,7 @@ def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
     known(t=claims, contender=contenders, studies=studies, timing=step_times)
     known(bar=interval_bar, amount=amount, described=described, counts=verdict_counts)
     known(account_of=evidence.account_of, units=UNITS, team=TEAM, robots=ROBOTS)
-    known(settled=(SETTLED_DISTANCE, SETTLED_WINDOW), resamples=RESAMPLES, least_maps=LEAST_MAPS)
+    known(settled=(SETTLED_DISTANCE, SETTLED_WINDOW), resamples=RESAMPLES, least_maps=FEW_MAPS)
     known(page=PAGE, beyond_page=BEYOND_PAGE, version=__version__, plan=plan, quick=plan.name == "quick")
     own = (ASSETS / "paper.css").read_text("utf-8")
     style = Markup(theme_rules(":root") + replay_css() + asset("report.css") + own)

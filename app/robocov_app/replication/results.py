@@ -30,6 +30,7 @@ from robocov_app.replication.plan import PARTITION_SEED, ROBOTS, Plan
 from robocov_app.replication.references import References, find_references
 from robocov_app.replication.step_times import UNKNOWN, StepTimes, step_times
 from robocov_app.replication.studies import BASELINE_GAINS
+from robocov_app.report.groups import FEW_MAPS
 from robocov_app.sweep import worker
 from robocov_app.sweep.executors import LocalPool
 from robocov_app.sweep.ledger import Ledger, opened
@@ -41,10 +42,9 @@ MARK = "paper.json"  # says that a folder is that of a study of the paper, and w
 _HEAD = {"format": "robocov-paper", "version": 1}
 WORST = 4  # so many of RAPF's worst runs are shown
 
-# maps from which intervals draw whole maps; of fewer, runs one by one: they are then of these maps alone
-ENOUGH_MAPS = 5
-
 ShownRuns: TypeAlias = list[tuple[Scenario, Record]]
+# final costs by map and seed, by controller and value of a column
+Finals: TypeAlias = dict[tuple[str, float | None], dict[tuple[str, int], float]]
 
 
 class Interrupted(Exception):  # noqa: N818 - it is no error
@@ -213,7 +213,12 @@ def references_of(on: Sequence[StudyMap], folder: Path, plan: Plan, options: Run
 
 def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bool) -> Forecast:
     sweeps = studies.figure_studies(plan)
-    papers = expected_contenders(plan) if claims or (beyond and grid_is_done(folder, plan)) else UNTUNED
+    papers: tuple[Contender, ...] = UNTUNED
+    if claims or (beyond and grid_is_done(folder, plan)):
+        # any gains stand for the best, distinct ones where that can be
+        grids = studies.gain_sets(plan).items()
+        guesses = (paper_contenders({law: grid[k] for law, grid in grids}) for k in (0, -1))
+        papers = max(guesses, key=lambda guess: sum(map(len, laws.distinct_gains(guess).values())))
     if claims:
         sweeps["gains"] = studies.gains_study(plan)
         sweeps["convex"] = studies.convex_contest(plan, papers).study
@@ -244,13 +249,6 @@ def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bo
         work += left[name] * float(mean) * study.duration
     seconds = {law: value * plan.duration for law, value in each.items()}
     return Forecast(runs, sum(left.values()), work / workers, seconds)
-
-
-def expected_contenders(plan: Plan) -> tuple[Contender, ...]:
-    """Return the paper's contenders with any gains for the best, distinct where that can be."""
-    grids = studies.gain_sets(plan).items()
-    guesses = (paper_contenders({law: grid[k] for law, grid in grids}) for k in (0, -1))
-    return max(guesses, key=lambda guess: sum(map(len, laws.distinct_gains(guess).values())))
 
 
 def grid_is_done(folder: Path, plan: Plan) -> bool:
@@ -381,18 +379,17 @@ def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
                 got = usual if value == best else disturbed.get((controller, value), {})
                 ratios = {key: got[key] / usual[key] for key in usual if key in got}
                 names = [name for name, _ in ratios]
-                clusters = names if len(set(names)) >= ENOUGH_MAPS else None
+                # of few maps runs are drawn one by one: the interval is then of these maps alone
+                clusters = names if len(set(names)) >= FEW_MAPS else None
                 ratio = bootstrap([*ratios.values()], clusters=clusters) if ratios else UNKNOWN
                 label = str(controller_kind(controller).label)
                 found.append(Degradation(axis, value, controller, label, ratio, len(ratios)))
     return found
 
 
-def _finals(
-    folder: Path, column: str = "", only: float | None = None
-) -> dict[tuple[str, float | None], dict[tuple[str, int], float]]:
-    """Return final costs by map and seed, by controller and value of a column, `only` if there is none."""
-    found: dict[tuple[str, float | None], dict[tuple[str, int], float]] = {}
+def _finals(folder: Path, column: str = "", only: float | None = None) -> Finals:
+    """Return the final costs of a sweep; without the column its value is `only`."""
+    found: Finals = {}
     for row in read_results(folder).to_table().to_pylist():
         if row["mean_distance_m"] is not None:
             group = found.setdefault((row["controller"], row.get(column, only)), {})

@@ -78,7 +78,7 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
         "summaries": tables.summary_tables(result),
         "costs": list(plots.cost_plots(result, looks, f"{key}c")),
         "medians": any(len(group.entries) > 1 for group in grouped.variants(result)),
-        "measures": plots.measure_plots(result, replayed, choice.entries, looks, f"{key}m"),
+        "measures": plots.measure_plots(result, replayed, looks, f"{key}m"),
         "finals": list(plots.final_plots(result, looks, f"{key}f")),
         "pairs": tables.pairs_table(pairs) if pairs else None,
         "pairs_plots": list(plots.paired_plots(pairs, looks, f"{key}p")),

@@ -50,6 +50,20 @@ def lede(result: Result, comparisons: Sequence[Comparison]) -> list[str]:
 def facts(result: Result) -> list[tuple[str, str]]:
     starts = dict.fromkeys(entry.start for entry in result.entries)
     sizes = sorted({entry.robots for entry in result.entries})
+    done = len(result.fine)
+    runs = [str(done) if done == result.wanted else f"{done} done"]
+    runs += [f"{len(result.failed)} failed"] * bool(result.failed)
+    runs += [f"{len(result.damaged)} unreadable"] * bool(result.damaged)
+    runs += [f"{result.missing} of {result.wanted} missing"] * bool(result.missing)
+    seeds = sorted({entry.seed for entry in result.entries if entry.seed is not None})
+    drawn = ", ".join(map(str, seeds[:12])) + (f", … ({len(seeds)})" if len(seeds) > 12 else "")
+    if len(seeds) > 2 and seeds[-1] - seeds[0] == len(seeds) - 1:
+        drawn = f"{seeds[0]} to {seeds[-1]}"
+    team = result.facts.get("team")
+    parts = [_parameter(str(key), value) for key, value in team.items()] if isinstance(team, dict) else []
+    for name, _ in result.entries[0].team if result.entries else ():
+        values = dict.fromkeys(parameter_text(name, dict(entry.team)[name]) for entry in result.entries)
+        parts.append(f"{name.replace('_', ' ')} {', '.join(values)}")
     versions = result.facts.get("versions")
     versions = versions if isinstance(versions, dict) else {}
 
@@ -58,13 +72,13 @@ def facts(result: Result) -> list[tuple[str, str]]:
         return "" if value is None else form.format(factor * value)
 
     rows = [
-        ("Runs", _runs_text(result)),
+        ("Runs", ", ".join(runs)),
         ("Maps", ", ".join(result.maps)),
         ("Weighed by", weighed_text(result)),
         ("Robots", ", ".join(map(str, sizes))),
-        ("Team", _team_text(result)),
+        ("Team", ", ".join(filter(None, parts))),
         ("Starts", ", ".join("given positions" if start is None else start for start in starts)),
-        ("Seeds", _seeds_text(result)),
+        ("Seeds", drawn),
         ("Duration", known("{:.6g} s", "duration_s")),
         ("Control period", known("{:.4g} ms", "dt_s", 1000)),
         ("Cost evaluated on", known("a lattice of {0} × {0} sites", "lattice")),
@@ -149,32 +163,6 @@ def run_facts(result: Result, entry: Entry) -> str:
 def _listed(names: Sequence[str], most: int = 4) -> str:
     shown = ", ".join(names[:most])
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
-
-
-def _runs_text(result: Result) -> str:
-    done = len(result.fine)
-    words = [str(done) if done == result.wanted else f"{done} done"]
-    words += [f"{len(result.failed)} failed"] * bool(result.failed)
-    words += [f"{len(result.damaged)} unreadable"] * bool(result.damaged)
-    words += [f"{result.missing} of {result.wanted} missing"] * bool(result.missing)
-    return ", ".join(words)
-
-
-def _seeds_text(result: Result) -> str:
-    seeds = sorted({entry.seed for entry in result.entries if entry.seed is not None})
-    if len(seeds) > 2 and seeds[-1] - seeds[0] == len(seeds) - 1:
-        return f"{seeds[0]} to {seeds[-1]}"
-    shown = ", ".join(map(str, seeds[:12]))
-    return shown if len(seeds) <= 12 else f"{shown}, … ({len(seeds)})"
-
-
-def _team_text(result: Result) -> str:
-    team = result.facts.get("team")
-    parts = [_parameter(str(key), value) for key, value in team.items()] if isinstance(team, dict) else []
-    for name, _ in result.entries[0].team if result.entries else ():
-        values = dict.fromkeys(parameter_text(name, dict(entry.team)[name]) for entry in result.entries)
-        parts.append(f"{name.replace('_', ' ')} {', '.join(values)}")
-    return ", ".join(filter(None, parts))
 
 
 def _parameter(key: str, value: Any) -> str:

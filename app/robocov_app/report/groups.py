@@ -221,10 +221,8 @@ def comparisons(groups: Sequence[Group]) -> list[Comparison]:
 
 
 def compared(first: Group, second: Group) -> Comparison | None:
-    a, b = (
-        {entry.case: entry for entry in group.entries if np.isfinite(entry.final) and entry.final > 0.0}
-        for group in (first, second)
-    )
+    both = first.entries, second.entries
+    a, b = ({entry.case: entry for entry in own if 0.0 < entry.final < np.inf} for own in both)
     cases = parted((entry for case, entry in a.items() if case in b), lambda entry: entry.map)
     if not cases:
         return None

@@ -273,20 +273,16 @@ _PANELS: tuple[tuple[str, str, str, Callable[[RunMetrics], Array]], ...] = (
 )
 
 
-def measure_plots(
-    result: Result, runs: Sequence[ReplayRun], entries: Sequence[Entry], looks: Looks, key: str
-) -> list[Plot]:
+def measure_plots(result: Result, runs: Sequence[ReplayRun], looks: Looks, key: str) -> list[Plot]:
     """Return a plot for each metric that tells something; none of a sweep, or where ways are not known."""
     if result.kind == "sweep" or not 0 < len(runs) <= MOST_MEASURED:
         return []
     if any(len(run.record.team) > MOST_ROBOTS or not has_path(run.record) for run in runs):
         return []
-    labels = {entry: group.label for group in grouped.shown_groups(result) for entry in group.entries}
-    spans = [float(run.record.time[-1] - run.record.time[0]) for run in runs]
-    measured = [
-        run_metrics(run.record, _MEASURED / seconds if seconds > 0.0 else 0.0)
-        for run, seconds in zip(runs, spans, strict=True)
-    ]
+    measured = []
+    for record in (run.record for run in runs):
+        seconds = float(record.time[-1] - record.time[0])
+        measured.append(run_metrics(record, _MEASURED / seconds if seconds > 0.0 else 0.0))
     parting = any((metrics.components != metrics.components[0]).any() for metrics in measured)
     curves = [
         (title, label, unit, [(metrics.time, of(metrics)) for metrics in measured])
@@ -300,9 +296,9 @@ def measure_plots(
     plots = []
     for title, label, unit, found in curves:
         bands = [
-            Band(labels[entry], looks[labels[entry]], time - time[0], np.where(known, values, np.nan)[None])
-            for entry, (time, values) in zip(entries, found, strict=True)
-            if entry in labels and (known := np.isfinite(values)).any()
+            Band(run.label, looks[run.label], time - time[0], np.where(known, values, np.nan)[None])
+            for run, (time, values) in zip(runs, found, strict=True)
+            if (known := np.isfinite(values)).any()
         ]
         if not bands:
             continue

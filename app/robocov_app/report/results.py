@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -338,15 +338,13 @@ def _gains(gains: Mapping[str, Value]) -> Gains:
     return tuple((printable(name), value) for name, value in known)
 
 
-def _known_gains(
-    entries: list[Entry], documented: Mapping[str, Sequence[str]]
-) -> tuple[dict[str, str], dict[str, str]]:
+def _known_gains(entries: list[Entry], others: dict[str, list[str]]) -> tuple[dict[str, str], dict[str, str]]:
     """Return units and meanings of gains: of the built-in controllers, and what a table says of others."""
     kinds = dict.fromkeys(CONTROLLERS[each.controller] for each in entries if each.controller in CONTROLLERS)
     gains = {name: gain for kind in kinds for name, gain in gains_of(kind).items()}
     units = {name: gain.unit for name, gain in gains.items()}
     meanings = {name: gain.meaning for name, gain in gains.items()}
-    for name, (unit, meaning) in documented.items():
+    for name, (unit, meaning) in others.items():
         if unit or meaning:
             units.setdefault(name, "" if unit == "1" else printable(unit))
             meanings.setdefault(name, printable(meaning))

@@ -56,21 +56,17 @@ class _Copy:
         for child in source:
             tag, clip = child.tag.removeprefix(_SPACE), child.get("clip-path")
             if tag == "defs":
-                for shape in child:
-                    self._define(shape)
+                for shape in (each for each in child if "id" in each.attrib):
+                    element = self._element(shape)
+                    element.extend([self._element(part) for part in shape])
+                    element.set("id", self._name(shape.attrib["id"]))
+                    element.attrib.pop("style", None)  # uses have their own
+                    self.definitions.append(element)
             elif tag == "g":
                 into = {} if clip is None else {"clip-path": self._renamed(clip)}
                 self.drawn(child, SubElement(target, "g", into) if into else target)
             elif tag in ("path", "text", "rect", "image") or (tag == "use" and dots is None):
                 target.append(self._element(child))
-
-    def _define(self, shape: Element) -> None:
-        if "id" in shape.attrib:
-            element = self._element(shape)
-            element.extend([self._element(child) for child in shape])
-            element.set("id", self._name(shape.attrib["id"]))
-            element.attrib.pop("style", None)  # uses have their own
-            self.definitions.append(element)
 
     def _name(self, old: str) -> str:
         return self._names.setdefault(old, f"{self._key}-{len(self._names)}")

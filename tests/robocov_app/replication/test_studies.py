@@ -10,7 +10,6 @@ from robocov.environment import CircleObstacle, DiscStart, Environment, PolygonO
 from robocov.errors import StartError
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.replication import studies
-from robocov_app.replication.claims import LEAST_MAPS
 from robocov_app.replication.contenders import (
     GRIDS,
     LLOYD,
@@ -25,6 +24,7 @@ from robocov_app.replication.contenders import (
 )
 from robocov_app.replication.evidence import account_of
 from robocov_app.replication.plan import CONVEX, CONVEX_KINDS, FULL, KINDS, NON_CONVEX, QUICK, TEAM
+from robocov_app.report.groups import FEW_MAPS
 from robocov_app.sweep.study import TEAM as TEAM_PARAMETERS
 from robocov_app.sweep.study import tasks_of
 
@@ -121,7 +121,7 @@ class TestMaps:
         )
         unseen = {each.name: each.environment for each in unseen}
         known = [*studies.claim_maps(FULL), *tuning, *small]
-        assert len(unseen) >= LEAST_MAPS
+        assert len(unseen) >= FEW_MAPS
         assert not set(unseen) & {each.name for each in known}
         assert not set(unseen.values()) & {each.environment for each in known}
         contest = studies.beyond_contests(FULL, {}, UNTUNED)["unseen"]

@@ -1,6 +1,7 @@
 """The metrics of single runs as small plots of the report."""
 
 from dataclasses import replace
+from itertools import cycle
 
 import numpy as np
 import pytest
@@ -26,7 +27,8 @@ def run_of(controller: str = "rapf", timed: bool = False, **walking) -> ReplayRu
 
 
 def plots_of(runs: list[ReplayRun], result=RESULT) -> dict[str, str]:
-    plots = measure_plots(result, runs, result.entries[: len(runs)], styles(result), "m")
+    shown = [replace(run, label=each.label) for run, each in zip(runs, cycle(result.entries), strict=False)]
+    plots = measure_plots(result, shown, styles(result), "m")
     return {plot.title: plot.svg for plot in plots}
 
 
