@@ -202,7 +202,7 @@ AREA = ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0))
 
 class TestAreas:
     def test_they_are_added_moved_weighed_and_taken_away(self):
-        sketch = density_edits.area_added(sheet(), AREA, 3.0).sketch
+        sketch = density_edits.area_added(sheet(), WeightedArea(AREA, 3.0)).sketch
         assert sketch.density == WeightedPolygons((WeightedArea(AREA, 3.0),), 1.0)
         moved = density_edits.moved(sketch, 0, 1.0, -1.0).sketch
         assert moved.density.areas[0].vertices[0] == (3.0, 1.0)
@@ -228,9 +228,12 @@ class TestAreas:
     @pytest.mark.parametrize(
         ("act", "words"),
         [
-            (lambda s: density_edits.area_added(s, AREA[:2], 1.0), "three corners"),
-            (lambda s: density_edits.area_added(s, (*AREA[:2], AREA[3], AREA[2]), 1.0), "crossings"),
-            (lambda s: density_edits.area_added(heavy(), AREA, 1.0), "is a gaussians"),
+            (lambda s: density_edits.area_added(s, WeightedArea(AREA[:2], 1.0)), "three corners"),
+            (
+                lambda s: density_edits.area_added(s, WeightedArea((*AREA[:2], AREA[3], AREA[2]), 1.0)),
+                "crossings",
+            ),
+            (lambda s: density_edits.area_added(heavy(), WeightedArea(AREA, 1.0)), "is a gaussians"),
             (lambda s: density_edits.corner_moved(s, 0, 9, (0.0, 0.0)), "no such corner"),
             (lambda s: density_edits.peak_sized(s, 0, 1.0), "no such hot spot"),
             (lambda s: density_edits.weighed(density_edits.floor_set(s, 0.0).sketch, 0, 0.0), "above 0"),
@@ -238,7 +241,7 @@ class TestAreas:
     )
     def test_what_cannot_be(self, act, words):
         with pytest.raises(MapError, match=words):
-            act(density_edits.area_added(sheet(), AREA, 3.0).sketch)
+            act(density_edits.area_added(sheet(), WeightedArea(AREA, 3.0)).sketch)
 
     def test_the_bundled_hospital_is_edited_with_the_mouse_and_by_typing(self, tmp_path):
         sketch = Sketch.from_environment(load_map("hospital"))

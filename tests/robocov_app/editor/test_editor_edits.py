@@ -101,7 +101,7 @@ def test_boundary_and_starts_are_drawn(sketch):
         (lambda s: transform.moved(s, ALL, 1e9, 1), "too far away"),
         (lambda s: transform.moved(s, ALL, math.nan, 1), "too far away"),
         (lambda s: transform.rotated(s, ALL, math.inf), "an angle"),
-        (lambda s: transform.scaled(s, ALL, 0.0), "a factor that is not 0"),
+        (lambda s: transform.scaled(s, ALL, 0.0, 0.0), "a factor that is not 0"),
         (lambda s: transform.scaled(s, Selection.of("corner"), 1.0, 2.0), "by the same factor both ways"),
         (lambda s: transform.resized(s, Selection.of(0), None, None), "a width or a height"),
         (lambda s: transform.resized(s, Selection.of(0), 0.0, None), "a width from 1 mm"),
@@ -190,7 +190,7 @@ def test_circles_walls_and_starts_turn_too(sketch):
 
 
 def test_scaling_both_ways_grows_radii_and_widths(sketch):
-    change = transform.scaled(sketch, ALL, 2.0, about=(0.0, 0.0))
+    change = transform.scaled(sketch, ALL, 2.0, 2.0, (0.0, 0.0))
     assert change.sketch.item(1).shape == CircleObstacle((12.0, 8.0), 1.0, "pillar")
     assert change.sketch.item(2).shape == WallObstacle(((10.0, 0.0), (10.0, 4.8), (14.0, 4.8)), 0.2)
     assert change.sketch.start("corner") == DiscStart((2.0, 10.0), 1.6)
@@ -249,7 +249,7 @@ def test_single_vertices_go_along_unless_their_owner_does(sketch):
     assert change.sketch.item(0).shape.vertices == ((1.0, 1.0), (3.0, 1.0), (4.0, 2.0), (1.0, 2.0))
     assert change.sketch.item(1).shape.center == (7.0, 4.0)
     once = transform.moved(sketch, Selection(frozenset({0}), frozenset({corner})), 1.0, 0.0)
-    assert once.sketch.item(0).shape == Affine.shift(1.0, 0.0).thing(BOX)
+    assert once.sketch.item(0).shape == Affine(x0=1.0).thing(BOX)
     turned = transform.rotated(sketch, Selection(vertices=frozenset({corner, Vertex(0, 0, 3)})), 180.0)
     assert turned.sketch.item(0).shape.vertices == ((1.0, 1.0), (3.0, 1.0), (1.0, 2.0), (3.0, 2.0))
 
@@ -258,7 +258,7 @@ def test_copies(sketch):
     noted = properties.noted(sketch, Selection.of(0), "oak").sketch
     change = transform.duplicated(noted, Selection.of(0, "corner", "all"), 1.0, 0.5)
     copy = change.sketch.obstacles[-1]
-    assert copy.shape == Affine.shift(1.0, 0.5).thing(BOX)
+    assert copy.shape == Affine(x0=1.0, y0=0.5).thing(BOX)
     assert copy.note == "oak"
     assert change.sketch.start("corner 2") == DiscStart((2.0, 5.5), 0.8)
     assert change.selection == Selection.of(copy.key, "corner 2", "all 2")

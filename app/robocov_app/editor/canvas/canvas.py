@@ -20,7 +20,7 @@ from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.select import Moving
-from robocov_app.editor.tools.tool import KNOB, frame_of, handles
+from robocov_app.editor.tools.tool import frame_of, handles
 from robocov_app.editor.ui.editor import Editor, Team
 from robocov_app.render import annotations, heatmaps, marks, sprites
 from robocov_app.render.camera import Camera
@@ -234,12 +234,11 @@ class EditorCanvas:
     def _carry(self, screen: Surface, view: View, drag: Moving) -> None:
         assert drag.offset is not None
         sketch, colour = self.editor.sketch, self.theme.final
-        fill = mix(self.theme.obstacle, colour, 0.22)
 
         def drawn() -> Surface:
             page = view.page()
             there = [item for item in sketch.obstacles if item.key in drag.moving.items]
-            self.sheet.draw_items(page, there, fill, colour)
+            self.sheet.draw_items(page, there, mix(self.theme.obstacle, colour, 0.22), colour)
             for owner in drag.moving.owners - drag.moving.items:
                 self._draw_owner(page, sketch, owner, colour, 2.0)
             return page.surface
@@ -299,7 +298,7 @@ class EditorCanvas:
             rim = overlay.pixels(canvas, shapely.box(*box).exterior.coords).tolist()
             overlay.dashed(canvas, rim, mix(floor, colour, 0.6), 3.0)
         found = editor.handles if sketch is editor.sketch else handles(sketch, selection, editor.pixel)
-        overlay.draw_grips(canvas, found, selection.vertices, selector.near, KNOB * canvas.scale)
+        overlay.draw_grips(canvas, found, selection.vertices, selector.near)
 
     def _draw_owner(self, canvas: Canvas, sketch: Sketch, owner: Owner, colour: Colour, width: float) -> None:
         if isinstance(owner, str):

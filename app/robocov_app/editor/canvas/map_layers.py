@@ -116,8 +116,7 @@ class View:
 
     @property
     def clip(self) -> Rect:
-        left, top, width, height = (round(value) for value in self.camera.view)
-        return Rect(left, top, width, height)
+        return Rect([round(value) for value in self.camera.view])
 
     def canvas(self, surface: Surface) -> Canvas:
         return Canvas(surface, self.camera, self.theme, self.scale, robot_hues(0))
@@ -184,8 +183,7 @@ class ReferenceImage:
 def _on_white(picture: Image.Image) -> Image.Image:
     if picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info:
         clear = picture.convert("RGBA")
-        page = Image.new("RGBA", clear.size, (255, 255, 255, 255))
-        return Image.alpha_composite(page, clear).convert("RGB")
+        return Image.alpha_composite(Image.new("RGBA", clear.size, "white"), clear).convert("RGB")
     if picture.mode.startswith("I") or picture.mode == "F":
         values = np.asarray(picture, dtype=float)
         grey = (values - values.min()) * (255.0 / max(float(np.ptp(values)), 1e-9))
@@ -387,10 +385,9 @@ def grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, float]:
 def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], colour: Colour) -> None:
     width = canvas.width(canvas.theme.line)
     if width == 1 and (not len(corners) or np.abs(corners).max() <= FAR):
-        points = corners.tolist()
         for begin, end in pairwise((0, *ends)):
             if end - begin > 1:
-                pygame.draw.aalines(canvas.surface, colour, True, points[begin:end])
+                pygame.draw.aalines(canvas.surface, colour, True, corners[begin:end].tolist())
         return
     following = np.arange(1, len(corners) + 1)
     following[np.array(ends) - 1] = [0, *ends[:-1]]

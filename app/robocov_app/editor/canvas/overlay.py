@@ -17,7 +17,7 @@ from robocov_app.editor.model.measurement import Measurement
 from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.snapping import Guide
-from robocov_app.editor.tools.tool import Handle, Preview
+from robocov_app.editor.tools.tool import KNOB, Handle, Preview
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry
 from robocov_app.render.theme import Colour, Theme, mix
@@ -47,13 +47,10 @@ def _ring(canvas: Canvas, at: Point, radius: float, colour: Colour, width: float
     canvas.stamp(partial(sprites.ring, radius * canvas.scale, colour, width * canvas.scale), at)
 
 
-def _disc(
-    canvas: Canvas, at: Point, radius: float, colours: Sequence[Colour], width: float, text: str = ""
-) -> None:
+def _disc(canvas: Canvas, at: Point, radius: float, colours: Sequence[Colour], rim: float, text: str) -> None:
     """Draw a disc: colours of its inside, of the ring around it, of what is around that."""
     fill, ring, edge = colours
-    width *= canvas.scale
-    canvas.stamp(partial(sprites.disc, radius * canvas.scale, fill, ring, width, edge, text), at)
+    canvas.stamp(partial(sprites.disc, radius * canvas.scale, fill, ring, rim * canvas.scale, edge, text), at)
 
 
 def dashed(canvas: Canvas, points: Iterable[sprites.Pixel], colour: Colour, dash: float = 4.0) -> None:
@@ -61,20 +58,17 @@ def dashed(canvas: Canvas, points: Iterable[sprites.Pixel], colour: Colour, dash
         canvas.dashes(a, b, colour, canvas.width(1.0), dash=dash)
 
 
-def draw_grips(
-    canvas: Canvas, found: tuple[Handle, ...], chosen: frozenset[Vertex], near: Handle | None, stem: float
-) -> None:
-    """Draw the handles; `stem` is how far the knob is from the box, px."""
+def draw_grips(canvas: Canvas, found: Sequence[Handle], solid: frozenset[Vertex], hot: Handle | None) -> None:
     floor, edge = canvas.theme.background, canvas.theme.final
     for handle, (x, y) in zip(found, pixels(canvas, (each.at for each in found)).tolist(), strict=True):
-        large = handle == near
+        large = handle == hot
         if handle.kind == "turn":
-            canvas.line((x, y), (x, y + stem), edge, canvas.width(1.0))
-            _disc(canvas, (x, y), 5.5 if large else 4.5, (floor, edge, edge), 1.6)
+            canvas.line((x, y), (x, y + KNOB * canvas.scale), edge, canvas.width(1.0))
+            _disc(canvas, (x, y), 5.5 if large else 4.5, (floor, edge, edge), 1.6, "")
         elif handle.kind == "scale":
             _square(canvas, (x, y), floor, large=large)
         else:
-            _square(canvas, (x, y), edge if handle.vertex in chosen else floor, large=large, rounded=True)
+            _square(canvas, (x, y), edge if handle.vertex in solid else floor, large=large, rounded=True)
 
 
 def _square(canvas: Canvas, at: Point, fill: Colour, *, large: bool = False, rounded: bool = False) -> None:
@@ -238,8 +232,7 @@ def hatched(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None
     """Return a picture of where robots do not pass, and of what is cut off, and its place, px."""
     theme, white = view.theme, (255, 255, 255)
     areas = ((measurement.sealed, theme.forces[SEALED], 0.5), (measurement.impassable, theme.trajectory, 1.0))
-    parts = [(outline_of(area), colour, strength) for area, colour, strength in areas]
-    parts = [part for part in parts if part[0].rings]
+    parts = [(outline_of(area), colour, strength) for area, colour, strength in areas if not area.is_empty]
     if not parts:
         return None
     bounds = shapely.total_bounds([outline.geometry for outline, _, _ in parts])
@@ -255,7 +248,7 @@ def hatched(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None
             mask.polygon(ring, (*white, 255) if outer else (0, 0, 0, 0))
             if outer:  # what is thinner than a pixel is a line
                 mask.outline(ring, white, 1)
-        lines = _lines(box.size, colour, view.scale, box.topleft, strength)
+        lines = _lines(box, colour, view.scale, strength)
         mask.surface.blit(lines, (0, 0), special_flags=pygame.BLEND_RGBA_MULT)
         patch.blit(mask.surface.premul_alpha(), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
         for ring, outer in zip(rings, outline.outer, strict=True):
@@ -264,16 +257,13 @@ def hatched(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None
     return patch, box
 
 
-def _lines(
-    size: tuple[int, int], colour: Colour, scale: float, corner: tuple[int, int], strength: float = 1.0
-) -> Surface:
+def _lines(box: Rect, colour: Colour, scale: float, strength: float = 1.0) -> Surface:
     """Return a page of slanted lines over a tint; they keep their place when the sheet is moved."""
-    page = Surface(size, pygame.SRCALPHA, 32)
+    page = Surface(box.size, pygame.SRCALPHA, 32)
     page.fill((*colour, round(56 * strength)))
-    width, height = size
     step, thick, ink = max(4, round(HATCH * scale)), max(1, round(1.2 * scale)), round(235 * strength)
-    for x in range(-((corner[0] + corner[1]) % step), width + height, step):
-        pygame.draw.line(page, (*colour, ink), (x, 0), (x - height, height), thick)
+    for x in range(-((box.left + box.top) % step), box.width + box.height, step):
+        pygame.draw.line(page, (*colour, ink), (x, 0), (x - box.height, box.height), thick)
     return page
 
 
@@ -350,10 +340,9 @@ def draw_problems(
                 _ring(canvas, (x, y), BADGE + 4, theme.ink, 1.6)
 
 
-def draw_badge(
-    canvas: Canvas, x: float, y: float, *, grave: bool, radius: float = BADGE, rim: float = 1.4
-) -> None:
+def draw_badge(canvas: Canvas, x: float, y: float, *, grave: bool, small: bool = False) -> None:
     theme, fill = canvas.theme, problem_colour(canvas.theme, grave=grave)
+    radius, rim = (6.5, 1.0) if small else (BADGE, 1.4)
     _disc(canvas, (x, y), radius, (fill, theme.background, mix(fill, theme.ink, 0.3)), rim, "!")
 
 
@@ -368,12 +357,12 @@ def legend_entries(found: Measurement | None, *, starts: bool, team: bool, unfre
 
     def robot(canvas: Canvas, x: float, y: float) -> None:
         edge = mix(canvas.theme.background, canvas.theme.ink, 0.55)
-        _disc(canvas, (x, y), 6.5, (canvas.theme.robots[0], canvas.theme.robot_ring, edge), 1.4)
+        _disc(canvas, (x, y), 6.5, (canvas.theme.robots[0], canvas.theme.robot_ring, edge), 1.4, "")
 
     def hatch(canvas: Canvas, x: float, y: float, *, narrow: bool) -> None:
         size = round(12 * canvas.scale)
         colour = canvas.theme.trajectory if narrow else canvas.theme.forces[SEALED]
-        page = _lines((size, size), colour, canvas.scale, (0, 0))
+        page = _lines(Rect(0, 0, size, size), colour, canvas.scale)
         canvas.surface.blit(page, (round(x - size / 2), round(y - size / 2)))
 
     rows: tuple[tuple[object, str, Glyph], ...] = (
@@ -384,6 +373,6 @@ def legend_entries(found: Measurement | None, *, starts: bool, team: bool, unfre
         (team, "robot", robot),
         (found and found.impassable, "too narrow for a robot", partial(hatch, narrow=True)),
         (found and found.sealed, "cut off", partial(hatch, narrow=False)),
-        (found and found.problems, "problem", partial(draw_badge, grave=True, radius=6.5, rim=1.0)),
+        (found and found.problems, "problem", partial(draw_badge, grave=True, small=True)),
     )
     return [LegendEntry(text, glyph) for is_there, text, glyph in rows if is_there]

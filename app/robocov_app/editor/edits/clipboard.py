@@ -34,8 +34,7 @@ def pasted(sketch: Sketch, text: str, at: Point | None = None, grid: float | Non
     if part.boundary is not None and not (new_boundary or shapes or part.starts):
         shapes.append((PolygonObstacle(part.boundary), ""))
     after, new = create.added(sketch, shapes, part.starts)
-    selection = replace(new, boundary=new_boundary)
-    require(selection, "there is nothing to paste in what was copied")
+    selection = require(replace(new, boundary=new_boundary), "there is nothing to paste in what was copied")
     after = replace(after, boundary=part.boundary) if new_boundary else after
     bounds = transform.bounds_of(after, selection)
     by = [0.0, 0.0]

@@ -62,8 +62,7 @@ def disc_start_drawn(sketch: Sketch, center: Point, radius: float) -> Change:
 
 
 def points_start_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
-    places = tuple(dict.fromkeys(ring_near(points)))
-    require(places, "a start needs a place for a robot at least")
+    places = require(tuple(dict.fromkeys(ring_near(points))), "a start needs a place for a robot at least")
     return _start_added(sketch, env.PointsStart(places))
 
 

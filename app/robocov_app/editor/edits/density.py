@@ -7,7 +7,7 @@ from typing import TypeAlias
 import shapely
 
 from robocov.density import HEAVIEST, Density, Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
-from robocov.environment import Point, PolygonObstacle, Ring
+from robocov.environment import Point, PolygonObstacle
 from robocov.errors import MapError, counted
 from robocov.mapfile.models import LARGEST
 from robocov_app.editor.edits import create, transform
@@ -41,24 +41,23 @@ def peak_added(sketch: Sketch, center: Point, sigma: float, weight: float) -> Ch
     return _put(sketch, (*features_of(sketch), peak), "hot spot added")
 
 
-def area_added(
-    sketch: Sketch, points: Ring, weight: float, holes: tuple[Ring, ...] = (), name: str | None = None
-) -> Change:
+def area_added(sketch: Sketch, area: WeightedArea) -> Change:
     """Add an area of constant weight on top; without a density, to one that is 1 everywhere."""
     if isinstance(sketch.density, Gaussians | Raster):
         raise _other_kind(sketch.density, ", areas are not")
-    area = _sound(WeightedArea(distinct(ring_near(points)), weight, holes, name))
+    area = _sound(replace(area, vertices=distinct(ring_near(area.vertices))))
     return _put(sketch, (*features_of(sketch), area), "area added")
 
 
 def areas_made(sketch: Sketch, selection: Selection, weight: float) -> Change:
     chosen = [item.shape for item in selection.items_in(sketch)]
     shapes = [shape for shape in chosen if isinstance(shape, PolygonObstacle)]
-    all_are = len(shapes) == len(chosen) > 0
-    require(all_are, "select polygons first: they become areas that count more, or less")
+    missing = "select polygons first: they become areas that count more, or less"
+    require(len(shapes) == len(chosen) > 0, missing)
     after = sketch.without(selection.items)
     for shape in shapes:
-        after = area_added(after, shape.vertices, weight, shape.holes, shape.name).sketch
+        area = WeightedArea(shape.vertices, weight, shape.holes, shape.name)
+        after = area_added(after, area).sketch
     return Change(after, Selection(), f"{counted(len(shapes), 'polygon')} made an area of the density")
 
 
@@ -70,7 +69,7 @@ def removed(sketch: Sketch, number: int) -> Change:
 
 
 def moved(sketch: Sketch, number: int, dx: float, dy: float) -> Change:
-    return _changed(sketch, number, transform.Affine.shift(dx, dy).thing(_feature(sketch, number)), "moved")
+    return _changed(sketch, number, transform.Affine(x0=dx, y0=dy).thing(_feature(sketch, number)), "moved")
 
 
 def peak_sized(sketch: Sketch, number: int, sigma: float) -> Change:

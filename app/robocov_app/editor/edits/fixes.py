@@ -126,8 +126,7 @@ def _shortened(wall: Obstacle, end: Point, by: float) -> WallObstacle | None:
     if not isinstance(wall, WallObstacle) or len(wall.points) < 2:
         return None
     line = LineString(wall.points)
-    shorter = ((wall.points[0], by, line.length), (wall.points[-1], 0.0, line.length - by))
-    for at, low, high in shorter:
+    for at, low, high in ((wall.points[0], by, line.length), (wall.points[-1], 0.0, line.length - by)):
         if math.dist(at, end) <= wall.width / 2 + SAGITTA and high - low > wall.width:
             return replace(wall, points=tuple(map(rounded, substring(line, low, high).coords)))
     return None

@@ -5,7 +5,7 @@ from functools import partial
 from itertools import count
 from typing import Any
 
-from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
+from robocov.environment import PolygonObstacle
 from robocov.errors import MapError, one_line
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits import create, vertices
@@ -70,8 +70,7 @@ def released(sketch: Sketch) -> Change:
 
 def _marked(sketch: Sketch, selection: Selection, words: str, **marks: Any) -> Change:
     require(selection.items, "select obstacles first")
-    chosen = selection.items
-    items = tuple(replace(item, **marks) if item.key in chosen else item for item in sketch.obstacles)
+    items = tuple(replace(i, **marks) if i.key in selection.items else i for i in sketch.obstacles)
     words = f"{Selection(items=selection.items).words(sketch)} {words}"
     left = replace(selection, items=frozenset()) if True in marks.values() else selection
     return Change(replace(sketch, obstacles=items), left, words)
@@ -93,20 +92,18 @@ def titled(sketch: Sketch, name: str | None = None, description: str | None = No
 
 
 def widened(sketch: Sketch, selection: Selection, width: float) -> Change:
-    return _sized(sketch, selection, WallObstacle, "width", width, "select walls first", "made {:g} m wide")
+    return _sized(sketch, selection, "width", width, "select walls first", "made {:g} m wide")
 
 
 def sized(sketch: Sketch, selection: Selection, radius: float) -> Change:
-    missing, kinds = "select circles first, or starts that are discs", (CircleObstacle, DiscStart)
-    return _sized(sketch, selection, kinds, "radius", radius, missing, "given a radius of {:g} m")
+    missing = "select circles first, or starts that are discs"
+    return _sized(sketch, selection, "radius", radius, missing, "given a radius of {:g} m")
 
 
-def _sized(
-    sketch: Sketch, selection: Selection, kinds: Any, name: str, size: float, missing: str, words: str
-) -> Change:
+def _sized(sketch: Sketch, selection: Selection, name: str, size: float, missing: str, words: str) -> Change:
     require(SMALLEST <= size <= LARGEST, f"a {name} of at least {1000 * SMALLEST:g} mm was wanted")
     things: dict[Owner, Any] = {owner: sketch.thing(owner) for owner in selection.owners}
-    sized = {owner: thing for owner, thing in things.items() if isinstance(thing, kinds)}
+    sized = {owner: thing for owner, thing in things.items() if hasattr(thing, name)}
     require(sized, missing)
     after = sketch.with_things({o: replace(thing, **{name: tenths(size)}) for o, thing in sized.items()})
     return Change(after, selection, f"{Selection.of(*sized).words(sketch)} {words.format(tenths(size))}")
@@ -130,7 +127,6 @@ def start_first(sketch: Sketch, name: str) -> Change:
 
 
 def made_polygons(sketch: Sketch, selection: Selection) -> Change:
-    """Turn the selected circles and walls into polygons, whose vertices can be edited one by one."""
     chosen = [item for item in selection.items_in(sketch) if not isinstance(item.shape, PolygonObstacle)]
     require(chosen, "select circles or walls first")
     shapes = {}

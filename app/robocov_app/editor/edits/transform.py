@@ -44,10 +44,6 @@ class Affine:
     y0: float = 0.0
 
     @classmethod
-    def shift(cls, dx: float, dy: float) -> Self:
-        return cls(x0=dx, y0=dy)
-
-    @classmethod
     def turn(cls, degrees: float, about: Point) -> Self:
         """Return the counter-clockwise rotation about a point, exact at quarters of a turn."""
         cos, sin = geometry.cos_sin(degrees)
@@ -104,7 +100,7 @@ class Affine:
 
 
 def moved(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
-    return _change(sketch, selection, Affine.shift(dx, dy), "moved")
+    return _change(sketch, selection, Affine(x0=dx, y0=dy), "moved")
 
 
 def rotated(sketch: Sketch, selection: Selection, degrees: float, about: Point | None = None) -> Change:
@@ -113,11 +109,8 @@ def rotated(sketch: Sketch, selection: Selection, degrees: float, about: Point |
     return _change(sketch, selection, Affine.turn(degrees, about or _middle(sketch, selection)), "turned")
 
 
-def scaled(
-    sketch: Sketch, selection: Selection, fx: float, fy: float | None = None, about: Point | None = None
-) -> Change:
+def scaled(sketch: Sketch, selection: Selection, fx: float, fy: float, about: Point | None = None) -> Change:
     """Scale by fx and fy about the middle or a point, see `Affine.thing`; factors below 0 mirror."""
-    fy = fx if fy is None else fy
     if not all(math.isfinite(f) and SMALLEST / LARGEST <= abs(f) <= LARGEST / SMALLEST for f in (fx, fy)):
         raise MapError("a factor that is not 0 was wanted")
     return _change(sketch, selection, Affine.stretch(fx, fy, about or _middle(sketch, selection)), "scaled")
@@ -142,7 +135,7 @@ def resized(sketch: Sketch, selection: Selection, width: float | None, height: f
         off = width - (box[2] - box[0]), height - (box[3] - box[1])
         if max(map(abs, off)) <= 2e-4:
             # what is put at its corner is there to the tenth of a millimetre
-            shift = Affine.shift(low_x - box[0], low_y - box[1])
+            shift = Affine(x0=low_x - box[0], y0=low_y - box[1])
             return replace(change, sketch=_placed(change.sketch, change.selection, shift))
         fx, fy = max(fx + off[0] / wide, 1e-9), max(fy + off[1] / high, 1e-9)
     raise MapError("it cannot get that size: walls keep their width when width and height change apart")
@@ -164,7 +157,7 @@ def mirrored(sketch: Sketch, selection: Selection, axis: str) -> Change:
 def duplicated(sketch: Sketch, selection: Selection, dx: float = 0.0, dy: float = 0.0) -> Change:
     chosen = Selection(items=selection.items, starts=selection.starts).within(sketch)
     whole = require(chosen, "select obstacles or starts to copy")
-    return Change(*_copied(sketch, whole, Affine.shift(dx, dy)), f"{whole.words(sketch)} duplicated")
+    return Change(*_copied(sketch, whole, Affine(x0=dx, y0=dy)), f"{whole.words(sketch)} duplicated")
 
 
 def arrayed(sketch: Sketch, selection: Selection, columns: int, rows: int, dx: float, dy: float) -> Change:
@@ -175,7 +168,7 @@ def arrayed(sketch: Sketch, selection: Selection, columns: int, rows: int, dx: f
         raise MapError(f"that makes more than {_MOST_COPIES} obstacles")
     after, everything = sketch, whole
     for row, column in list(product(range(rows), range(columns)))[1:]:
-        after, copies = _copied(after, whole, Affine.shift(column * dx, row * dy))
+        after, copies = _copied(after, whole, Affine(x0=column * dx, y0=row * dy))
         everything = everything.plus(copies)
     return Change(after, everything, f"{whole.words(sketch)} copied into {columns} × {rows}")
 
@@ -236,8 +229,7 @@ def levelled(sketch: Sketch, a: Point, b: Point) -> Change:
 
 def box_of(sketch: Sketch, owner: Owner) -> Box | None:
     # a typed size is that of a circle, not of the polygon that stands for it
-    round_one = isinstance(sketch.thing(owner), CircleObstacle)
-    if isinstance(owner, int) and owner != BOUNDARY and not round_one:
+    if isinstance(owner, int) and owner != BOUNDARY and not isinstance(sketch.thing(owner), CircleObstacle):
         covered = sketch.item(owner).geometry
         return None if covered.is_empty else covered.bounds
     points = [point for ring in sketch.ring_points(owner) for point in ring]
@@ -258,8 +250,7 @@ def bounds_of(sketch: Sketch, selection: Selection) -> Box | None:
 
 def _boxes(sketch: Sketch, selection: Selection) -> dict[Owner, Box]:
     things = selection.items | selection.starts
-    boxes = {owner: box_of(sketch, owner) for owner in sketch.owners if owner in things}
-    return {owner: box for owner, box in boxes.items() if box is not None}
+    return {owner: box for owner in sketch.owners if owner in things and (box := box_of(sketch, owner))}
 
 
 def _level(box: Box, side: Side) -> float:
@@ -275,8 +266,8 @@ def _copied(sketch: Sketch, whole: Selection, affine: Affine) -> tuple[Sketch, S
 
 
 def _each_moved(sketch: Sketch, by: Mapping[Owner, float], *, along_x: bool) -> Sketch:
-    shifts = {owner: (off, 0.0) if along_x else (0.0, off) for owner, off in by.items() if off}
-    things = {owner: Affine.shift(*shift).thing(sketch.thing(owner)) for owner, shift in shifts.items()}
+    shifts = {owner: Affine(x0=off) if along_x else Affine(y0=off) for owner, off in by.items() if off}
+    things = {owner: shift.thing(sketch.thing(owner)) for owner, shift in shifts.items()}
     return sketch.with_things(things)
 
 

@@ -28,6 +28,7 @@ _STRAIGHT = math.radians(0.1)  # a corner that turns by less has nothing to be c
 _MOST_SEGMENTS = 256
 _STEPS = 12  # tolerances that are tried, each half of the one before, until nothing crosses
 _Cut: TypeAlias = Callable[[float], tuple[float, int]]  # length and segments for the angle of a turn
+_Redraw: TypeAlias = Callable[[tuple[Ring, ...], bool], tuple[Ring, ...]]  # of rings, closed or not
 _SAME = 1e-4  # ends of walls that are closer, in metres, are one point
 
 
@@ -244,9 +245,7 @@ def straightened(sketch: Sketch, selection: Selection, degrees: float = 5.0) -> 
     return Change(after, selection.without_vertices(), f"{counted(len(changed), 'outline')} straightened")
 
 
-def _redrawn(
-    sketch: Sketch, selection: Selection, redraw: Callable[[tuple[Ring, ...], bool], tuple[Ring, ...]]
-) -> tuple[Sketch, list[tuple[Ring, Ring]]]:
+def _redrawn(sketch: Sketch, selection: Selection, redraw: _Redraw) -> tuple[Sketch, list[tuple[Ring, Ring]]]:
     """Redraw what is selected, or all obstacles; return the sketch, and what rings were and became."""
     chosen = selection.owners if selection.items or selection.boundary else sketch.places.keys()
     outlines = {each: found for each in sketch.owners if each in chosen and (found := sketch.rings_of(each))}

@@ -110,10 +110,6 @@ class OnDisk:
     digest: str  # SHA-256 of its content
     stamp: tuple[int, int]  # (size, time of change in ns); what can be asked of the file quickly
 
-    @classmethod
-    def of(cls, path: Path, content: bytes, stamp: tuple[int, int] | None) -> Self:
-        return cls(path, sha256(content).hexdigest(), stamp or (-1, 0))
-
 
 @dataclass(frozen=True)
 class Autosave:
@@ -175,7 +171,8 @@ def read_sketch(path: Path) -> tuple[Sketch, OnDisk]:
     path = path.absolute()
     stamp = _stamp(path)  # the stamp of before: what changes while it is read is noticed at the next look
     content = read_bytes(path)
-    return parse_sketch(content, str(path), path.parent), OnDisk.of(path, content, stamp)
+    disk = OnDisk(path, sha256(content).hexdigest(), stamp or (-1, 0))
+    return parse_sketch(content, str(path), path.parent), disk
 
 
 def write_sketch(sketch: Sketch, path: Path, before: OnDisk | None = None, *, over: bool = False) -> OnDisk:
@@ -190,7 +187,7 @@ def write_sketch(sketch: Sketch, path: Path, before: OnDisk | None = None, *, ov
         raise ChangedError(f"{one_line(path)}: {what}")
     with written(path) as part:
         part.write_bytes(text)
-    return OnDisk.of(path, text, _stamp(path))
+    return OnDisk(path, sha256(text).hexdigest(), _stamp(path) or (-1, 0))
 
 
 def state_of(before: OnDisk) -> State:

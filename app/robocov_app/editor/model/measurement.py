@@ -72,8 +72,7 @@ def reach_of(free: MultiPolygon, radius: float) -> tuple[tuple[shapely.Geometry,
     one arc and lie within the radius of it. Right to about a hundredth of the radius.
     """
     centres = [part for part in _polygons(free.buffer(_EXACTLY - radius)) if part.area > 0.0]
-    swept = [part.buffer(radius) & free for part in centres]
-    swept.sort(key=lambda part: -part.area)
+    swept = sorted((part.buffer(radius) & free for part in centres), key=lambda part: -part.area)
     opened = shapely.union_all(swept)
     left = free - opened.buffer(SAGITTA / 2)
     parts = np.array([part for part in _polygons(left) if part.area > 0.0], dtype=object)

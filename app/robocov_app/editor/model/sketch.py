@@ -175,8 +175,7 @@ class Sketch:
 
     def with_things(self, things: Mapping[Any, Any]) -> Self:
         """Return the sketch with other obstacles by their keys, and other or more starts by their names."""
-        shapes = {key: shape for key, shape in things.items() if isinstance(key, int)}
-        changed = {key: shape for key, shape in shapes.items() if shape != self.item(key).shape}
+        changed = {k: new for k, new in things.items() if isinstance(k, int) and new != self.item(k).shape}
         items = [replace(i, shape=changed[i.key]) if i.key in changed else i for i in self.obstacles]
         starts = dict(self.starts) | {name: spec for name, spec in things.items() if isinstance(name, str)}
         return replace(self, obstacles=tuple(items), starts=tuple(starts.items()))

@@ -44,12 +44,10 @@ class DensityTool(Tool):
             self.change = self._wanted(context, self.begun.point, event.point)
 
     def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
-        """Make what was dragged; a click on a middle chooses it, elsewhere nothing is chosen."""
         begun, change, self.begun, self.change = self.begun, self.change, None, None
         if begun is not None and change is not None and not clicked:
             context.change(change)
-            new = len(density.features_of(context.sketch)) - 1
-            self.chosen = new if self._taken is None else self._taken
+            self.chosen = len(density.features_of(context.sketch)) - 1 if self._taken is None else self._taken
         elif begun is not None:
             self.chosen = self._taken if self._corner is None else None
             if self.chosen is not None:
@@ -99,7 +97,7 @@ class DensityTool(Tool):
     def _wanted(self, context: Workspace, begun: Point, to: Point) -> Change | None:
         sketch, number = context.sketch, self._taken
         if number is None and isinstance(sketch.density, WeightedPolygons):
-            return density.area_added(sketch, rectangle(begun, to), self.weight)
+            return density.area_added(sketch, WeightedArea(rectangle(begun, to), self.weight))
         if number is None:
             return density.peak_added(sketch, begun, max(distance(begun, to), 0.02), self.weight)
         if number >= len(features := density.features_of(sketch)):

@@ -177,8 +177,7 @@ class Scaling(Drag):
         self._even = bool(selection.starts) or shapes == {CircleObstacle}
 
     def to(self, event: PointerEvent) -> None:
-        to = event.raw[0] - self._offset[0], event.raw[1] - self._offset[1]
-        to = self.snapped_to(event, to)
+        to = self.snapped_to(event, (event.raw[0] - self._offset[0], event.raw[1] - self._offset[1]))
         about = geometry.middle_of(self._bounds) if event.alt else self._fixed
         factors = [1.0, 1.0]
         for k in (0, 1):
@@ -257,7 +256,7 @@ class SelectTool(Tool):
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
         self.begun, self.drag, self._narrows = event, None, False
-        self._handle = _handle_at(context, event)
+        self._handle = handle_at(context.handles, event.raw, NEAR * event.reach)
         vertex = self._handle.vertex if self._handle is not None else None
         if vertex is not None:
             own = Selection(vertices=frozenset({vertex}))
@@ -282,7 +281,7 @@ class SelectTool(Tool):
 
     def move(self, context: Workspace, event: PointerEvent) -> None:
         if self.begun is None:
-            self.near = _handle_at(context, event)
+            self.near = handle_at(context.handles, event.raw, NEAR * event.reach)
             self.hovered = None if self.near else next(iter(_owners_at(context, event)), None)
             return
         if self.drag is None and event.is_apart_from(self.begun.raw):
@@ -324,7 +323,7 @@ class SelectTool(Tool):
         """Insert a vertex where the edge of something was clicked twice; elsewhere it is one more press."""
         owners = context.handled or _owners_at(context, event)[:1]
         edge = edge_at(context.sketch, event.raw, NEAR * event.reach, owners)
-        if edge is None or _handle_at(context, event) is not None:
+        if edge is None or handle_at(context.handles, event.raw, NEAR * event.reach) is not None:
             self.press(context, event)
             return
         self.begun = self.drag = None
@@ -361,10 +360,6 @@ class SelectTool(Tool):
         if self.hovered is not None:
             return "move" if self.hovered in context.selection.owners else "hand"
         return "arrow"
-
-
-def _handle_at(context: Workspace, event: PointerEvent) -> Handle | None:
-    return handle_at(context.handles, event.raw, NEAR * event.reach)
 
 
 def _owners_at(context: Workspace, event: PointerEvent) -> tuple[Owner, ...]:

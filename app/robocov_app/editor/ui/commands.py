@@ -158,7 +158,6 @@ def fill(editor: Editor) -> None:
 
 
 def widen(editor: Editor, factor: float) -> None:
-    """Make the selected walls wider or narrower, and those that are drawn."""
     selection = whole(editor.selection)
     shapes = [editor.sketch.item(key).shape for key in selection.items]
     widths = [shape.width for shape in shapes if isinstance(shape, WallObstacle)]
@@ -180,8 +179,7 @@ def next_start(editor: Editor) -> None:
 
 def make_default(editor: Editor) -> None:
     require(len(editor.selection.starts) == 1, "select one start first")
-    (name,) = editor.selection.starts
-    editor.change(properties.start_first(editor.sketch, name))
+    editor.change(properties.start_first(editor.sketch, *editor.selection.starts))
 
 
 def make_areas(editor: Editor) -> None:
@@ -240,9 +238,7 @@ def _edit_to(edit: Edit, read: Callable[[str], object]) -> RunWith:
 def common_measure(editor: Editor, name: str) -> float | None:
     """Return the width or radius of all selected things that have one; None where they differ."""
     sketch, selection = editor.preview
-    things: list[object] = [sketch.item(key).shape for key in selection.items if key in sketch.places]
-    things += [spec for start, spec in sketch.starts if start in selection.starts]
-    found = {getattr(thing, name) for thing in things if hasattr(thing, name)}
+    found = {getattr(thing, name) for thing in map(sketch.thing, selection.owners) if hasattr(thing, name)}
     return found.pop() if len(found) == 1 else None
 
 
@@ -270,7 +266,7 @@ def _scale(editor: Editor, text: str) -> None:
     selection = selected(editor)
     require(transform.bounds_of(editor.sketch, selection), "there is nothing to scale")
     factor = length_of(text if text.endswith("%") else f"*{text.lstrip('*x')}", now=1.0)
-    editor.change(transform.scaled(editor.sketch, selection, factor))
+    editor.change(transform.scaled(editor.sketch, selection, factor, factor))
 
 
 def rename(editor: Editor, text: str) -> None:
@@ -312,10 +308,6 @@ _REPEATED = (
 def editor_commands(
     editor: Editor, canvas: EditorCanvas, documents: FileCommands, of_window: Mapping[str, Run]
 ) -> list[Command]:
-
-    def does(act: Callable[..., object], *rest: object) -> Run:
-        return partial(act, editor, *rest)
-
     def edited(edit: Edit, *rest: object) -> Run:
         return lambda: editor.change(edit(editor.sketch, selected(editor), *rest))
 
@@ -328,13 +320,12 @@ def editor_commands(
             yield name.format(way), title, keys.format(way), partial(act, x, y)
             title = ""
 
-    def things() -> Selection:
-        return editor.selection.without_vertices()
-
     def switch_theme() -> None:
         editor.theme = "dark" if editor.theme == "light" else "light"
 
+    clip = of_map(boolean.clipped, lambda: editor.selection.without_vertices())
     fill_unreachable = of_map(fixes.unreachable_filled, lambda: editor.radius)
+    level_map = partial(level, editor)
     ask_picture = partial(documents.ask_path, "Picture under the map", documents.underlay, PICTURES)
     no_picture = of_map(properties.underlaid, lambda: None)
     table: tuple[str | Row, ...] = (  # the headings of groups, and below each its commands
@@ -354,34 +345,34 @@ def editor_commands(
         "Edit",
         ("undo", "Undo", "ctrl+z", partial(editor.travel, 1)),
         ("redo", "Redo", "ctrl+y, ctrl+shift+z", partial(editor.travel, -1)),
-        ("cut", "Cut", "ctrl+x", does(cut)),
-        ("copy", "Copy", "ctrl+c", does(copy)),
+        ("cut", "Cut", "ctrl+x", partial(cut, editor)),
+        ("copy", "Copy", "ctrl+c", partial(copy, editor)),
         ("paste", "Paste at the cursor", "ctrl+v", lambda: paste(editor, editor.cursor)),
-        ("paste:there", "Paste in the same place", "ctrl+shift+v", does(paste, None)),
-        ("duplicate", "Duplicate", "ctrl+d", does(duplicate)),
-        ("delete", "Delete", "delete, x", does(delete)),
+        ("paste:there", "Paste in the same place", "ctrl+shift+v", partial(paste, editor, None)),
+        ("duplicate", "Duplicate", "ctrl+d", partial(duplicate, editor)),
+        ("delete", "Delete", "delete, x", partial(delete, editor)),
         ("select:all", "Select all", "ctrl+a", lambda: editor.select(Selection.all(editor.sketch))),
-        ("select:next", "Select the next obstacle", "tab", does(select_next, 1)),
-        ("select:previous", "Select the previous obstacle", "shift+tab", does(select_next, -1)),
+        ("select:next", "Select the next obstacle", "tab", partial(select_next, editor, 1)),
+        ("select:previous", "Select the previous obstacle", "shift+tab", partial(select_next, editor, -1)),
         ("name", "Name what is selected", "f2", of_window["name"]),
         *arrows("{}", "Nudge by the grid (all arrows)", "{}", partial(nudge, editor, 1)),
         *arrows("{}:far", "Nudge ten times as far (all arrows)", "shift+{}", partial(nudge, editor, FAR)),
         ("finish", "Finish what is being drawn", "return, enter", lambda: editor.tool.finish(editor)),
-        ("back", "Take the last point back, or delete", "backspace", does(back)),
-        ("cancel", "Give up; select nothing; close", "escape", does(cancel)),
+        ("back", "Take the last point back, or delete", "backspace", partial(back, editor)),
+        ("cancel", "Give up; select nothing; close", "escape", partial(cancel, editor)),
         ("menu", "What can be done here (right click)", "menu, shift+f10", of_window["menu"]),
         "Arrange",
         ("rotate:left", "Turn by 90° to the left", "q", edited(transform.rotated, 90.0)),
         ("rotate:right", "Turn by 90° to the right", "e", edited(transform.rotated, -90.0)),
-        ("level", "Level: turn the map so that the measured line is level or upright", "", does(level)),
+        ("level", "Level: turn the map so that the measured line is level or upright", "", level_map),
         ("mirror:x", "Mirror left and right", "shift+h", edited(transform.mirrored, "x")),
         ("mirror:y", "Mirror up and down", "shift+v", edited(transform.mirrored, "y")),
-        ("align:left", "Align left sides", "alt+left", does(align, "left")),
-        ("align:right", "Align right sides", "alt+right", does(align, "right")),
-        ("align:top", "Align tops", "alt+up", does(align, "top")),
-        ("align:bottom", "Align bottoms", "alt+down", does(align, "bottom")),
-        ("align:centre", "Align middles across", "alt+c", does(align, "centre")),
-        ("align:middle", "Align middles in height", "alt+m", does(align, "middle")),
+        ("align:left", "Align left sides", "alt+left", partial(align, editor, "left")),
+        ("align:right", "Align right sides", "alt+right", partial(align, editor, "right")),
+        ("align:top", "Align tops", "alt+up", partial(align, editor, "top")),
+        ("align:bottom", "Align bottoms", "alt+down", partial(align, editor, "bottom")),
+        ("align:centre", "Align middles across", "alt+c", partial(align, editor, "centre")),
+        ("align:middle", "Align middles in height", "alt+m", partial(align, editor, "middle")),
         ("distribute:x", "Equal gaps across", "alt+x", edited(transform.distributed, "x")),
         ("distribute:y", "Equal gaps in height", "alt+y", edited(transform.distributed, "y")),
         ("raise", "To the top", "page up", edited(properties.raised, "top")),
@@ -396,25 +387,25 @@ def editor_commands(
         ("subtract", "Subtract the upper ones", "alt+s", edited(boolean.subtracted)),
         ("intersect", "Keep what they have in common", "alt+i", edited(boolean.intersected)),
         ("divide", "Cut along each other", "alt+d", edited(boolean.divided)),
-        ("clip", "Cut off outside the boundary", "alt+b", of_map(boolean.clipped, things)),
+        ("clip", "Cut off outside the boundary", "alt+b", clip),
         ("join", "Join walls end to end", "alt+j", edited(vertices.joined)),
         ("polygons", "Turn into polygons", "alt+p", edited(properties.made_polygons)),
         ("boundary:of", "Make it the boundary", "", edited(properties.made_boundary)),
         ("repair", "Repair crossing outlines", "alt+r", edited(boolean.repaired)),
-        ("density:area", "Make it an area that counts more", "", does(make_areas)),
+        ("density:area", "Make it an area that counts more", "", partial(make_areas, editor)),
         ("fill:unreachable", "Fill all that robots cannot reach", "", fill_unreachable),
         "Vertices",
-        ("bevel", "Cut corners off", "shift+b", does(trim, vertices.bevelled)),
-        ("round", "Round corners", "shift+r", does(trim, vertices.rounded_off)),
-        ("split", "Cut a wall in two here", "shift+c", of_map(vertices.split, does(one_vertex))),
-        ("extend", "Go on with the wall from here", "shift+w", does(extend)),
-        ("fill", "Fill the hole", "shift+f", does(fill)),
+        ("bevel", "Cut corners off", "shift+b", partial(trim, editor, vertices.bevelled)),
+        ("round", "Round corners", "shift+r", partial(trim, editor, vertices.rounded_off)),
+        ("split", "Cut a wall in two here", "shift+c", of_map(vertices.split, partial(one_vertex, editor))),
+        ("extend", "Go on with the wall from here", "shift+w", partial(extend, editor)),
+        ("fill", "Fill the hole", "shift+f", partial(fill, editor)),
         ("simplify", "Leave needless vertices out", "shift+p", edited(vertices.simplified, TOLERANCE)),
         ("straighten", "Make edges straight that nearly are", "shift+l", edited(vertices.straightened)),
         ("path:repeat", "Obstacle goes in a loop, or back and forth", "shift+o", edited(paths.path_turned)),
         ("path:none", "Take an obstacle's path away", "alt+o", edited(paths.path_removed)),
-        ("wider", "Wider walls", "]", does(widen, WIDER)),
-        ("narrower", "Narrower walls", "[", does(widen, 1.0 / WIDER)),
+        ("wider", "Wider walls", "]", partial(widen, editor, WIDER)),
+        ("narrower", "Narrower walls", "[", partial(widen, editor, 1.0 / WIDER)),
         "Snap",
         ("grid:finer", "Finer grid", "-", partial(editor.change_grid, -1)),
         ("grid:coarser", "Coarser grid", "=, +", partial(editor.change_grid, 1)),
@@ -430,13 +421,13 @@ def editor_commands(
         ("panel", "Hide or show the panel", "h", lambda: setattr(editor, "panel", not editor.panel)),
         ("tab", "Next page of the panel", "ctrl+tab", of_window["tab"]),
         ("fullscreen", "Full screen", "f11", of_window["fullscreen"]),
-        ("path:play", "Let obstacles move, or stand again", "l", does(play)),
-        ("problem:next", "Go to the next problem", "f8, n", does(next_problem)),
-        ("problem:fix", "Mend the problem that is shown", "shift+f8", does(fix_problem)),
+        ("path:play", "Let obstacles move, or stand again", "l", partial(play, editor)),
+        ("problem:next", "Go to the next problem", "f8, n", partial(next_problem, editor)),
+        ("problem:fix", "Mend the problem that is shown", "shift+f8", partial(fix_problem, editor)),
         "Robots",
         ("start:uniform", "A start anywhere in the free space", "shift+u", of_map(create.anywhere_added)),
-        ("start:next", "Next start of the map", "shift+n", does(next_start)),
-        ("start:default", "Make it the default start", "shift+d", does(make_default)),
+        ("start:next", "Next start of the map", "shift+n", partial(next_start, editor)),
+        ("start:default", "Make it the default start", "shift+d", partial(make_default, editor)),
         ("more", "One robot more", "shift+=, shift++", partial(editor.add_robots, 1)),
         ("fewer", "One robot fewer", "shift+-", partial(editor.add_robots, -1)),
         "Help",
@@ -459,8 +450,7 @@ def editor_commands(
         choose = partial(editor.choose, tool.name)
         add("Tools", f"tool:{tool.name}", f"{tool.title}: {tool.hint}", key, choose)
     for k, (name, (title, _)) in enumerate(SNAPS.items(), 1):
-        switch = partial(editor.switch, "snap", name)
-        add("Snap", f"snap:{name}", f"Snap to {title.lower()}", str(k), switch)
+        add("Snap", f"snap:{name}", f"Snap to {title.lower()}", str(k), partial(editor.switch, "snap", name))
     for (name, title), key in zip(SHOWN.items(), _SHOWN_KEYS, strict=True):
         add("View", f"show:{name}", title, key, partial(editor.switch, "show", name))
     return listed

@@ -192,8 +192,8 @@ class ImportDialog(Dialog):
         return corners[1][1] + above + high - box.top
 
     def _draw_maps(self, screen: Surface, imported: Imported, scale: float, theme: Theme) -> None:
-        size, look = screen.get_size(), (*(camera.view for camera in self.cameras), scale, theme)
-        maps = self._picture.of(imported, look, lambda: _maps(size, imported, self.cameras, scale, theme))
+        look = (*(camera.view for camera in self.cameras), scale, theme)
+        maps = self._picture.of(imported, look, lambda: _maps(screen, imported, self.cameras, scale, theme))
         screen.blit(maps, (0, 0))
         self._draw_captions(screen, imported, scale, theme)
         inside = next(option for option in self.options if option.name == "inside")
@@ -231,10 +231,8 @@ class ImportDialog(Dialog):
             screen.blit(label(facts, small, theme.faint), (x, y + round(20 * scale)))
 
 
-def _maps(
-    size: tuple[int, int], imported: Imported, cameras: list[Camera], scale: float, theme: Theme
-) -> Surface:
-    compared, picture = imported.comparison, Surface(size, pygame.SRCALPHA)
+def _maps(screen: Surface, imported: Imported, cameras: list[Camera], scale: float, theme: Theme) -> Surface:
+    compared, picture = imported.comparison, Surface(screen.get_size(), pygame.SRCALPHA)
     before, after = (compared.before, compared.lost), (compared.after, compared.opened)
     colours = theme.trajectory, theme.start
     for camera, (free, marked), colour in zip(cameras, (before, after), colours, strict=True):
@@ -243,7 +241,7 @@ def _maps(
         for ring in shapely.get_rings(shapely.get_parts(free)):
             points = camera.to_pixels(shapely.get_coordinates(ring)).tolist()
             pygame.draw.aalines(picture, theme.obstacle_edge, True, points)
-        marks = Surface(size, pygame.SRCALPHA)
+        marks = Surface(screen.get_size(), pygame.SRCALPHA)
         _fill(marks, camera, marked, (*colour, 150), (0, 0, 0, 0))
         picture.blit(marks, (0, 0))
     if compared.gap is not None:

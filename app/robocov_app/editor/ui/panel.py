@@ -46,10 +46,9 @@ def _box(editor: Editor) -> tuple[float, float, float, float]:
     if len(selection.vertices) == 1:
         x, y = place_of(sketch, *selection.vertices)
     elif not selection.vertices and len(selection.owners) == 1:
-        shapes = [sketch.item(key).shape for key in selection.items]
-        for thing in (*shapes, *(dict(sketch.starts)[name] for name in selection.starts)):
-            if isinstance(thing, CircleObstacle | DiscStart):
-                x, y = thing.center
+        thing = sketch.thing(*selection.owners)
+        if isinstance(thing, CircleObstacle | DiscStart):
+            x, y = thing.center
     return x, y, *sides
 
 
@@ -87,8 +86,7 @@ def _picture(editor: Editor) -> Background:
 
 
 def _lay(editor: Editor, drag: str | None = None, **changes: float) -> None:
-    laid = replace(_picture(editor), **changes)  # type: ignore[arg-type]
-    editor.change(properties.underlaid(editor.sketch, laid), drag=drag)
+    editor.change(properties.underlaid(editor.sketch, replace(_picture(editor), **changes)), drag=drag)  # type: ignore[arg-type]
 
 
 def _set_scale(editor: Editor, text: str) -> None:

@@ -75,9 +75,8 @@ class PlayWindow(Window):
 def begun(editor: Editor, screen: pygame.Surface, scale: float, *, patient: bool) -> PlayWindow:
     environment = editor.sketch.environment()
     name = editor.start_name if editor.start_name in environment.starts else None
-    limits = TeamSpec(radius=editor.radius)
-    scenario = Scenario(environment, robots=editor.robots, start=name, seed=editor.seed, limits=limits)
-    session = Session(scenario)
+    spec = TeamSpec(radius=editor.radius)
+    session = Session(Scenario(environment, robots=editor.robots, start=name, seed=editor.seed, limits=spec))
     if patient:
         session.clock.budget = float("inf")
     costs = Costs(LATTICE, direct=patient)
