@@ -16,9 +16,9 @@ from robocov.simulation import Simulation
 from robocov_app.bench.measure import Call, Case, Row, in_turn
 from robocov_app.render.picture import Painter
 from robocov_app.render.scene import record_scene
+from robocov_app.runs.encoding import png_bytes, save_film
 from robocov_app.runs.film import iter_frames
 from robocov_app.runs.options import FilmOptions
-from robocov_app.runs.recording import png_bytes, save_film
 
 SIZE = (1280, 720)
 FRAME_GOALS = {50: 4e-3}  # wanted seconds for a frame, by number of robots

@@ -18,7 +18,7 @@ from robocov_app.terminal.progress import progress
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from robocov_app.runs.recording import Frame
+    from robocov_app.runs.encoding import Frame
     from robocov_app.viewer.launch import Launcher
     from robocov_app.viewer.session.session import Session
     from robocov_app.viewer.window import Window
@@ -141,7 +141,7 @@ def session_of(options: Arguments) -> Session:
 def rendered(opening: Launcher, options: Arguments) -> int:
     from robocov.files.atomic import writable
     from robocov.files.result_folder import results
-    from robocov_app.runs.recording import encoder, save_moving_picture
+    from robocov_app.runs.encoding import encoder, save_moving_picture
     from robocov_app.viewer.film import pixels
     from robocov_app.viewer.launch import HEADLESS_FPS
 

@@ -58,7 +58,7 @@ def command(options: Arguments) -> int:
             show(window, options, options.folder)
             return 0
         from robocov.files.atomic import written
-        from robocov_app.runs.recording import png_bytes
+        from robocov_app.runs.encoding import png_bytes
         from robocov_app.viewer.film import pixels
 
         window.panel.show_tab(options.page)

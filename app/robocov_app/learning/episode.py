@@ -25,7 +25,7 @@ from robocov_app.runs.spec import RunSpec
 
 if TYPE_CHECKING:
     from robocov_app.render.picture import Painter
-    from robocov_app.runs.recording import Frame
+    from robocov_app.runs.encoding import Frame
 
 
 @dataclass(frozen=True)

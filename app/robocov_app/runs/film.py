@@ -21,8 +21,8 @@ from robocov_app.render.picture import Painter, pane_layers, scale_for, standard
 from robocov_app.render.scene import Scene, record_scene
 from robocov_app.render.theme import Colour, Theme
 from robocov_app.runs.cost import FILM_LATTICE, built_cost, cost_for_pictures
+from robocov_app.runs.encoding import Frame, save_moving_picture
 from robocov_app.runs.options import FilmOptions
-from robocov_app.runs.recording import Frame, save_moving_picture
 from robocov_app.runs.run import Run
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.progress import progress

@@ -171,7 +171,7 @@ class FilmOptions(LayerOptions):
         checked("--film-speed", self.film_speed, 0.01, 1e4)
         self.picture_size()
         if self.video:  # rather than after the run
-            from robocov_app.runs.recording import encoder
+            from robocov_app.runs.encoding import encoder
 
             encoder()
 

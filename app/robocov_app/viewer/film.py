@@ -9,7 +9,7 @@ import numpy as np
 import pygame
 
 from robocov.errors import OutputError
-from robocov_app.runs.recording import Frame, film_command
+from robocov_app.runs.encoding import Frame, film_command
 
 FPS = 30  # frames of a film per second
 _WAITING = 45  # frames that may wait to be written; what comes when there are more is left out

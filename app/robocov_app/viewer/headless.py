@@ -27,19 +27,19 @@ from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Theme
 from robocov_app.runs.artifacts import begin_comparison, save_comparison, save_pictures
 from robocov_app.runs.cost import built_cost
+from robocov_app.runs.encoding import Frame
 from robocov_app.runs.film import FILM_HOLD, FILMS, pane_layout, write_moving
 from robocov_app.runs.options import FilmOptions, RunOptions
-from robocov_app.runs.recording import Frame
 from robocov_app.runs.run import Run, cost_table, evaluated, save_numbers
 from robocov_app.runs.saved import folder_names, wreck_name
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import write_csv, write_json
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.session.changes import Place
-from robocov_app.viewer.session.document import Document, Node, replayed
 from robocov_app.viewer.session.map_edits import with_obstacle
 from robocov_app.viewer.session.moments import PaneSetup
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.undo_tree import Document, Node, replayed
 
 History: TypeAlias = tuple[float, str, CostHistory]  # when a part began, s, a controller's name, its cost
 

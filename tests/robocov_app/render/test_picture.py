@@ -216,7 +216,7 @@ sys.path.insert(0, sys.argv[1])
 from drawn_run import ROOMS, run_of, scene_of
 for module in ("pygame", "matplotlib"):
     assert module not in sys.modules, module
-import robocov_app.render.theme, robocov_app.render.camera, robocov_app.runs.recording
+import robocov_app.render.theme, robocov_app.render.camera, robocov_app.runs.encoding
 assert "pygame" not in sys.modules and "matplotlib" not in sys.modules
 from robocov_app.render.picture import Painter
 frame = Painter(ROOMS, (320, 240)).frame(scene_of(run_of(ROOMS, 3)))

@@ -23,8 +23,8 @@ from robocov.files.strictjson import check_header, located, parse, read_bytes, r
 from robocov.mapfile import bundled_maps, from_json, load_map, to_json
 from robocov_app.viewer.session import changes
 from robocov_app.viewer.session.changes import Change, Drag, Restart, Robot, Step
-from robocov_app.viewer.session.document import Document, Node
 from robocov_app.viewer.session.scenario import Coordinate, Text
+from robocov_app.viewer.session.undo_tree import Document, Node
 
 FORMAT, VERSION, SUFFIX = "robocov-session", 1, ".robocov"
 MOST_SAMPLES = 30  # samples of a curve that stand in the file, for each touch

@@ -21,12 +21,12 @@ from robocov_app.viewer.session.changes import Drag, Release, Touch, map_change
 from robocov_app.viewer.session.clock import Clock
 from robocov_app.viewer.session.curves import Curve, Event, Ghost
 from robocov_app.viewer.session.decision_replay import replayed_snapshot, sensor_in
-from robocov_app.viewer.session.document import MOST_KEPT, Document, Node, replayed
 from robocov_app.viewer.session.file import SavedSession
 from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.moments import History, Moment, PaneSetup, State, Trail, way_of
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Scenario, TeamSpec
+from robocov_app.viewer.session.undo_tree import MOST_KEPT, Document, Node, replayed
 
 MOST_GHOSTS = 8  # branches whose curves are shown
 PUSHED = 5e-3  # metres from which on a robot counts as pushed: who leans on something moves in any case

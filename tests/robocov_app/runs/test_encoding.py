@@ -17,9 +17,9 @@ from hypothesis.extra.numpy import arrays
 
 from robocov.errors import OutputError, ParameterError
 from robocov.metrics import CostHistory
+from robocov_app.runs.encoding import encoder, png_bytes, save_film, save_moving_picture
 from robocov_app.runs.film import frame_rows, iter_frames
 from robocov_app.runs.options import FilmOptions
-from robocov_app.runs.recording import encoder, png_bytes, save_film, save_moving_picture
 from robocov_app.viewer.film import Film
 
 
