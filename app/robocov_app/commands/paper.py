@@ -67,8 +67,7 @@ def command(options: Arguments) -> int:
     open_folder(out, plan)
     with_claims = not (options.figures_only or options.beyond_only)
     with_beyond = not (options.figures_only or options.without_beyond)
-    found: tuple[Any, ...] = ()  # claims
-    more: tuple[Any, ...] = ()
+    found, more = list[Any](), tuple[Any, ...]()  # claims
     paper = beyond = None
     with Interruption() as stop:
         workers, scheduler = options.workers or processors(), options.scheduler
