@@ -217,7 +217,7 @@ class WriteOptions(Options):
 
 @dataclass(frozen=True)
 class ExportReport(_Report):
-    """What came of a map in a foreign format: files (that asked for first), free areas in m², and words.
+    """Result of an export: files (the one asked for first), free areas in m², and words.
 
     `dropped`: what the format cannot hold. `warnings`: where robots cannot drive any more.
     """

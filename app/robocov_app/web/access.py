@@ -1,4 +1,4 @@
-"""Who may see a served window: tokens in links and cookies."""
+"""Access to a served window: tokens in links and cookies."""
 
 import hmac
 from collections.abc import Iterable

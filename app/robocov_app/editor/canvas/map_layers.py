@@ -35,7 +35,7 @@ class Outline:
 
     @cached_property
     def name_place(self) -> tuple[float, float, float, float]:
-        """Where a name has most room, and how much: x, y, width, height, m."""
+        """Largest free spot for a name: x, y, width, height, m."""
         geometry, best = self.geometry, (0.0, 0.0, 0.0, 0.0)
         for y in () if geometry.is_empty else (geometry.centroid.y, geometry.representative_point().y):
             for part in _cut(geometry, 0, y):

@@ -257,7 +257,7 @@ def snapped_angle(degrees: float, step: float = 15.0, reach: float = 3.0) -> flo
 
 @dataclass(frozen=True)
 class _Candidates:
-    """Where a point may snap to; angles count from `origin`."""
+    """Snap candidates of a point; angles count from `origin`."""
 
     point: Point
     targets: Targets

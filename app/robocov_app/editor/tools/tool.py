@@ -195,7 +195,7 @@ class Tool:
 
     @property
     def origin(self) -> Point | None:
-        """Where the line comes from that is being drawn."""
+        """Last point of the line that is being drawn."""
         return None
 
     @property

@@ -56,7 +56,7 @@ class PaneSetup:
 
     @property
     def speeds(self) -> Array | None:
-        """How fast each robot can go, (n,) m/s; None where all, failed too, are alike."""
+        """Speed limits, (n,) m/s; None where all robots, failed ones too, are alike."""
         return self.team.max_speed if "max_speed" in self.limits.different else None
 
 
