@@ -196,7 +196,7 @@ def changes(draw, sketch):
         lambda: create.anywhere_added(sketch),
         lambda: transform.moved(sketch, selection, dx, dy),
         lambda: transform.rotated(sketch, selection, degrees, draw(st.sampled_from([None, a]))),
-        lambda: transform.scaled(sketch, selection, factor, draw(st.sampled_from([None, 1.5])), a),
+        lambda: transform.scaled(sketch, selection, factor, draw(st.sampled_from([factor, 1.5])), a),
         lambda: transform.resized(sketch, selection, length, draw(st.sampled_from([None, 1.0]))),
         lambda: transform.placed(sketch, selection, a[0], None),
         lambda: transform.mirrored(sketch, selection, axis),
