@@ -14,10 +14,11 @@ from robocov.controllers.driving import last_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.localization import Estimates, localized, wary
 from robocov.controllers.route_following import follow_routes
+from robocov.controllers.shared_map import shared
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.planning.discovered import DiscoveredMap, Raster
-from robocov.planning.placement import CoverageDemand, OwnPlace, own_place, team_places
+from robocov.planning.placement import OwnPlace, demand, own_place, team_places, viewpoint
 from robocov.planning.wayfinding import GridPlanner, Window
 from robocov.robots import Team
 
@@ -244,10 +245,10 @@ class Atlas(Law):
             if np.abs(situation - before.situation).max() < _HARDLY * spacing:
                 return replace(state, walked=before.walked), None
         state = replace(state, planned=state.known, situation=situation, group=group)
-        ways = state.ways or GridPlanner(state.known, window, float(team.radius[i]) + self.clearance)
+        ways = state.ways or GridPlanner.of(state.known, window, float(team.radius[i]) + self.clearance)
         ways = ways.updated(state.known, window)
         state = replace(state, ways=ways)
-        demand = CoverageDemand(state.known, window, seen.density)
+        weights = demand(ways, seen.density)
         settling = 2.0 ** min(state.walked / (self.settling * seen.region.diameter), 60.0)
         together = seen.time - state.since <= _TOGETHER * seen.region.diameter / fastest
         # afterwards each decides for itself alone
@@ -258,9 +259,9 @@ class Atlas(Law):
         if begin < 0:
             return replace(state, own=place, idle=False), place
         former = np.full(2, np.nan) if state.own is None else state.own
-        own = own_place(ways, demand.weights, at, begin, former, min(1.0, self.rest * settling))
+        own = own_place(ways, weights, at, begin, former, min(1.0, self.rest * settling))
         state = replace(state, own=own.goal, node=own.node)
-        return self._looking(state, demand, own, place, state.walked - before.walked)
+        return self._looking(state, own, place, state.walked - before.walked)
 
     def _teammates(
         self, seen: Observations, team: Team, state: PlannerState, i: int
@@ -300,7 +301,7 @@ class Atlas(Law):
         window = Window.around(known.raster, now[0], reach, most)
         ways = (state.team_ways or state.ways).updated(known, window)
         # who is there already does not leave for what may not be there
-        weights = CoverageDemand(known, ways.window, seen.density, sure=not together).weights
+        weights = demand(ways, seen.density, sure=not together)
         fixed = np.concatenate([[False], still])[: len(now)]
         begin = now.copy()
         if state.places is not None:
@@ -315,7 +316,7 @@ class Atlas(Law):
         return replace(state, team_ways=ways, places=np.column_stack([group, places])), places
 
     def _looking(
-        self, state: PlannerState, demand: CoverageDemand, own: OwnPlace, place: Array, step: float
+        self, state: PlannerState, own: OwnPlace, place: Array, step: float
     ) -> tuple[PlannerState, Array]:
         """Return the state, and where to go: to the own place, or first to what there is to see."""
         ways, former, look = state.ways, state.former, None
@@ -328,9 +329,9 @@ class Atlas(Law):
         looked = state.looked + max(step, 0.0) * (state.look is not None)
         # the place of who is alone hardly depends on what it has not seen
         if node >= 0 and self.stake < 1.0 and len(state.group) > 1:
-            far = self.patience * demand.known.raster.region.diameter
+            far = self.patience * state.known.raster.region.diameter
             least = self.stake * own.cost * 2.0 ** min(looked / far, 60.0)
-            look = demand.viewpoint(own.mine, ways.distances(node), ways.tight, least, former)
+            look = viewpoint(ways, own.mine, ways.distances(node), least, former)
         state = replace(state, look=look, former=former, looked=looked, idle=look is None)
         return state, own.goal if look is None else look
 
@@ -345,4 +346,4 @@ class AtlasShared(Atlas):
     information = "shared map"
 
     def _exchanged(self, maps: list[DiscoveredMap], seen: Observations) -> list[DiscoveredMap]:
-        return [known.merged(maps[k] for k in seen.neighbours.of(i).tolist()) for i, known in enumerate(maps)]
+        return list(shared(tuple(maps), seen.neighbours))

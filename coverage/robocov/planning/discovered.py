@@ -33,7 +33,7 @@ _CORE = 0.3  # a ray that passes the middle of a presumed cell, to so much of it
 PRIOR, LONG = 0.8, 30.0  # openness of what is far, so many blocks, from all that is known
 BLOCKS = 1000  # that a map is divided into, at most
 _OVER = 1.9  # relaxation factor; the best for walks that end after `LONG` blocks
-_SWEEPS, _EXACT = 1000, 1e-11
+_SWEEPS, _EXACT = 1000, 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,6 +251,20 @@ def openness(state: NDArray[np.uint8], outside: BoolArray, blocks: int = BLOCKS)
     return _relaxed(np.where(outside, 255, state).astype(np.uint8), side)
 
 
+@inlined_kernel
+def _meet(
+    here: int, there: int, i: int, j: int, a: int, b: int, links: Array, open_to: Array, closed_to: Array
+) -> None:
+    """Count the border between a cell in block (i, j) and the next one, in block (a, b)."""
+    if here == there:
+        if here == UNKNOWN and (a > i or b > j):
+            links[i, j] += 1.0
+    elif here == UNKNOWN and there != 255:
+        (open_to if there == FREE else closed_to)[i, j] += 1.0
+    elif there == UNKNOWN and here != 255:
+        (open_to if here == FREE else closed_to)[a, b] += 1.0
+
+
 @kernel
 def _relaxed(state: NDArray[np.uint8], side: int) -> Array:
     """Solve Laplace's equation on blocks by successive over-relaxation; 255 marks cells that do not count."""
@@ -260,22 +274,15 @@ def _relaxed(state: NDArray[np.uint8], side: int) -> Array:
     count, open_to, closed_to = np.zeros((high, wide)), np.zeros((high, wide)), np.zeros((high, wide))
     above, right = np.zeros((high + 1, wide + 1)), np.zeros((high + 1, wide + 1))
     for r in range(rows):
+        i = r // side
         for c in range(columns):
-            if state[r, c] != UNKNOWN:
-                continue
-            i, j = r // side, c // side
-            count[i, j] += 1.0
-            for a, b in ((r + 1, c), (r, c + 1), (r - 1, c), (r, c - 1)):
-                if not (0 <= a < rows and 0 <= b < columns) or state[a, b] == 255:
-                    continue
-                if state[a, b] == FREE:
-                    open_to[i, j] += 1.0
-                elif state[a, b] != UNKNOWN:
-                    closed_to[i, j] += 1.0
-                elif a // side > i:
-                    above[i, j] += 1.0
-                elif b // side > j:
-                    right[i, j] += 1.0
+            j, here = c // side, state[r, c]
+            if here == UNKNOWN:
+                count[i, j] += 1.0
+            if r + 1 < rows:
+                _meet(here, state[r + 1, c], i, j, (r + 1) // side, j, above, open_to, closed_to)
+            if c + 1 < columns:
+                _meet(here, state[r, c + 1], i, j, i, (c + 1) // side, right, open_to, closed_to)
     u = np.full((high + 1, wide + 1), PRIOR)
     for _ in range(_SWEEPS):
         change = 0.0

@@ -8,91 +8,65 @@ with geodesic distances d. An unknown cell counts by how likely it is free (see 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.optimize import linear_sum_assignment
 
 from robocov.arrays import Array, BoolArray
 from robocov.density import Density
 from robocov.k_median import improved, moved
-from robocov.planning.discovered import BLOCKS, FREE, UNKNOWN, DiscoveredMap, openness
-from robocov.planning.wayfinding import GridPlanner, Window
+from robocov.planning.wayfinding import GridPlanner
 
 _FAR = 1e9  # metres that stand for "nobody is there"
 _STEPS = 6  # of nodes that a plan moves an own place by, at most
 _SEEN_ENOUGH = 0.6  # metres around a place from where somebody has looked: it is not gone to again
 
 
-@dataclass(frozen=True, eq=False)
-class CoverageDemand:
-    """Demand in a window of a discovered map; if `sure`, only of cells known to be free."""
+def demand(ways: GridPlanner, density: Density | None = None, *, sure: bool = False) -> Array:
+    """Return the weights w of the nodes, (m,), in cells: for so many each stands, times the density.
 
-    known: DiscoveredMap
-    window: Window
-    density: Density | None = None
-    sure: bool = False
+    Unknown cells count by their openness; if `sure`, not at all.
+    """
+    weights = ways.cells_of_nodes(sure=sure)
+    if density is not None and not density.uniform:
+        weights = weights * density.value(ways.nodes)
+    return weights
 
-    @cached_property
-    def _state(self) -> NDArray[np.uint8]:
-        return self.window.cut(self.known.state, np.uint8(UNKNOWN))
 
-    @cached_property
-    def _outside(self) -> BoolArray:
-        return self.window.cut(self.known.raster.outside, True)
+def viewpoint(
+    ways: GridPlanner, mine: Array, home: Array, least: float, former: tuple[Array, ...]
+) -> Array | None:
+    """Return where to look at what may matter most, of the unknown patches in a robot's own cell.
 
-    @cached_property
-    def _openness(self) -> Array:
-        return openness(self._state, self._outside, min(BLOCKS, self.window.rows * self.window.columns))
+    At stake is what a patch is expected to add to the cost: an inside of an obstacle hardly adds
+    anything. The place is a free cell on its border, chosen by stake over one metre plus the way.
 
-    @cached_property
-    def weights(self) -> Array:
-        """Number of cells that each node stands for, (m,); unknown ones count by their openness."""
-        window = self.window
-        worth = np.where(self._state == FREE, 1.0, 0.0 if self.sure else self._openness)
-        worth[self._outside] = 0.0
-        blocks = worth.reshape(window.rows, window.stride, window.columns, window.stride)
-        weights = blocks.sum(axis=(1, 3)).ravel()
-        if self.density is not None and not self.density.uniform:
-            weights = weights * self.density.value(window.nodes(self.known.raster))
-        return np.asarray(weights)
-
-    def viewpoint(
-        self, mine: Array, home: Array, tight: BoolArray, least: float, former: tuple[Array, ...]
-    ) -> Array | None:
-        """Return where to look at what may matter most, of the unknown patches in a robot's own cell.
-
-        At stake is what a patch is expected to add to the cost: an inside of an obstacle hardly adds
-        anything. The place is a free cell on its border, chosen by stake over one metre plus the way.
-
-        Distances, (m,) m, are those of the nodes of its own cell from its goal, 0 for others (`mine`), and
-        of all nodes from where it is (`home`). It cannot be in `tight` cells, (h, w); from the `former`
-        places it has looked already. None: no stake is above the `least`, in cells times metres.
-        """
-        stride, columns, raster = self.window.stride, self.window.columns, self.known.raster
-        patch, _ = ndimage.label((self._state == UNKNOWN) & ~self._outside)
-        row, column = patch.nonzero()
-        hoped = mine[row // stride * columns + column // stride] * self._openness[row, column]
-        stake = np.bincount(patch[row, column], hoped, minlength=1)[patch]
-        usable = np.pad((self._state == FREE) & ~tight, 1)
-        row, column = np.nonzero(ndimage.binary_dilation(usable)[1:-1, 1:-1] & (stake > least))
-        if not len(row):
-            return None
-        # the cells right of, above, left of and below those of the patch
-        a, b = row[:, None] + [0, 1, 0, -1], column[:, None] + [1, 0, -1, 0]
-        node = np.clip(a // stride * columns + b // stride, 0, len(home) - 1)
-        worth = usable[a + 1, b + 1] * stake[row, column][:, None] / (1.0 + home[node])
-        first = raster.middles(*np.array(self.window[:2]))
-        for x, y in (np.array(former).reshape(-1, 2) - first) / raster.cell:
-            worth[(x - b) ** 2 + (y - a) ** 2 < (_SEEN_ENOUGH / raster.cell) ** 2] = 0.0
-        best = worth.argmax()
-        if not worth.flat[best] > 0.0:
-            return None
-        return np.asarray(first + np.array([b.flat[best], a.flat[best]]) * raster.cell)
+    Distances, (m,) m, are those of the nodes of its own cell from its goal, 0 for others (`mine`), and
+    of all nodes from where it is (`home`). From the `former` places it has looked already. None: no stake
+    is above the `least`, in cells times metres.
+    """
+    stride, columns, raster = ways.window.stride, ways.window.columns, ways.known.raster
+    patch, _ = ndimage.label(ways.unknown & ~ways.outside)
+    row, column = patch.nonzero()
+    hoped = mine[row // stride * columns + column // stride] * ways.openness[row, column]
+    stake = np.bincount(patch[row, column], hoped, minlength=1)[patch]
+    usable = np.pad(ways.free & ~ways.tight, 1)
+    row, column = np.nonzero(ndimage.binary_dilation(usable)[1:-1, 1:-1] & (stake > least))
+    if not len(row):
+        return None
+    # the cells right of, above, left of and below those of the patch
+    a, b = row[:, None] + [0, 1, 0, -1], column[:, None] + [1, 0, -1, 0]
+    node = np.clip(a // stride * columns + b // stride, 0, len(home) - 1)
+    worth = usable[a + 1, b + 1] * stake[row, column][:, None] / (1.0 + home[node])
+    first = raster.middles(*np.array(ways.window[:2]))
+    for x, y in (np.array(former).reshape(-1, 2) - first) / raster.cell:
+        worth[(x - b) ** 2 + (y - a) ** 2 < (_SEEN_ENOUGH / raster.cell) ** 2] = 0.0
+    best = worth.argmax()
+    if not worth.flat[best] > 0.0:
+        return None
+    return np.asarray(first + np.array([b.flat[best], a.flat[best]]) * raster.cell)
 
 
 def team_places(

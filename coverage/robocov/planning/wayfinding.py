@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import count
 from typing import NamedTuple, TypeVar
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +22,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
-from robocov.planning.discovered import UNKNOWN, DiscoveredMap, Raster, dilate
+from robocov.planning.discovered import BLOCKS, UNKNOWN, DiscoveredMap, Raster, dilate, openness
 
 Cell = TypeVar("Cell", bound=np.generic)
 
@@ -92,9 +93,16 @@ class GridPlanner:
     clearance: float  # how far ways keep from walls, but for the last step to a node, m
     _tables: dict[int, Array] = field(default_factory=dict)
 
+    @classmethod
+    def of(cls, known: DiscoveredMap, window: Window, clearance: float) -> GridPlanner:
+        """Return the planner of a map, the one in use where robots that share the map have made it."""
+        key = id(known), window, clearance  # whoever is found holds its map, so no other one has this id
+        made = _IN_USE.get(key) or cls(known, window, clearance)
+        return _IN_USE.setdefault(key, made)
+
     def updated(self, known: DiscoveredMap, window: Window) -> GridPlanner:
         """Return the planner for a later map and window; the same one where it makes no difference."""
-        later = GridPlanner(known, window, self.clearance)
+        later = GridPlanner.of(known, window, self.clearance)
         same = self.window == window and np.array_equal(self.blocked, later.blocked)
         return self if same and np.array_equal(self.unknown, later.unknown) else later
 
@@ -107,6 +115,29 @@ class GridPlanner:
     def unknown(self) -> BoolArray:
         """The window's cells that the robot has not seen, (h, w)."""
         return np.asarray(self.window.cut(self.known.state, np.uint8(UNKNOWN)) == UNKNOWN)
+
+    @cached_property
+    def outside(self) -> BoolArray:
+        """The window's cells that are not in the region, (h, w)."""
+        return self.window.cut(self.known.raster.outside, True)
+
+    @cached_property
+    def free(self) -> BoolArray:
+        """The window's cells that are known to be free, (h, w)."""
+        return np.asarray(~(self.unknown | self.blocked | self.outside))
+
+    @cached_property
+    def openness(self) -> Array:
+        """How likely those are free that the robot has not seen, 0 for all others, (h, w)."""
+        state = self.window.cut(self.known.state, np.uint8(UNKNOWN))
+        return openness(state, self.outside, min(BLOCKS, self.window.rows * self.window.columns))
+
+    def cells_of_nodes(self, *, sure: bool = False) -> Array:
+        """Return for how many free cells each node stands, (m,); unknown ones count by openness, or 0."""
+        worth = self.free if sure else self.free + self.openness
+        _, _, rows, columns, stride = self.window
+        blocks = worth.reshape(rows, stride, columns, stride)
+        return np.asarray(blocks.sum(axis=(1, 3), dtype=np.float64).ravel())
 
     @property
     def spacing(self) -> float:
@@ -137,28 +168,14 @@ class GridPlanner:
         a hole in a wall that has not been seen as a whole.
         """
         _, _, rows, columns, stride = self.window
-        number = np.arange(rows * columns).reshape(rows, columns)
-        cells = self.tight + np.uint8(2) * self.blocked
-        edges = []
-        for down, right in _MOVES:
-            # nodes from which the move stays in the window, and all cells that it crosses
-            high, wide, low = max(0, rows - down), max(0, columns - abs(right)), max(0, -right)
-            met, unseen = np.zeros((high, wide), dtype=np.uint8), np.zeros((high, wide))
-            crossed = _crossed(down, right, stride)
-            for row, column in crossed:
-                top, left = stride // 2 + row, stride // 2 + low * stride + column
-                part = slice(top, top + high * stride, stride), slice(left, left + wide * stride, stride)
-                met |= cells[part]
-                unseen += self.unknown[part]
-            longer = (1.0 + _DETOUR / len(crossed) * unseen).ravel()
-            end = number[:high, low : low + wide].ravel()
-            other = end + down * columns + right
-            way, no_wall = (met & 1 == 0).ravel(), (met & 2 == 0).ravel()
-            for one, two in ((end, other), (other, end)):
-                some = way | (no_wall & self.roomy[one] & ~self.roomy[two])
-                edges.append((one[some], two[some], math.hypot(down, right) * self.spacing * longer[some]))
-        begins, ends, lengths = (np.concatenate(part) for part in zip(*edges, strict=True))
-        return csr_array((lengths, (begins, ends)), shape=(number.size, number.size))
+        crossed = [_crossed(down, right, stride) for down, right in _MOVES]
+        counts = np.array([len(cells) for cells in crossed])
+        lengths = np.array([math.hypot(*move) for move in _MOVES]) * self.spacing
+        graph = _joined(
+            self.tight, self.blocked, self.unknown, self.roomy, (rows, columns, stride),
+            np.array(_MOVES), lengths, counts, np.concatenate(crossed),
+        )  # fmt: skip
+        return csr_array(graph, shape=(rows * columns, rows * columns))
 
     @cached_property
     def _frame(self) -> tuple[float, float, float, int, int, int, int]:
@@ -283,6 +300,52 @@ class GridPlanner:
             kept.append(at)
             k += 1
         return np.array(kept)
+
+
+_IN_USE: WeakValueDictionary[tuple[int, Window, float], GridPlanner] = WeakValueDictionary()
+
+
+@kernel
+def _joined(
+    tight: BoolArray, blocked: BoolArray, unknown: BoolArray, roomy: BoolArray, size: tuple[int, int, int],
+    moves: IntArray, lengths: Array, counts: IntArray, crossed: IntArray,
+) -> tuple[Array, IntArray, IntArray]:  # fmt: skip
+    """Return the graph of a lattice as lengths, ends, and where the edges of each node begin.
+
+    For each of the moves there is its length and how many cells it crosses, (m, 2) from that of its node on.
+    """
+    rows, columns, stride = size
+    length = np.full((rows * columns, 5, 5), np.inf)
+    first = 0
+    for k in range(len(moves)):
+        down, right = moves[k]
+        for row in range(rows - down):
+            for column in range(max(0, -right), columns - max(0, right)):
+                top, left = stride // 2 + row * stride, stride // 2 + column * stride
+                way, no_wall, unseen = True, True, 0
+                for m in range(first, first + counts[k]):
+                    i, j = top + crossed[m, 0], left + crossed[m, 1]
+                    way, no_wall = way and not tight[i, j], no_wall and not blocked[i, j]
+                    unseen += unknown[i, j]
+                one, other = row * columns + column, (row + down) * columns + column + right
+                far = lengths[k] * (1.0 + _DETOUR / counts[k] * unseen)
+                if way or (no_wall and roomy[one] and not roomy[other]):
+                    length[one, 2 + down, 2 + right] = far
+                if way or (no_wall and roomy[other] and not roomy[one]):
+                    length[other, 2 - down, 2 - right] = far
+        first += counts[k]
+    count = 0
+    data, ends = np.empty(length.size), np.empty(length.size, dtype=np.intp)
+    begins = np.zeros(rows * columns + 1, dtype=np.intp)
+    for node in range(rows * columns):
+        for down in range(5):
+            for right in range(5):
+                if length[node, down, right] < np.inf:
+                    data[count] = length[node, down, right]
+                    ends[count] = node + (down - 2) * columns + right - 2
+                    count += 1
+        begins[node + 1] = count
+    return data[:count].copy(), ends[:count].copy(), begins
 
 
 @kernel
