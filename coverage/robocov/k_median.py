@@ -159,11 +159,13 @@ def best_swaps(table: Array, sources: IntArray, beat: Beat = lambda: None) -> In
     return sources
 
 
-def improved(table: Array, sources: IntArray, fixed: BoolArray, threshold: float) -> IntArray:
+def improved(
+    table: Array, sources: IntArray, fixed: BoolArray, threshold: float, *, removals: bool = True
+) -> IntArray:
     """Return (k,) sources for which the sum over the targets of the distances to the nearest is low.
 
     Lloyd's iteration in turn with the best swap of one source for another, and, where no swap helps, with
-    taking away two or three and putting them back where each helps most. Those that are `fixed` stay. What
+    `removals`: taking away two or three and putting them back where each helps most. Those that are `fixed` stay. What
     all this saves must be more than the part `threshold` of the sum after Lloyd's iteration alone; that one
     is returned else.
     """
@@ -172,7 +174,7 @@ def improved(table: Array, sources: IntArray, fixed: BoolArray, threshold: float
         return near
     for _ in range(_PASSES):
         after = best_swap(table, best, fixed, _HARDLY)
-        if after is best:
+        if after is best and removals:
             after = rebuilt(table, best, fixed, _HARDLY)
         if after is best:
             break

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from robocov.controllers.driving import last_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.localization import Estimates, localized, wary
 from robocov.controllers.route_following import follow_routes
-from robocov.controllers.shared_map import shared
-from robocov.observation import Decision, Observations, Scanning
+from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.region import Region
 from robocov.planning.discovered import DiscoveredMap, Raster
 from robocov.planning.placement import OwnPlace, demand, own_place, team_places, viewpoint
@@ -24,7 +23,7 @@ from robocov.robots import Team
 
 FINEST_CELL, MOST_CELLS = 0.05, 1_000_000  # side of a cell of the maps, m, larger in very large regions
 TEAM_NODES, GROUP_NODES, OWN_NODES = 1000, 500, 2500  # of lattices: for a team, for its group, for itself
-MAX_PLANNING_GROUP = 8  # a robot plans for itself and up to so many less one that it hears
+NODES_OF_ROBOT = 27  # more for large teams
 STILL_FOR, STILL_WITHIN = 3.0, 0.1  # who does not get so many metres away for so many seconds rests
 
 _AROUND, _LEAST = 2.0, 1.0  # a group is planned for in a window so many times as far as it is, and that, m
@@ -35,8 +34,8 @@ _MISSED, _IN_RANGE = (
 _HARDLY = 0.1  # part of the spacing of the nodes that others may move before a plan is made anew
 _WALLS = 4.0  # radii of the robot: longer than the side of another one that shows, which has failed
 _ARRIVED = 0.35  # metres from a place at which it counts as reached
-_TOGETHER = 1.5  # a robot plans for its whole team as long as it takes to cross the region so many times
-_STAGGERED = 0.5  # part of the period in which all robots make their first plans
+MAX_PLANNING_GROUP = 8  # who plans by a map of its own plans for itself and so many less one that it hears
+_JOINTLY = 3.0  # a robot plans for others as long as it takes to cross the region so many times
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
@@ -139,7 +138,7 @@ class Atlas(Law):
     Private maps agree ever more where it matters, and so do the plans. Where they do not, the team comes to
     rest by 1, and as what a relocation or a goal must save doubles with the way that a robot walks, not with
     time (`settling`): who rests stays as ready to move as it was. It begins anew when robots join or fail,
-    and when a robot sees a wall come or go. Of more than `MAX_PLANNING_GROUP` robots each plans for itself
+    and when a robot sees a wall come or go. Of more than `most_planned_for` robots each plans for itself
     and its nearest ones, in the part of the map where these are; the others are where they are.
     """
 
@@ -147,6 +146,7 @@ class Atlas(Law):
     label = "Atlas"
     summary = "plans the team's placement on the map that each robot discovers itself"
     scanning = Scanning(rays=240, period=0.5)
+    staggered: ClassVar[float] = 0.5  # part of the period in which all robots make their first plans
 
     period: float = gain(1.0, "s", "between two plans of a robot", low=0.05, high=60.0)
     threshold: float = gain(0.01, "1", "part of the cost that a relocation must save", high=1.0)
@@ -157,7 +157,7 @@ class Atlas(Law):
         0.12, "1", "way of looks, in diameters of the region, that doubles it", low=1e-3, high=1e4
     )
     settling: float = gain(
-        0.8, "1", "way, in diameters, that doubles what relocations and goals must save", low=1e-3, high=1e6
+        0.5, "1", "way, in diameters, that doubles what relocations and goals must save", low=1e-3, high=1e6
     )
     clearance: float = gain(0.03, "m", "that routes keep between rim and walls", high=10.0)
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the goal", high=100.0)
@@ -171,7 +171,7 @@ class Atlas(Law):
         nowhere, never = np.empty((0, 2)), np.empty(0)
         nobody = Teammates(np.empty(0, dtype=np.intp), nowhere, never, never, never, nowhere)
         # the robots do not all plan at the same moment
-        first = [self.period * _STAGGERED * (i * _GOLDEN % 1.0) for i in range(len(team))]
+        first = [self.period * self.staggered * (i * _GOLDEN % 1.0) for i in range(len(team))]
         states = tuple(PlannerState(empty, due, nobody) for due in first)
         routes = (np.full((1, 2), np.nan),) * len(team)
         return AtlasMemory(team, states, routes, np.zeros(len(team), dtype=np.intp))
@@ -184,11 +184,7 @@ class Atlas(Law):
             )
         states, scans = list(memory.states), seen.scans
         if scans is not None:
-            each = zip(states, seen.positions, scans.distances, scans.hit, strict=True)
-            maps = [state.known.scanned(*scan) for state, *scan in each]
-            radii, others = memory.team.radius.tolist(), seen.neighbour_positions
-            maps = [known.visited(others(i), radii[i]) for i, known in enumerate(maps)]
-            maps = self._exchanged(maps, seen)
+            maps = self._surveyed([state.known for state in states], seen, scans, memory.team.radius)
             states = [replace(state, known=known) for state, known in zip(states, maps, strict=True)]
         routes, legs = list(memory.routes), memory.legs.copy()
         for i, state in enumerate(states):
@@ -206,9 +202,19 @@ class Atlas(Law):
         after = AtlasMemory(team, tuple(states), tuple(routes), legs, returns, estimates)
         return Decision(forces, goals, {"attraction": forces}, memory=after)
 
-    def _exchanged(self, maps: list[DiscoveredMap], seen: Observations) -> list[DiscoveredMap]:
-        """Return the maps after the robots have told each other of theirs, which they do not here."""
-        return maps
+    def _surveyed(
+        self, maps: list[DiscoveredMap], seen: Observations, scans: Scans, radius: Array
+    ) -> list[DiscoveredMap]:
+        """Return the maps after a scan of each robot; where others are, it is free."""
+        each = zip(maps, seen.positions, scans.distances, scans.hit, strict=True)
+        maps = [known.scanned(*scan) for known, *scan in each]
+        return [
+            known.visited(seen.neighbour_positions(i), float(radius[i])) for i, known in enumerate(maps)
+        ]
+
+    def _agreed(self, others: Teammates, seen: Observations) -> bool:
+        """Return whether all plan on the same map, so that all come to the same plan."""
+        return False
 
     def _planned(
         self, seen: Observations, team: Team, state: PlannerState, i: int
@@ -218,9 +224,9 @@ class Atlas(Law):
         known, met = self._teammates(seen, team, state, i)
         others, at = known.robots, known.at
         still = (seen.time - known.since >= STILL_FOR) | (known.heard < seen.time)
-        quiet = bool(still.all())
+        quiet, agreed = bool(still.all()), self._agreed(known, seen)
         # those that it plans for come first
-        beyond = np.ones(len(at), dtype=bool)
+        beyond = np.full(len(at), not agreed)
         beyond[np.argsort(((at - place) ** 2).sum(axis=1), kind="stable")[: MAX_PLANNING_GROUP - 1]] = False
         order = np.argsort(beyond, kind="stable")
         others, at, still = others[order], at[order], (still | beyond)[order]
@@ -229,7 +235,7 @@ class Atlas(Law):
         # nobody gets farther than to the next node meanwhile
         period = max(self.period, spacing / fastest)
         first = state.planned is None
-        due = seen.time + period * (1.0 + ((i + 1) * _GOLDEN) % 1.0 if first else 1.0)
+        due = seen.time + period * (1.0 + bool(self.staggered) * ((i + 1) * _GOLDEN) % 1.0 if first else 1.0)
         before, walked = state, state.walked
         if state.situation is not None:
             walked += math.dist(place, state.situation[0])
@@ -250,10 +256,10 @@ class Atlas(Law):
         state = replace(state, ways=ways)
         weights = demand(ways, seen.density)
         settling = 2.0 ** min(state.walked / (self.settling * seen.region.diameter), 60.0)
-        together = seen.time - state.since <= _TOGETHER * seen.region.diameter / fastest
+        together = agreed or seen.time - state.since <= _JOINTLY * seen.region.diameter / fastest
         # afterwards each decides for itself alone
-        still = still if together else np.ones_like(still)
-        state, places = self._plan_for_all(state, seen, still, settling, together)
+        still = still & (not agreed) if together else np.ones_like(still)
+        state, places = self._plan_for_all(state, seen, still, settling, together=together, agreed=agreed)
         begin = ways.nearest(places[0])
         at[~still] = places[1:][~still[: len(places) - 1]]
         if begin < 0:
@@ -285,23 +291,20 @@ class Atlas(Law):
         return known.updated(robots, at, place, seen.time, failed | missed), met
 
     def _plan_for_all(
-        self, state: PlannerState, seen: Observations, still: BoolArray, settling: float, together: bool
-    ) -> tuple[PlannerState, Array]:
+        self, state: PlannerState, seen: Observations, still: BoolArray, settling: float,
+        *, together: bool, agreed: bool,
+    ) -> tuple[PlannerState, Array]:  # fmt: skip
         """Return the state with a plan for the team, and the places in it, (k, 2) m, the own one first."""
         known = state.known
         assert state.ways is not None and state.situation is not None and state.group is not None
-        group, (now, others) = (
-            state.group[:MAX_PLANNING_GROUP],
-            np.split(state.situation, [MAX_PLANNING_GROUP]),
-        )
-        reach, most = math.inf, TEAM_NODES
+        most = len(state.group) if agreed else MAX_PLANNING_GROUP
+        group, (now, others) = state.group[:most], np.split(state.situation, [most])
+        reach, nodes = math.inf, max(TEAM_NODES, NODES_OF_ROBOT * len(now))
         if len(others):
             away = float(np.sqrt(((now - now[0]) ** 2).sum(axis=1).max()))
-            reach, most = max(_AROUND * away, _LEAST), GROUP_NODES
-        window = Window.around(known.raster, now[0], reach, most)
+            reach, nodes = max(_AROUND * away, _LEAST), GROUP_NODES
+        window = Window.around(known.raster, now[0], reach, nodes)
         ways = (state.team_ways or state.ways).updated(known, window)
-        # who is there already does not leave for what may not be there
-        weights = demand(ways, seen.density, sure=not together)
         fixed = np.concatenate([[False], still])[: len(now)]
         begin = now.copy()
         if state.places is not None:
@@ -310,9 +313,22 @@ class Atlas(Law):
             free = ~fixed[here]
             begin[here[free]] = places[there[free]]
         # who decides alone goes nowhere else while others do
+        settling = 1.0 if agreed else settling  # as each robot walks another way
         threshold = min(1.0, self.threshold * settling) if together or state.quiet else 1.0
         nearby = min(1.0, self.nearby * settling)
-        places = team_places(ways, weights, now, begin, fixed, others, threshold, nearby)
+        # who plans on the same map comes to the same plan, which is made once
+        order = np.argsort(group) if agreed else np.arange(len(group))
+        key = (*(each[order].tobytes() for each in (group, now, begin)), threshold)
+        made = ways.plans.get(key) if agreed else None
+        if made is None or made[0] is not seen.density:
+            # who is there already does not leave for what may not be there
+            weights = demand(ways, seen.density, sure=not together)
+            each = (each[order] for each in (now, begin, fixed))
+            made = seen.density, team_places(ways, weights, *each, others, threshold, nearby)
+            if agreed:
+                ways.plans[key] = made
+        places = np.empty_like(begin)
+        places[order] = made[1]
         return replace(state, team_ways=ways, places=np.column_stack([group, places])), places
 
     def _looking(
@@ -344,6 +360,25 @@ class AtlasShared(Atlas):
     label = "Atlas, shared maps"
     summary = "as Atlas, with the maps merged among the robots that hear each other"
     information = "shared map"
+    staggered = 0.0
 
-    def _exchanged(self, maps: list[DiscoveredMap], seen: Observations) -> list[DiscoveredMap]:
-        return list(shared(tuple(maps), seen.neighbours))
+    patience: float = gain(
+        0.3, "1", "way of looks, in diameters of the region, that doubles it", low=1e-3, high=1e4
+    )
+
+    def _surveyed(
+        self, maps: list[DiscoveredMap], seen: Observations, scans: Scans, radius: Array
+    ) -> list[DiscoveredMap]:
+        if not seen.neighbours.complete:
+            own = super()._surveyed(maps, seen, scans, radius)
+            return [
+                known.merged(own[k] for k in seen.neighbours.of(i).tolist()) for i, known in enumerate(own)
+            ]
+        # all scans go into one map, where the last one counts
+        one = maps[0].merged(other for other in maps if other is not maps[0])
+        for scan in zip(seen.positions, scans.distances, scans.hit, strict=True):
+            one = one.scanned(*scan)
+        return [one.visited(seen.positions, float(radius.min()))] * len(maps)
+
+    def _agreed(self, others: Teammates, seen: Observations) -> bool:
+        return bool((others.heard == seen.time).all())

@@ -20,6 +20,7 @@ from robocov.k_median import improved, moved
 from robocov.planning.wayfinding import GridPlanner
 
 _FAR = 1e9  # metres that stand for "nobody is there"
+_FEW = 8  # robots up to which plans are also looked for by taking two or three places away
 _STEPS = 6  # of nodes that a plan moves an own place by, at most
 _SEEN_ENOUGH = 0.6  # metres around a place from where somebody has looked: it is not gone to again
 
@@ -29,7 +30,7 @@ def demand(ways: GridPlanner, density: Density | None = None, *, sure: bool = Fa
 
     Unknown cells count by their openness; if `sure`, not at all.
     """
-    weights = ways.cells_of_nodes(sure=sure)
+    weights = ways.free_cells if sure else ways.expected_cells
     if density is not None and not density.uniform:
         weights = weights * density.value(ways.nodes)
     return weights
@@ -48,7 +49,7 @@ def viewpoint(
     is above the `least`, in cells times metres.
     """
     stride, columns, raster = ways.window.stride, ways.window.columns, ways.known.raster
-    patch, _ = ndimage.label(ways.unknown & ~ways.outside)
+    patch = ways.patches
     row, column = patch.nonzero()
     hoped = mine[row // stride * columns + column // stride] * ways.openness[row, column]
     stake = np.bincount(patch[row, column], hoped, minlength=1)[patch]
@@ -106,7 +107,7 @@ def team_places(
     # in an order that does not depend on who plans: of two equal plans all take the same
     order, outside = np.lexsort(begin.T), len(sources)
     team = np.append(chosen[order], outside), np.append(fixed[order], True)
-    chosen[order] = improved(weighted, *team, threshold)[:-1]
+    chosen[order] = improved(weighted, *team, threshold, removals=len(now) <= _FEW)[:-1]
     if fixed[1:].all():
         from_team = np.column_stack([distance[:, sources[chosen]], away[sources]])
         own = np.append(from_team.argmin(axis=1) == 0, False)

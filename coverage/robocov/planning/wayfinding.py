@@ -12,11 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import count
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
@@ -31,7 +32,7 @@ _MOVES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
 
 _DETOUR = 0.4  # part by which ways through what nobody has seen are longer, as walls turn up there
 _NEAREST = 12  # so many nodes are tried for the first, and the last, of a route
-_MOST_SOURCES = 180  # a plan for a team chooses among at most so many nodes
+_MOST_SOURCES, _NODES_OF_SOURCE = 180, 9  # a plan chooses among at most so many nodes, or one of so many
 _FINE = 0.5  # a straight line is looked at after every so many cells
 
 
@@ -91,7 +92,9 @@ class GridPlanner:
     known: DiscoveredMap
     window: Window
     clearance: float  # how far ways keep from walls, but for the last step to a node, m
-    _tables: dict[int, Array] = field(default_factory=dict)
+    plans: dict[Any, Any] = field(default_factory=dict, repr=False)  # of a team, by what they come from
+    _tables: dict[int, Array] = field(default_factory=dict, repr=False)
+    _sights: dict[bytes, IntArray] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, known: DiscoveredMap, window: Window, clearance: float) -> GridPlanner:
@@ -132,9 +135,22 @@ class GridPlanner:
         state = self.window.cut(self.known.state, np.uint8(UNKNOWN))
         return openness(state, self.outside, min(BLOCKS, self.window.rows * self.window.columns))
 
-    def cells_of_nodes(self, *, sure: bool = False) -> Array:
-        """Return for how many free cells each node stands, (m,); unknown ones count by openness, or 0."""
-        worth = self.free if sure else self.free + self.openness
+    @cached_property
+    def patches(self) -> IntArray:
+        """The numbers of the connected patches of what the robot has not seen, 0 for all else, (h, w)."""
+        return np.asarray(ndimage.label(self.unknown & ~self.outside)[0])
+
+    @cached_property
+    def free_cells(self) -> Array:
+        """For how many free cells each node stands, (m,)."""
+        return self._summed(self.free)
+
+    @cached_property
+    def expected_cells(self) -> Array:
+        """The same with the unknown ones, which count by their openness, (m,)."""
+        return self._summed(self.free + self.openness)
+
+    def _summed(self, worth: Array | BoolArray) -> Array:
         _, _, rows, columns, stride = self.window
         blocks = worth.reshape(rows, stride, columns, stride)
         return np.asarray(blocks.sum(axis=(1, 3), dtype=np.float64).ravel())
@@ -191,7 +207,7 @@ class GridPlanner:
         row, column = np.divmod(np.arange(len(self.nodes)), self.window.columns)
         for k in count(1):
             sources = np.flatnonzero(self.roomy & (row % k == k // 2) & (column % k == k // 2))
-            if len(sources) <= _MOST_SOURCES:
+            if len(sources) <= max(_MOST_SOURCES, len(self.nodes) // _NODES_OF_SOURCE):
                 break
         return sources
 
@@ -240,10 +256,13 @@ class GridPlanner:
 
     def _in_sight(self, place: Array) -> IntArray:
         """Return the roomy nodes in sight of those near a place; where there are none, the nearest."""
-        near = self._closest(place, self.roomy)
-        seen = near[self.clear(place, self.nodes[near], self.blocked)]
-        # who stands in what is taken for a wall is beside it
-        return seen if len(seen) else near[:1]
+        key = place.tobytes()
+        if key not in self._sights:
+            near = self._closest(place, self.roomy)
+            seen = near[self.clear(place, self.nodes[near], self.blocked)]
+            # who stands in what is taken for a wall is beside it
+            self._sights[key] = seen if len(seen) else near[:1]
+        return self._sights[key]
 
     def _closest(self, place: Array, among: BoolArray) -> IntArray:
         """Return some nodes near a place, the nearest first."""
