@@ -23,7 +23,7 @@ from robocov.robots import Team
 
 FINEST_CELL, MOST_CELLS = 0.05, 1_000_000  # side of a cell of the maps, m, larger in very large regions
 TEAM_NODES, GROUP_NODES, OWN_NODES = 1000, 500, 2500  # of lattices: for a team, for its group, for itself
-NODES_OF_ROBOT = 27  # more for large teams
+OF_A_ROBOT, ENOUGH, LEAST_OF_A_ROBOT = 160, 4000, 27  # of a team's: so many for each up to so many in all, then fewer
 STILL_FOR, STILL_WITHIN = 3.0, 0.1  # who does not get so many metres away for so many seconds rests
 
 _AROUND, _LEAST = 2.0, 1.0  # a group is planned for in a window so many times as far as it is, and that, m
@@ -299,7 +299,8 @@ class Atlas(Law):
         assert state.ways is not None and state.situation is not None and state.group is not None
         most = len(state.group) if agreed else MAX_PLANNING_GROUP
         group, (now, others) = state.group[:most], np.split(state.situation, [most])
-        reach, nodes = math.inf, max(TEAM_NODES, NODES_OF_ROBOT * len(now))
+        nodes = min(OF_A_ROBOT * len(now), ENOUGH)
+        reach, nodes = math.inf, max(TEAM_NODES, nodes, LEAST_OF_A_ROBOT * len(now))
         if len(others):
             away = float(np.sqrt(((now - now[0]) ** 2).sum(axis=1).max()))
             reach, nodes = max(_AROUND * away, _LEAST), GROUP_NODES
@@ -314,7 +315,8 @@ class Atlas(Law):
             begin[here[free]] = places[there[free]]
         # who decides alone goes nowhere else while others do
         settling = 1.0 if agreed else settling  # as each robot walks another way
-        threshold = min(1.0, self.threshold * settling) if together or state.quiet else 1.0
+        worth = self.threshold * min(1.0, MAX_PLANNING_GROUP / len(group))  # of many robots each saves less
+        threshold = min(1.0, worth * settling) if together or state.quiet else 1.0
         nearby = min(1.0, self.nearby * settling)
         # who plans on the same map comes to the same plan, which is made once
         order = np.argsort(group) if agreed else np.arange(len(group))

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
 from scipy.optimize import linear_sum_assignment
 
 from robocov.arrays import Array, BoolArray
@@ -49,18 +48,16 @@ def viewpoint(
     is above the `least`, in cells times metres.
     """
     stride, columns, raster = ways.window.stride, ways.window.columns, ways.known.raster
-    patch = ways.patches
-    row, column = patch.nonzero()
-    hoped = mine[row // stride * columns + column // stride] * ways.openness[row, column]
-    stake = np.bincount(patch[row, column], hoped, minlength=1)[patch]
-    usable = np.pad(ways.free & ~ways.tight, 1)
-    row, column = np.nonzero(ndimage.binary_dilation(usable)[1:-1, 1:-1] & (stake > least))
-    if not len(row):
+    patch, node, cells = ways.unseen
+    row, column, patches, beside = ways.border
+    stake = np.bincount(patch, mine[node] * cells, minlength=1 + patches.max(initial=0))[patches]
+    some = stake > least
+    if not some.any():
         return None
     # the cells right of, above, left of and below those of the patch
-    a, b = row[:, None] + [0, 1, 0, -1], column[:, None] + [1, 0, -1, 0]
+    a, b = row[some, None] + [0, 1, 0, -1], column[some, None] + [1, 0, -1, 0]
     node = np.clip(a // stride * columns + b // stride, 0, len(home) - 1)
-    worth = usable[a + 1, b + 1] * stake[row, column][:, None] / (1.0 + home[node])
+    worth = beside[some] * stake[some, None] / (1.0 + home[node])
     first = raster.middles(*np.array(ways.window[:2]))
     for x, y in (np.array(former).reshape(-1, 2) - first) / raster.cell:
         worth[(x - b) ** 2 + (y - a) ** 2 < (_SEEN_ENOUGH / raster.cell) ** 2] = 0.0

@@ -150,6 +150,26 @@ class GridPlanner:
         """The same with the unknown ones, which count by their openness, (m,)."""
         return self._summed(self.free + self.openness)
 
+    @cached_property
+    def border(self) -> tuple[IntArray, IntArray, IntArray, BoolArray]:
+        """What is not seen beside free cells with room for a robot: row, column, patch, and on which sides.
+
+        (b,) each, and (b, 4): right, above, left and below.
+        """
+        usable = np.pad(self.free & ~self.tight, 1)
+        beside = np.stack([usable[1:-1, 2:], usable[2:, 1:-1], usable[1:-1, :-2], usable[:-2, 1:-1]], axis=-1)
+        row, column = np.nonzero(beside.any(axis=-1) & (self.patches > 0))
+        return row, column, self.patches[row, column], beside[row, column]
+
+    @cached_property
+    def unseen(self) -> tuple[IntArray, IntArray, Array]:
+        """What the patches expect to hold at each node: patch, node, and free cells, (p,) each."""
+        row, column = self.patches.nonzero()
+        stride, m = self.window.stride, len(self.nodes)
+        node = row // stride * self.window.columns + column // stride
+        pair, index = np.unique(self.patches[row, column] * m + node, return_inverse=True)
+        return pair // m, pair % m, np.bincount(index, self.openness[row, column])
+
     def _summed(self, worth: Array | BoolArray) -> Array:
         _, _, rows, columns, stride = self.window
         blocks = worth.reshape(rows, stride, columns, stride)
