@@ -164,10 +164,10 @@ def improved(
 ) -> IntArray:
     """Return (k,) sources for which the sum over the targets of the distances to the nearest is low.
 
-    Lloyd's iteration in turn with the best swap of one source for another, and, where no swap helps, with
-    `removals`: taking away two or three and putting them back where each helps most. Those that are `fixed` stay. What
-    all this saves must be more than the part `threshold` of the sum after Lloyd's iteration alone; that one
-    is returned else.
+    Lloyd's iteration in turn with the best swap of one source for another, and, with `removals`, where no
+    swap helps, with taking away two or three and putting them back where each helps most. Those that are
+    `fixed` stay. What all this saves must be more than the part `threshold` of the sum after Lloyd's
+    iteration alone; that one is returned else.
     """
     near = best = lloyd_iterations(table, sources, fixed)
     if not threshold < 1.0:

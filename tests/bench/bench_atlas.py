@@ -1,6 +1,6 @@
 """What `atlas` was made for, beside the benchmark: doors, team sizes, rest, and computing time.
 
-    python tests/bench/bench_atlas.py doors sizes pace rest [--controller atlas-shared] [--count 200]
+python tests/bench/bench_atlas.py doors sizes pace rest [--controller atlas-shared] [--count 200]
 """
 
 from __future__ import annotations
@@ -65,7 +65,10 @@ def sizes(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
     found = {n: list(pool.map(partial(_final, name), [(seed, n) for seed in maps])) for n in SIZES}
     for k, seed in enumerate(maps):
         costs = [found[n][k][0] for n in SIZES]
-        more = [f"{n}: {cost / min(costs[: j + 1]) - 1.0:.1%}" for j, (n, cost) in enumerate(zip(SIZES, costs, strict=True))]
+        more = [
+            f"{n}: {cost / min(costs[: j + 1]) - 1.0:.1%}"
+            for j, (n, cost) in enumerate(zip(SIZES, costs, strict=True))
+        ]
         yield f"rooms {seed}: mean distance above the best of smaller teams {', '.join(more)}; way of one {found[1][k][1]:.1f} m"
 
 

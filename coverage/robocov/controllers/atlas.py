@@ -23,18 +23,17 @@ from robocov.robots import Team
 
 FINEST_CELL, MOST_CELLS = 0.05, 1_000_000  # side of a cell of the maps, m, larger in very large regions
 TEAM_NODES, GROUP_NODES, OWN_NODES = 1000, 500, 2500  # of lattices: for a team, for its group, for itself
-OF_A_ROBOT, ENOUGH, LEAST_OF_A_ROBOT = 160, 4000, 27  # of a team's: so many for each up to so many in all, then fewer
+ROBOT_NODES, ENOUGH, FEWEST = 160, 4000, 27  # a large team's: so many a robot, up to so many, at least these
 STILL_FOR, STILL_WITHIN = 3.0, 0.1  # who does not get so many metres away for so many seconds rests
 
 _AROUND, _LEAST = 2.0, 1.0  # a group is planned for in a window so many times as far as it is, and that, m
-_MISSED, _IN_RANGE = (
-    5.0,
-    0.8,
-)  # who is not heard for so many seconds where it would be, to so much of the range
+# who is not heard for so many seconds where it would be, to so much of the range
+_MISSED, _IN_RANGE = 5.0, 0.8
 _HARDLY = 0.1  # part of the spacing of the nodes that others may move before a plan is made anew
 _WALLS = 4.0  # radii of the robot: longer than the side of another one that shows, which has failed
 _ARRIVED = 0.35  # metres from a place at which it counts as reached
 MAX_PLANNING_GROUP = 8  # who plans by a map of its own plans for itself and so many less one that it hears
+_LISTENED = 2.0  # seconds that robots whose messages are late stay where they begin
 _JOINTLY = 3.0  # a robot plans for others as long as it takes to cross the region so many times
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
@@ -188,7 +187,7 @@ class Atlas(Law):
             states = [replace(state, known=known) for state, known in zip(states, maps, strict=True)]
         routes, legs = list(memory.routes), memory.legs.copy()
         for i, state in enumerate(states):
-            if seen.time >= state.due - 1e-9:
+            if seen.time >= max(state.due, 0.0 if estimates is None else _LISTENED) - 1e-9:
                 states[i], goal = self._planned(seen, memory.team, state, i)
                 ways = states[i].ways
                 if goal is not None and ways is not None:
@@ -208,9 +207,7 @@ class Atlas(Law):
         """Return the maps after a scan of each robot; where others are, it is free."""
         each = zip(maps, seen.positions, scans.distances, scans.hit, strict=True)
         maps = [known.scanned(*scan) for known, *scan in each]
-        return [
-            known.visited(seen.neighbour_positions(i), float(radius[i])) for i, known in enumerate(maps)
-        ]
+        return [known.visited(seen.neighbour_positions(i), float(radius[i])) for i, known in enumerate(maps)]
 
     def _agreed(self, others: Teammates, seen: Observations) -> bool:
         """Return whether all plan on the same map, so that all come to the same plan."""
@@ -299,8 +296,8 @@ class Atlas(Law):
         assert state.ways is not None and state.situation is not None and state.group is not None
         most = len(state.group) if agreed else MAX_PLANNING_GROUP
         group, (now, others) = state.group[:most], np.split(state.situation, [most])
-        nodes = min(OF_A_ROBOT * len(now), ENOUGH)
-        reach, nodes = math.inf, max(TEAM_NODES, nodes, LEAST_OF_A_ROBOT * len(now))
+        nodes = min(ROBOT_NODES * len(now), ENOUGH)
+        reach, nodes = math.inf, max(TEAM_NODES, nodes, FEWEST * len(now))
         if len(others):
             away = float(np.sqrt(((now - now[0]) ** 2).sum(axis=1).max()))
             reach, nodes = max(_AROUND * away, _LEAST), GROUP_NODES
@@ -325,8 +322,8 @@ class Atlas(Law):
         if made is None or made[0] is not seen.density:
             # who is there already does not leave for what may not be there
             weights = demand(ways, seen.density, sure=not together)
-            each = (each[order] for each in (now, begin, fixed))
-            made = seen.density, team_places(ways, weights, *each, others, threshold, nearby)
+            own = now[order], begin[order], fixed[order]
+            made = seen.density, team_places(ways, weights, *own, others, threshold, nearby)
             if agreed:
                 ways.plans[key] = made
         places = np.empty_like(begin)

@@ -20,7 +20,7 @@ _LEAST = 1e-9  # m, of a standard deviation
 _MANOEUVRE = 0.5  # part of the acceleration that others are taken to change their velocity with
 _HORIZON = 1.5  # s, for which others are taken to go on as they did
 _DOUBT = 1.0  # standard deviations of a fix by which others may be nearer than estimated,
-_DRIFT = 0.25  # and metres for each second since they told where they are
+_DRIFT = 1.0  # and metres for each second since they told where they are
 
 
 class Estimates(NamedTuple):
@@ -84,7 +84,7 @@ def wary(seen: Observations, estimates: Estimates) -> Observations:
     offset = seen.reported_positions - seen.positions[robot]
     distance = np.sqrt((offset**2).sum(axis=1))
     ages = np.clip(seen.time - estimates.sent[robot, other], 0.0, _HORIZON)
-    doubt = np.minimum(_DOUBT * np.sqrt(estimates.variance[robot]) + _DRIFT * ages, 0.5 * distance)
+    doubt = np.minimum(_DOUBT * np.sqrt(estimates.variance[robot]) + _DRIFT * ages, 0.75 * distance)
     nearer = 1.0 - doubt / np.maximum(distance, _LEAST)
     places = seen.positions[robot] + nearer[:, None] * offset
     return replace(seen, reported_positions=places)

@@ -168,7 +168,7 @@ class GridPlanner:
         stride, m = self.window.stride, len(self.nodes)
         node = row // stride * self.window.columns + column // stride
         pair, index = np.unique(self.patches[row, column] * m + node, return_inverse=True)
-        return pair // m, pair % m, np.bincount(index, self.openness[row, column])
+        return pair // m, pair % m, np.bincount(index, self.openness[row, column]).astype(np.float64)
 
     def _summed(self, worth: Array | BoolArray) -> Array:
         _, _, rows, columns, stride = self.window

@@ -121,8 +121,8 @@ def test_others_may_be_nearer_by_the_noise_and_with_time() -> None:
     before, after = (
         np.hypot(*(each.reported_positions - each.positions[robot]).T) for each in (known, close)
     )
-    doubt = np.sqrt(estimates.variance)[robot] + 0.25 * (known.time - estimates.sent[robot, other])
-    assert np.allclose(before - after, np.minimum(doubt, before / 2.0))
+    doubt = np.sqrt(estimates.variance)[robot] + 1.0 * (known.time - estimates.sent[robot, other])
+    assert np.allclose(before - after, np.minimum(doubt, 0.75 * before))
 
 
 @pytest.mark.slow
