@@ -14,6 +14,7 @@ from robocov.controllers.driving import last_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.localization import Estimates, localized, wary
 from robocov.controllers.route_following import follow_routes
+from robocov.controllers.shared_map import circles, surveyed
 from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.region import Region
 from robocov.planning.discovered import DiscoveredMap, Raster
@@ -368,16 +369,13 @@ class AtlasShared(Atlas):
     def _surveyed(
         self, maps: list[DiscoveredMap], seen: Observations, scans: Scans, radius: Array
     ) -> list[DiscoveredMap]:
-        if not seen.neighbours.complete:
-            own = super()._surveyed(maps, seen, scans, radius)
-            return [
-                known.merged(own[k] for k in seen.neighbours.of(i).tolist()) for i, known in enumerate(own)
-            ]
-        # all scans go into one map, where the last one counts
-        one = maps[0].merged(other for other in maps if other is not maps[0])
-        for scan in zip(seen.positions, scans.distances, scans.hit, strict=True):
-            one = one.scanned(*scan)
-        return [one.visited(seen.positions, float(radius.min()))] * len(maps)
+        around, visited = circles(seen.neighbours, len(maps)), dict[tuple[object, ...], DiscoveredMap]()
+        for i, known in enumerate(surveyed(maps, seen, scans)):
+            key = id(known), around[i], float(radius[i])
+            if key not in visited:
+                visited[key] = known.visited(seen.positions[list(around[i])], float(radius[i]))
+            maps[i] = visited[key]
+        return maps
 
     def _agreed(self, others: Teammates, seen: Observations) -> bool:
         return bool((others.heard == seen.time).all())

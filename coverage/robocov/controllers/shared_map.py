@@ -6,6 +6,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.route_following import follow_routes
 from robocov.density import Density
 from robocov.k_median import lloyd_iterations
-from robocov.observation import Decision, Observations, Scanning
+from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.planning.discovered import DiscoveredMap, Raster
@@ -164,9 +165,7 @@ class SharedMapLaw(Law):
         """Return the forces along the ways to the robots' own places in their plans."""
         team, scans = memory.team, seen.scans
         if scans is not None:
-            each = zip(memory.maps, seen.positions, scans.distances, scans.hit, strict=True)
-            maps = shared(tuple(known.scanned(*scan) for known, *scan in each), seen.neighbours)
-            memory = replace(memory, maps=maps)
+            memory = replace(memory, maps=surveyed(memory.maps, seen, scans))
         if seen.time >= memory.due - 1e-9:
             plans = self._plans(seen, memory)
             own = [plan.places[np.searchsorted(plan.group.robots, i)] for i, plan in enumerate(plans)]
@@ -212,14 +211,32 @@ class SharedMapLaw(Law):
         return Plan(group, *self.placed(now), known, ways, seen.density)
 
 
-def shared(maps: Sequence[DiscoveredMap], neighbours: Neighbours) -> tuple[DiscoveredMap, ...]:
-    """Return the maps after each robot has told those that hear it of its own."""
-    if neighbours.complete:
-        one = maps[0].merged(other for other in maps if other is not maps[0])
-        return (one,) * len(maps)
-    heard = [[maps[k] for k in neighbours.of(i).tolist()] for i in range(len(maps))]
-    each = zip(maps, heard, strict=True)
-    return tuple(known.merged(other for other in told if other is not known) for known, told in each)
+def circles(neighbours: Neighbours, count: int) -> list[tuple[int, ...]]:
+    """Return for each robot itself and those that it hears, ascending."""
+    return [tuple(sorted({i, *neighbours.of(i).tolist()})) for i in range(count)]
+
+
+def surveyed(maps: Sequence[DiscoveredMap], seen: Observations, scans: Scans) -> tuple[DiscoveredMap, ...]:
+    """Return the maps after a scan of each robot, told to those that hear it.
+
+    Robots that all hear each other share one map, into which all scans go, and where the last one counts:
+    maps that are merged time and again would keep what one of them has mistaken.
+    """
+    around, together = circles(seen.neighbours, len(maps)), dict[tuple[int, ...], DiscoveredMap]()
+    every = list(zip(seen.positions, scans.distances, scans.hit, strict=True))
+    own = cache(lambda i: maps[i].scanned(*every[i]))
+    later = []
+    for i, circle in enumerate(around):
+        if any(around[k] != circle for k in circle):
+            later.append(own(i).merged(own(k) for k in circle if k != i))
+            continue
+        if circle not in together:
+            one = maps[i].merged(maps[k] for k in circle if maps[k] is not maps[i])
+            for k in circle:
+                one = one.scanned(*every[k])
+            together[circle] = one
+        later.append(together[circle])
+    return tuple(later)
 
 
 def _group(seen: Observations, team: Team, former: Plan | None, i: int) -> Group:
