@@ -8,11 +8,12 @@ import pytest
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Rapf, information_of, make_controller
 from robocov.controllers.frontier_median import FrontierMedian
-from robocov.controllers.shared_map import Situation, assigned, shared
+from robocov.controllers.shared_map import Situation, assigned, surveyed
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
 from robocov.metrics import clearances, contacts
+from robocov.observation import Observations, Scans
 from robocov.observation.neighbours import Neighbours
 from robocov.planning.discovered import FREE, UNKNOWN, WALL, DiscoveredMap, Raster
 from robocov.planning.wayfinding import GridPlanner, Window
@@ -102,18 +103,37 @@ def test_what_they_go_by() -> None:
         make_controller("voronoi-graph", {"nodes": 3})
 
 
+def observed(neighbours: Neighbours, distances: np.ndarray, hit: bool) -> tuple[Observations, Scans]:
+    n, at = len(distances), np.tile([2.02, 2.02], (len(distances), 1))
+    scans = Scans(distances, np.full(distances.shape, hit))
+    return Observations(at, np.zeros((n, 2)), neighbours, np.full((n, 2), np.nan), ROOMS.region), scans
+
+
 def test_maps_go_to_those_who_hear() -> None:
     states = np.random.default_rng(0).choice([UNKNOWN, FREE, WALL], size=(4, *RASTER.shape)).astype(np.uint8)
-    maps = [DiscoveredMap(RASTER, state) for state in states]
-    # each knows best what it has seen itself; else the first counts that has
+    maps, blind = [DiscoveredMap(RASTER, state) for state in states], np.zeros((4, 8))
     first = states[(states != UNKNOWN).argmax(axis=0), *np.indices(RASTER.shape)]
-    for known in shared(maps, Neighbours(4)):
-        assert np.array_equal(known.state, first)
+    together = surveyed(maps, *observed(Neighbours(4), blind, False))
+    assert np.array_equal(together[0].state, first) and len({id(known) for known in together}) == 1
+    # each knows best what it has seen itself; else the first counts that has
     line = Neighbours.within(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [9.0, 0.0]]), np.full(4, 1.5))
-    told = shared(maps, line)
+    told = surveyed(maps, *observed(line, blind, False))
     assert np.array_equal(told[0].state, np.where(states[0] != UNKNOWN, states[0], states[1]))
     assert np.array_equal(told[1].state == UNKNOWN, (states[:3] == UNKNOWN).all(axis=0))
     assert told[3] is maps[3]
+
+
+def test_what_one_has_mistaken_is_corrected_by_whoever_sees_it() -> None:
+    """Robot 1 takes for free what robot 2 sees to be a wall; two pairs do not hear each other."""
+    free, nothing = (DiscoveredMap(RASTER, np.full(RASTER.shape, each, np.uint8)) for each in (FREE, UNKNOWN))
+    pairs = Neighbours.within(np.array([[0.0, 0.0], [1.0, 0.0], [8.0, 0.0], [9.0, 0.0]]), np.full(4, 1.5))
+    distances = np.array([[0.0], [1.0], [0.0], [0.0]])
+    seen, scans = observed(pairs, distances, False)
+    scans.hit[1] = True
+    told = surveyed([free, nothing, free, nothing], seen, scans)
+    assert told[0] is told[1] and told[2] is told[3] and told[0] is not told[2]
+    assert told[0].blocked[20, 30] and not told[2].blocked[20, 30]
+    assert (told[0].state >= WALL).sum() == 1
 
 
 def test_the_sum_of_squared_ways_is_the_least() -> None:

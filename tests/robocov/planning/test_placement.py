@@ -7,7 +7,7 @@ import numpy as np
 from robocov.density import Gaussian, Gaussians
 from robocov.observation.region import Region
 from robocov.planning.discovered import FREE, WALL, DiscoveredMap, Raster
-from robocov.planning.placement import CoverageDemand, own_place, team_places
+from robocov.planning.placement import demand, own_place, team_places, viewpoint
 from robocov.planning.wayfinding import GridPlanner, Window
 
 REGION = Region(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 4.0], [0.0, 4.0]]))
@@ -31,16 +31,17 @@ HALVES = (slice(0, 28), slice(39, 41))
 
 
 def test_weights_are_areas() -> None:
-    demand = CoverageDemand(known(HALVES), WINDOW)
-    assert demand.weights.sum() == np.count_nonzero(~known(HALVES).blocked)
-    every = np.ones(len(demand.weights))
-    assert demand.viewpoint(every, every, WINDOW.cut(known().blocked, True), 0.0, ()) is None
+    some = ways(known(HALVES))
+    weights = demand(some)
+    assert weights.sum() == np.count_nonzero(~known(HALVES).blocked)
+    every = np.ones(len(weights))
+    assert viewpoint(some, every, every, 0.0, ()) is None
 
 
 def test_what_counts_more_weighs_more() -> None:
     spot = Gaussians((Gaussian((6.0, 2.0), 3.0, 0.5),), floor=1.0)
-    plain, dense = CoverageDemand(known(), WINDOW).weights, CoverageDemand(known(), WINDOW, spot).weights
     some = ways(known())
+    plain, dense = demand(some), demand(some, spot)
     assert (dense >= plain).all()
     near = some.standing(np.array([6.0, 2.0]))
     np.testing.assert_allclose(dense[near] / plain[near], spot.value(some.nodes[[near]])[0])
@@ -51,24 +52,25 @@ def test_unknown_insides_hardly_count_and_shadows_do() -> None:
     state[10:20, 10:20] = WALL
     state[11:19, 11:19] = 0
     state[10:20, 50:60] = 0
-    demand = CoverageDemand(DiscoveredMap(RASTER, state), WINDOW)
+    some = GridPlanner(DiscoveredMap(RASTER, state), WINDOW, 0.0)
     full = np.count_nonzero(state == FREE)
-    np.testing.assert_allclose(demand.weights.sum(), full + 100, rtol=1e-3)
+    np.testing.assert_allclose(demand(some).sum(), full + 100, rtol=1e-3)
+    assert demand(some, sure=True).sum() == full
     # a look goes to the border of what is open, and not to where somebody has looked
-    mine = home = np.ones(len(demand.weights))
-    tight = np.zeros(WINDOW.cut(state, np.uint8(0)).shape, dtype=bool)
-    place = demand.viewpoint(mine, home, tight, 5.0, ())
+    mine = home = np.ones(len(some.nodes))
+    place = viewpoint(some, mine, home, 5.0, ())
     assert place is not None
     assert 4.9 < place[0] < 6.1
     assert 0.9 < place[1] < 2.1
-    other = demand.viewpoint(mine, home, tight, 5.0, (place,))
+    other = viewpoint(some, mine, home, 5.0, (place,))
     assert other is not None
     assert math.dist(place, other) > 0.5
-    assert demand.viewpoint(mine, home, tight, 101.0, ()) is None
+    assert viewpoint(some, mine, home, 101.0, ()) is None
 
 
 def cost(on: DiscoveredMap, places: np.ndarray) -> float:
-    some, weights = ways(on), CoverageDemand(on, WINDOW).weights
+    some = ways(on)
+    weights = demand(some)
     away = some.from_places(places)
     good = np.isfinite(away) & (weights > 0)
     return float((weights[good] * away[good]).sum())
@@ -79,18 +81,14 @@ def test_a_team_spreads_over_both_rooms() -> None:
     some = ways(on)
     now = np.array([[1.0, 1.0], [1.5, 1.0], [1.0, 1.5], [1.5, 1.5]])
     nobody = np.zeros(4, dtype=bool)
-    places = team_places(
-        some, CoverageDemand(on, WINDOW).weights, now, now, nobody, np.empty((0, 2)), 0.01, 0.01
-    )
+    places = team_places(some, demand(some), now, now, nobody, np.empty((0, 2)), 0.01, 0.01)
     assert (places[:, 0] > 4.1).any()
     assert cost(on, places) < 0.5 * cost(on, now)
     for by_hand in ([[1.5, 2], [2.5, 1], [5.5, 2], [7, 2]], [[1, 1], [3, 1], [1.5, 3], [6, 2]]):
         assert cost(on, places) < 1.02 * cost(on, np.array(by_hand, dtype=float))
     # the same plan, by whom ever it is made
     order = np.array([2, 0, 3, 1])
-    other = team_places(
-        some, CoverageDemand(on, WINDOW).weights, now[order], now[order], nobody, np.empty((0, 2)), 0.01, 0.01
-    )
+    other = team_places(some, demand(some), now[order], now[order], nobody, np.empty((0, 2)), 0.01, 0.01)
     np.testing.assert_allclose(np.sort(places, axis=0), np.sort(other, axis=0))
 
 
@@ -99,16 +97,15 @@ def test_who_rests_stays_in_the_plan() -> None:
     some = ways(on)
     now = np.array([[1.0, 1.0], [6.3, 1.9], [1.0, 1.5]])
     given = np.array([False, True, False])
-    places = team_places(
-        some, CoverageDemand(on, WINDOW).weights, now, now, given, np.empty((0, 2)), 0.01, 0.01
-    )
+    places = team_places(some, demand(some), now, now, given, np.empty((0, 2)), 0.01, 0.01)
     np.testing.assert_array_equal(places[1], now[1])
     assert (places[[0, 2], 0] < 4.1).sum() >= 1
 
 
 def test_ones_own_place_is_a_minimum_and_is_kept() -> None:
     on = known()
-    some, weights = ways(on), CoverageDemand(on, WINDOW).weights
+    some = ways(on)
+    weights = demand(some)
     others = np.array([[6.0, 2.0]])
     begin = some.standing(np.array([0.7, 0.7]))
     found = own_place(some, weights, others, begin, np.full(2, np.nan), 0.0)
@@ -128,6 +125,6 @@ def test_what_is_not_known_may_be_left_out() -> None:
     state = np.full(RASTER.shape, FREE, dtype=np.uint8)
     state[:, 40:] = 0
     on = DiscoveredMap(RASTER, state)
-    hoped, sure = CoverageDemand(on, WINDOW).weights, CoverageDemand(on, WINDOW, sure=True).weights
+    hoped, sure = demand(ways(on)), demand(ways(on), sure=True)
     assert sure.sum() == 40 * 40
     assert hoped.sum() > 1.5 * sure.sum()
