@@ -35,6 +35,7 @@ _WALLS = 4.0  # radii of the robot: longer than the side of another one that sho
 _ARRIVED = 0.35  # metres from a place at which it counts as reached
 MAX_PLANNING_GROUP = 8  # who plans by a map of its own plans for itself and so many less one that it hears
 _LISTENED = 2.0  # seconds that robots whose messages are late stay where they begin
+_LOOKED_FOR_ALL = 2.5  # so many times the patience where all learn of a look
 _JOINTLY = 3.0  # a robot plans for others as long as it takes to cross the region so many times
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
@@ -265,7 +266,7 @@ class Atlas(Law):
         former = np.full(2, np.nan) if state.own is None else state.own
         own = own_place(ways, weights, at, begin, former, min(1.0, self.rest * settling))
         state = replace(state, own=own.goal, node=own.node)
-        return self._looking(state, own, place, state.walked - before.walked)
+        return self._looking(state, own, place, state.walked - before.walked, agreed=agreed)
 
     def _teammates(
         self, seen: Observations, team: Team, state: PlannerState, i: int
@@ -332,7 +333,7 @@ class Atlas(Law):
         return replace(state, team_ways=ways, places=np.column_stack([group, places])), places
 
     def _looking(
-        self, state: PlannerState, own: OwnPlace, place: Array, step: float
+        self, state: PlannerState, own: OwnPlace, place: Array, step: float, *, agreed: bool
     ) -> tuple[PlannerState, Array]:
         """Return the state, and where to go: to the own place, or first to what there is to see."""
         ways, former, look = state.ways, state.former, None
@@ -345,7 +346,7 @@ class Atlas(Law):
         looked = state.looked + max(step, 0.0) * (state.look is not None)
         # the place of who is alone hardly depends on what it has not seen
         if node >= 0 and self.stake < 1.0 and len(state.group) > 1:
-            far = self.patience * state.known.raster.region.diameter
+            far = self.patience * (_LOOKED_FOR_ALL if agreed else 1.0) * state.known.raster.region.diameter
             least = self.stake * own.cost * 2.0 ** min(looked / far, 60.0)
             look = viewpoint(ways, own.mine, ways.distances(node), least, former)
         state = replace(state, look=look, former=former, looked=looked, idle=look is None)
@@ -361,10 +362,6 @@ class AtlasShared(Atlas):
     summary = "as Atlas, with the maps merged among the robots that hear each other"
     information = "shared map"
     staggered = 0.0
-
-    patience: float = gain(
-        0.3, "1", "way of looks, in diameters of the region, that doubles it", low=1e-3, high=1e4
-    )
 
     def _surveyed(
         self, maps: list[DiscoveredMap], seen: Observations, scans: Scans, radius: Array
