@@ -15,8 +15,17 @@ from functools import partial
 
 import numpy as np
 
-from robocov import Conditions, CoverageCost, Environment, Failure, Simulation, Team
-from robocov import generated_map, load_map, make_controller
+from robocov import (
+    Conditions,
+    CoverageCost,
+    Environment,
+    Failure,
+    Simulation,
+    Team,
+    generated_map,
+    load_map,
+    make_controller,
+)
 from robocov.environment import WallObstacle
 
 SIZES, SEEDS, SHORT = (1, 2, 3, 6, 8, 9, 12, 20, 50), range(901, 905), 3.0
@@ -68,7 +77,8 @@ def sizes(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
             costs = np.array([cost for cost, _ in found])
             rises = costs / np.minimum.accumulate(costs) - 1.0
             told = ", ".join(f"{n}: {cost:.2f}" for n, cost in zip(SIZES, costs, strict=True))
-            yield f"rooms {seed}, hear {hears} m: {told} m, rises by {rises.max():.1%}; one walks {found[0][1]:.1f} m"
+            first = f"rises by {rises.max():.1%}; one walks {found[0][1]:.1f} m"
+            yield f"rooms {seed}, hear {hears} m: {told} m, {first}"
 
 
 def moved(name: str, what: str) -> float:
@@ -98,7 +108,7 @@ def rest(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
 
 
 def pace(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
-    """Seconds of the whole simulation for one second, with six robots on 10 x 10 m and as many a square metre."""
+    """Seconds of the whole simulation for one second: six robots on 10 x 10 m, more on as much each."""
     for n in (*SIZES, 100, 200):
         side = 10.0 * max(1.0, math.sqrt(n / 6.0))
         rooms = generated_map(7, kind="polygons", side=side, obstacles=max(6, n))

@@ -36,6 +36,8 @@ _ARRIVED = 0.35  # metres from a place at which it counts as reached
 MAX_PLANNING_GROUP = 8  # who plans by a map of its own plans for itself and so many less one that it hears
 _LISTENED = 2.0  # seconds that robots whose messages are late stay where they begin
 _LOOKED_FOR_ALL = 2.5  # so many times the patience where all learn of a look
+# who gets on less than so far, m, for so many plans is in a jam with those so far around, m
+_GETS_ON, _JAMMED, _CROWD = 0.05, 4, 0.7
 _JOINTLY = 3.0  # a robot plans for others as long as it takes to cross the region so many times
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
@@ -87,6 +89,7 @@ class PlannerState:
     look: Array | None = None  # (2,) m, where it goes first, to look around,
     former: tuple[Array, ...] = ()  # from where it has,
     idle: bool = False  # whether the next plan may be left out where nothing has changed
+    jammed: int = 0  # how many plans it has not got on for, away from its place
 
     def __deepcopy__(self, memo: object) -> PlannerState:
         return self
@@ -266,6 +269,15 @@ class Atlas(Law):
         former = np.full(2, np.nan) if state.own is None else state.own
         own = own_place(ways, weights, at, begin, former, min(1.0, self.rest * settling))
         state = replace(state, own=own.goal, node=own.node)
+        if agreed and before.situation is not None:
+            stands = math.dist(place, before.situation[0]) < _GETS_ON
+            stands = stands and math.dist(place, own.goal) > _ARRIVED
+            state = replace(state, jammed=state.jammed + 1 if stands else 0)
+            crowd = situation[((situation - place) ** 2).sum(axis=1) < _CROWD**2]
+            back = place - crowd.mean(axis=0)
+            if state.jammed >= _JAMMED and (state.jammed + i) % 2 and back.any():
+                # every other one makes way for a period
+                return replace(state, idle=False), place + back * (_CROWD / float(np.hypot(*back)))
         return self._looking(state, own, place, state.walked - before.walked, agreed=agreed)
 
     def _teammates(
