@@ -37,7 +37,8 @@ MAX_PLANNING_GROUP = 8  # who plans by a map of its own plans for itself and so 
 _LISTENED = 2.0  # seconds that robots whose messages are late stay where they begin
 _LOOKED_FOR_ALL = 2.5  # so many times the patience where all learn of a look
 # who gets on less than so far, m, for so many plans is in a jam with those so far around, m
-_GETS_ON, _JAMMED, _CROWD = 0.05, 4, 0.7
+_GETS_ON, _JAMMED, _CROWD = 0.05, 3, 0.7
+_BACKOFF = 8.0  # s, at most, that it makes way then
 _JOINTLY = 3.0  # a robot plans for others as long as it takes to cross the region so many times
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
@@ -90,6 +91,7 @@ class PlannerState:
     former: tuple[Array, ...] = ()  # from where it has,
     idle: bool = False  # whether the next plan may be left out where nothing has changed
     jammed: int = 0  # how many plans it has not got on for, away from its place
+    backing: float = 0.0  # until when it makes way, s
 
     def __deepcopy__(self, memo: object) -> PlannerState:
         return self
@@ -273,11 +275,14 @@ class Atlas(Law):
             stands = math.dist(place, before.situation[0]) < _GETS_ON
             stands = stands and math.dist(place, own.goal) > _ARRIVED
             state = replace(state, jammed=state.jammed + 1 if stands else 0)
+            if state.jammed >= _JAMMED:
+                # each for another time, so that they do not all come back at once
+                wait = _BACKOFF * ((i + seen.time) * _GOLDEN % 1.0)
+                state = replace(state, jammed=0, backing=seen.time + wait)
             crowd = situation[((situation - place) ** 2).sum(axis=1) < _CROWD**2]
             back = place - crowd.mean(axis=0)
-            if state.jammed >= _JAMMED and (state.jammed + i) % 2 and back.any():
-                # every other one makes way for a period
-                return replace(state, idle=False), place + back * (_CROWD / float(np.hypot(*back)))
+            if seen.time < state.backing and back.any():
+                return replace(state, jammed=0, idle=False), place + back * (_CROWD / float(np.hypot(*back)))
         return self._looking(state, own, place, state.walked - before.walked, agreed=agreed)
 
     def _teammates(
@@ -367,7 +372,13 @@ class Atlas(Law):
 
 @dataclass(frozen=True)
 class AtlasShared(Atlas):
-    """`Atlas`, but robots that hear each other also tell each other their maps."""
+    """`Atlas`, but robots that hear each other also tell each other their maps.
+
+    As long as a robot hears all that it has met, all have the same map, and all make the same plan, for the
+    whole team, however large: relocations are for good, nobody has to decide for itself alone, and everybody
+    learns of a look. Who has not got on for some plans, away from its place, is in a jam, and makes way for
+    a while, each for another one. Whoever does not hear all of them goes by `Atlas` on the map that it has.
+    """
 
     name = "atlas-shared"
     label = "Atlas, shared maps"

@@ -356,3 +356,26 @@ def test_copies_share_what_never_changes() -> None:
     assert all(one is other for one, other in zip(memory.states, twin.states, strict=True))
     assert twin.legs is not memory.legs
     assert all((known.state == 0).all() for known in memory.maps)
+
+
+def test_who_shares_a_map_plans_once() -> None:
+    some = simulation(AtlasShared())
+    while some.time < 3.0:
+        some.step()
+    states = some.memory.states
+    assert len({id(state.known) for state in states}) == len({id(state.team_ways) for state in states}) == 1
+    plans = [state.places[np.argsort(state.places[:, 0])] for state in states]
+    assert all(np.array_equal(plan, plans[0]) for plan in plans)
+    assert states[0].team_ways is not None and 0 < len(states[0].team_ways.plans) <= 3
+
+
+@pytest.mark.slow
+def test_a_jam_at_a_door_dissolves() -> None:
+    """Thirty robots behind a door of 0.5 m."""
+    walls = WallObstacle(((3.0, 0.0), (3.0, 1.75)), 0.2), WallObstacle(((3.0, 2.25), (3.0, 4.0)), 0.2)
+    halls = Environment("halls", ((0.0, 0.0), (8.0, 0.0), (8.0, 4.0), (0.0, 4.0)), walls)
+    x, y = np.meshgrid(np.linspace(1.3, 2.7, 5), np.linspace(1.2, 2.8, 6))
+    crowd = Simulation(halls, AtlasShared(), np.column_stack([x.ravel(), y.ravel()]), dt=1 / 30)
+    while crowd.time < 80.0:
+        crowd.step()
+    assert 16 <= (crowd.positions[:, 0] > 3.1).sum() <= 21

@@ -62,7 +62,7 @@ COARSE = {
     **{name: {"nodes": 100.0, "period": 0.4} for name in SHARING},
 }
 LARGEST = {"atlas": 12, "atlas-shared": 12, **dict.fromkeys(SHARING, 3)}
-"""Teams of laws that plan are small here: above their `MAX_PLANNING_GROUP` all robots are treated alike."""
+"""Teams of laws that plan are small here, as they are slow."""
 ALL = [
     *(informed(kind(**COARSE.get(name, {})), ROOM) for name, kind in CONTROLLERS.items()),
     Adaptive(estimate="gp"),
