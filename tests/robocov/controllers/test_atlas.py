@@ -359,7 +359,7 @@ def test_copies_share_what_never_changes() -> None:
 
 
 def test_who_shares_a_map_plans_once() -> None:
-    some = simulation(AtlasShared())
+    some = simulation(AtlasShared)
     while some.time < 3.0:
         some.step()
     states = some.memory.states
