@@ -272,17 +272,9 @@ class Atlas(Law):
         own = own_place(ways, weights, at, begin, former, min(1.0, self.rest * settling))
         state = replace(state, own=own.goal, node=own.node)
         if agreed and before.situation is not None:
-            stands = math.dist(place, before.situation[0]) < _GETS_ON
-            stands = stands and math.dist(place, own.goal) > _ARRIVED
-            state = replace(state, jammed=state.jammed + 1 if stands else 0)
-            if state.jammed >= _JAMMED:
-                # each for another time, so that they do not all come back at once
-                wait = _BACKOFF * ((i + seen.time) * _GOLDEN % 1.0)
-                state = replace(state, jammed=0, backing=seen.time + wait)
-            crowd = situation[((situation - place) ** 2).sum(axis=1) < _CROWD**2]
-            back = place - crowd.mean(axis=0)
-            if seen.time < state.backing and back.any():
-                return replace(state, jammed=0, idle=False), place + back * (_CROWD / float(np.hypot(*back)))
+            state, aside = self._aside(state, before.situation[0], seen.time, i)
+            if aside is not None:
+                return state, aside
         return self._looking(state, own, place, state.walked - before.walked, agreed=agreed)
 
     def _teammates(
@@ -348,6 +340,24 @@ class Atlas(Law):
         places = np.empty_like(begin)
         places[order] = made[1]
         return replace(state, team_ways=ways, places=np.column_stack([group, places])), places
+
+    def _aside(
+        self, state: PlannerState, before: Array, time: float, i: int
+    ) -> tuple[PlannerState, Array | None]:
+        """Return the state, and where to make way to for those in the same jam; None where it is in none."""
+        situation = state.situation
+        assert situation is not None and state.own is not None
+        place = situation[0]
+        stands = math.dist(place, before) < _GETS_ON and math.dist(place, state.own) > _ARRIVED
+        state = replace(state, jammed=state.jammed + 1 if stands else 0)
+        if state.jammed >= _JAMMED:
+            # each for another time, so that they do not all come back at once
+            state = replace(state, jammed=0, backing=time + _BACKOFF * ((i + time) * _GOLDEN % 1.0))
+        crowd = situation[((situation - place) ** 2).sum(axis=1) < _CROWD**2]
+        back = place - crowd.mean(axis=0)
+        if not (time < state.backing and back.any()):
+            return state, None
+        return replace(state, jammed=0, idle=False), place + back * (_CROWD / float(np.hypot(*back)))
 
     def _looking(
         self, state: PlannerState, own: OwnPlace, place: Array, step: float, *, agreed: bool
