@@ -1,0 +1,43 @@
+"""The handbook's numbers are those of the entries that the package holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robocov_app.benchmark import suite
+from robocov_app.benchmark.ratings import Rating
+from robocov_app.benchmark.running import ENTRIES, read_result
+
+PAGE = Path(__file__).parents[3] / "app/handbook/controllers.md"
+
+
+def line(law: str, track: str) -> str:
+    """Return the row of a law's results on a track."""
+    rows = [row for row in read_result(ENTRIES / f"{law}.json.gz")["rows"] if row["track"] == track]
+    assert not any("error" in row for row in rows)
+    rating = Rating(law, track, rows, 0)
+    medians = {}
+    for name in suite.TRACKS[track].maps:
+        gaps = [row["gap"] for row in rows if row["map"] == name and row["gap"] is not None]
+        medians[name] = np.median(gaps)
+    above = sum(median > 0.05 for median in medians.values())
+    touched = sum(row["contacts"] > 0 for row in rows)
+    gap, way = 100.0 * rating.gap.estimate, rating.median("path_length_m")
+    cells = f"{gap:.1f} %", f"{above} of {len(medians)}", f"{touched} of {len(rows)}"
+    rest = 100.0 * rating.at_rest()[0]
+    return f"| `{law}` | {' | '.join(cells)} | {rest:.0f} % | {way:.1f} m |"
+
+
+RIVALS = ("rapf", "frontier-median", "greedy-submodular")
+ROWS = [
+    *((law, track) for track in suite.RATED for law in ("atlas", "atlas-shared")),
+    *((law, track) for track in ("ideal", "short-range", "large-team") for law in RIVALS),
+]
+
+
+@pytest.mark.parametrize(("law", "track"), ROWS)
+def test_rows_are_those_of_the_entries(law: str, track: str) -> None:
+    assert f"| {suite.heading(track)} {line(law, track)}\n" in PAGE.read_text(encoding="utf-8")
