@@ -5,7 +5,7 @@ are given, whole clusters are drawn (Field and Welsh, 2007); intervals are perce
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -25,6 +25,20 @@ class Interval:
     estimate: float
     low: float
     high: float
+    resampled: Array | None = field(default=None, compare=False, repr=False)  # its values in the resamples
+    alike: int = field(default=0, compare=False, repr=False)  # clusters of a share that is 0, or 1, in all
+
+    def p_value(self, low: float, high: float) -> float:
+        """Return the p-value of the truth lying outside `low` to `high`; 1 where there is no interval.
+
+        It is the share of resamples outside; of a share that is 0 in all clusters, or 1, the binomial one.
+        """
+        if self.alike and low <= self.estimate <= high:
+            return float((max(low, 0.0) if self.estimate else 1.0 - min(high, 1.0)) ** self.alike)
+        if self.alike or self.resampled is None:
+            return 1.0
+        inside = (low <= self.resampled) & (self.resampled <= high)
+        return float(1 + np.count_nonzero(~inside)) / (1 + inside.size)
 
 
 def bootstrap(
@@ -69,7 +83,7 @@ def _interval(of: Callable[[IntArray], ArrayLike], clusters: Sequence[object], r
     known, tail = found[~np.isnan(found)], (1.0 - LEVEL) / 2.0
     how: Any = "linear" if np.isfinite(known).all() else "inverted_cdf"  # between a number and inf is nothing
     low, high = np.quantile(known, [tail, 1.0 - tail], method=how).tolist() if len(known) else (np.nan,) * 2
-    return Interval(estimate, low, high)
+    return Interval(estimate, low, high, found)
 
 
 def share(there: ArrayLike, clusters: Sequence[object]) -> Interval:
@@ -81,8 +95,19 @@ def share(there: ArrayLike, clusters: Sequence[object]) -> Interval:
     found, values = bootstrap(there, "mean", clusters), np.unique(there)
     if len(values) > 1 or values[0] not in (0.0, 1.0):
         return found
-    beyond = 1.0 - (1.0 - LEVEL) ** (1.0 / len(set(clusters)))
-    return Interval(1.0, 1.0 - beyond, 1.0) if values[0] else Interval(0.0, 0.0, beyond)
+    maps = len(set(clusters))
+    beyond = 1.0 - (1.0 - LEVEL) ** (1.0 / maps)
+    low, high = (1.0 - beyond, 1.0) if values[0] else (0.0, beyond)
+    return Interval(float(values[0]), low, high, alike=maps)
+
+
+def holm(p_values: ArrayLike) -> list[float]:
+    """Return p-values adjusted for their number by Holm (1979): each is at least what it was."""
+    p = np.asarray(p_values, dtype=float)
+    order = np.argsort(p, kind="stable")
+    adjusted = np.empty_like(p)
+    adjusted[order] = np.minimum(np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1)), 1.0)
+    return [float(each) for each in adjusted]
 
 
 def median_time(ended: Sequence[float] | Array, censored: Sequence[float] | Array) -> float:

@@ -36,6 +36,8 @@ COLUMNS = {
     "stuck": "stuck_robots",
     "settled": "settled_at_s",
     "time": "mean_time_s",
+    "path": "path_length_m",
+    "over_run": "mean_distance_over_run_m",
 }
 
 
@@ -55,8 +57,9 @@ class Outcomes:
     """Results of every contender in each of m scenarios; nan where its run failed.
 
     Measures are ``final`` (m), ``gap`` (J/J_ref - 1), ``early`` and ``first_minute`` (m, time averages),
-    ``stuck`` (robots), ``contacts``, ``settled`` (s, nan where it did not), ``time`` (s), all (m,), and
-    ``placement``, (m, n, 2) m at the end.
+    ``stuck`` (robots), ``contacts``, ``settled`` (s, nan where it did not), ``time`` (s), ``path``
+    (m, mean over the robots), ``over_run`` (m, the cost's time average), all (m,), and ``placement``, (m, n,
+    2) m at the end.
     """
 
     scenarios: tuple[Scenario, ...]
