@@ -118,14 +118,16 @@ def test_the_median_of_times_is_the_product_limit(ended: list[int], censored: li
 
 def test_p_values_are_adjusted_as_holm_did_by_hand() -> None:
     # 4 * 0.005, 3 * 0.01, then 2 * 0.03 and 0.04, which may not be below the one before
-    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-    assert holm([0.6, 0.5]) == [1.0, 1.0]
-    assert holm([]) == []
+    found = holm({"a": 0.01, "b": 0.04, "c": 0.03, "d": 0.005})
+    assert found == pytest.approx({"a": 0.03, "b": 0.06, "c": 0.06, "d": 0.02})
+    assert holm({"a": 0.6, "b": 0.5}) == {"a": 1.0, "b": 1.0}
+    assert holm({}) == {}
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))
 def test_adjusted_p_values_keep_their_order_and_are_never_lower(p: list[float]) -> None:
-    adjusted = holm(p)
+    found = holm({str(k): each for k, each in enumerate(p)})
+    adjusted = [found[str(k)] for k in range(len(p))]
     assert all(one <= other <= 1.0 for one, other in zip(p, adjusted, strict=True))
     assert min(adjusted) == pytest.approx(min(1.0, min(p) * len(p)))
     in_order = [value for _, value in sorted(zip(p, adjusted, strict=True))]

@@ -4,8 +4,9 @@ Runs on one map are alike: resampling them one by one would make the intervals t
 are given, whole clusters are drawn (Field and Welsh, 2007); intervals are percentiles.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Any, Literal
 
 import numpy as np
@@ -35,10 +36,8 @@ class Interval:
         """
         if self.alike and low <= self.estimate <= high:
             return float((max(low, 0.0) if self.estimate else 1.0 - min(high, 1.0)) ** self.alike)
-        if self.alike or self.resampled is None:
-            return 1.0
-        inside = (low <= self.resampled) & (self.resampled <= high)
-        return float(1 + np.count_nonzero(~inside)) / (1 + inside.size)
+        drawn = np.empty(0) if self.resampled is None else self.resampled
+        return float(1 + np.count_nonzero(~((low <= drawn) & (drawn <= high)))) / (1 + drawn.size)
 
 
 def bootstrap(
@@ -95,19 +94,17 @@ def share(there: ArrayLike, clusters: Sequence[object]) -> Interval:
     found, values = bootstrap(there, "mean", clusters), np.unique(there)
     if len(values) > 1 or values[0] not in (0.0, 1.0):
         return found
-    maps = len(set(clusters))
-    beyond = 1.0 - (1.0 - LEVEL) ** (1.0 / maps)
-    low, high = (1.0 - beyond, 1.0) if values[0] else (0.0, beyond)
-    return Interval(float(values[0]), low, high, alike=maps)
+    several = len(set(clusters))
+    nearly = (1.0 - LEVEL) ** (1.0 / several)
+    low, high = (nearly, 1.0) if values[0] else (0.0, 1.0 - nearly)
+    return Interval(float(values[0]), low, high, alike=several)
 
 
-def holm(p_values: ArrayLike) -> list[float]:
-    """Return p-values adjusted for their number by Holm (1979): each is at least what it was."""
-    p = np.asarray(p_values, dtype=float)
-    order = np.argsort(p, kind="stable")
-    adjusted = np.empty_like(p)
-    adjusted[order] = np.minimum(np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1)), 1.0)
-    return [float(each) for each in adjusted]
+def holm(p_values: Mapping[str, float]) -> dict[str, float]:
+    """Return p-values by name, adjusted for their number by Holm (1979), from the lowest on."""
+    ranked = sorted(p_values, key=p_values.__getitem__)
+    raised = (p_values[name] * (len(ranked) - k) for k, name in enumerate(ranked))
+    return {name: min(p, 1.0) for name, p in zip(ranked, accumulate(raised, max), strict=True)}
 
 
 def median_time(ended: Sequence[float] | Array, censored: Sequence[float] | Array) -> float:

@@ -22,15 +22,8 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.controllers import controller_kind, information_of
-from robocov_app.figures.statistics import (
-    Interval,
-    bootstrap,
-    bootstrap_by,
-    holm,
-    median_time,
-    share,
-    spread,
-)
+from robocov_app.figures.statistics import Interval, bootstrap, bootstrap_by, median_time, share, spread
+from robocov_app.figures.statistics import holm as adjusted_by_holm
 from robocov_app.replication import contenders as laws
 from robocov_app.replication.contenders import LABELS, OURS, OWN, PAPER, TARGETS, TEAMS, Contender
 from robocov_app.replication.outcomes import EARLY, FIRST_MINUTE, Comparison, GainOutcomes, Outcomes
@@ -164,9 +157,8 @@ class Claim:
     @property
     def p_text(self) -> str:
         """The p-values in words: "p = 0.001, by Holm 0.007"."""
-        return f"p = {amount(self.p)}" + (
-            "" if self.adjusted is None else f", by Holm {amount(self.adjusted)}"
-        )
+        known = {"p =": self.p} | ({} if self.adjusted is None else {"by Holm": self.adjusted})
+        return ", ".join(f"{name} {amount(p)}" for name, p in known.items())
 
     @property
     def verdict(self) -> Verdict:
@@ -175,9 +167,7 @@ class Claim:
         met = [criterion.met for criterion in self.criteria]
         if all(met):
             return "holds" if self.adjusted is None or self.adjusted <= ALPHA else "undecided"
-        if any(met):
-            return "holds partly"
-        return "does not hold" if False in met else "undecided"
+        return "holds partly" if any(met) else "does not hold" if False in met else "undecided"
 
     def to_json(self) -> dict[str, Any]:
         main = self.criteria[0].to_json() if self.criteria else {}
@@ -244,10 +234,7 @@ def paper_claims(convex: Outcomes, nonconvex: Outcomes, gains: Mapping[str, Gain
         against_lloyd(nonconvex),
         *(gap_to_reference(nonconvex, law) for law in ("rapf-shared", "rpf-shared", "lloyd")),
     ]
-    together = [claim for claim in found if claim.key in REGISTERED]
-    adjusted = dict(
-        zip((claim.key for claim in together), holm([claim.p for claim in together]), strict=True)
-    )
+    adjusted = adjusted_by_holm({claim.key: claim.p for claim in found if claim.key in REGISTERED})
     return [replace(claim, adjusted=adjusted.get(claim.key)) for claim in found]
 
 
@@ -662,8 +649,7 @@ def highest_of_maps(statistic: Callable[[IntArray], Any], maps: Sequence[str]) -
         rows = np.flatnonzero(names == name)
         estimates.append(float(statistic(rows)))
         drawn.append(statistic(rng.choice(rows, size=(_RESAMPLES, len(rows)))))
-    highest = np.max(drawn, axis=0)
-    low, high = np.quantile(highest, [0.025, 0.975]).tolist()
+    low, high = np.quantile(highest := np.max(drawn, axis=0), [0.025, 0.975]).tolist()
     return Interval(max(estimates), low, high, highest)
 
 

@@ -44,9 +44,7 @@ class LawRow:
     stuck: float  # that end with a robot stuck; nan where a law has no goals
     settled: float  # that come to rest
     settling: float  # s, median time until they do, by Kaplan and Meier; inf where most do not
-    final: float  # m, median of J at the end
-    over_run: float  # m, of J's time average over the run
-    path: float  # m, of the way of a robot
+    medians: Mapping[str, float]  # m, of J at the end (final), its mean over_run, and a robot's path
 
 
 @dataclass(frozen=True)
@@ -82,9 +80,6 @@ def law_rows(outcomes: Outcomes, contenders: Iterable[Contender], duration: floa
         gap, settled = fine.of(each.key, "gap"), fine.of(each.key, "settled")
         low, high = np.quantile(gap, [0.25, 0.75]).tolist()
         rest = settled[np.isfinite(settled)]
-        final, over_run, path = (
-            float(np.median(fine.of(each.key, measure))) for measure in ("final", "over_run", "path")
-        )
         rows.append(
             LawRow(
                 each,
@@ -95,9 +90,7 @@ def law_rows(outcomes: Outcomes, contenders: Iterable[Contender], duration: floa
                 stuck=share_above_zero(fine.of(each.key, "stuck")),
                 settled=len(rest) / len(settled),
                 settling=median_time(rest, np.full(len(settled) - len(rest), duration)),
-                final=final,
-                over_run=over_run,
-                path=path,
+                medians={name: np.median(fine.of(each.key, name)) for name in ("final", "over_run", "path")},
             )
         )
     return rows

@@ -58,8 +58,7 @@ class Outcomes:
 
     Measures are ``final`` (m), ``gap`` (J/J_ref - 1), ``early`` and ``first_minute`` (m, time averages),
     ``stuck`` (robots), ``contacts``, ``settled`` (s, nan where it did not), ``time`` (s), ``path``
-    (m, mean over the robots), ``over_run`` (m, the cost's time average), all (m,), and ``placement``, (m, n,
-    2) m at the end.
+    (m), ``over_run`` (m, time average of the cost), all (m,), and ``placement``, (m, n, 2) m at the end.
     """
 
     scenarios: tuple[Scenario, ...]

@@ -52,7 +52,7 @@ class BeyondPlan:
     maps: tuple[int, ...] = tuple(range(1, 13))
     map_starts: tuple[str, ...] = KINDS
     # disturbances
-    conditions_maps: tuple[str, ...] = NON_CONVEX[:-1]
+    conditions_maps: tuple[str, ...] = NON_CONVEX[:-1]  # but for the largest
     conditions_seeds: int = 3  # how many
     conditions_duration: float = 60.0  # s
     # s of the runs by which the time of the others is estimated: controllers that plan compute most at first,

@@ -351,7 +351,9 @@ class TestTables:
             assert row.quartiles[0] <= row.gap.estimate <= row.quartiles[1]
             assert 0.0 <= row.touched <= 1.0
             assert np.isnan(row.stuck) == (row.contender.controller == "rpf")
-            assert row.final < row.over_run and 0.0 < row.path < TINY.duration
+            assert (
+                row.medians["final"] < row.medians["over_run"] and 0.0 < row.medians["path"] < TINY.duration
+            )
             assert row.settling <= TINY.duration or (row.settling == np.inf and row.settled <= 0.5)
 
     def test_a_row_for_each_map_in_the_order_of_the_laws(self, paper, content):
