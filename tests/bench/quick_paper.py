@@ -21,8 +21,8 @@ def test_the_quick_study_finds_what_is_plain(tmp_path):
     claims = {claim["key"]: claim for claim in json.loads((out / "claims.json").read_text())}
     assert len(claims) == 15
     for key in ("nonconvex-final-shared", "nonconvex-motion-shared"):
-        # that RAPF is ahead in nine of ten runs is not shown by six maps, even if it always is
-        assert claims[key]["verdict"] in ("holds", "holds partly")
+        # that RAPF is ahead in nine of ten runs is hardly shown by twelve maps, even if it always is
+        assert claims[key]["verdict"] != "does not hold" and claims[key]["criteria"][0]["met"]
     assert claims["gap-rpf"]["verdict"] == "holds"
     assert claims["convex-spreading"]["verdict"] == "does not hold"
     assert claims["convex-final"]["estimate"] == pytest.approx(1.0, abs=0.03)
@@ -30,7 +30,7 @@ def test_the_quick_study_finds_what_is_plain(tmp_path):
     for claim in claims.values():
         low, high = claim["interval"]
         assert low <= claim["estimate"] <= high
-        assert claim["maps"] >= 5 and claim["runs"] >= 15
+        assert claim["maps"] == 12 and claim["runs"] >= 36
     for number in range(1, 9):
         for suffix in ("png", "svg", "pdf"):
             assert (out / "figures" / f"figure-{number}.{suffix}").is_file()

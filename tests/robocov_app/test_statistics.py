@@ -9,6 +9,7 @@ from scipy.stats import binomtest
 from robocov_app.figures.statistics import (
     bootstrap,
     bootstrap_by,
+    holm,
     mean_with_t_interval,
     median_time,
     share,
@@ -113,3 +114,40 @@ def test_the_median_of_times_is_the_product_limit(ended: list[int], censored: li
             break
     found = median_time(ended, censored)
     assert found == wanted or abs(float(left) - 0.5) < 1e-9  # in floats a half may be missed by rounding
+
+
+def test_p_values_are_adjusted_as_holm_did_by_hand() -> None:
+    # 4 * 0.005, 3 * 0.01, then 2 * 0.03 and 0.04, which may not be below the one before
+    found = holm({"a": 0.01, "b": 0.04, "c": 0.03, "d": 0.005})
+    assert found == pytest.approx({"a": 0.03, "b": 0.06, "c": 0.06, "d": 0.02})
+    assert holm({"a": 0.6, "b": 0.5}) == {"a": 1.0, "b": 1.0}
+    assert holm({}) == {}
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))
+def test_adjusted_p_values_keep_their_order_and_are_never_lower(p: list[float]) -> None:
+    found = holm({str(k): each for k, each in enumerate(p)})
+    adjusted = [found[str(k)] for k in range(len(p))]
+    assert all(one <= other <= 1.0 for one, other in zip(p, adjusted, strict=True))
+    assert min(adjusted) == pytest.approx(min(1.0, min(p) * len(p)))
+    in_order = [value for _, value in sorted(zip(p, adjusted, strict=True))]
+    assert in_order == sorted(adjusted)
+
+
+def test_a_p_value_is_the_share_of_resamples_beyond_the_bounds() -> None:
+    values = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    found = bootstrap(values, "mean", resamples=999)
+    drawn = found.resampled
+    assert drawn is not None and len(drawn) == 999
+    assert found.p_value(-np.inf, 4.0) == (1 + (drawn > 4.0).sum()) / 1000
+    assert found.p_value(3.0, 4.0) == (1 + (drawn > 4.0).sum() + (drawn < 3.0).sum()) / 1000
+    assert found.p_value(0.0, 9.0) == 0.001
+    assert bootstrap([1.5]).p_value(0.0, 9.0) == 1.0
+
+
+def test_the_p_value_of_what_is_always_or_never_so_is_binomial() -> None:
+    always, never = (share([value] * 24, [k // 2 for k in range(24)]) for value in (1.0, 0.0))
+    exact = binomtest(12, 12, 0.8, "greater").pvalue
+    assert always.p_value(0.8, np.inf) == pytest.approx(exact)
+    assert never.p_value(-np.inf, 0.2) == pytest.approx(exact)
+    assert always.p_value(-np.inf, 0.2) == never.p_value(0.8, np.inf) == 1.0

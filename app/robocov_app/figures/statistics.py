@@ -4,8 +4,9 @@ Runs on one map are alike: resampling them one by one would make the intervals t
 are given, whole clusters are drawn (Field and Welsh, 2007); intervals are percentiles.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Any, Literal
 
 import numpy as np
@@ -25,6 +26,18 @@ class Interval:
     estimate: float
     low: float
     high: float
+    resampled: Array | None = field(default=None, compare=False, repr=False)  # its values in the resamples
+    alike: int = field(default=0, compare=False, repr=False)  # clusters of a share that is 0, or 1, in all
+
+    def p_value(self, low: float, high: float) -> float:
+        """Return the p-value of the truth lying outside `low` to `high`; 1 where there is no interval.
+
+        It is the share of resamples outside; of a share that is 0 in all clusters, or 1, the binomial one.
+        """
+        if self.alike and low <= self.estimate <= high:
+            return float((max(low, 0.0) if self.estimate else 1.0 - min(high, 1.0)) ** self.alike)
+        drawn = np.empty(0) if self.resampled is None else self.resampled
+        return float(1 + np.count_nonzero(~((low <= drawn) & (drawn <= high)))) / (1 + drawn.size)
 
 
 def bootstrap(
@@ -69,7 +82,7 @@ def _interval(of: Callable[[IntArray], ArrayLike], clusters: Sequence[object], r
     known, tail = found[~np.isnan(found)], (1.0 - LEVEL) / 2.0
     how: Any = "linear" if np.isfinite(known).all() else "inverted_cdf"  # between a number and inf is nothing
     low, high = np.quantile(known, [tail, 1.0 - tail], method=how).tolist() if len(known) else (np.nan,) * 2
-    return Interval(estimate, low, high)
+    return Interval(estimate, low, high, found)
 
 
 def share(there: ArrayLike, clusters: Sequence[object]) -> Interval:
@@ -81,8 +94,17 @@ def share(there: ArrayLike, clusters: Sequence[object]) -> Interval:
     found, values = bootstrap(there, "mean", clusters), np.unique(there)
     if len(values) > 1 or values[0] not in (0.0, 1.0):
         return found
-    beyond = 1.0 - (1.0 - LEVEL) ** (1.0 / len(set(clusters)))
-    return Interval(1.0, 1.0 - beyond, 1.0) if values[0] else Interval(0.0, 0.0, beyond)
+    several = len(set(clusters))
+    nearly = (1.0 - LEVEL) ** (1.0 / several)
+    low, high = (nearly, 1.0) if values[0] else (0.0, 1.0 - nearly)
+    return Interval(float(values[0]), low, high, alike=several)
+
+
+def holm(p_values: Mapping[str, float]) -> dict[str, float]:
+    """Return p-values by name, adjusted for their number by Holm (1979), from the lowest on."""
+    ranked = sorted(p_values, key=p_values.__getitem__)
+    raised = (p_values[name] * (len(ranked) - k) for k, name in enumerate(ranked))
+    return {name: min(p, 1.0) for name, p in zip(ranked, accumulate(raised, max), strict=True)}
 
 
 def median_time(ended: Sequence[float] | Array, censored: Sequence[float] | Array) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from robocov.controllers import controller_kind, gain_values, information_of, make_controller
 from robocov.controllers.gains import value_text
-from robocov_app.figures.statistics import Interval, bootstrap
+from robocov_app.figures.statistics import Interval, bootstrap, median_time
 from robocov_app.replication.claims import amount, capitalised, share_above_zero
 from robocov_app.replication.contenders import ASSETS, OWN, Contender
 from robocov_app.replication.outcomes import Comparison, GainOutcomes, Outcomes
@@ -43,7 +43,8 @@ class LawRow:
     touched: float  # share of runs in which a robot touches something
     stuck: float  # that end with a robot stuck; nan where a law has no goals
     settled: float  # that come to rest
-    settling: float  # s, median time until these do
+    settling: float  # s, median time until they do, by Kaplan and Meier; inf where most do not
+    medians: Mapping[str, float]  # m, of J at the end (final), its mean over_run, and a robot's path
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ def account_of(controller: str) -> Account:
     return Account(controller, kind.label, information_of(kind), known.get("short", "–"), source, does)
 
 
-def law_rows(outcomes: Outcomes, contenders: Iterable[Contender]) -> list[LawRow]:
+def law_rows(outcomes: Outcomes, contenders: Iterable[Contender], duration: float) -> list[LawRow]:
     rows = []
     for each in contenders:
         fine = outcomes.measured("gap", each.key)
@@ -88,14 +89,16 @@ def law_rows(outcomes: Outcomes, contenders: Iterable[Contender]) -> list[LawRow
                 touched=share_above_zero(fine.of(each.key, "contacts")),
                 stuck=share_above_zero(fine.of(each.key, "stuck")),
                 settled=len(rest) / len(settled),
-                settling=float(np.median(rest)) if len(rest) else np.nan,
+                settling=median_time(rest, np.full(len(settled) - len(rest), duration)),
+                medians={name: np.median(fine.of(each.key, name)) for name in ("final", "over_run", "path")},
             )
         )
     return rows
 
 
 def ranked_rows(results: BeyondResults) -> list[LawRow]:
-    return sorted(law_rows(results.outcomes, results.contenders), key=lambda row: row.gap.estimate)
+    rows = law_rows(results.outcomes, results.contenders, results.plan.duration)
+    return sorted(rows, key=lambda row: row.gap.estimate)
 
 
 def evidence(results: BeyondResults, rows: Iterable[LawRow]) -> list[Evidence]:

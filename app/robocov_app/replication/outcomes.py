@@ -36,6 +36,8 @@ COLUMNS = {
     "stuck": "stuck_robots",
     "settled": "settled_at_s",
     "time": "mean_time_s",
+    "path": "path_length_m",
+    "over_run": "mean_distance_over_run_m",
 }
 
 
@@ -55,8 +57,8 @@ class Outcomes:
     """Results of every contender in each of m scenarios; nan where its run failed.
 
     Measures are ``final`` (m), ``gap`` (J/J_ref - 1), ``early`` and ``first_minute`` (m, time averages),
-    ``stuck`` (robots), ``contacts``, ``settled`` (s, nan where it did not), ``time`` (s), all (m,), and
-    ``placement``, (m, n, 2) m at the end.
+    ``stuck`` (robots), ``contacts``, ``settled`` (s, nan where it did not), ``time`` (s), ``path``
+    (m), ``over_run`` (m, time average of the cost), all (m,), and ``placement``, (m, n, 2) m at the end.
     """
 
     scenarios: tuple[Scenario, ...]

@@ -23,9 +23,8 @@ from robocov_app.replication.claims import Claim, Criterion, amount, described, 
 from robocov_app.replication.contenders import ASSETS, LABELS, OURS
 from robocov_app.replication.evidence import Evidence
 from robocov_app.replication.outcomes import Outcomes, Scenario
-from robocov_app.replication.plan import FULL, NON_CONVEX, ROBOTS, TEAM, Plan
+from robocov_app.replication.plan import FULL, NON_CONVEX, ROBOTS, TEAM, UNSEEN, Plan
 from robocov_app.replication.results import BeyondResults, FigureRun, PaperResults
-from robocov_app.report.groups import FEW_MAPS
 from robocov_app.report.pictures import run_picture
 from robocov_app.report.replay import ReplayRun, asset, replay_css, replay_js, replay_part, script
 from robocov_app.report.theme_css import theme_rules
@@ -135,7 +134,7 @@ def paper_page(
         context |= {
             "best": best,
             "maps_in_all": len({*outcomes.maps}) + len({*results.convex.maps}) + len(plan.tuning),
-            "laws": evidence.law_rows(outcomes, [best[key] for key in LABELS if key in best]),
+            "laws": evidence.law_rows(outcomes, [best[key] for key in LABELS if key in best], plan.duration),
             "maps": {
                 name: {law: gaps[name] for law, gaps in medians.items() if name in gaps}
                 for name in dict.fromkeys(outcomes.maps)
@@ -164,6 +163,7 @@ def beyond_page(images: Mapping[str, Image], results: BeyondResults) -> str:
         "failures": _failures(results.worst, results.outcomes, OURS[0], others),
         "images": images,
         "tuned": tuned,
+        "unseen_families": UNSEEN,
         "tuning": results.plan if tuned else FULL,
     }
     return _rendered("beyond.html.jinja", results.plan, context)
@@ -197,7 +197,7 @@ def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
     known(t=claims, contender=contenders, studies=studies, timing=step_times)
     known(bar=interval_bar, amount=amount, described=described, counts=verdict_counts)
     known(account_of=evidence.account_of, units=UNITS, team=TEAM, robots=ROBOTS)
-    known(settled=(SETTLED_DISTANCE, SETTLED_WINDOW), resamples=RESAMPLES, least_maps=FEW_MAPS)
+    known(settled=(SETTLED_DISTANCE, SETTLED_WINDOW), resamples=RESAMPLES)
     known(page=PAGE, beyond_page=BEYOND_PAGE, version=__version__, plan=plan, quick=plan.name == "quick")
     own = (ASSETS / "paper.css").read_text("utf-8")
     style = Markup(theme_rules(":root") + replay_css() + asset("report.css") + own)

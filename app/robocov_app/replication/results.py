@@ -129,7 +129,7 @@ class BeyondResults:
 
     plan: Plan
     outcomes: Outcomes  # of all contenders: those of the claims, the baselines, and ours
-    unseen: Outcomes | None  # of ours and the paper's strongest, on maps that nobody looked at
+    unseen: Outcomes | None  # of ours and the paper's strongest, on maps of other families
     contenders: tuple[Contender, ...]
     gains: Mapping[str, GainOutcomes]  # of the baselines whose gains were tuned here
     steps: Mapping[int, StepTimes]  # by number of robots
@@ -311,7 +311,7 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
     if (tuning := studies.baseline_gains_study(plan)) is not None:
         gains, _ = _run_grid(tuning, BASELINE_GAINS, folder, plan, options)
     contests = studies.beyond_contests(plan, best_gains(gains), papers)
-    on = *studies.generated_maps(plan.beyond.maps), *studies.generated_maps(plan.beyond.unseen)
+    on = *studies.generated_maps(plan.beyond.maps), *studies.unseen_maps(plan)
     known |= references_of(on, folder, plan, options)
     sweeps = {name: each.study for name, each in contests.items()} | studies.conditions_studies(plan)
     run_together(sweeps, folder, options, "paper: beyond")

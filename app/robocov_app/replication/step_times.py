@@ -41,9 +41,10 @@ class StepTimes:
         own, yardstick = self.seconds.get(controller), self.seconds.get(YARDSTICK)
         return bootstrap(np.array(own) / np.array(yardstick)) if own and yardstick else UNKNOWN
 
-    def interval(self, controller: str) -> Interval:
+    def real_time(self, controller: str) -> Interval:
+        """Return the time of a step by the simulated one."""
         own = self.seconds.get(controller)
-        return bootstrap(own) if own else UNKNOWN
+        return bootstrap(np.array(own) / self.dt) if own else UNKNOWN
 
 
 def step_times(

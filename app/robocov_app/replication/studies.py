@@ -8,6 +8,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from robocov.generator import generated_map
 from robocov.mapfile import load_map
 from robocov_app.replication import contenders as laws
 from robocov_app.replication.contenders import Contender
-from robocov_app.replication.plan import CONVEX, CONVEX_KINDS, KINDS, ROBOTS, TEAM, Plan
+from robocov_app.replication.plan import CONVEX, CONVEX_KINDS, KINDS, ROBOTS, TEAM, UNSEEN, Plan
 from robocov_app.sweep import study as sweep_study
 from robocov_app.sweep.study import Study, StudyMap
 
@@ -143,6 +144,14 @@ def convex_maps(plan: Plan) -> tuple[StudyMap, ...]:
     return (*(bundled(name, CONVEX_KINDS) for name in CONVEX), *map(convex_region, plan.convex_generated))
 
 
+@cache
+def unseen_maps(plan: Plan) -> tuple[StudyMap, ...]:
+    """Return generated maps of other families than those of the claims, with the study's starts."""
+    found = product(UNSEEN, plan.beyond.unseen)
+    drawn = {f"{kind}-{seed}": generated_map(seed, kind=kind) for kind, seed in found}
+    return tuple(StudyMap(name, with_kinds_of_starts(each)) for name, each in drawn.items())
+
+
 def baseline_maps(plan: Plan) -> tuple[StudyMap, ...]:
     """Return the maps of baselines and ours: those of the claims, or some of them."""
     wanted = {*plan.beyond.bundled, *(f"generated-{seed}" for seed in plan.beyond.generated)}
@@ -219,7 +228,7 @@ def beyond_contests(plan: Plan, best: laws.BestGains, papers: Sequence[Contender
     }
     if beyond.unseen:
         three = laws.OWN[0], *laws.strongest(papers)
-        found["unseen"] = contest(plan, generated_maps(beyond.unseen), three, beyond.starts, beyond.seeds)
+        found["unseen"] = contest(plan, unseen_maps(plan), three, beyond.starts, beyond.seeds)
     found["targets"] = contest(plan, on, laws.TARGETS, starts, (0,))
     known, rapf = load_map(DENSITY_MAP), (laws.RAPF_DEFAULT,)
     both = ("", density_maps(plan), known), ("-ignored", on, replace(known, density=None))

@@ -29,7 +29,7 @@ from robocov_app.replication.step_times import StepTimes
 
 pytestmark = pytest.mark.usefixtures("few_resamples")
 
-MAPS = ("a", "b", "c", "d", "e", "f")
+MAPS = tuple("abcdefghijkl")
 OURS = with_gains("howard", {})
 """Stands for ours: goals are asked of any contender."""
 
@@ -38,7 +38,7 @@ LARGE, HUGE = FULL.beyond.large, FULL.beyond.huge
 
 
 def outcomes(ours: float = 1.01, rapf: float = 1.05, lloyd: float = 1.08, **other: float) -> Outcomes:
-    """Return what three contenders reached on six maps from two starts, J_ref being 2 m."""
+    """Return what three contenders reached on twelve maps from two starts, J_ref being 2 m."""
     scenarios = tuple(Scenario(map_, start, 0) for map_ in MAPS for start in ("corner", "uniform"))
     full = np.ones(len(scenarios))
     values = {}
@@ -72,7 +72,7 @@ def test_all_goals_are_met_by_who_meets_them():
         *("step", "real-time"),
     }
     for name, goal in found.items():
-        # that none of six maps shows a contact, or all of them rest, is no proof of either
+        # that none of twelve maps shows a contact, or all of them rest, is no proof of either
         words, verdict = ("met", "holds") if name not in ("contacts", "rest") else (UNSURE, "undecided")
         assert (is_met(goal), goal_outcome(goal), goal.verdict, goal.part) == (True, words, verdict, GOALS)
 
@@ -108,7 +108,7 @@ def test_steps_are_judged_by_their_own_goals():
 @pytest.mark.parametrize(
     ("changes", "verdict"),
     [
-        ({}, "holds partly"),  # six maps are too few to show that it touches nothing and rests
+        ({}, "holds partly"),  # twelve maps are too few to show that it touches nothing and rests
         ({"ours": 1.02}, "holds partly"),
         ({"contacts": 1.0}, "holds partly"),
         ({"settled": np.nan}, "holds partly"),
@@ -116,9 +116,9 @@ def test_steps_are_judged_by_their_own_goals():
         ({"ours": 1.2, "contacts": 1.0, "settled": np.nan}, "does not hold"),
     ],
 )
-def test_on_maps_that_nobody_looked_at_it_is_judged_once_more(changes, verdict):
+def test_on_maps_of_other_families_it_is_judged_once_more(changes, verdict):
     claim = unseen_claim(outcomes(**changes), OURS, (RAPF, LLOYD, OURS))
-    assert (claim.key, claim.part, claim.runs, claim.maps) == ("goal-unseen", GOALS, 12, 6)
+    assert (claim.key, claim.part, claim.runs, claim.maps) == ("goal-unseen", GOALS, 24, 12)
     assert [criterion.text for criterion in claim.criteria] == [
         "median of J/J_ref - 1",
         "runs with a contact",
@@ -141,13 +141,13 @@ def test_on_one_bad_map_the_goal_for_every_map_is_missed():
     what.values[OURS.key, "final"][:2] = 2.4
     found = asked(what)
     assert is_met(found["gap"]) and not is_met(found["every-map"])
-    assert "Highest on a; above it on 1 of 6 maps." in found["every-map"].explanation
+    assert "Highest on a; above it on 1 of 12 maps." in found["every-map"].explanation
     ratio = found["not-worse-lloyd"].criteria[0].interval
     assert ratio.estimate == pytest.approx(1.2 / 1.08)
 
 
 def test_without_a_run_no_goal_is_judged():
-    empty = outcomes().where(np.zeros(12, dtype=bool))
+    empty = outcomes().where(np.zeros(24, dtype=bool))
     assert set(asked(empty)) == {"step", "real-time"}
     assert asked(empty, {}) == {}
     assert goal_counts([]) == "Nothing was measured."
@@ -168,13 +168,13 @@ def test_the_worst_median_is_that_of_the_worst_map(rows):
 def test_ours_is_compared_pair_by_pair_with_everybody():
     rival = with_gains("geodesic-lloyd", {})
     what = outcomes()
-    values = {**what.values, (rival.key, "final"): np.full(12, 2.01)}
+    values = {**what.values, (rival.key, "final"): np.full(24, 2.01)}
     found = {
         each.key: each
         for each in rival_claims(Outcomes(what.scenarios, values), OURS, (RAPF, LLOYD, rival, OURS))
     }
     better = found["beyond-howard-lloyd"]
-    assert (better.verdict, better.runs, better.maps, better.part) == ("holds", 24, 6, RIVALS)
+    assert (better.verdict, better.runs, better.maps, better.part) == ("holds", 48, 12, RIVALS)
     assert better.criteria[0].interval.estimate == pytest.approx(1.01 / 1.08)
     worse = found["beyond-howard-geodesic-lloyd"]
     assert worse.verdict == "does not hold" and worse.claim.endswith("which goes by the whole map.")
@@ -187,7 +187,7 @@ def test_ours_is_compared_pair_by_pair_with_everybody():
 
 def level(what: dict[str, float], measure: str = "final") -> Outcomes:
     scenarios = tuple(Scenario(map_, "corner", 0) for map_ in MAPS)
-    return Outcomes(scenarios, {(key, measure): np.full(6, value) for key, value in what.items()})
+    return Outcomes(scenarios, {(key, measure): np.full(len(MAPS), value) for key, value in what.items()})
 
 
 def test_targets_make_a_difference_or_none():
@@ -221,8 +221,8 @@ def test_messages_are_borne_or_not():
             for axis, value, ratio in (("loss", 0.6, loss), ("delay", 1.0, delay))
         ]
 
-    assert conditions_claim(found(1.01, 1.02), 6).verdict == "holds"
-    assert conditions_claim(found(1.01, 1.5), 6).verdict == "holds partly"
-    assert conditions_claim(found(1.2, 1.5), 6).verdict == "does not hold"
-    assert "1.5, with delay 1" in conditions_claim(found(1.2, 1.5), 6).explanation
-    assert conditions_claim([], 6).verdict == "undecided"
+    assert conditions_claim(found(1.01, 1.02), 12).verdict == "holds"
+    assert conditions_claim(found(1.01, 1.5), 12).verdict == "holds partly"
+    assert conditions_claim(found(1.2, 1.5), 12).verdict == "does not hold"
+    assert "1.5, with delay 1" in conditions_claim(found(1.2, 1.5), 12).explanation
+    assert conditions_claim([], 12).verdict == "undecided"

@@ -29,7 +29,7 @@ from robocov_app.replication.outcomes import (
 pytestmark = pytest.mark.usefixtures("few_resamples")
 
 STARTS = ("corner", "centre", "uniform")
-FEW, MANY = 3, 30
+FEW, MANY = 11, 30
 
 
 def scenarios(maps: int, seeds: int = 2) -> tuple[Scenario, ...]:
@@ -88,11 +88,31 @@ class TestVerdicts:
             Criterion("x", Interval(1.0, *interval[word]), 0.0, 1.0) for word in outcomes.split()
         )
         assert Claim("k", 1, "c", "", criteria, runs=50, maps=20).verdict == verdict
-        assert Claim("k", 1, "c", "", criteria, runs=50, maps=4).verdict == "undecided"
+        assert Claim("k", 1, "c", "", criteria, runs=50, maps=11).verdict == "undecided"
+
+    @pytest.mark.parametrize(("adjusted", "verdict"), [(None, "holds"), (0.05, "holds"), (0.06, "undecided")])
+    def test_a_registered_claim_holds_by_its_adjusted_p_value(self, adjusted, verdict):
+        criteria = tuple(
+            Criterion("x", Interval(0.5, 0.4, 0.6, np.array(drawn)), high=1.0)
+            for drawn in ([0.5, 0.5, 0.5], [0.5, 2.0, 0.5])
+        )
+        claim = Claim("k", 1, "c", "", criteria, 50, 20, adjusted=adjusted)
+        assert (claim.verdict, claim.p) == (verdict, 0.5)
+        assert claim.p_text == ("p = 0.5" if adjusted is None else f"p = 0.5, by Holm {adjusted}")
+
+    def test_registered_claims_are_adjusted_together(self):
+        there = outcomes(rapf_shared=0.7, rpf_shared=1.0, lloyd=1.0)
+        both = {"rapf": grid(0.02), "rpf": grid(0.9)}
+        found = {claim.key: claim for claim in claims.paper_claims(there, there, both)}
+        assert {key for key, claim in found.items() if claim.adjusted is not None} == set(claims.REGISTERED)
+        # two p-values are the least there are of 200 samples, the others 1
+        assert found["gains-result"].p == pytest.approx(1 / 201)
+        assert found["gains-result"].adjusted == pytest.approx(7 / 201)
+        assert found["nonconvex-final-best"].adjusted == 1.0  # without a run
 
     def test_json_has_what_was_promised(self):
         criterion = Criterion("ratio", Interval(0.9, 0.8, 0.95), high=1.0)
-        found = Claim("k", 2, "It is lower.", "VI", (criterion,), 40, 10, "Why.").to_json()
+        found = Claim("k", 2, "It is lower.", "VI", (criterion,), 40, 12, "Why.").to_json()
         assert found["claim"] == "It is lower."
         assert (found["verdict"], found["estimate"], found["interval"]) == ("holds", 0.9, [0.8, 0.95])
         assert (found["runs"], found["key"], found["criteria"][0]["met"]) == (40, "k", True)
@@ -366,7 +386,7 @@ def test_how_many_claims_hold_is_told_in_words():
             "not": Interval(2.0, 1.9, 2.1),
             "open": Interval(1.0, 0.9, 1.1),
         }
-        return [Claim("k", 1, "", "", (Criterion("", kinds[word], high=1.0),), 9, 9) for word in verdicts]
+        return [Claim("k", 1, "", "", (Criterion("", kinds[word], high=1.0),), 12, 12) for word in verdicts]
 
     assert verdict_counts(of("holds", "holds", "open")) == "Of 3 claims 2 hold, 1 is undecided."
     assert verdict_counts(of("holds", "not", "open", "open")) == (

@@ -61,5 +61,5 @@ def test_ratios_are_medians_of_blocks_timed_together():
     times = StepTimes(6, 0.02, {"rapf": (1.0, 2.0, 4.0), "mine": (3.0, 4.0, 20.0)})
     interval = times.ratio_interval("mine")
     assert (interval.low, interval.estimate, interval.high) == (2.0, 3.0, 5.0)
-    assert times.interval("mine").estimate == 4.0
+    assert times.real_time("mine").estimate == 200.0
     assert np.isnan(times.ratio_interval("other").estimate)

@@ -343,7 +343,7 @@ class TestStopping:
 
 class TestTables:
     def test_a_row_for_each_law(self, paper):
-        rows = law_rows(paper.claims, paper.contenders)
+        rows = law_rows(paper.claims, paper.contenders, TINY.duration)
         assert [row.contender for row in rows] == list(paper.contenders)
         for row in rows:
             gap = paper.claims.of(row.contender.key, "gap")
@@ -351,6 +351,10 @@ class TestTables:
             assert row.quartiles[0] <= row.gap.estimate <= row.quartiles[1]
             assert 0.0 <= row.touched <= 1.0
             assert np.isnan(row.stuck) == (row.contender.controller == "rpf")
+            assert (
+                row.medians["final"] < row.medians["over_run"] and 0.0 < row.medians["path"] < TINY.duration
+            )
+            assert row.settling <= TINY.duration or (row.settling == np.inf and row.settled <= 0.5)
 
     def test_a_row_for_each_map_in_the_order_of_the_laws(self, paper, content):
         (table,) = re.findall(r"<caption><span>Map by map.*?</table>", content, re.DOTALL)
@@ -432,6 +436,11 @@ class TestPages:
             assert {"claim", "verdict", "estimate", "interval", "runs"} <= set(claim)
             assert claim["verdict"] == "undecided"  # on two maps nothing is decided
             assert claim["claim"] in plain(content)
+            p = {criterion["p"] for criterion in claim["criteria"]}
+            assert claim["p"] == max(p) and (claim["p_adjusted"] or 1.0) >= claim["p"]
+            assert claims.amount(claim["p"]) in plain(content)
+        adjusted = {claim["key"] for claim in found if claim["p_adjusted"] is not None}
+        assert adjusted == set(claims.REGISTERED)
         assert {claim["question"] for claim in found} == set(range(1, claims.GOALS))
         ratio = paper.claims.compared("rapf-shared", "rpf-shared").ratio
         shared = next(claim for claim in found if claim["key"] == "nonconvex-final-shared")
@@ -488,13 +497,18 @@ class TestPages:
         said = plain(pages.beyond_page({}, quick))
         assert "default gains: those that the full study" in said and "120 s on 4 generated maps" in said
 
-    def test_it_says_what_ours_reached_on_maps_that_played_no_part(self, more, beyond):
-        assert {scenario.map for scenario in beyond.unseen.scenarios} == {"generated-201"}
+    def test_it_says_what_ours_reached_on_maps_of_other_families(self, more, beyond):
+        assert {scenario.map for scenario in beyond.unseen.scenarios} == {
+            f"{kind}-301" for kind in planned.UNSEEN
+        }
         assert np.isfinite(beyond.unseen.of("atlas", "gap")).all()
-        heading = "On maps that played no part in its development"
-        assert heading in more and "generated maps with seeds 201, on which nothing" in more
+        heading = "On maps of other families than those of the claims"
+        assert (
+            f"<caption>{heading}" in more
+            and "blocks, rooms, caves, mazes (robocov generate), seeds 301" in more
+        )
         without = replace(beyond, unseen=None)
-        assert heading not in pages.beyond_page({}, without)
+        assert f"<caption>{heading}" not in pages.beyond_page({}, without)
         assert "goal-unseen" not in text_of(claims.beyond_claims(without))
 
     def test_the_same_runs_give_the_same_pages(self, study, content, more):
