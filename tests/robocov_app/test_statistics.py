@@ -88,17 +88,16 @@ def test_spread() -> None:
     assert spread([2.0, 2.0, 2.0]) == 0.0
 
 
-@given(st.integers(1, 200), st.integers(1, 3), st.booleans())
-def test_what_is_always_or_never_so_has_an_exact_bound(maps: int, runs: int, always: bool) -> None:
-    found = share([always] * (maps * runs), [k // runs for k in range(maps * runs)])
-    exact = binomtest(maps * always, maps).proportion_ci(0.9, "exact")  # one of its two sides
-    wanted = (1.0, exact.low, 1.0) if always else (0.0, 0.0, exact.high)
-    assert (found.estimate, found.low, found.high) == pytest.approx(wanted, abs=1e-9)
-
-
-def test_a_share_between_is_drawn_by_clusters() -> None:
-    values, clusters = [0.0, 0.0, 1.0, 0.5, 1.0, 1.0], [0, 0, 1, 1, 2, 2]
-    assert share(values, clusters) == bootstrap(values, "mean", clusters)
+@given(st.data(), st.integers(1, 200), st.integers(1, 3), st.sampled_from([0.2, 0.5, 0.9]))
+def test_a_share_is_exact_by_clusters(data: st.DataObject, maps: int, runs: int, bound: float) -> None:
+    """As many runs of each map have the same value as there are, so that maps are single trials."""
+    count = data.draw(st.integers(0, maps))
+    found = share([k // runs < count for k in range(maps * runs)], [k // runs for k in range(maps * runs)])
+    level = 0.95 if 0 < count < maps else 0.9  # one of its two sides, where the other one is no bound
+    exact = binomtest(count, maps).proportion_ci(level, "exact")
+    assert (found.estimate, found.low, found.high) == pytest.approx((count / maps, exact.low, exact.high))
+    for side, limits in (("greater", (bound, np.inf)), ("less", (-np.inf, bound))):
+        assert found.p_value(*limits) == pytest.approx(binomtest(count, maps, bound, side).pvalue, abs=1e-9)
 
 
 @given(st.lists(st.integers(1, 20), max_size=12), st.lists(st.integers(1, 20), max_size=12))
@@ -143,11 +142,3 @@ def test_a_p_value_is_the_share_of_resamples_beyond_the_bounds() -> None:
     assert found.p_value(3.0, 4.0) == (1 + (drawn > 4.0).sum() + (drawn < 3.0).sum()) / 1000
     assert found.p_value(0.0, 9.0) == 0.001
     assert bootstrap([1.5]).p_value(0.0, 9.0) == 1.0
-
-
-def test_the_p_value_of_what_is_always_or_never_so_is_binomial() -> None:
-    always, never = (share([value] * 24, [k // 2 for k in range(24)]) for value in (1.0, 0.0))
-    exact = binomtest(12, 12, 0.8, "greater").pvalue
-    assert always.p_value(0.8, np.inf) == pytest.approx(exact)
-    assert never.p_value(-np.inf, 0.2) == pytest.approx(exact)
-    assert always.p_value(-np.inf, 0.2) == never.p_value(0.8, np.inf) == 1.0

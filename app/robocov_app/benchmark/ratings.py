@@ -32,7 +32,7 @@ class Rating:
     @property
     def gap(self) -> Interval:
         maps = [row["map"] for row in self.rows if row["gap"] is not None]
-        return bootstrap(self.values("gap"), "median", maps) if maps else Interval(*3 * [float("nan")])
+        return bootstrap(self.values("gap"), "median", maps) if maps else Interval(np.nan, np.nan, np.nan)
 
     def at_rest(self) -> tuple[float, float | None]:
         """Return the share of runs at rest at the end, and the Kaplan-Meier median of the time to rest, s."""
