@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from robocov.conditions import LOSS, Conditions
 from robocov.conditions.perception import Inbox, Perception
 from robocov.conditions.random_streams import Draws
-from robocov.controllers import CONTROLLERS, Controller, informed
+from robocov.controllers import CONTROLLERS, Controller, atlas, informed
 from robocov.environment import Environment
 from robocov.errors import InputError
 from robocov.observation import Observations, Scans
@@ -245,7 +245,8 @@ def test_what_was_heard_matters(kind: type) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PLANNING)
-def test_those_that_plan_go_by_what_they_heard_too(name: str) -> None:
+def test_those_that_plan_go_by_what_they_heard_too(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(atlas, "_LISTENED", 0.0)
     kind, team = CONTROLLERS[name], Team.homogeneous(4)
     places = np.random.default_rng(5).uniform(1, 9, size=(4, 2))
     neighbours = Neighbours.within(places, np.full(4, 20.0))
