@@ -70,7 +70,7 @@ def final(name: str, seed: int, hears: float, robots: int) -> tuple[float, float
 
 
 def sizes(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
-    """How far the mean distance is above the lowest of smaller teams: it should never rise with N."""
+    """Mean distances by team size, and how far one is above that of a smaller team: it should never rise."""
     for hears in (math.inf, SHORT):
         for seed in SEEDS:
             found = list(pool.map(partial(final, name, seed, hears), SIZES))

@@ -40,6 +40,7 @@ _LOOKED_FOR_ALL = 2.5  # so many times the patience where all learn of a look
 _GETS_ON, _JAMMED, _CROWD = 0.05, 3, 0.7
 _BACKOFF = 8.0  # s, at most, that it makes way then
 _JOINTLY = 3.0  # a robot plans for others as long as it takes to cross the region so many times
+_STAGGERED = 0.5  # part of the period in which all robots make their first plans
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
@@ -144,7 +145,7 @@ class Atlas(Law):
     Private maps agree ever more where it matters, and so do the plans. Where they do not, the team comes to
     rest by 1, and as what a relocation or a goal must save doubles with the way that a robot walks, not with
     time (`settling`): who rests stays as ready to move as it was. It begins anew when robots join or fail,
-    and when a robot sees a wall come or go. Of more than `most_planned_for` robots each plans for itself
+    and when a robot sees a wall come or go. Of more than `MAX_PLANNING_GROUP` robots each plans for itself
     and its nearest ones, in the part of the map where these are; the others are where they are.
     """
 
@@ -152,7 +153,7 @@ class Atlas(Law):
     label = "Atlas"
     summary = "plans the team's placement on the map that each robot discovers itself"
     scanning = Scanning(rays=240, period=0.5)
-    staggered: ClassVar[float] = 0.5  # part of the period in which all robots make their first plans
+    staggered: ClassVar[bool] = True  # whether robots plan at different moments
 
     period: float = gain(1.0, "s", "between two plans of a robot", low=0.05, high=60.0)
     threshold: float = gain(0.01, "1", "part of the cost that a relocation must save", high=1.0)
@@ -176,8 +177,7 @@ class Atlas(Law):
         empty = DiscoveredMap.nothing(Raster(region, cell))
         nowhere, never = np.empty((0, 2)), np.empty(0)
         nobody = Teammates(np.empty(0, dtype=np.intp), nowhere, never, never, never, nowhere)
-        # the robots do not all plan at the same moment
-        first = [self.period * self.staggered * (i * _GOLDEN % 1.0) for i in range(len(team))]
+        first = [self.period * _STAGGERED * (i * _GOLDEN % 1.0) * self.staggered for i in range(len(team))]
         states = tuple(PlannerState(empty, due, nobody) for due in first)
         routes = (np.full((1, 2), np.nan),) * len(team)
         return AtlasMemory(team, states, routes, np.zeros(len(team), dtype=np.intp))
@@ -239,7 +239,7 @@ class Atlas(Law):
         # nobody gets farther than to the next node meanwhile
         period = max(self.period, spacing / fastest)
         first = state.planned is None
-        due = seen.time + period * (1.0 + bool(self.staggered) * ((i + 1) * _GOLDEN) % 1.0 if first else 1.0)
+        due = seen.time + period * (1.0 + (i + 1) * _GOLDEN % 1.0 if first and self.staggered else 1.0)
         before, walked = state, state.walked
         if state.situation is not None:
             walked += math.dist(place, state.situation[0])
@@ -394,7 +394,7 @@ class AtlasShared(Atlas):
     label = "Atlas, shared maps"
     summary = "as Atlas, with the maps merged among the robots that hear each other"
     information = "shared map"
-    staggered = 0.0
+    staggered = False  # one plan is for all
 
     def _surveyed(
         self, maps: list[DiscoveredMap], seen: Observations, scans: Scans, radius: Array

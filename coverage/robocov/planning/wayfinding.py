@@ -131,7 +131,7 @@ class GridPlanner:
 
     @cached_property
     def openness(self) -> Array:
-        """How likely those are free that the robot has not seen, 0 for all others, (h, w)."""
+        """The chance of each unseen cell to be free, 0 for all others, (h, w)."""
         state = self.window.cut(self.known.state, np.uint8(UNKNOWN))
         return openness(state, self.outside, min(BLOCKS, self.window.rows * self.window.columns))
 
@@ -152,7 +152,7 @@ class GridPlanner:
 
     @cached_property
     def border(self) -> tuple[IntArray, IntArray, IntArray, BoolArray]:
-        """What is not seen beside free cells with room for a robot: row, column, patch, and on which sides.
+        """The unseen cells beside free ones with room for a robot: row, column, patch, and on which sides.
 
         (b,) each, and (b, 4): right, above, left and below.
         """
@@ -163,7 +163,7 @@ class GridPlanner:
 
     @cached_property
     def unseen(self) -> tuple[IntArray, IntArray, Array]:
-        """What the patches expect to hold at each node: patch, node, and free cells, (p,) each."""
+        """The free cells that are expected in a patch, by nodes: patch, node, and their number, (p,) each."""
         row, column = self.patches.nonzero()
         stride, m = self.window.stride, len(self.nodes)
         node = row // stride * self.window.columns + column // stride
