@@ -14,7 +14,7 @@ from robocov.controllers.driving import last_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.localization import Estimates, localized, wary
 from robocov.controllers.route_following import follow_routes
-from robocov.controllers.shared_map import circles, surveyed
+from robocov.controllers.shared_map import Circle, circles, surveyed
 from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.region import Region
 from robocov.planning.discovered import DiscoveredMap, Raster
@@ -336,6 +336,8 @@ class Atlas(Law):
             own = now[order], begin[order], fixed[order]
             made = seen.density, team_places(ways, weights, *own, others, threshold, nearby)
             if agreed:
+                # of former moments nobody asks any more
+                ways.plans.clear()
                 ways.plans[key] = made
         places = np.empty_like(begin)
         places[order] = made[1]
@@ -399,13 +401,13 @@ class AtlasShared(Atlas):
     def _surveyed(
         self, maps: list[DiscoveredMap], seen: Observations, scans: Scans, radius: Array
     ) -> list[DiscoveredMap]:
-        around, visited = circles(seen.neighbours, len(maps)), dict[tuple[object, ...], DiscoveredMap]()
-        for i, known in enumerate(surveyed(maps, seen, scans)):
-            key = id(known), around[i], float(radius[i])
-            if key not in visited:
-                visited[key] = known.visited(seen.positions[list(around[i])], float(radius[i]))
-            maps[i] = visited[key]
-        return maps
+        around, visited = circles(seen.neighbours), dict[tuple[int, Circle, float], DiscoveredMap]()
+        told = surveyed(maps, seen, scans, around)
+        # those who share a map share the next one, too
+        for known, circle, size in (each := list(zip(told, around, radius.tolist(), strict=True))):
+            if (id(known), circle, size) not in visited:
+                visited[id(known), circle, size] = known.visited(seen.positions[list(circle)], size)
+        return [visited[id(known), circle, size] for known, circle, size in each]
 
     def _agreed(self, others: Teammates, seen: Observations) -> bool:
         return bool((others.heard == seen.time).all())

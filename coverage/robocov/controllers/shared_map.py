@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -69,9 +70,8 @@ class Situation(NamedTuple):
 
     def weights(self, cells: BoolArray) -> Array:
         """Return the number of these cells that each node stands for, times φ, (m,); 0 where no way leads."""
-        window = self.ways.window
-        blocks = window.cut(cells, False).reshape(window.rows, window.stride, window.columns, window.stride)
-        weights = blocks.sum(axis=(1, 3)).ravel() * np.isfinite(self.ways.from_places(self.at))
+        weights = self.ways.sums(self.ways.window.cut(cells, False))
+        weights = weights * np.isfinite(self.ways.from_places(self.at))
         if self.density is not None and not self.density.uniform:
             weights = weights * self.density.value(self.ways.nodes)
         return np.asarray(weights, dtype=np.float64)
@@ -165,7 +165,8 @@ class SharedMapLaw(Law):
         """Return the forces along the ways to the robots' own places in their plans."""
         team, scans = memory.team, seen.scans
         if scans is not None:
-            memory = replace(memory, maps=surveyed(memory.maps, seen, scans))
+            maps = surveyed(memory.maps, seen, scans, circles(seen.neighbours))
+            memory = replace(memory, maps=tuple(maps))
         if seen.time >= memory.due - 1e-9:
             plans = self._plans(seen, memory)
             own = [plan.places[np.searchsorted(plan.group.robots, i)] for i, plan in enumerate(plans)]
@@ -211,23 +212,30 @@ class SharedMapLaw(Law):
         return Plan(group, *self.placed(now), known, ways, seen.density)
 
 
-def circles(neighbours: Neighbours, count: int) -> list[tuple[int, ...]]:
-    """Return for each robot itself and those that it hears, ascending."""
-    return [tuple(sorted({i, *neighbours.of(i).tolist()})) for i in range(count)]
+Circle: TypeAlias = tuple[int, ...]
+"""A robot and those that it hears, ascending."""
 
 
-def surveyed(maps: Sequence[DiscoveredMap], seen: Observations, scans: Scans) -> tuple[DiscoveredMap, ...]:
-    """Return the maps after a scan of each robot, told to those that hear it.
+def circles(neighbours: Neighbours) -> list[Circle]:
+    """Return the circle of each robot."""
+    if neighbours.complete:
+        return [tuple(range(neighbours.count))] * neighbours.count
+    return [tuple(sorted({i, *neighbours.of(i).tolist()})) for i in range(neighbours.count)]
+
+
+def surveyed(
+    maps: Sequence[DiscoveredMap], seen: Observations, scans: Scans, around: Sequence[Circle]
+) -> list[DiscoveredMap]:
+    """Return the maps after a scan of each robot, told to those in its circle.
 
     Robots that all hear each other share one map, into which all scans go, and where the last one counts:
     maps that are merged time and again would keep what one of them has mistaken.
     """
-    around, together = circles(seen.neighbours, len(maps)), dict[tuple[int, ...], DiscoveredMap]()
     every = list(zip(seen.positions, scans.distances, scans.hit, strict=True))
     own = cache(lambda i: maps[i].scanned(*every[i]))
-    later = []
+    together, sizes, later = dict[Circle, DiscoveredMap](), Counter(around), []
     for i, circle in enumerate(around):
-        if any(around[k] != circle for k in circle):
+        if sizes[circle] < len(circle):
             later.append(own(i).merged(own(k) for k in circle if k != i))
             continue
         if circle not in together:
@@ -236,7 +244,7 @@ def surveyed(maps: Sequence[DiscoveredMap], seen: Observations, scans: Scans) ->
                 one = one.scanned(*every[k])
             together[circle] = one
         later.append(together[circle])
-    return tuple(later)
+    return later
 
 
 def _group(seen: Observations, team: Team, former: Plan | None, i: int) -> Group:

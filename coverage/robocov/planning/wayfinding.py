@@ -33,6 +33,7 @@ _MOVES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
 _DETOUR = 0.4  # part by which ways through what nobody has seen are longer, as walls turn up there
 _NEAREST = 12  # so many nodes are tried for the first, and the last, of a route
 _MOST_SOURCES, _NODES_OF_SOURCE = 180, 9  # a plan chooses among at most so many nodes, or one of so many
+_REMEMBERED = 1000  # places whose nodes in sight are kept: on a map that stays the same robots go on
 _FINE = 0.5  # a straight line is looked at after every so many cells
 
 
@@ -143,12 +144,12 @@ class GridPlanner:
     @cached_property
     def free_cells(self) -> Array:
         """For how many free cells each node stands, (m,)."""
-        return self._summed(self.free)
+        return self.sums(self.free)
 
     @cached_property
     def expected_cells(self) -> Array:
         """The same with the unknown ones, which count by their openness, (m,)."""
-        return self._summed(self.free + self.openness)
+        return self.sums(self.free + self.openness)
 
     @cached_property
     def border(self) -> tuple[IntArray, IntArray, IntArray, BoolArray]:
@@ -170,7 +171,8 @@ class GridPlanner:
         pair, index = np.unique(self.patches[row, column] * m + node, return_inverse=True)
         return pair // m, pair % m, np.bincount(index, self.openness[row, column]).astype(np.float64)
 
-    def _summed(self, worth: Array | BoolArray) -> Array:
+    def sums(self, worth: Array | BoolArray) -> Array:
+        """Return the sums of the window's cells, (h, w), by nodes, (m,)."""
         _, _, rows, columns, stride = self.window
         blocks = worth.reshape(rows, stride, columns, stride)
         return np.asarray(blocks.sum(axis=(1, 3), dtype=np.float64).ravel())
@@ -278,6 +280,8 @@ class GridPlanner:
         """Return the roomy nodes in sight of those near a place; where there are none, the nearest."""
         key = place.tobytes()
         if key not in self._sights:
+            if len(self._sights) >= _REMEMBERED:
+                self._sights.clear()
             near = self._closest(place, self.roomy)
             seen = near[self.clear(place, self.nodes[near], self.blocked)]
             # who stands in what is taken for a wall is beside it

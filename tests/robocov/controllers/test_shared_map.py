@@ -8,7 +8,7 @@ import pytest
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Rapf, information_of, make_controller
 from robocov.controllers.frontier_median import FrontierMedian
-from robocov.controllers.shared_map import Situation, assigned, surveyed
+from robocov.controllers.shared_map import Circle, Situation, assigned, circles, surveyed
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
@@ -103,10 +103,16 @@ def test_what_they_go_by() -> None:
         make_controller("voronoi-graph", {"nodes": 3})
 
 
-def observed(neighbours: Neighbours, distances: np.ndarray, hit: bool) -> tuple[Observations, Scans]:
+def observed(
+    neighbours: Neighbours, distances: np.ndarray, hit: bool
+) -> tuple[Observations, Scans, list[Circle]]:
     n, at = len(distances), np.tile([2.02, 2.02], (len(distances), 1))
-    scans = Scans(distances, np.full(distances.shape, hit))
-    return Observations(at, np.zeros((n, 2)), neighbours, np.full((n, 2), np.nan), ROOMS.region), scans
+    scans, around = Scans(distances, np.full(distances.shape, hit)), circles(neighbours)
+    return (
+        Observations(at, np.zeros((n, 2)), neighbours, np.full((n, 2), np.nan), ROOMS.region),
+        scans,
+        around,
+    )
 
 
 def test_maps_go_to_those_who_hear() -> None:
@@ -128,9 +134,9 @@ def test_what_one_has_mistaken_is_corrected_by_whoever_sees_it() -> None:
     free, nothing = (DiscoveredMap(RASTER, np.full(RASTER.shape, each, np.uint8)) for each in (FREE, UNKNOWN))
     pairs = Neighbours.within(np.array([[0.0, 0.0], [1.0, 0.0], [8.0, 0.0], [9.0, 0.0]]), np.full(4, 1.5))
     distances = np.array([[0.0], [1.0], [0.0], [0.0]])
-    seen, scans = observed(pairs, distances, False)
+    seen, scans, around = observed(pairs, distances, False)
     scans.hit[1] = True
-    told = surveyed([free, nothing, free, nothing], seen, scans)
+    told = surveyed([free, nothing, free, nothing], seen, scans, around)
     assert told[0] is told[1] and told[2] is told[3] and told[0] is not told[2]
     assert told[0].blocked[20, 30] and not told[2].blocked[20, 30]
     assert (told[0].state >= WALL).sum() == 1
