@@ -38,6 +38,7 @@ _LISTENED = 2.0  # seconds that robots whose messages are late stay where they b
 _LOOKED_FOR_ALL = 2.5  # so many times the patience where all learn of a look
 # who gets on less than so far, m, for so many plans is in a jam with those so far around, m
 _GETS_ON, _JAMMED, _CROWD = 0.05, 3, 0.7
+_SWAPPING = 0.1  # part of the squared ways that robots must save to swap the places of one plan
 _BACKOFF = 8.0  # s, at most, that it makes way then
 _JOINTLY = 3.0  # a robot plans for others as long as it takes to cross the region so many times
 _STAGGERED = 0.5  # part of the period in which all robots make their first plans
@@ -334,7 +335,10 @@ class Atlas(Law):
             # who is there already does not leave for what may not be there
             weights = demand(ways, seen.density, sure=not together)
             own = now[order], begin[order], fixed[order]
-            made = seen.density, team_places(ways, weights, *own, others, threshold, nearby)
+            made = (
+                seen.density,
+                team_places(ways, weights, *own, others, threshold, nearby, _SWAPPING * agreed),
+            )
             if agreed:
                 # of former moments nobody asks any more
                 ways.plans.clear()

@@ -69,7 +69,7 @@ def viewpoint(
 
 def team_places(
     ways: GridPlanner, weights: Array, now: Array, begin: Array,
-    fixed: BoolArray, others: Array, threshold: float, nearby: float,
+    fixed: BoolArray, others: Array, threshold: float, nearby: float, swapping: float = 0.0,
 ) -> Array:  # fmt: skip
     """Return where the robots of a team should be, (k, 2) m: a low sum of distances, by few relocations.
 
@@ -79,7 +79,8 @@ def team_places(
     it goes to the best place of its own cell. What a relocation must save is the part `threshold` of the
     cost, one in the own cell the part `nearby`. Who goes to which of the places is such that the sum of the
     squared ways is least: then the choice stays the same while the robots are on their way, and their ways
-    do not cross.
+    do not cross. As they go elsewhere too, to look, they swap places only where that saves the part
+    `swapping` of the sum.
     """
     home = ways.standing(now[0])
     if home < 0:
@@ -114,6 +115,9 @@ def team_places(
     entry = [int(((nodes - now[k]) ** 2).sum(axis=1).argmin()) for k in mobile]
     square = np.minimum(distance[entry][:, sources[chosen[mobile]]] ** 2, _FAR)
     _, column = linear_sum_assignment(square)
+    stay = np.arange(len(mobile))
+    if square[stay, column].sum() > (1.0 - swapping) * square[stay, stay].sum():
+        column = stay
     places = begin.copy()
     places[mobile] = nodes[chosen[mobile[column]]]
     return places
