@@ -128,3 +128,17 @@ def test_what_is_not_known_may_be_left_out() -> None:
     hoped, sure = demand(ways(on)), demand(ways(on), sure=True)
     assert sure.sum() == 40 * 40
     assert hoped.sum() > 1.5 * sure.sum()
+
+
+def test_places_are_swapped_only_where_that_saves_enough() -> None:
+    some = ways(known())
+    weights, nobody = demand(some), np.zeros(2, dtype=bool)
+    start = np.array([[2.0, 2.0], [6.0, 2.0]])
+    places = team_places(some, weights, start, start, nobody, np.empty((0, 2)), 1.0, 1.0)
+    left, right = places[:, 0]
+    assert left < right
+    # each is half a node beyond the middle between them: 2.5 m of way each, or 1.5 m to the other's place
+    now = np.array([[0.5 * (left + right) + 0.3, 2.0], [0.5 * (left + right) - 0.3, 2.0]])
+    for swapping, swapped in ((0.0, True), (0.6, True), (0.7, False)):
+        found = team_places(some, weights, now, places, nobody, np.empty((0, 2)), 1.0, 1.0, swapping)
+        assert np.array_equal(found, places[::-1] if swapped else places)
