@@ -137,8 +137,8 @@ def test_places_are_swapped_only_where_that_saves_enough() -> None:
     places = team_places(some, weights, start, start, nobody, np.empty((0, 2)), 1.0, 1.0)
     left, right = places[:, 0]
     assert left < right
-    # each is half a node beyond the middle between them: 2.5 m of way each, or 1.5 m to the other's place
+    # each is beyond the middle between them: 2.4 m of way each, or 1.6 m to the place of the other one
     now = np.array([[0.5 * (left + right) + 0.3, 2.0], [0.5 * (left + right) - 0.3, 2.0]])
-    for swapping, swapped in ((0.0, True), (0.6, True), (0.7, False)):
+    for swapping, swapped in ((0.0, True), (0.5, True), (0.6, False)):
         found = team_places(some, weights, now, places, nobody, np.empty((0, 2)), 1.0, 1.0, swapping)
         assert np.array_equal(found, places[::-1] if swapped else places)
