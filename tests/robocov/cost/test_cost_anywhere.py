@@ -180,21 +180,22 @@ def test_lattices_and_teams_of_every_size(lattice, robots):
 
 
 LARGE = """
-import resource, sys
+import re, sys
+from pathlib import Path
 sys.path.insert(0, {folder!r})
 from drawn_maps import drawn_map
 from robocov.cost import CoverageCost
 environment = drawn_map("polygons", 260, 4)
 cost = CoverageCost(environment, 512)
 cost(cost.points[::1000])
-most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-print(len(cost.corners), most / (1e6 if sys.platform == "linux" else 1e9))
+# not ru_maxrss, which a child inherits from whoever starts it
+most = re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())[1]
+print(len(cost.corners), int(most) / 1e6)
 """
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="memory is measured otherwise")
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is measured otherwise")
 def test_a_large_map_takes_less_than_a_gigabyte():
     folder = str(Path(__file__).parents[1])
     done = subprocess.run(
@@ -202,7 +203,7 @@ def test_a_large_map_takes_less_than_a_gigabyte():
     )
     corners, gigabytes = done.stdout.split()
     assert int(corners) > 400
-    assert float(gigabytes) < 1.0
+    assert float(gigabytes) < 0.5
 
 
 @pytest.mark.parametrize("name", ["museum", "city", "hospital", "warehouse", "office"])
