@@ -79,12 +79,12 @@ def final(name: str, seed: int, hears: float, robots: int) -> tuple[float, float
 
 def sizes(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
     """Mean distances by team size, and how far one is above that of a smaller team: it should never rise."""
-    for hears in (math.inf, SHORT):
+    for hears in (math.inf, SHORT):  # more than 90 do not fit into the corner where they begin
         for seed in SEEDS:
-            found = list(pool.map(partial(final, name, seed, hears), SIZES))
+            found = list(pool.map(partial(final, name, seed, hears), SIZES[:-2]))
             costs = np.array([cost for cost, _ in found])
             rises = costs / np.minimum.accumulate(costs) - 1.0
-            told = ", ".join(f"{n}: {cost:.2f}" for n, cost in zip(SIZES, costs, strict=True))
+            told = ", ".join(f"{n}: {cost:.2f}" for n, cost in zip(SIZES, costs, strict=False))
             first = f"rises by {rises.max():.1%}; one walks {found[0][1]:.1f} m"
             yield f"rooms {seed}, hear {hears} m: {told} m, {first}"
 

@@ -446,10 +446,6 @@ class AtlasShared(Atlas):
         return [visited[id(known), circle, size] for known, circle, size in each]
 
     def _reports(self, states: Sequence[PlannerState], heard: IntArray) -> list[Teammates]:
-        """Return what robots that are heard tell of others."""
-        return []
-
-    def _reports(self, states: Sequence[PlannerState], heard: IntArray) -> list[Teammates]:
         if len(heard) == len(states) - 1:  # who hears all need not be told
             return []
         return [states[j].others for j in heard.tolist()]
