@@ -207,7 +207,7 @@ class TestPaper:
         assert size < 600
         beyond = [each.study for each in studies.beyond_contests(QUICK, {}, UNTUNED).values()]
         beyond += studies.conditions_studies(QUICK).values()
-        assert sum(study.duration * len(study) for study in beyond) < 5000.0
+        assert sum(study.duration * len(study) for study in beyond) < 4500.0
 
 
 def baseline_contests(plan):
