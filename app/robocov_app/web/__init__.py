@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +29,8 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         print(f"open {display.link}", flush=True)  # noqa: T201 - it is the answer
         print(f"to watch only: {display.watch_link}", flush=True)  # noqa: T201
         window.remote = display
+        # whoever stops the process cannot be asked about unsaved work, which is kept aside in any case
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
         window.run()
 
 
