@@ -1,4 +1,4 @@
-"""A reverse proxy that shows a server below a path, as jupyter-server-proxy does; its lines can be slow, and cut."""
+"""A reverse proxy that shows a server below a path, as jupyter-server-proxy does; slow, or cut, if wanted."""
 
 import socket
 import time
