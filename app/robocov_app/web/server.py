@@ -270,9 +270,10 @@ class WebDisplay:
             return await asyncio.to_thread(self._download, line, unquote(name))
         if not place.endswith("/"):
             return line.respond(HTTPStatus.NOT_FOUND, "Nothing is there.\n")
-        return self._page(line, token_in(request.path))
+        kept = cookies_of(request.headers.get_all("Cookie")).get(self._cookie, "")
+        return self._page(line, token_in(request.path), kept)
 
-    def _page(self, line: ServerConnection, given: str) -> Response:
+    def _page(self, line: ServerConnection, given: str, kept: str) -> Response:
         nonce = secrets.token_urlsafe(12)
         page = files("robocov_app.web").joinpath("page.html").read_text("utf-8").replace("{nonce}", nonce)
         framed = "*" if self._known(given) else "'none'"  # notebooks frame it: who does knows the token
@@ -281,7 +282,8 @@ class WebDisplay:
             f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; img-src data:; "
             f"connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {framed}"
         )
-        if self._known(given):  # of no path: it is that of the page, also behind a proxy
+        # of no path: it is that of the page, also behind a proxy; who controls may look at what others see
+        if self._known(given) and not same(kept, self.token):
             headers["Set-Cookie"] = f"{self._cookie}={given}; HttpOnly; SameSite=Strict"
         return _answer(line, page.encode(), "text/html; charset=utf-8", headers)
 

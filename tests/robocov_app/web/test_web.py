@@ -139,6 +139,14 @@ def test_strangers_see_nothing_and_do_nothing(display):
         pass
 
 
+def test_who_controls_may_open_the_other_link_too(display):
+    asked = urllib.request.Request(display.watch_link, headers={"Cookie": cookie_of(display)})
+    with urllib.request.urlopen(asked) as answer:
+        assert answer.headers["Set-Cookie"] is None
+    with urllib.request.urlopen(display.watch_link) as answer:
+        assert display.watch_token in answer.headers["Set-Cookie"]
+
+
 def test_a_proxy_may_stand_before_it(display):
     headers = {"X-Forwarded-Host": "hub.example", "Origin": "https://hub.example"}
     with socket_of(display, Cookie=cookie_of(display), **headers):
