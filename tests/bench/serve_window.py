@@ -1,4 +1,4 @@
-"""First picture, pictures a second, and the time from a drag to its picture, of a served window in a real browser.
+"""First picture, pictures a second, and the time from a drag to its picture, of a window in a real browser.
 
     python tests/bench/serve_window.py [--robots 50] [--size 1280x720] [--ratio 1] [--shots FOLDER]
 
@@ -41,7 +41,8 @@ const wall = () => {  // the map's left wall in the row where the drag is
     const at = wall(), began = performance.now();
     pointer('pointermove', 10 + (k % 2 ? 6 : 0), 1);
     while (wall() === at && performance.now() - began < 2000) {
-      for (const seen = window.drawn; window.drawn === seen && performance.now() - began < 2000;) await pause(1);
+      const seen = window.drawn;
+      while (window.drawn === seen && performance.now() - began < 2000) await pause(1);
     }
     waits.push(performance.now() - began);
   }
@@ -67,7 +68,8 @@ def main() -> None:
             browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
             browser.driver.set_script_timeout(120)
             begun = time.monotonic()
-            with served("demo", "rooms", "--robots", options.robots, "--start", "uniform", "--folder", folder) as link:
+            more = "--robots", options.robots, "--start", "uniform", "--folder", folder
+            with served("demo", "rooms", *more) as link:
                 browser.driver.get(link)
                 browser.until(lambda: browser.js("return canvas.width") == round(width * options.ratio))
                 print(f"{time.monotonic() - begun:.1f} s from the command to its first picture")

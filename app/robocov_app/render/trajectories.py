@@ -89,9 +89,9 @@ class Trajectories:
                 done.append((robot, path))
                 self._open[robot] = path[-1:]
         groups = [(self._box(group, width), group) for group in ([each] for each in done)]
-        if together and (whole := self._box(done, width)) is not None:  # one sketch where they are crowded
-            if sum(box.width * box.height for box, _ in groups if box) > whole.width * whole.height:
-                groups = [(whole, done)]
+        apart = sum(box.width * box.height for box, _ in groups if box)
+        if together and (whole := self._box(done, width)) and apart > whole.width * whole.height:
+            groups = [(whole, done)]
         for box, group in groups:
             if box is not None:
                 sketch = Sketch(box)
