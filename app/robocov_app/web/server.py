@@ -354,6 +354,7 @@ class WebDisplay:
                     allowed += 0.05 * MOST_EVENTS
                 try:
                     if isinstance(text, bytes):
+                        allowed -= MOST_EVENTS  # a file a second
                         await asyncio.to_thread(self._upload, page, text)
                     elif len(text) > LONGEST:
                         raise ValueError
