@@ -118,6 +118,9 @@ def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tm
         assert browser.js("return document.body.className") == "watching"
         browser.until(lambda: canvas_size(browser) == [1280, 720])
         browser.find("summary").click()
+        browser.js("prompt = () => 'Ada'")
+        browser.all("#here button")[1].click()
+        browser.until(lambda: "Ada (you)" in browser.find("#here ul").text)
         browser.find("#here button").click()  # a second window of the teacher's takes control
         browser.until(lambda: browser.js("return document.body.className") == "")
         browser.driver.close()
