@@ -29,9 +29,26 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         print(f"open {display.link}", flush=True)  # noqa: T201 - it is the answer
         print(f"to watch only: {display.watch_link}", flush=True)  # noqa: T201
         window.remote = display
-        # whoever stops the process cannot be asked about unsaved work, which is kept aside in any case
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        stopped: list[int] = []
+
+        def stop(number: int, _: object) -> None:
+            if stopped and number == signal.SIGINT:
+                raise KeyboardInterrupt  # a second time: at once
+            stopped.append(number)
+            window.closed = True  # who stops the process cannot be asked about unsaved work
+
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, stop)
+        interruptible(True)
         window.run()
+    if stopped:
+        raise KeyboardInterrupt
+
+
+def interruptible(now: bool) -> None:
+    """Hold Ctrl C back, which a terminal sends to all processes, while one of them begins; or let it come."""
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK if now else signal.SIG_BLOCK, {signal.SIGINT})
 
 
 def serve_each(command: Callable[[Any], int], options: Any) -> int:

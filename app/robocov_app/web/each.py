@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass, replace
 from io import TextIOBase
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from threading import Thread
@@ -16,6 +17,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from robocov.errors import InputError, RobocovError
+from robocov_app.web import interruptible
 from robocov_app.web.access import cookies_of, link_to, listening_failed, same, token_in
 
 LONGEST_HEAD = 1 << 14  # bytes of a request's head
@@ -138,7 +140,10 @@ class Sessions:
         context = multiprocessing.get_context("spawn")
         said, says = context.Pipe(duplex=False)
         process = context.Process(target=_session, args=(self._command, own, says), daemon=False)
+        resource_tracker.ensure_running()  # which would unblock what is blocked here
+        interruptible(False)
         process.start()
+        interruptible(True)
         self._processes.append(process)
         says.close()
         words = "the window did not open"

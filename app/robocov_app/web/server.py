@@ -223,11 +223,11 @@ class WebDisplay:
     async def _serve(self) -> None:
         from websockets.asyncio.server import ServerConnection, serve
 
-        opened = WeakSet[Any]()
+        lines = WeakSet[ServerConnection]()
 
         class Line(ServerConnection):
             def connection_made(self, transport: asyncio.BaseTransport) -> None:
-                opened.add(transport)
+                lines.add(self)
                 super().connection_made(transport)
 
         self._loop = asyncio.get_running_loop()
@@ -241,9 +241,12 @@ class WebDisplay:
             await self._ended.wait()
             server.close()
             closed = asyncio.ensure_future(server.wait_closed())
+            pages = {page.line for page in self._pages}
+            for line in {*lines} - pages:  # browsers open lines ahead of need, on which nothing comes
+                line.transport.abort()
             await asyncio.wait([closed], timeout=1.0)
-            for transport in opened:  # browsers open lines ahead of need, on which nothing comes
-                transport.abort()
+            for line in lines:
+                line.transport.abort()
             await closed
         except OSError as error:
             self._trouble = error
