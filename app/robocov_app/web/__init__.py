@@ -22,6 +22,7 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         window.run()
         return
     extra("websockets", "web")
+    from robocov_app.terminal.interruption import interruptible
     from robocov_app.web.confined import confined
     from robocov_app.web.server import WebDisplay
 
@@ -43,12 +44,6 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         window.run()
     if stopped:
         raise KeyboardInterrupt
-
-
-def interruptible(now: bool) -> None:
-    """Hold Ctrl C back, which a terminal sends to all processes, while one of them begins; or let it come."""
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK if now else signal.SIG_BLOCK, {signal.SIGINT})
 
 
 def serve_each(command: Callable[[Any], int], options: Any) -> int:

@@ -17,7 +17,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from robocov.errors import InputError, RobocovError
-from robocov_app.web import interruptible
+from robocov_app.terminal.interruption import interruptible
 from robocov_app.web.access import cookies_of, link_to, listening_failed, same, token_in
 
 LONGEST_HEAD = 1 << 14  # bytes of a request's head
