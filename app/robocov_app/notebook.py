@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
+from robocov.controllers.gains import gain_values
 from robocov.cost import LATTICE, CoverageResult
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, counted, shown
@@ -21,6 +22,7 @@ from robocov.mapfile import load_map, save_map
 from robocov.metrics import CostHistory, cost_history
 from robocov.record import Record
 from robocov.robots import Team
+from robocov.simulation import Simulation
 from robocov_app.figures.files import figure_png
 from robocov_app.render.camera import length_label, round_length
 from robocov_app.render.density import mean_label
@@ -163,15 +165,21 @@ def record_png(record: Record) -> bytes:
 
 
 def show(
-    map: str | Path | Environment,  # noqa: A002 - as everywhere else
+    map: str | Path | Environment | Simulation,  # noqa: A002 - as everywhere else
     *,
     robots: int = 6,
     controllers: Sequence[str] = ("rapf",),
     seed: int = 0,
     height: int = 620,
 ) -> LiveWindow | Record:
-    """Return the interactive window of a map, live; without ``robocov[web]`` a replay of one minute."""
-    if find_spec("websockets") is None:
+    """Return the interactive window of a map, live; without ``robocov[web]`` a replay of one minute.
+
+    Of a simulation, the others but `height` are as there: the team begins where it is, and goes on beside it.
+    """
+    here = find_spec("websockets") is not None
+    if isinstance(map, Simulation):
+        return _live(map, height) if here else map.copy().run(60.0)
+    if not here:
         environment = map if isinstance(map, Environment) else load_map(map)
         return RunSpec(environment, controllers[0], team=Team.homogeneous(robots), seed=seed).record()
     options = ["--robots", str(robots), "--seed", str(seed), "--controllers", *controllers]
@@ -181,6 +189,22 @@ def show(
         file = Path(folder) / "map.json"
         save_map(map, file)
         return LiveWindow(["demo", str(file), *options], height)
+
+
+def _live(simulation: Simulation, height: int) -> LiveWindow:
+    from robocov_app.viewer.session.file import save_session
+    from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
+    from robocov_app.viewer.session.session import Session
+
+    law, team = simulation.controller, simulation.team
+    choice = (ControllerChoice(law.name, gain_values(getattr(law, "law", law))),)
+    now = simulation.positions, simulation.velocities, simulation.conditions
+    given = simulation.environment, choice, len(team), None, 0, TeamSpec.of(team), simulation.dt
+    session = Session(Scenario(*given, *now))
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "simulation.robocov"
+        save_session(file, session.document, session.head, 0, {})
+        return LiveWindow(["demo", str(file)], height)
 
 
 def _page_png(axes: Any) -> bytes:

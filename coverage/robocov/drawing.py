@@ -82,8 +82,8 @@ def show(map: Any, **options: Any) -> Any:  # noqa: A002 - as everywhere else
 
     Parameters
     ----------
-    map : str, Path or Environment
-        A bundled map's name, a file, or the map itself.
+    map : str, Path, Environment or Simulation
+        A bundled map's name, a file, the map itself, or what is to go on, with all but `height` as there.
     robots, seed : int
         How many robots start, and the seed of where: 6 and 0 by default.
     controllers : sequence of str

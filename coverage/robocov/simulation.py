@@ -17,6 +17,7 @@ from robocov.conditions.perception import Inbox, Perception, of_working
 from robocov.controllers import CONTROLLERS, informed, remembers
 from robocov.controllers.base import Controller, IndividualController, for_team
 from robocov.controllers.user_modules import fault_of
+from robocov.drawing import show
 from robocov.environment import Environment, PolygonObstacle, require_environment
 from robocov.errors import (
     ParameterError,
@@ -331,6 +332,13 @@ class Simulation:
         for snapshot in self.snapshots(duration):
             recorder.add(snapshot)
         return recorder.record()
+
+    def show(self, *, height: int = 620) -> Any:
+        """Show it as the interactive window, live in a notebook's cell of `height` px: see `robocov.show`.
+
+        The window begins with the team as it is now, at 0 s; what happens there does not change this one.
+        """
+        return show(self, height=height)
 
     def copy(self) -> Simulation:
         """Return an independent simulation in the same state; it goes on identically, bit for bit."""

@@ -8,17 +8,25 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 
+class Link(str):
+    """The link of a served window, with its process."""
+
+    process: subprocess.Popen[str]
+
+
 @contextmanager
-def served(command: str, *arguments: str) -> Iterator[str]:
-    """Serve a window at any free port, and give its link."""
+def served(command: str, *arguments: str, **how: object) -> Iterator[Link]:
+    """Serve a window at any free port, and give its link; `how`: more for the process."""
     call = [sys.executable, "-m", "robocov_app", command, *arguments, "--serve", "--port", "0"]
     environment = {**os.environ, "PYTHONUNBUFFERED": "1", "ROBOCOV_SETTINGS": ""}
-    process = subprocess.Popen(call, stdout=subprocess.PIPE, env=environment, text=True)
+    process = subprocess.Popen(call, stdout=subprocess.PIPE, env=environment, text=True, **how)
     try:
         assert process.stdout is not None
         for line in process.stdout:
             if found := re.search(r"http://\S+", line):
-                yield found[0]
+                link = Link(found[0])
+                link.process = process
+                yield link
                 return
         raise AssertionError("no link was printed")
     finally:

@@ -88,13 +88,20 @@ class Trajectories:
             if len(path) >= corners:
                 done.append((robot, path))
                 self._open[robot] = path[-1:]
-        for group in [done] * bool(done) if together else [[each] for each in done]:
-            box = visible_box(np.concatenate([path for _, path in group]), 5.0 + width, self._page)
+        groups = [(self._box(group, width), group) for group in ([each] for each in done)]
+        apart = sum(box.width * box.height for box, _ in groups if box)
+        if together and (whole := self._box(done, width)) and apart > whole.width * whole.height:
+            groups = [(whole, done)]
+        for box, group in groups:
             if box is not None:
                 sketch = Sketch(box)
                 for robot, path in group:
                     sketch.path(path, colours[robot], width)
                 sketch.onto(self._page)
+
+    def _box(self, group: list[tuple[int, list[list[float]]]], width: float) -> pygame.Rect | None:
+        points = np.concatenate([np.empty((0, 2)), *(path for _, path in group)])
+        return visible_box(points, 5.0 + width, self._page)
 
     def _continued(self, canvas: Canvas, scene: Scene, trail: Array, pen: Pen) -> bool:
         """Return whether a trail continues the page of old sections; if not, that is fresh from now on."""

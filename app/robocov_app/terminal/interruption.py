@@ -33,3 +33,9 @@ class Interruption:
         self.requested = True
         with suppress(OSError):
             os.write(2, b"\nstopping; Ctrl-C again ends at once\n")
+
+
+def interruptible(now: bool) -> None:
+    """Hold Ctrl C back, which a terminal sends to all processes, while one of them begins; or let it come."""
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK if now else signal.SIG_BLOCK, {signal.SIGINT})

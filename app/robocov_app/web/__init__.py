@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,7 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         window.run()
         return
     extra("websockets", "web")
+    from robocov_app.terminal.interruption import interruptible
     from robocov_app.web.confined import confined
     from robocov_app.web.server import WebDisplay
 
@@ -28,7 +30,20 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         print(f"open {display.link}", flush=True)  # noqa: T201 - it is the answer
         print(f"to watch only: {display.watch_link}", flush=True)  # noqa: T201
         window.remote = display
+        stopped: list[int] = []
+
+        def stop(number: int, _: object) -> None:
+            if stopped and number == signal.SIGINT:
+                raise KeyboardInterrupt  # a second time: at once
+            stopped.append(number)
+            window.closed = True  # who stops the process cannot be asked about unsaved work
+
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, stop)
+        interruptible(True)
         window.run()
+    if stopped:
+        raise KeyboardInterrupt
 
 
 def serve_each(command: Callable[[Any], int], options: Any) -> int:

@@ -3,7 +3,9 @@
 import hmac
 from collections.abc import Iterable
 from http.cookies import CookieError, SimpleCookie
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qsl
+
+from robocov.errors import InputError
 
 
 def link_to(host: str, port: int, token: str) -> str:
@@ -11,8 +13,17 @@ def link_to(host: str, port: int, token: str) -> str:
     return f"http://{f'[{host}]' if ':' in host else host}:{port}/?token={token}"
 
 
+def listening_failed(host: str, port: int, error: OSError) -> InputError:
+    why = (error.strerror or str(error)).rpartition(": ")[2]
+    return InputError(f"--port: {host}:{port} cannot be listened to: {why}; --port 0 takes one that is free")
+
+
+def query_of(address: str) -> dict[str, str]:
+    return dict(parse_qsl(address.partition("?")[2]))
+
+
 def token_in(address: str) -> str:
-    return (parse_qs(urlsplit(address).query).get("token") or [""])[0]
+    return query_of(address).get("token", "")
 
 
 def cookies_of(headers: Iterable[str]) -> dict[str, str]:

@@ -77,6 +77,7 @@ class Left(_Message):
     """The pointer has left the page, or the page is not typed into any more."""
 
     kind: Literal["leave", "blur"]
+    held: Literal[0] = 0
 
 
 class PageChanged(_Message):
@@ -137,7 +138,7 @@ class Hands:
     """Turns what hands do to the page into pygame's events."""
 
     def __init__(self) -> None:
-        self._at = (0, 0)
+        self._at, self._pressed = (0, 0), 0
 
     def events(self, message: OfHands | Uploaded) -> Iterator[Event]:
         match message:
@@ -146,6 +147,7 @@ class Hands:
             case ButtonChanged():
                 yield self._moved(message.x, message.y, 0 if message.down else message.button)
                 kind = pygame.MOUSEBUTTONDOWN if message.down else pygame.MOUSEBUTTONUP
+                self._pressed = message.button * message.down
                 yield Event(kind, pos=self._at, button=message.button, touch=False)
             case WheelTurned():
                 yield self._moved(message.x, message.y, 0)
@@ -166,6 +168,9 @@ class Hands:
             case Uploaded():
                 yield Event(pygame.DROPFILE, file=message.path)
             case Left():
+                if message.kind == "blur" and self._pressed:  # it will be let go elsewhere
+                    yield Event(pygame.MOUSEBUTTONUP, pos=self._at, button=self._pressed, touch=False)
+                    self._pressed = 0
                 yield Event(pygame.WINDOWLEAVE if message.kind == "leave" else pygame.WINDOWFOCUSLOST)
 
     def _moved(self, x: float, y: float, button: int) -> Event:

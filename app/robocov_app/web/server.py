@@ -23,14 +23,14 @@ from itertools import count, islice
 from pathlib import Path
 from time import monotonic, time
 from typing import TYPE_CHECKING, Any
-from urllib.parse import quote, unquote, urlsplit
+from urllib.parse import quote, unquote
+from weakref import WeakSet
 from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import pygame
 from numpy.typing import NDArray
 
-from robocov.errors import InputError
 from robocov.files.atomic import written
 from robocov.files.result_folder import MANIFEST
 from robocov_app.terminal.output import free_name
@@ -38,7 +38,7 @@ from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.dialogs import MOST_LISTED
 from robocov_app.toolkit.input import shown_cursor
 from robocov_app.web import events
-from robocov_app.web.access import cookies_of, link_to, same, token_in
+from robocov_app.web.access import cookies_of, link_to, listening_failed, query_of, same, token_in
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -116,6 +116,7 @@ class Page:
     number: int
     teacher: bool  # may take control at any time
     name: str
+    own: str  # by which it is known again after its line broke
     asks: bool = False  # for control
     shown: Picture | None = None  # the picture that it has, or will have
     sent: deque[int] = field(default_factory=deque)  # numbers of pictures on their way
@@ -163,8 +164,7 @@ class WebDisplay:
         self._thread.start()
         self._begun.wait()
         if self._trouble is not None:
-            why = self._trouble.strerror or self._trouble
-            raise InputError(f"--port: {self.host}:{self.port} cannot be listened to: {why}")
+            raise listening_failed(self.host, self.port, self._trouble)
         self.link = link_to(self.host, self.port, self.token)
         self.watch_link = link_to(self.host, self.port, self.watch_token)
         return self
@@ -221,16 +221,33 @@ class WebDisplay:
             page.changed.set()
 
     async def _serve(self) -> None:
-        from websockets.asyncio.server import serve
+        from websockets.asyncio.server import ServerConnection, serve
+
+        lines = WeakSet[ServerConnection]()
+
+        class Line(ServerConnection):
+            def connection_made(self, transport: asyncio.BaseTransport) -> None:
+                lines.add(self)
+                super().connection_made(transport)
 
         self._loop = asyncio.get_running_loop()
         how: dict[str, Any] = {"process_request": self._answer, "compression": None, "server_header": None}
+        how["create_connection"] = Line
         how |= {"max_size": LARGEST_UPLOAD, "max_queue": 16, "write_limit": 1 << 16}
         try:
-            async with serve(self._talk, self.host, self.port, **how) as server:
-                self.port = server.sockets[0].getsockname()[1]
-                self._begun.set()
-                await self._ended.wait()
+            server = await serve(self._talk, self.host, self.port, **how)
+            self.port = server.sockets[0].getsockname()[1]
+            self._begun.set()
+            await self._ended.wait()
+            server.close()
+            closed = asyncio.ensure_future(server.wait_closed())
+            pages = {page.line for page in self._pages}
+            for line in {*lines} - pages:  # browsers open lines ahead of need, on which nothing comes
+                line.transport.abort()
+            await asyncio.wait([closed], timeout=1.0)
+            for line in lines:
+                line.transport.abort()
+            await closed
         except OSError as error:
             self._trouble = error
         finally:
@@ -238,27 +255,28 @@ class WebDisplay:
 
     async def _answer(self, line: ServerConnection, request: Request) -> Response | None:
         """Answer a request for the page; None lets a socket be opened."""
-        place = urlsplit(request.path)
+        place = request.path.partition("?")[0]
         if not self._known(self._secret(request)):
             words = "This needs the whole link that robocov printed, with its token.\n"
             return line.respond(HTTPStatus.FORBIDDEN, words)
-        if place.path.endswith("/socket"):
+        if place.endswith("/socket"):
             # our own page opens it; what is no browser names no origin
             origins, headers = request.headers.get_all("Origin"), request.headers
             hosts = headers.get_all("Host") + headers.get_all("X-Forwarded-Host")
-            if len(origins) > 1 or any(urlsplit(origin).netloc not in hosts for origin in origins):
+            if len(origins) > 1 or any(origin.partition("://")[2] not in hosts for origin in origins):
                 return line.respond(HTTPStatus.FORBIDDEN, "Another page may not drive this window.\n")
             if len(self._pages) >= MOST_PAGES:
                 return line.respond(HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages show this window.\n")
             return None
-        folder, _, name = place.path.rpartition("/")
+        folder, _, name = place.rpartition("/")
         if folder.endswith("/saved") and unquote(name) in self._saved:
             return await asyncio.to_thread(self._download, line, unquote(name))
-        if not place.path.endswith("/"):
+        if not place.endswith("/"):
             return line.respond(HTTPStatus.NOT_FOUND, "Nothing is there.\n")
-        return self._page(line, token_in(request.path))
+        kept = cookies_of(request.headers.get_all("Cookie")).get(self._cookie, "")
+        return self._page(line, token_in(request.path), kept)
 
-    def _page(self, line: ServerConnection, given: str) -> Response:
+    def _page(self, line: ServerConnection, given: str, kept: str) -> Response:
         nonce = secrets.token_urlsafe(12)
         page = files("robocov_app.web").joinpath("page.html").read_text("utf-8").replace("{nonce}", nonce)
         framed = "*" if self._known(given) else "'none'"  # notebooks frame it: who does knows the token
@@ -267,7 +285,8 @@ class WebDisplay:
             f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; img-src data:; "
             f"connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {framed}"
         )
-        if self._known(given):  # of no path: it is that of the page, also behind a proxy
+        # of no path: it is that of the page, also behind a proxy; who controls may look at what others see
+        if self._known(given) and not same(kept, self.token):
             headers["Set-Cookie"] = f"{self._cookie}={given}; HttpOnly; SameSite=Strict"
         return _answer(line, page.encode(), "text/html; charset=utf-8", headers)
 
@@ -290,8 +309,16 @@ class WebDisplay:
     async def _talk(self, line: ServerConnection) -> None:
         assert line.request is not None
         number, teacher = next(self._numbers), same(self._secret(line.request), self.token)
-        page = Page(line, number, teacher, f"{'Teacher' if teacher else 'Viewer'} {number}")
+        own = query_of(line.request.path).get("page", "")
+        page = Page(line, number, teacher, f"{'Teacher' if teacher else 'Viewer'} {number}", own)
         self._pages.append(page)
+        for one in self._pages[:-1]:
+            if (
+                own and one.own == own and one.teacher == teacher
+            ):  # its line broke, which nobody has noticed yet
+                page.number, page.name, page.asks = one.number, one.name, one.asks
+                self._control = page if one is self._control else self._control
+                one.line.transport.abort()
         self._give_control(self._control)
         sender = asyncio.ensure_future(self._send_all(page))
         try:
@@ -306,13 +333,15 @@ class WebDisplay:
         if page not in self._pages:
             page = next((each for each in self._pages if each.teacher), None)
         if page is not self._control:
-            self._control = page
+            before, self._control = self._control, page
             if page is not None:
                 page.asks = False
                 self._wanted = page.size or self._wanted
                 self._called.set()
-            if self._held:  # keys that the one before has held
-                self._waiting.append(events.Left(kind="blur"))
+            if before is not None:
+                self._waiting.append(
+                    events.Left(kind="blur")
+                )  # keys and buttons that the one before has held
         self._wake()
 
     async def _take_all(self, page: Page) -> None:
@@ -328,6 +357,7 @@ class WebDisplay:
                     allowed += 0.05 * MOST_EVENTS
                 try:
                     if isinstance(text, bytes):
+                        allowed -= MOST_EVENTS  # a file a second
                         await asyncio.to_thread(self._upload, page, text)
                     elif len(text) > LONGEST:
                         raise ValueError

@@ -459,3 +459,16 @@ def test_a_window_that_nobody_touches_is_not_drawn_again(
         drawn.clear()
         hands.frames(20)
         assert hands.window.dialogs.open and not drawn
+
+
+def test_a_map_that_is_fitted_stays_so_in_a_window_of_another_size(tmp_path: Path) -> None:
+    with opened_editor(tmp_path) as hands:
+        shown, zooms = hands.window.canvas, [hands.window.canvas.camera.zoom]
+        for size in ((1700, 1300), (900, 600)):
+            pygame.display.set_mode(size, pygame.RESIZABLE)
+            hands.post(pygame.WINDOWSIZECHANGED, x=size[0], y=size[1])
+            hands.frames(2)
+            zooms.append(shown.camera.zoom)
+            shown.zoom(0.5)  # and not fitted any more
+        assert zooms[1] > 1.2 * zooms[0]
+        assert zooms[2] == zooms[1] / 2

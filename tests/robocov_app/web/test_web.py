@@ -1,6 +1,7 @@
 """A window in a browser: pictures arrive as they were, hands do what they did there, strangers do nothing."""
 
 import json
+import socket
 import time
 import urllib.error
 import urllib.request
@@ -23,7 +24,7 @@ from robocov.mapfile import load_map
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.input import key_of
 from robocov_app.web.confined import OutsideError, confined
-from robocov_app.web.events import MESSAGES, Hands, PageChanged, PictureShown
+from robocov_app.web.events import MESSAGES, Hands, PageChanged, PictureShown, PointerMoved
 
 pytest.importorskip("websockets")
 
@@ -101,8 +102,9 @@ def display():
         yield shown
 
 
-def socket_of(display, **headers):
-    return connect(f"ws://127.0.0.1:{display.port}/socket", additional_headers=headers, proxy=None)
+def socket_of(display, query="", **headers):
+    address = f"ws://127.0.0.1:{display.port}/socket{query}"
+    return connect(address, additional_headers=headers, proxy=None)
 
 
 def cut_off(line):
@@ -124,16 +126,25 @@ def cookie_of(display):
 
 def test_strangers_see_nothing_and_do_nothing(display):
     own, cookie = f"http://127.0.0.1:{display.port}", cookie_of(display)
-    for path in ("/", "/?token=", "/?token=ä", "/?token=" + "x" * 24, "/socket", "/page.html"):
+    for path in ("/", "/?token=", "/?token=ä", "/?token=" + "x" * 24, "/socket", "/page.html", "//[x/"):
         with pytest.raises((urllib.error.HTTPError, UnicodeEncodeError)) as refused:
             urllib.request.urlopen(own + path)
         assert getattr(refused.value, "code", 403) == 403
         getattr(refused.value, "close", int)()
-    for headers in ({}, {"Origin": own}, {"Cookie": cookie, "Origin": "http://elsewhere.example"}):
+    elsewhere = ({"Cookie": cookie, "Origin": origin} for origin in ("http://elsewhere.example", "http://[x"))
+    for headers in ({}, {"Origin": own}, *elsewhere):
         with pytest.raises(InvalidStatus, match="403"):
             socket_of(display, **headers)
     with socket_of(display, Cookie=cookie, Origin=own):
         pass
+
+
+def test_who_controls_may_open_the_other_link_too(display):
+    asked = urllib.request.Request(display.watch_link, headers={"Cookie": cookie_of(display)})
+    with urllib.request.urlopen(asked) as answer:
+        assert answer.headers["Set-Cookie"] is None
+    with urllib.request.urlopen(display.watch_link) as answer:
+        assert display.watch_token in answer.headers["Set-Cookie"]
 
 
 def test_a_proxy_may_stand_before_it(display):
@@ -201,8 +212,8 @@ def moved(display):
     """Return where the window's pointer has been meanwhile."""
     found = []
     while display._waiting:
-        found.append(display._waiting.popleft().x)
-    return found
+        found.append(display._waiting.popleft())
+    return [each.x for each in found if isinstance(each, PointerMoved)]
 
 
 def test_one_controls_the_others_watch_and_control_is_handed_over(display):
@@ -227,6 +238,42 @@ def test_one_controls_the_others_watch_and_control_is_handed_over(display):
             assert moved(display) == []
         while controller(told_to(pupil)) is not None:  # the teacher is gone: nobody controls
             pass
+
+
+def test_a_page_that_lost_its_line_is_known_again(display):
+    cookie = cookie_of(display)
+    with socket_of(display, Cookie=cookie) as other, socket_of(display, "?page=a", Cookie=cookie) as before:
+        told_to(other)
+        own = told_to(before)["you"]
+        other.send(json.dumps({"kind": "control", "to": own}))
+        before.send(json.dumps({"kind": "name", "name": "Ada"}))
+        with socket_of(display, "?page=a", Cookie=cookie) as again:  # nobody has noticed yet
+            told = told_to(again)
+            while len(told["people"]) > 2 or told["people"][1]["name"] != "Ada":
+                told = told_to(again)
+            assert told["you"] == controller(told) == own
+
+
+def test_what_is_held_is_let_go_when_control_passes():
+    hands, at = Hands(), {"kind": "button", "x": 5, "y": 6, "button": 1}
+    told = ({**at, "down": True}, {"kind": "blur"}, {"kind": "blur"})
+    found = [[each.type for each in hands.events(MESSAGES.validate_json(json.dumps(one)))] for one in told]
+    assert found[1:] == [[pygame.MOUSEBUTTONUP, pygame.WINDOWFOCUSLOST], [pygame.WINDOWFOCUSLOST]]
+
+
+def test_the_end_does_not_wait_for_lines_on_which_nothing_comes():
+    with WebDisplay() as display:
+        idle = socket.create_connection(("127.0.0.1", display.port))
+        cookie_of(display)
+        begun = time.monotonic()
+    assert time.monotonic() - begun < 3.0
+    idle.close()
+
+
+def test_a_port_that_is_taken_is_told_in_a_line(display):
+    taken = rf"^--port: 127.0.0.1:{display.port} cannot be listened to: address already in use; --port 0"
+    with pytest.raises(RobocovError, match=taken), WebDisplay(port=display.port):
+        pass
 
 
 def test_only_who_controls_sees_the_clipboard(display):

@@ -1,10 +1,14 @@
 """The served windows in a real browser."""
 
+import json
+import time
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 from driven_browser import CHROMIUM, DRIVER, Browser
 from served_window import served
+from sub_path_proxy import PREFIX, SubPathProxy
 
 pytest.importorskip("websockets")
 
@@ -104,6 +108,7 @@ def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tm
         browser.js(upload, (MAPS / "trap.json").read_text())
         browser.until(lambda: picture(browser) != begun)
         browser.until(lambda: browser.all("#saved a"))
+        assert browser.find("#saved").get_property("open")
         browser.find("#saved a").click()
         browser.until(lambda: (tmp_path / "down/corner.json").exists())
         teacher = browser.driver.current_window_handle
@@ -113,12 +118,88 @@ def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tm
         assert browser.js("return document.body.className") == "watching"
         browser.until(lambda: canvas_size(browser) == [1280, 720])
         browser.find("summary").click()
+        browser.js("prompt = () => 'Ada'")
+        browser.all("#here button")[1].click()
+        browser.until(lambda: "Ada (you)" in browser.find("#here ul").text)
         browser.find("#here button").click()  # a second window of the teacher's takes control
         browser.until(lambda: browser.js("return document.body.className") == "")
         browser.driver.close()
         browser.driver.switch_to.window(teacher)
         browser.until(lambda: browser.js("return document.body.className") == "")
         assert not browser.complaints()
+
+
+def told_by(browser):
+    """Let the page keep what it tells; the result returns that, and forgets it."""
+    browser.js("window.kept = []; const tells = tell; tell = (one) => { kept.push(one); tells(one); }")
+    return lambda: [each for each in browser.js("return kept.splice(0)") if each["kind"] != "shown"]
+
+
+def test_below_a_path_of_a_proxy_and_after_its_line_broke_the_page_is_the_same(browser, tmp_path):
+    sized(browser, 900, 600)
+    with (
+        served("demo", "rooms", "--folder", str(tmp_path)) as link,
+        SubPathProxy(urlsplit(link).port) as proxy,
+    ):
+        browser.driver.get(proxy.link(link))
+        browser.until(lambda: canvas_size(browser) == [900, 600])
+        assert urlsplit(browser.driver.current_url).path == PREFIX + "/"
+        proxy.cut()
+        browser.until(lambda: "broken" in browser.find("#note").text)
+        browser.until(lambda: browser.find("#note").text == "")
+        assert browser.js("return controls")
+        browser.driver.refresh()
+        browser.until(lambda: canvas_size(browser) == [900, 600])
+        # a slow line misses pictures, and nothing that is done
+        browser.js("window.seen = 0; const shows = show; show = (...all) => (seen++, shows(...all))")
+        proxy.rate = 20_000.0
+        time.sleep(1.0)
+        before = browser.js("return seen")
+        time.sleep(2.0)
+        assert browser.js("return seen") - before < 30
+        browser.keys(" " * 9)  # which pauses in the end
+        time.sleep(1.0)
+        proxy.rate = 0.0
+        still = rested(browser)
+        browser.keys(" ")
+        browser.until(lambda: picture(browser) != still)
+
+
+def test_text_is_pasted_once_and_copied(browser, tmp_path):
+    sized(browser, 1280, 720)
+    with served("edit", "--folder", str(tmp_path)) as link:
+        allowed = {"permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"]}
+        origin = link.partition("/?")[0]
+        browser.driver.execute_cdp_cmd("Browser.grantPermissions", {"origin": origin, **allowed})
+        browser.driver.get(link)
+        browser.until(lambda: canvas_size(browser) == [1280, 720])
+        rested(browser)
+
+        def key(name, command):
+            event = {"key": name, "modifiers": 2, "commands": [command] if command else []}
+            for kind in ("rawKeyDown", "keyUp"):
+                browser.driver.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": kind, **event})
+
+        put = "navigator.clipboard.writeText('Große Halle').then(arguments[0])"
+        browser.driver.execute_async_script(put)
+        for kind in ("mousePressed", "mouseReleased"):  # the map's name
+            event = {"type": kind, "x": 1150, "y": 281, "button": "left", "clickCount": 1}
+            browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
+        key("a", "")
+        key("v", "paste")
+        rested(browser)
+        browser.keys("!")
+        key("a", "")
+        key("c", "copy")
+        copied = "navigator.clipboard.readText().then(arguments[0])"
+        browser.until(lambda: browser.driver.execute_async_script(copied) == "Große Halle!")
+        for press in (lambda: browser.keys("\ue007"), lambda: key("s", ""), lambda: browser.keys("\ue007")):
+            press()
+            rested(browser)
+        browser.until(lambda: list(tmp_path.glob("*.json")))
+        assert json.loads(next(tmp_path.glob("*.json")).read_text())["name"] == "Große Halle!"
+        key("z", "")  # what is not saved does not keep a process that is to stop
+        rested(browser)
 
 
 def test_a_telephone_held_upright_has_large_letters_and_buttons_below(browser, tmp_path):
@@ -135,6 +216,28 @@ def test_a_telephone_held_upright_has_large_letters_and_buttons_below(browser, t
             assert browser.js("return document.getElementById('touch').getBoundingClientRect().top") == 800
             browser.find("[data-key=h]").click()
             browser.until(lambda: picture(browser) != narrow)
+            told = told_by(browser)
+
+            def touch(*moments):
+                for moment in moments:
+                    points = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(moment)]
+                    event = {"type": "touchMove" if moment is not moments[0] else "touchStart"}
+                    browser.driver.execute_cdp_cmd(
+                        "Input.dispatchTouchEvent", event | {"touchPoints": points}
+                    )
+                    time.sleep(0.05)
+                event = {"type": "touchEnd", "touchPoints": []}
+                browser.driver.execute_cdp_cmd("Input.dispatchTouchEvent", event)
+                found = [each for each in told() if each["kind"] in ("button", "wheel")]
+                return [(each["kind"], each.get("button"), round(each["x"] / 3)) for each in found]
+
+            dragged = touch(*([(40 + 10 * k, 300)] for k in range(5)))
+            assert dragged == [("button", 1, 40), ("button", 1, 80)]
+            unsteady = touch(*([(60 + k % 2, 300)] for k in range(15)))
+            assert unsteady == [("button", 3, 60)] * 2
+            pinch = touch(*([(50 - 4 * k, 300), (70 + 4 * k, 300)] for k in range(8)))
+            assert pinch[0] == pinch[-1] == ("button", 3, 60)
+            assert {"wheel"} == {kind for kind, *_ in pinch[1:-1]}
             assert browser.complaints() == []
     finally:
         browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})

@@ -3,12 +3,16 @@
 import functools
 import http.server
 import threading
+from pathlib import Path
 
+import numpy as np
 import pytest
 from driven_browser import CHROMIUM, DRIVER, Browser
 
 import robocov
 from robocov_app.notebook import show
+from robocov_app.viewer.session.file import load_session
+from robocov_app.viewer.session.session import Session
 from robocov_app.web import live
 
 pytest.importorskip("websockets")
@@ -25,7 +29,8 @@ def test_a_cell_shows_the_window(tmp_path, monkeypatch):
     from nbclient import NotebookClient
 
     monkeypatch.chdir(tmp_path)
-    code = "import robocov as rc\nwindow = rc.show('rooms', robots=3)\nwindow"
+    code = "import robocov as rc\nrooms = rc.load_map('rooms')\nwindow = "
+    code += "rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(3, seed=0)).show()\nwindow"
     fetch = "import urllib.request\nprint(urllib.request.urlopen(window.link).status)\nwindow.close()"
     cells = [nbformat.v4.new_code_cell(each) for each in (code, fetch)]
     notebook = nbformat.v4.new_notebook(cells=cells)
@@ -57,6 +62,22 @@ def test_the_cell_is_live_also_in_a_page_of_another_site(tmp_path, monkeypatch):
         site.shutdown()
         site.server_close()
         window.close()
+
+
+def test_a_simulation_goes_on_in_the_window(monkeypatch):
+    def opened(call, height):
+        return Session.opened(load_session(Path(call[1]))).panes[0].simulation
+
+    monkeypatch.setattr("robocov_app.notebook.LiveWindow", opened)
+    rooms = robocov.load_map("rooms")
+    simulation = robocov.Simulation(rooms, robocov.Rapf(k_rep=0.4), rooms.start().sample(3, seed=1))
+    simulation.run(1.0)
+    found = simulation.show()
+    assert np.array_equal(found.positions, simulation.positions)
+    assert np.array_equal(found.velocities, simulation.velocities)
+    assert found.controller.k_rep == 0.4
+    monkeypatch.setattr("robocov_app.notebook.find_spec", lambda _: None)
+    assert simulation.show().time[-1] == pytest.approx(61.0)
 
 
 def test_what_is_wrong_is_told(tmp_path, monkeypatch):

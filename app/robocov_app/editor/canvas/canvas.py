@@ -65,12 +65,15 @@ class EditorCanvas:
         self.hovered: Problem | None = None
         self.at: Point | None = None  # where the mouse is, px; None where it is elsewhere
         self.camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
+        self._fitted: tuple[Point, float] | None = None  # centre and zoom of the camera that shows all
         self._hatched: Latest[tuple[Surface, Rect] | None] = Latest()
         self._legend, self._carried, self._outlined = Latest[Surface](), Latest[Surface](), Latest[Surface]()
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
         self.layout, self.theme = layout, theme
         self._look(self.camera.within(self._view_box()))
+        if self._fitted == (self.camera.center, self.camera.zoom):  # and not zoomed or panned since
+            self.fit()
 
     def _view_box(self) -> tuple[float, float, float, float]:
         """Return what the legend and the strip at the foot leave: left, top, width and height, px."""
@@ -104,6 +107,7 @@ class EditorCanvas:
         grow_x, grow_y = max(0.2 - (high_x - low_x), 0) / 2, max(0.2 - (high_y - low_y), 0) / 2  # m
         grown = (low_x - grow_x, low_y - grow_y, high_x + grow_x, high_y + grow_y)
         self._look(Camera.fit(grown, self._view_box(), MARGIN * self.layout.scale))
+        self._fitted = None if bounds else (self.camera.center, self.camera.zoom)
 
     def go_to(self, problem: Problem | None) -> None:
         if problem is None or problem.where is None or problem.where.is_empty:
