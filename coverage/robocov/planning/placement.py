@@ -116,7 +116,7 @@ def team_places(
     square = np.minimum(distance[entry][:, sources[chosen[mobile]]] ** 2, _FAR)
     _, column = linear_sum_assignment(square)
     stay = np.arange(len(mobile))
-    if square[stay, column].sum() > (1.0 - swapping) * square[stay, stay].sum():
+    if swapping and square[stay, column].sum() > (1.0 - swapping) * square[stay, stay].sum():
         column = stay
     places = begin.copy()
     places[mobile] = nodes[chosen[mobile[column]]]
