@@ -18,9 +18,14 @@ class HandbookHook(BuildHookInterface[Any]):
         """Build the pages of this very source."""
         if version == "editable" or not all(map(find_spec, ("sphinx", "furo", "myst_parser", "numpy"))):
             return
-        self._folder = TemporaryDirectory()  # it goes with this process
+        self._folder = TemporaryDirectory()
         pages = Path(self._folder.name, "pages")
         roots = os.pathsep.join(str(Path(self.root, name)) for name in ("app", "coverage"))
         call = [sys.executable, "-m", "robocov_app", "handbook", "--out", str(pages)]
         subprocess.run(call, check=True, stdout=sys.stderr, env={**os.environ, "PYTHONPATH": roots})
         build_data["force_include"][str(pages)] = "robocov_app/pages"
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """Remove what was only for the wheel."""
+        if hasattr(self, "_folder"):
+            self._folder.cleanup()
