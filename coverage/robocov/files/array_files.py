@@ -138,7 +138,7 @@ class ArrayCache:
         """Keep arrays under a key, if that is possible."""
         buffer = io.BytesIO()
         np.savez(buffer, **arrays)  # type: ignore[arg-type]
-        payload = buffer.getbuffer()
+        payload = buffer.getvalue()
         if len(payload) > self.limit:
             return
         with suppress(OSError, OutputError):
