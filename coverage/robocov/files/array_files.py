@@ -166,5 +166,5 @@ class ArrayCache:
             total -= size
 
 
-def _digest(payload: memoryview) -> bytes:
+def _digest(payload: bytes | memoryview) -> bytes:
     return hashlib.blake2b(payload, digest_size=_DIGEST).digest()
