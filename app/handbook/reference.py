@@ -130,10 +130,10 @@ def metrics() -> str:
     """Return the columns of ``metrics.csv`` and of the table of a sweep."""
     told = ModuleAnalyzer.for_module("robocov.metrics.run_metrics").find_attr_docs()
     text = "# Metrics\n\n## Along a run\n\nThe columns of `metrics.csv`, which `robocov metrics` writes; in "
-    text += "Python the attributes of [RunMetrics](names.rst).\n\n| column | attribute | meaning |\n"
+    text += "Python the attributes of [RunMetrics](names.rst).\n\n| column | meaning | attribute |\n"
     text += "|---|---|---|\n"
     for name, column in COLUMNS.items():
-        text += f"| `{column}` | `{name}` | {_cell(' '.join(told['RunMetrics', name]))} |\n"
+        text += f"| `{column}` | {_cell(' '.join(told['RunMetrics', name]))} | `{name}` |\n"
     text += "\n## Of a whole run\n\nThe columns of a sweep's `results.csv`, after what was run; most stand "
     text += "in `summary` of each `run.json`, too.\n\n| column | unit | meaning |\n|---|---|---|\n"
     columns = (*table._FIGURES, table._TIME, *table._METRICS)
