@@ -1,6 +1,6 @@
-"""The goals of `atlas` that the benchmark's tracks do not measure: doors, team sizes, rest, and pace.
+"""The goals of `atlas` that the benchmark's tracks do not measure, and another simulator's setting.
 
-python tests/bench/bench_atlas.py doors sizes rest pace [--controller atlas-shared] [--count 200]
+python tests/bench/bench_atlas.py doors sizes ranges rest pace lpac [--controller atlas-shared] [--count 200]
 """
 
 from __future__ import annotations
@@ -20,15 +20,23 @@ from robocov import (
     CoverageCost,
     Environment,
     Failure,
+    Gaussian,
+    Gaussians,
     Simulation,
     Team,
+    UniformStart,
     generated_map,
     load_map,
     make_controller,
+    settled_at,
 )
 from robocov.environment import WallObstacle
+from robocov.metrics import path_lengths
+from robocov_app.benchmark import suite
+from robocov_app.benchmark.running import reference
 
-SIZES, SEEDS, SHORT = (1, 2, 3, 6, 8, 9, 12, 20, 50), range(901, 905), 3.0
+SIZES, SEEDS, SHORT = (1, 2, 3, 6, 8, 9, 12, 20, 50, 100, 200), range(901, 905), 3.0
+RANGES = ({}, {"communication_range": 3.0}, {"communication_range": 6.0}, {"sensing_range": 6.0})
 PROTOTYPE = {6: 0.168, 50: 0.263, 200: 0.575}  # ms, a vectorised step of RAPF before there was a compiled one
 
 
@@ -71,14 +79,40 @@ def final(name: str, seed: int, hears: float, robots: int) -> tuple[float, float
 
 def sizes(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
     """Mean distances by team size, and how far one is above that of a smaller team: it should never rise."""
-    for hears in (math.inf, SHORT):
+    for hears in (math.inf, SHORT):  # more than 90 do not fit into the corner where they begin
         for seed in SEEDS:
-            found = list(pool.map(partial(final, name, seed, hears), SIZES))
+            found = list(pool.map(partial(final, name, seed, hears), SIZES[:-2]))
             costs = np.array([cost for cost, _ in found])
             rises = costs / np.minimum.accumulate(costs) - 1.0
-            told = ", ".join(f"{n}: {cost:.2f}" for n, cost in zip(SIZES, costs, strict=True))
+            told = ", ".join(f"{n}: {cost:.2f}" for n, cost in zip(SIZES, costs, strict=False))
             first = f"rises by {rises.max():.1%}; one walks {found[0][1]:.1f} m"
             yield f"rooms {seed}, hear {hears} m: {told} m, {first}"
+
+
+def ended(name: str, on: str, changes: dict[str, float]) -> tuple[float, float, float]:
+    """Return gap, when the team came to rest (s, or nan), and mean way (m) of 120 s on a map of the suite."""
+    rooms, team = suite.suite_map(on), Team.homogeneous(suite.TEAM, **changes)
+    start = rooms.start(None).sample(suite.TEAM, seed=0, radius=suite.RADIUS)
+    record = Simulation(rooms, make_controller(name), start, team).run(120.0)
+    cost = CoverageCost(rooms, suite.LATTICE)(record.positions[-1]).mean_distance
+    rest = settled_at(record.time, record.positions)
+    gap = cost / reference(on, suite.TEAM)["mean_distance_m"] - 1.0
+    return gap, math.nan if rest is None else rest, float(path_lengths(record.positions).mean())
+
+
+def ranges(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
+    """Six robots on the maps of the benchmark's short-range track for 120 s, beside RAPF."""
+    maps = suite.TRACKS["short-range"].maps
+    for changes in RANGES:
+        tables = [list(pool.map(partial(ended, each, changes=changes), maps)) for each in (name, "rapf")]
+        (gaps, rest, ways), (others, _, theirs) = (np.transpose(each) for each in tables)
+        behind = [each for each, mine, its in zip(maps, gaps, others, strict=True) if mine > its]
+        above, still = (gaps > 0.05).sum(), np.isfinite(rest).mean()
+        yield (
+            f"{changes or 'all hear all, see 3 m'}: gap {np.median(gaps):.1%} (worst {gaps.max():.0%}; "
+            f"{above} of {len(maps)} above 5 %), {still:.0%} at rest by 120 s, way {np.median(ways):.1f} m; "
+            f"RAPF {np.median(others):.1%}, {np.median(theirs):.1f} m; behind it on {behind}"
+        )
 
 
 def moved(name: str, what: str) -> float:
@@ -109,7 +143,7 @@ def rest(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
 
 def pace(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
     """Seconds of the whole simulation for one second: six robots on 10 x 10 m, more on as much each."""
-    for n in (*SIZES, 100, 200):
+    for n in SIZES:
         side = 10.0 * max(1.0, math.sqrt(n / 6.0))
         rooms = generated_map(7, kind="polygons", side=side, obstacles=max(6, n))
         start, took = rooms.start("uniform").sample(n, seed=0, radius=0.1), []
@@ -124,8 +158,43 @@ def pace(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
         yield f"{n} robots: {took[0]:.3f} s for one second, {took[0] / took[1]:.0f} times RAPF's{old}"
 
 
+def world(seed: int) -> tuple[Environment, np.ndarray]:
+    """Return the default setting of the simulator CoverageControl (Agarwal et al. 2024, LPAC), and starts.
+
+    32 robots in a square of 1024 m without obstacles, with 32 places of interest.
+    """
+    rng, side = np.random.default_rng(seed), 1024.0
+    peaks = [
+        Gaussian(tuple(rng.uniform(0.0, side, 2).tolist()), rng.uniform(6.0, 10.0), rng.uniform(40.0, 60.0))
+        for _ in range(32)
+    ]
+    square = ((0.0, 0.0), (side, 0.0), (side, side), (0.0, side))
+    field = Environment("field", square, density=Gaussians(tuple(peaks), 0.0), starts={"any": UniformStart()})
+    return field, field.start("any").sample(32, seed=seed, radius=1.0)
+
+
+def remaining(name: str, seed: int) -> float:
+    """Return the sum of squared distances, weighed by the density, after 120 s by that at the start."""
+    field, start = world(seed)
+    team = Team.homogeneous(
+        32, radius=1.0, max_speed=5.0, max_acceleration=10.0, sensing_range=32.0, communication_range=128.0
+    )
+    some, cost = Simulation(field, make_controller(name), start, team), CoverageCost(field, 128)
+    while some.time < 120.0:
+        some.step()
+    weights = field.density.value(cost.points)
+    ends, begins = (weights @ cost(each).distances ** 2 for each in (some.positions, start))
+    return float(ends / begins)
+
+
+def lpac(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
+    shares = np.array(list(pool.map(partial(remaining, name), range(4))))
+    told = " ".join(f"{each:.2f}" for each in shares)
+    yield f"CoverageControl's setting: after 120 s {shares.mean():.2f} of the first cost is left ({told})"
+
+
 def main() -> None:
-    measures = {each.__name__: each for each in (doors, sizes, rest, pace)}
+    measures = {each.__name__: each for each in (doors, sizes, ranges, rest, pace, lpac)}
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", nargs="+", choices=measures)
     parser.add_argument("--controller", default="atlas")

@@ -166,7 +166,8 @@ def method() -> list[str]:
         "near_final_s: from when on J stays within 5 % of its end. settled_at_s: from when on no robot gets "
         "5 cm in any 4 s. path_length_m: mean over robots. work_J: integral of |F v|, all robots.",
         "told_bytes: 20 bytes (position and number) a robot and control period, or message; where maps are "
-        "shared also 5 bytes for each cell that has changed on a robot's map, whoever it knows it from.",
+        "shared also 5 bytes for each cell that has changed on its map, whoever it knows it from, and by "
+        "atlas-shared 28 bytes (number, position, time) for each other robot that it knows of, at each plan.",
         "deciding_s: processor time of the control law alone, all robots; it depends on the machine.",
     ]
 

@@ -29,7 +29,7 @@ class Arguments(JsonOption):
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")]
     """Folder for the results; one that holds a part of the same study is gone on with."""
     quick: bool = False
-    """A small study of three to four minutes, to see that all is well; the full one takes an hour or more."""
+    """A small study of some minutes, to see that all is well; the full one takes two hours or more."""
     figures_only: bool = False
     """Only the figures, without the claims."""
     without_beyond: bool = False

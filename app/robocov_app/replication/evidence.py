@@ -14,10 +14,12 @@ from robocov_app.figures.statistics import Interval, bootstrap, median_time
 from robocov_app.replication.claims import amount, capitalised, share_above_zero
 from robocov_app.replication.contenders import ASSETS, OWN, Contender
 from robocov_app.replication.outcomes import Comparison, GainOutcomes, Outcomes
-from robocov_app.replication.results import BeyondResults
+from robocov_app.replication.results import IDEAL, BeyondResults, Degradation
+from robocov_app.replication.studies import AXES, WORSE
 from robocov_app.report.groups import parted
 
 WORST_MAPS = 3  # so many maps are named on which a controller does worst
+MEDIANS = ("final", "over_run", "path", "work")  # of a law, in a table
 OFTEN = 0.05  # a failure is told of a controller when it happens in more than 5 % of its runs
 
 
@@ -44,7 +46,7 @@ class LawRow:
     stuck: float  # that end with a robot stuck; nan where a law has no goals
     settled: float  # that come to rest
     settling: float  # s, median time until they do, by Kaplan and Meier; inf where most do not
-    medians: Mapping[str, float]  # m, of J at the end (final), its mean over_run, and a robot's path
+    medians: Mapping[str, float]  # of J at the end (final), its mean over_run, a robot's path, m; of work, J
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ def law_rows(outcomes: Outcomes, contenders: Iterable[Contender], duration: floa
                 stuck=share_above_zero(fine.of(each.key, "stuck")),
                 settled=len(rest) / len(settled),
                 settling=median_time(rest, np.full(len(settled) - len(rest), duration)),
-                medians={name: np.median(fine.of(each.key, name)) for name in ("final", "over_run", "path")},
+                medians={name: np.median(fine.of(each.key, name)) for name in MEDIANS},
             )
         )
     return rows
@@ -120,6 +122,14 @@ def duels(results: BeyondResults, rows: Sequence[LawRow]) -> list[tuple[str, str
     both = [(ours, row.contender) for ours in OWN for row in rows if row.contender.key != ours.key]
     pairs = [(a.label, b.label, results.outcomes.compared(a.key, b.key)) for a, b in both]
     return [(first, second, found) for first, second, found in pairs if found is not None]
+
+
+def conditions_rows(results: BeyondResults, rows: Iterable[LawRow]) -> dict[str, list[Degradation]]:
+    """Return by controller, in the order of `rows`, what it bears: no disturbance, then one of each kind."""
+    known = {(each.controller, each.axis, each.value): each for each in results.degradations}
+    wanted = (IDEAL, None), *((axis, values[WORSE]) for axis, values in AXES.items())
+    names = dict.fromkeys(row.contender.controller for row in rows)
+    return {name: [known[name, *at] for at in wanted] for name in names}
 
 
 def failure_text(outcomes: Outcomes, law: LawRow) -> str:

@@ -38,6 +38,7 @@ COLUMNS = {
     "time": "mean_time_s",
     "path": "path_length_m",
     "over_run": "mean_distance_over_run_m",
+    "work": "work_J",
 }
 
 
@@ -58,7 +59,8 @@ class Outcomes:
 
     Measures are ``final`` (m), ``gap`` (J/J_ref - 1), ``early`` and ``first_minute`` (m, time averages),
     ``stuck`` (robots), ``contacts``, ``settled`` (s, nan where it did not), ``time`` (s), ``path``
-    (m), ``over_run`` (m, time average of the cost), all (m,), and ``placement``, (m, n, 2) m at the end.
+    (m), ``over_run`` (m, time average of the cost), ``work`` (J, of the team), all (m,), and ``placement``,
+    (m, n, 2) m at the end.
     """
 
     scenarios: tuple[Scenario, ...]

@@ -37,16 +37,17 @@ PAGE, BEYOND_PAGE, CLAIMS = "index.html", "beyond.html", "claims.json"
 _REPLAY_BUDGET = 400_000  # bytes of the runs in the page's replay
 _CASES = {"convex": "Figure 2", "a": "Figure 4", "b": "Figure 6", "other": "Figure 8"}  # which shows what
 _TICKS = (0.0, 0.01, 0.03, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0)  # of the axis of gaps
-_UNIT = re.compile(r"(?<=\d) (?=(?:%|m|s|m²|m³|N)(?![\w³²]))")
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|m|s|m²|m³|N|J)(?![\w³²]))")
 
 
 class Image(NamedTuple):
-    """A picture in the page: the name of its files in ``figures/``, its size in px, and what it shows."""
+    """A picture in the page: files' name in ``figures/``, size in px, what it shows, what is seen there."""
 
     name: str
     width: int
     height: int
     words: str
+    seen: str = ""
 
 
 def save(path: Path, text: str) -> None:
@@ -64,11 +65,15 @@ def save_paper_figures(
 ) -> dict[str, Image]:
     """Write the paper's figures to ``figures/``, and the plots of the claims, without `results` none."""
 
+    shown = {f"figure-{k}": (k, runs, first) for k in figures.FIGURES}
+    if results is not None:
+        shown |= {f"figure-{k}-best": (k, results.best_figures, first) for k in figures.BEST}
+
     def drawn(theme: str) -> figures.Plots:
-        own = {f"figure-{k}": partial(figures.draw_figure, k, runs, first, theme) for k in figures.FIGURES}
+        own = {name: partial(figures.draw_figure, *each, theme) for name, each in shown.items()}
         return own if results is None else {**own, **figures.paper_plots(results, theme)}
 
-    seen = {f"figure-{k}": figures.describe_figure(k, runs, first) for k in figures.FIGURES}
+    seen = {name: figures.describe_figure(*each) for name, each in shown.items()}
     return _save_figures(folder, drawn, seen, quiet=quiet)
 
 
@@ -90,8 +95,9 @@ def _save_figures(
             for suffix in ("png", "svg", "pdf"):
                 save_figure(figure, target / f"{name}.{suffix}")
             save_figure(dark[name](), target / f"{name}-dark.png")
-            words = f"{figures.CAPTIONS[name]} {seen.get(name, '')}".rstrip()
-            found[name] = Image(name, round(figure.bbox.width), round(figure.bbox.height), words)
+            told = seen.get(name, "")
+            words, box = f"{figures.CAPTIONS[name]} {told}".rstrip(), figure.bbox
+            found[name] = Image(name, round(box.width), round(box.height), words, told)
             update(number)
     return found
 
@@ -118,7 +124,7 @@ def paper_page(
         "beyond": beyond,
         "images": images,
         "figures": [
-            (number, figures.CAPTIONS[name], images[name], figures.describe_figure(number, runs, first))
+            (number, figures.CAPTIONS[name], images[name], images.get(f"{name}-best"))
             for number, name in ((number, f"figure-{number}") for number in figures.FIGURES)
         ],
         "replay": Markup(replay_part(replays, panes, _REPLAY_BUDGET)),
@@ -159,6 +165,8 @@ def beyond_page(images: Mapping[str, Image], results: BeyondResults) -> str:
         "goal_claims": goal_claims,
         "rival_claims": [claim for claim in found if claim.part == claims.RIVALS],
         "rows": rows,
+        "conditions": evidence.conditions_rows(results, rows),
+        "captions": figures.CAPTIONS,
         "controllers": [(one, _strips(one, each)) for one in each],
         "failures": _failures(results.worst, results.outcomes, OURS[0], others),
         "images": images,
@@ -192,6 +200,7 @@ def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
     loader, undefined = jinja2.FileSystemLoader(ASSETS), jinja2.StrictUndefined
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=undefined, finalize=_unbroken)
     environment.filters.update(span=span, g="{:g}".format, amount=amount)
+    environment.filters["hundredths"] = lambda value: f"{value:.2f}" if math.isfinite(value) else "–"
     environment.filters["unbroken"] = lambda text: Markup(_unbroken(str(text)))
     known = environment.globals.update
     known(t=claims, contender=contenders, studies=studies, timing=step_times)

@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
-from itertools import compress
+from itertools import compress, product
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -14,7 +14,7 @@ import numpy as np
 import robocov
 from robocov.controllers import CONTROLLERS, controller_kind
 from robocov.cost import CoverageCost
-from robocov.errors import InputError, RobocovError, counted
+from robocov.errors import InputError
 from robocov.files.atomic import written
 from robocov.files.result_folder import for_results
 from robocov.metrics import CostHistory
@@ -43,8 +43,9 @@ _HEAD = {"format": "robocov-paper", "version": 1}
 WORST = 4  # so many of RAPF's worst runs are shown
 
 ShownRuns: TypeAlias = list[tuple[Scenario, Record]]
-# final costs by map and seed, by controller and value of a column
-Finals: TypeAlias = dict[tuple[str, float | None], dict[tuple[str, int], float]]
+Costs: TypeAlias = dict[tuple[str, int], float]  # final ones by map and seed
+Finals: TypeAlias = dict[tuple[str, float | None], Costs]  # by controller and value of a column
+IDEAL = "ideal"  # stands for the axis of a disturbance where there is none
 
 
 class Interrupted(Exception):  # noqa: N818 - it is no error
@@ -92,6 +93,7 @@ class PaperResults:
     """Results of the paper's claims."""
 
     figures: Mapping[str, FigureRun]  # by "case/controller"
+    best_figures: Mapping[str, FigureRun]  # of figures 4 to 8, at the best gains
     gains: Mapping[str, GainOutcomes]  # by controller
     convex: Outcomes  # in convex regions
     claims: Outcomes  # on non-convex maps
@@ -113,7 +115,10 @@ class DensityResults:
 
 @dataclass(frozen=True)
 class Degradation:
-    """The final cost of a controller at one value of a disturbance, by that of the same run without any."""
+    """The final cost of a controller at one value of a disturbance, by that of the same run without any.
+
+    On the axis `IDEAL` it is that without any, by RAPF's.
+    """
 
     axis: str
     value: float | None
@@ -220,6 +225,7 @@ def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bo
         guesses = (paper_contenders({law: grid[k] for law, grid in grids}) for k in (0, -1))
         papers = max(guesses, key=lambda guess: sum(map(len, laws.distinct_gains(guess).values())))
     if claims:
+        sweeps |= studies.figure_studies(plan, papers)
         sweeps["gains"] = studies.gains_study(plan)
         sweeps["convex"] = studies.convex_contest(plan, papers).study
     if claims or beyond:
@@ -263,12 +269,14 @@ def partition_record() -> Record:
     return robocov.Simulation(environment, robocov.Lloyd(), starts).run(0.1)
 
 
-def run_figures(folder: Path, plan: Plan, options: RunnerOptions) -> dict[str, FigureRun]:
-    """Do the runs that the figures show; raise as `run_study`, and InputError when one of them failed."""
+def run_figures(
+    folder: Path, plan: Plan, options: RunnerOptions, papers: Sequence[Contender] = ()
+) -> dict[str, FigureRun]:
+    """Do the runs that the figures show, as `studies.figure_studies`; InputError when one of them failed."""
     found: dict[str, FigureRun] = {}
-    for name, study in studies.figure_studies(plan).items():
+    for name, study in studies.figure_studies(plan, papers).items():
         for row, run in _figure_runs(run_study(study, folder, name, options)):
-            case = "other" if row["start"] == "other" else name.removeprefix("figures-")
+            case = "other" if row["start"] == "other" else name.split("-")[1]
             found[f"{case}/{row['controller']}"] = run
     return found
 
@@ -285,13 +293,15 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
     figures = run_figures(folder, plan, options)
     gains, known = _run_grid(studies.gains_study(plan), "gains", folder, plan, options)
     papers = paper_contenders(best_gains(gains))
+    best_figures = run_figures(folder, plan, options, papers)
     convex, claims = studies.convex_contest(plan, papers), studies.claims_contest(plan, papers)
     known |= references_of((*convex.study.maps, *claims.study.maps), folder, plan, options)
     in_convex = read_outcomes(run_study(convex.study, folder, "convex", options), convex, known)
     outcomes = read_outcomes(run_study(claims.study, folder, "claims", options), claims, known)
-    counts = _counts(folder, (*studies.figure_studies(plan), "gains", "convex", "claims"))
+    shown = studies.figure_studies(plan), studies.figure_studies(plan, papers)
+    counts = _counts(folder, (*shown[0], *shown[1], "gains", "convex", "claims"))
     worst = worst_runs(claims.study, outcomes, RAPF_SHARED, WORST)
-    return PaperResults(figures, gains, in_convex, outcomes, papers, known, worst, **counts)
+    return PaperResults(figures, best_figures, gains, in_convex, outcomes, papers, known, worst, **counts)
 
 
 def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperResults | None) -> BeyondResults:
@@ -366,24 +376,27 @@ def worst_runs(study: Study, outcomes: Outcomes, contender: Contender, count: in
 
 
 def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
-    ideal = _finals(at / "conditions-ideal")
-    found = []
-    for axis, (best, *bad) in studies.axes_of_disturbances(plan).items():
-        disturbed = _finals(at / f"conditions-{axis.replace('_', '-')}", parameter_column(axis), bad[0])
-        for value in (best, *bad):
-            for controller in studies.DISTURBED:
-                usual = ideal.get((controller, None))
-                if not usual:
-                    runs = counted(plan.beyond.conditions_seeds, "run")
-                    raise RobocovError(f"{controller}: all {runs} on each map failed")
-                got = usual if value == best else disturbed.get((controller, value), {})
-                ratios = {key: got[key] / usual[key] for key in usual if key in got}
-                names = [name for name, _ in ratios]
-                # of few maps runs are drawn one by one: the interval is then of these maps alone
-                clusters = names if len(set(names)) >= FEW_MAPS else None
-                ratio = bootstrap([*ratios.values()], clusters=clusters) if ratios else UNKNOWN
-                label = str(controller_kind(controller).label)
-                found.append(Degradation(axis, value, controller, label, ratio, len(ratios)))
+    """Return what became of final costs: under each condition by the ideal ones, and these by RAPF's."""
+    found, parts = [], studies.disturbed(plan)
+    ideal = {key: costs for part in parts for key, costs in _finals(at / f"{part}-ideal").items()}
+
+    def add(axis: str, value: float | None, controller: str, costs: Costs, by: Costs) -> None:
+        ratios = {key: costs[key] / by[key] for key in by if key in costs}
+        names = [name for name, _ in ratios]
+        # of few maps runs are drawn one by one: the interval is then of these maps alone
+        clusters = names if len(set(names)) >= FEW_MAPS else None
+        ratio = bootstrap([*ratios.values()], clusters=clusters) if ratios else UNKNOWN
+        label = str(controller_kind(controller).label)
+        found.append(Degradation(axis, value, controller, label, ratio, len(ratios)))
+
+    for part, (controllers, _, axes) in parts.items():
+        for name in controllers:
+            add(IDEAL, None, name, ideal.get((name, None), {}), ideal.get((RAPF_SHARED.controller, None), {}))
+        for axis, (best, *bad) in axes.items():
+            costs = _finals(at / f"{part}-{axis.replace('_', '-')}", parameter_column(axis), bad[0])
+            for value, name in product((best, *bad), controllers):
+                usual = ideal.get((name, None), {})
+                add(axis, value, name, usual if value == best else costs.get((name, value), {}), usual)
     return found
 
 

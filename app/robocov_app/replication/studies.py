@@ -9,11 +9,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import shapely
 
+from robocov.controllers import CONTROLLERS
 from robocov.controllers.gains import Value
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import DiscStart, Environment, StartSpec, UniformStart
@@ -44,8 +45,9 @@ DENSITY_MAP, DENSITY_START = "hospital", "reception"  # of the picture of a dens
 # a team of robots of different speeds
 GROUPS = ({"count": 2, "max_speed": 1.0}, {"count": 2, "max_speed": 0.5}, {"count": 2, "max_speed": 0.25})
 
+Axes: TypeAlias = Mapping[str, tuple[float | None, ...]]
 # disturbances, from none to bad; the first value of each is the ideal
-AXES: Mapping[str, tuple[float | None, ...]] = {
+AXES: Axes = {
     "loss": (0.0, 0.3, 0.6, 0.9),
     "delay": (0.0, 0.5, 1.0, 2.0),
     "communication_range": (None, 6.0, 4.0, 2.0),
@@ -55,7 +57,8 @@ AXES: Mapping[str, tuple[float | None, ...]] = {
 }
 # conditions of all these runs, the ideal ones as well: of sixty messages a second nobody would miss one
 ALWAYS = {"message_rate": 2.0}
-DISTURBED = ("rapf", "lloyd")  # controllers that are disturbed
+DISTURBED = ("rapf", "lloyd")  # controllers at every value; all others at one, `WORSE`, of a seed
+WORSE = 2  # place of that value in `AXES`
 BASELINE_GAINS = "rival-gains"
 
 
@@ -170,18 +173,25 @@ def contest(
     seeds: Sequence[int],
     **other: Any,
 ) -> Contest:
-    """Return a sweep of contenders, in which all else is as the plan has it but for `other`."""
+    """Return a sweep of contenders, with their work; all else is as the plan has it but for `other`."""
     gains = laws.distinct_gains(contenders)
-    given = {"controllers": tuple(gains), "gains": gains, "starts": starts, "seeds": seeds, **other}
-    return Contest(Study(maps=tuple(on), **{**_common(plan), **given}), tuple(contenders))
+    given = {"controllers": tuple(gains), "gains": gains, "starts": starts, "seeds": seeds, "metrics": True}
+    return Contest(Study(maps=tuple(on), **{**_common(plan), **given, **other}), tuple(contenders))
 
 
-def figure_studies(plan: Plan) -> dict[str, Study]:
-    """Return the sweeps whose runs the figures show; their paths and costs are kept finely."""
+def figure_studies(plan: Plan, papers: Sequence[Contender] = ()) -> dict[str, Study]:
+    """Return the sweeps whose runs the figures show; their paths and costs are kept finely.
+
+    With the paper's contenders, they are those of figures 4 to 8 at the best gains of these.
+    """
+    best = tuple(each for each in papers if each.key.endswith("-best"))
     finely = {"lattice": 2 * plan.lattice, "cost_hz": 5.0, "record_hz": 10.0}
     return {
-        name: contest(plan, (StudyMap(on, load_map(on)),), contenders, starts, (0,), **finely).study
+        f"{name}-best" if best else name: contest(
+            plan, (StudyMap(on, load_map(on)),), best or contenders, starts, (0,), **finely
+        ).study
         for name, (on, starts, contenders) in FIGURES.items()
+        if not (best and laws.LLOYD in contenders)
     }
 
 
@@ -239,18 +249,18 @@ def beyond_contests(plan: Plan, best: laws.BestGains, papers: Sequence[Contender
     return found | {"teams": contest(plan, on, laws.TEAMS, starts, (0,), group=GROUPS)}
 
 
-def axes_of_disturbances(plan: Plan) -> dict[str, tuple[float | None, ...]]:
-    """Return all values of each axis, or two of them."""
-    quick = plan.name == "quick"
-    return {name: (values[0], values[2]) if quick else values for name, values in AXES.items()}
+def disturbed(plan: Plan) -> dict[str, tuple[tuple[str, ...], int, Axes]]:
+    """Return controllers, a number of seeds, and values on axes, by the first words of their sweeps."""
+    two = {name: (values[0], values[WORSE]) for name, values in AXES.items()}
+    others = tuple(name for name in CONTROLLERS if name not in DISTURBED)
+    papers = DISTURBED, plan.beyond.conditions_seeds, two if plan.name == "quick" else AXES
+    return {"conditions": papers, "conditions-others": (others, 1, two)}
 
 
 def conditions_studies(plan: Plan) -> dict[str, Study]:
     common: dict[str, Any] = {
         "maps": tuple(StudyMap(name, load_map(name)) for name in plan.beyond.conditions_maps),
-        "controllers": DISTURBED,
         "robots": (ROBOTS,),
-        "seeds": range(plan.beyond.conditions_seeds),
         "duration": plan.beyond.conditions_duration,
         "dt": 1 / 60,
         "lattice": plan.lattice,
@@ -258,10 +268,13 @@ def conditions_studies(plan: Plan) -> dict[str, Study]:
         "record_hz": 0.0,
         "conditions": ALWAYS,
     }
-    found = {"conditions-ideal": Study(**common)}
-    for name, (_, *bad) in axes_of_disturbances(plan).items():
-        changed = {name: bad} if name in sweep_study.TEAM else {"conditions": {**ALWAYS, name: bad}}
-        found[f"conditions-{name.replace('_', '-')}"] = Study(**{**common, **changed})
+    found = {}
+    for part, (controllers, seeds, axes) in disturbed(plan).items():
+        common |= {"controllers": controllers, "seeds": range(seeds)}
+        found[f"{part}-ideal"] = Study(**common)
+        for name, (_, *bad) in axes.items():
+            changed = {name: bad} if name in sweep_study.TEAM else {"conditions": {**ALWAYS, name: bad}}
+            found[f"{part}-{name.replace('_', '-')}"] = Study(**{**common, **changed})
     return found
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from robocov.controllers import information_of
+from robocov.controllers.atlas import Teammates
 from robocov.controllers.user_modules import provided
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
@@ -44,7 +45,7 @@ FIGURES = {  # of a run in the table, in this order: kind, unit and meaning
 }
 TIMED = "mean_time_s"  # what it holds as well where robots are not equally fast
 EFFORT = "effort.json"  # of runs with metrics: computing time differs each time, so the table has it not
-POSITION, CELL = 20, 5  # bytes that are told of a position, and of a cell of a map
+POSITION, CELL, REPORT = 20, 5, 28  # bytes of a position, a cell of a map, and a position at some time
 _ONE_AT_A_TIME = threading.Lock()
 _RESULTS = 3  # goes up when the same inputs give other results: since robots in contact alone are substepped
 
@@ -150,7 +151,8 @@ class Telling:
 
     A message is a position, `POSITION` bytes with the robot's number, at the rate of the conditions or each
     control period. Robots that share maps also tell each cell of theirs that has changed, `CELL` bytes with
-    its number, whoever they know it from. The bytes are None where a law shares other maps than ours.
+    its number, whoever they know it from, and at each plan where they know others to be, `REPORT` bytes each.
+    The bytes are None where a law shares other maps than ours.
     """
 
     def __init__(self, simulation: Simulation) -> None:
@@ -158,14 +160,18 @@ class Telling:
         rate: float | None = getattr(simulation.conditions, "message_rate", None)
         self._share = 1.0 if rate is None else min(1.0, rate * simulation.dt)
         self._sharing = information_of(simulation.controller) == "shared map"
-        self._maps = self._known()
+        self._maps, self._reports = self._known(), self._told()
         self.bytes: float | None = 0.0
 
     def _known(self) -> tuple[DiscoveredMap, ...] | None:
         return getattr(self._simulation.memory, "maps", None) if self._sharing else ()
 
+    def _told(self) -> tuple[Teammates, ...]:
+        return getattr(self._simulation.memory, "reports", ()) if self._sharing else ()
+
     def count(self) -> None:
         before, self._maps = self._maps, self._known()
+        told, self._reports = self._reports, self._told()
         if self.bytes is None or before is None or self._maps is None:
             self.bytes = None
             return
@@ -173,6 +179,9 @@ class Telling:
         for old, new in zip(before, self._maps, strict=True):
             if new is not old:
                 self.bytes += CELL * int(np.count_nonzero(new.state != old.state))
+        for last, others in zip(told, self._reports, strict=True):
+            if others is not last:
+                self.bytes += REPORT * len(others.robots)
 
 
 def prepared(task: Task) -> tuple[Environment, CoverageCost]:

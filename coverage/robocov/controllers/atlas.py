@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -68,6 +69,16 @@ class Teammates(NamedTuple):
         later.places[here], later.since[here] = self.places[there], self.since[there]
         return later
 
+    def joined(self, report: Teammates, i: int, gone: Mapping[int, float]) -> Teammates:
+        """Return it with what robot i is told of others that were heard later, and after they were `gone`."""
+        since = [math.inf if j == i else gone.get(j, -1.0) for j in report.robots.tolist()]
+        new = report.heard > np.array(since)
+        told = report._replace(away=np.full(len(new), math.inf))
+        both = [np.concatenate([mine, theirs[new]]) for mine, theirs in zip(self, told, strict=True)]
+        order = np.lexsort((-both[2], both[0]))
+        order = order[np.unique(both[0][order], return_index=True)[1]]
+        return Teammates(*(each[order] for each in both))
+
 
 @dataclass(frozen=True, eq=False)
 class PlannerState:
@@ -76,7 +87,8 @@ class PlannerState:
     known: DiscoveredMap
     due: float  # when it plans next, s
     others: Teammates
-    met: frozenset[int] = frozenset()  # the robots that it has ever heard, but for those that failed
+    met: frozenset[int] = frozenset()  # whom it has ever heard, or heard of, that has not failed,
+    gone: Mapping[int, float] = field(default_factory=dict)  # when it took one for failed, or missed it, s
     since: float = 0.0  # when it began, or the team, or the walls, became others, s,
     walked: float = 0.0  # how far it has walked since then, m,
     looked: float = 0.0  # and how much of that to look around
@@ -114,6 +126,11 @@ class AtlasMemory:
     def maps(self) -> tuple[DiscoveredMap, ...]:
         """The map that each robot has discovered."""
         return tuple(state.known for state in self.states)
+
+    @property
+    def reports(self) -> tuple[Teammates, ...]:
+        """Where each robot knows others to be, which it tells where maps are shared."""
+        return tuple(state.others for state in self.states)
 
 
 @dataclass(frozen=True)
@@ -196,7 +213,8 @@ class Atlas(Law):
         routes, legs = list(memory.routes), memory.legs.copy()
         for i, state in enumerate(states):
             if seen.time >= max(state.due, 0.0 if estimates is None else _LISTENED) - 1e-9:
-                states[i], goal = self._planned(seen, memory.team, state, i)
+                reports = self._reports(states, seen.neighbours.of(i))
+                states[i], goal = self._planned(seen, memory.team, state, i, reports)
                 ways = states[i].ways
                 if goal is not None and ways is not None:
                     routes[i], legs[i] = ways.route(seen.positions[i], goal), 0
@@ -217,16 +235,22 @@ class Atlas(Law):
         maps = [known.scanned(*scan) for known, *scan in each]
         return [known.visited(seen.neighbour_positions(i), float(radius[i])) for i, known in enumerate(maps)]
 
+    def _reports(self, states: Sequence[PlannerState], heard: IntArray) -> list[Teammates]:
+        """Return what robots that are heard tell of others."""
+        return []
+
     def _agreed(self, others: Teammates, seen: Observations) -> bool:
         """Return whether all plan on the same map, so that all come to the same plan."""
         return False
 
     def _planned(
-        self, seen: Observations, team: Team, state: PlannerState, i: int
+        self, seen: Observations, team: Team, state: PlannerState, i: int, reports: Sequence[Teammates]
     ) -> tuple[PlannerState, Array | None]:
         """Return what robot i remembers after its plan, and where to go; None for where it goes already."""
         place, raster, fastest = seen.positions[i], state.known.raster, float(team.max_speed[i])
-        known, met = self._teammates(seen, team, state, i)
+        before = state
+        state = self._met(seen, team, state, i, reports)
+        known, met = state.others, state.met
         others, at = known.robots, known.at
         still = (seen.time - known.since >= STILL_FOR) | (known.heard < seen.time)
         quiet, agreed = bool(still.all()), self._agreed(known, seen)
@@ -241,10 +265,10 @@ class Atlas(Law):
         period = max(self.period, spacing / fastest)
         first = state.planned is None
         due = seen.time + period * (1.0 + (i + 1) * _GOLDEN % 1.0 if first and self.staggered else 1.0)
-        before, walked = state, state.walked
+        walked = state.walked
         if state.situation is not None:
             walked += math.dist(place, state.situation[0])
-        state = replace(state, due=due, others=known, met=met, walked=walked, quiet=quiet)
+        state = replace(state, due=due, walked=walked, quiet=quiet)
         # a team, or walls, that have changed: there may be much to do again
         walls = 0 if state.planned is None else state.known.walls_changed(state.planned)
         if first or met != before.met or walls * raster.cell > _WALLS * float(team.radius[i]):
@@ -278,10 +302,10 @@ class Atlas(Law):
                 return state, aside
         return self._looking(state, own, place, state.walked - before.walked, agreed=agreed)
 
-    def _teammates(
-        self, seen: Observations, team: Team, state: PlannerState, i: int
-    ) -> tuple[Teammates, frozenset[int]]:
-        """Return what robot i knows of the others now, and whom it has met that has not failed.
+    def _met(
+        self, seen: Observations, team: Team, state: PlannerState, i: int, reports: Sequence[Teammates]
+    ) -> PlannerState:
+        """Return what robot i knows of the others now: where they are, whom it has met, and who is gone.
 
         Who falls silent and cannot have got out of range has failed. Others are presumed to be where they
         were going, and are forgotten, not taken for failed, when they are not heard there.
@@ -296,8 +320,15 @@ class Atlas(Law):
             known.at[here] = state.places[there, 1:]
         away = np.sqrt(((known.at - place) ** 2).sum(axis=1))
         missed = (silence > _MISSED) & (away < _IN_RANGE * hears)
-        met = (state.met - {*known.robots[failed].tolist()}) | {*robots.tolist()}
-        return known.updated(robots, at, place, seen.time, failed | missed), met
+        lost = known.robots[failed | missed].tolist()
+        met, gone = (
+            state.met - {*known.robots[failed].tolist()},
+            {**state.gone, **dict.fromkeys(lost, seen.time)},
+        )
+        known = known.updated(robots, at, place, seen.time, failed | missed)
+        for report in reports:
+            known = known.joined(report, i, gone)
+        return replace(state, others=known, met=met | {*known.robots.tolist()}, gone=gone)
 
     def _plan_for_all(
         self, state: PlannerState, seen: Observations, still: BoolArray, settling: float,
@@ -388,12 +419,13 @@ class Atlas(Law):
 
 @dataclass(frozen=True)
 class AtlasShared(Atlas):
-    """`Atlas`, but robots that hear each other also tell each other their maps.
+    """`Atlas`, but robots that hear each other also tell each other their maps, and where others are.
 
     As long as a robot hears all that it has met, all have the same map, and all make the same plan, for the
     whole team, however large: relocations are for good, nobody has to decide for itself alone, and everybody
     learns of a look. Who has not got on for some plans, away from its place, is in a jam, and makes way for
-    a while, each for another one. Whoever does not hear all of them goes by `Atlas` on the map that it has.
+    a while, each for another one. Whoever does not hear all of them goes by `Atlas` on the map that it has,
+    and presumes those that it does not hear where they were last heard by anybody who tells it.
     """
 
     name = "atlas-shared"
@@ -412,6 +444,11 @@ class AtlasShared(Atlas):
             if (id(known), circle, size) not in visited:
                 visited[id(known), circle, size] = known.visited(seen.positions[list(circle)], size)
         return [visited[id(known), circle, size] for known, circle, size in each]
+
+    def _reports(self, states: Sequence[PlannerState], heard: IntArray) -> list[Teammates]:
+        if len(heard) == len(states) - 1:  # who hears all need not be told
+            return []
+        return [states[j].others for j in heard.tolist()]
 
     def _agreed(self, others: Teammates, seen: Observations) -> bool:
         return bool((others.heard == seen.time).all())

@@ -18,8 +18,8 @@ from robocov.voronoi.delaunay import Mesh
 from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
 
 Information: TypeAlias = Literal["own", "shared map", "whole map"]
-"""Information class of a law: what the robot itself senses and hears, maps that neighbours tell each other as
-well, or the whole map from the beginning."""
+"""Information class of a law: what the robot itself senses and hears; maps, and where they last heard others,
+that neighbours tell each other as well; or the whole map from the beginning."""
 
 
 @runtime_checkable

@@ -270,6 +270,33 @@ def test_who_stays_is_noticed() -> None:
     assert silent.robots.tolist() == [1, 4] and silent.heard.tolist() == [2.0] * 2
 
 
+def test_the_latest_report_of_a_robot_counts() -> None:
+    def known(*rows: tuple[int, float, float]) -> Teammates:
+        robots, x, heard = np.array(rows, dtype=float).reshape(-1, 3).T
+        at = np.column_stack([x, x])
+        return Teammates(robots.astype(np.intp), at, heard, np.ones(len(x)), heard, at)
+
+    mine = known((2, 0.2, 5.0), (3, 0.3, 1.0), (6, 0.6, 4.0))
+    # itself, older, later, then missed before, missed since, and just as old news
+    report = known((0, 9.0, 9.0), (2, 9.0, 4.0), (3, 0.33, 2.0), (4, 0.4, 3.0), (5, 9.0, 3.0), (6, 9.0, 4.0))
+    told = mine.joined(report, 0, {4: 2.5, 5: 3.5})
+    assert (told.robots.tolist(), told.at[:, 0].tolist()) == ([2, 3, 4, 6], [0.2, 0.33, 0.4, 0.6])
+    assert told.heard.tolist() == [5.0, 2.0, 3.0, 4.0]
+    # who was never near cannot be missed for its silence
+    assert told.away.tolist() == [1.0, math.inf, math.inf, 1.0]
+
+
+@pytest.mark.parametrize(("kind", "whom"), [(Atlas, [1]), (AtlasShared, [1, 2])])
+def test_a_robot_in_the_middle_tells_where_the_others_are(kind: type[Atlas], whom: list[int]) -> None:
+    hall = Environment("hall", ((0.0, 0.0), (20.0, 0.0), (20.0, 3.0), (0.0, 3.0)))
+    team = Team.homogeneous(3, communication_range=5.0)
+    some = Simulation(hall, kind(), [[6.5, 1.5], [10.0, 1.5], [13.5, 1.5]], team)
+    while some.time < 2.5:
+        some.step()
+    state = some.memory.states[0]
+    assert state.others.robots.tolist() == whom and state.met == {*whom}
+
+
 @pytest.mark.slow
 def test_who_is_out_of_range_is_presumed_at_its_place_and_who_falls_silent_in_range_is_forgotten() -> None:
     team = Team.homogeneous(2, communication_range=5.0)

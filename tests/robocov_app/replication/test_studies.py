@@ -9,8 +9,9 @@ from robocov.controllers import CONTROLLERS, gain_values, gains_of, make_control
 from robocov.environment import CircleObstacle, DiscStart, Environment, PolygonObstacle
 from robocov.errors import StartError
 from robocov.mapfile import bundled_maps, load_map
+from robocov_app.figures.statistics import share
 from robocov_app.replication import studies
-from robocov_app.replication.claims import LEAST_MAPS
+from robocov_app.replication.claims import ALPHA, LEAST_MAPS, NEARLY_ALWAYS, REGISTERED
 from robocov_app.replication.contenders import (
     GRIDS,
     LLOYD,
@@ -119,6 +120,16 @@ class TestMaps:
         assert len(studies.claim_maps(plan)) >= LEAST_MAPS
         assert len(studies.convex_maps(plan)) >= LEAST_MAPS
 
+    def test_nearly_always_can_be_shown_on_the_maps_of_the_full_study(self):
+        for count in (len(FULL.bundled + FULL.generated), len(CONVEX) + len(FULL.convex_generated)):
+            lows, p_values = [], []
+            for others in range(6):
+                there = share(np.arange(count) >= others, range(count))
+                lows.append(there.low)
+                p_values.append(len(REGISTERED) * there.p_value(NEARLY_ALWAYS, np.inf))
+            assert [low >= NEARLY_ALWAYS for low in lows] == [True] * 5 + [False]
+            assert [p <= ALPHA for p in p_values] == [True] * 3 + [False] * 3
+
     @pytest.mark.slow
     def test_unseen_maps_are_of_other_families(self):
         unseen = {each.name: each.environment for each in studies.unseen_maps(FULL)}
@@ -138,10 +149,10 @@ class TestMaps:
 class TestPaper:
     @pytest.mark.slow
     def test_the_full_study_is_as_large_as_it_is_said_to_be(self):
-        assert len(studies.claim_maps(FULL)) == 33 and len(studies.convex_maps(FULL)) == 12
+        assert len(studies.claim_maps(FULL)) == len(studies.convex_maps(FULL)) == 100
         study = studies.claims_contest(FULL, PAPERS).study
         assert study.starts == KINDS
-        assert len(study) == 33 * 3 * 4 * 6
+        assert len(study) == 100 * 3 * 4 * 6
         assert len(studies.gains_study(FULL)) == 12 * 2 * (20 + 80)
 
     def test_every_law_moves_under_the_same_limits_from_the_same_places(self):
@@ -181,12 +192,22 @@ class TestPaper:
         assert found["figures-b"].starts == ("paper", "other")
         assert {len(study) for study in found.values()} == {2, 4}
 
+    def test_figures_4_to_8_are_run_at_the_best_gains_from_the_same_places(self):
+        shared, best = studies.figure_studies(TINY), studies.figure_studies(TINY, PAPERS)
+        assert list(best) == ["figures-a-best", "figures-b-best"]
+        for name, study in best.items():
+            tasks = list(tasks_of(study))
+            assert all(BEST[task.controller].items() <= task.gains.items() for task in tasks)
+            beside = tasks_of(shared[name.removesuffix("-best")])
+            places = [(task.document, task.start, task.seed, task.controller) for task in beside]
+            assert [(task.document, task.start, task.seed, task.controller) for task in tasks] == places
+
     def test_the_quick_study_is_a_small_part(self):
         size = len(studies.claims_contest(QUICK, PAPERS).study) + len(studies.gains_study(QUICK))
         assert size < 600
         beyond = [each.study for each in studies.beyond_contests(QUICK, {}, UNTUNED).values()]
         beyond += studies.conditions_studies(QUICK).values()
-        assert sum(study.duration * len(study) for study in beyond) < 4000.0
+        assert sum(study.duration * len(study) for study in beyond) < 4500.0
 
 
 def baseline_contests(plan):
@@ -217,7 +238,7 @@ class TestBeyond:
     def test_in_full_ours_is_run_as_often_as_rapf_and_baselines_on_every_map(self):
         assert FULL.beyond.own_seeds == FULL.seeds
         assert min(len(FULL.beyond.maps), len(FULL.beyond.conditions_maps)) >= LEAST_MAPS
-        assert len(studies.baseline_maps(FULL)) == len(studies.claim_maps(FULL)) == 33
+        assert len(studies.baseline_maps(FULL)) == 33
         for name, each in baseline_contests(FULL).items():
             seeds = len(FULL.seeds) if name == f"ours-{OURS[0]}" else 1
             assert len(each.study) == 33 * 3 * seeds * len(each.contenders)
@@ -241,14 +262,19 @@ class TestBeyond:
 
     def test_each_disturbance_stands_alone(self):
         found = {name: list(tasks_of(study)) for name, study in studies.conditions_studies(TINY).items()}
-        assert set(found) == {"conditions-ideal"} | {
-            f"conditions-{name.replace('_', '-')}" for name in studies.AXES
-        }
+        names = "ideal", *(name.replace("_", "-") for name in studies.AXES)
+        parts = "conditions", "conditions-others"
+        assert set(found) == {f"{part}-{name}" for part in parts for name in names}
+        for name in names:
+            assert {task.controller for part in parts for task in found[f"{part}-{name}"]} == set(CONTROLLERS)
         assert all(task.team["message_rate"] == 2.0 for tasks in found.values() for task in tasks)
         assert {task.team["communication_range"] for task in found["conditions-communication-range"]} == {4.0}
         assert {task.team["communication_range"] for task in found["conditions-loss"]} == {None}
         assert {task.team["loss"] for task in found["conditions-loss"]} == {0.6}
         assert "loss" not in found["conditions-failure-rate"][0].team
+        full = studies.conditions_studies(FULL)
+        assert len(full["conditions-loss"]) == 3 * 2 * 12 * 3 and full["conditions-others-loss"].seeds == (0,)
+        assert len(full["conditions-others-loss"]) == len(CONTROLLERS) * 12 - 2 * 12
         assert all(values[0] in (None, 0.0) for values in studies.AXES.values())
 
     @pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - {*PAPER, *OURS}))

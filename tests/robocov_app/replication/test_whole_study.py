@@ -186,6 +186,13 @@ class TestRuns:
         assert (other.start, same.start) == ("other", "paper")
         assert same.positions[0] == pytest.approx(paper.figures["a/rapf"].record.positions[0])
 
+    def test_figures_4_to_8_show_the_best_gains_as_well(self, paper):
+        best, of = paper.best_figures, {each.key: each for each in paper.contenders}
+        assert set(best) == {f"{case}/{law}" for case in ("a", "b", "other") for law in ("rapf", "rpf")}
+        for name, run in best.items():
+            assert dict(run.record.gains) == of[f"{name.partition('/')[2]}-best"].all_gains
+            assert run.record.positions[0] == pytest.approx(paper.figures[name].record.positions[0])
+
     def test_a_task_of_two_studies_is_done_once(self, tmp_path):
         common = {
             "maps": studies.generated_maps(TINY.beyond.maps),
@@ -239,10 +246,13 @@ class TestBeyond:
             assert (seconds > metres).all() and (seconds < 4.0 * metres + 1e-9).all()
 
     def test_degradations_have_every_value_of_every_axis(self, beyond):
-        axes = studies.axes_of_disturbances(TINY).items()
-        wanted = {(axis, value) for axis, values in axes for value in values}
-        assert {(each.axis, each.value) for each in beyond.degradations} == wanted
-        assert all(each.ratio.estimate == 1.0 for each in beyond.degradations if each.value in (None, 0.0))
+        axes = studies.disturbed(TINY)["conditions"][2].items()
+        wanted = {("ideal", None)} | {(axis, value) for axis, values in axes for value in values}
+        for name in CONTROLLERS:
+            own = [each for each in beyond.degradations if each.controller == name]
+            assert {(each.axis, each.value) for each in own} == wanted and len(own) == len(wanted)
+            best = [each for each in own if each.value in (None, 0.0) and each.axis != "ideal"]
+            assert all(each.ratio.estimate == 1.0 for each in best)
 
     def test_all_figures_are_drawn(self, beyond):
         drawn = beyond_plots(beyond, "dark")
@@ -302,11 +312,11 @@ class TestStopping:
         said, told = process.communicate(timeout=60)
         assert process.returncode == 130
         first = told.splitlines()[0]
-        assert first.startswith("paper (quick): 108 runs, about ")
+        assert first.startswith("paper (quick): 114 runs, about ")
         assert "on 2 processes (measured: rapf 0." in first and "Ctrl-C keeps what is done" in first
         assert f"to go on: robocov paper --out {out} --quick --without-beyond" in said
         kept = finished_runs(out)
-        assert 12 <= kept < 108
+        assert 12 <= kept < 114
 
         process = begun("--out", str(out), "--workers", "2")
         wait_for_runs(out, kept + 12, process)
@@ -317,7 +327,7 @@ class TestStopping:
         said, told = process.communicate(timeout=120)
         assert process.returncode == 0, told
         answer = json.loads(said)
-        assert (answer["runs"], answer["failed"], answer["interrupted"]) == (108, 0, False)
+        assert (answer["runs"], answer["failed"], answer["interrupted"]) == (114, 0, False)
         assert (out / "claims.json").read_bytes() == (folder / "claims.json").read_bytes()
         assert (out / "index.html").read_text(encoding="utf-8") == content
         for name in ("gains", "convex", "claims"):
@@ -352,6 +362,8 @@ class TestTables:
             assert (
                 row.medians["final"] < row.medians["over_run"] and 0.0 < row.medians["path"] < TINY.duration
             )
+            work = paper.claims.of(row.contender.key, "work")
+            assert row.medians["work"] == np.median(work) and work.min() > 0.0
             assert row.settling <= TINY.duration or (row.settling == np.inf and row.settled <= 0.5)
 
     def test_a_row_for_each_map_in_the_order_of_the_laws(self, paper, content):
@@ -446,7 +458,7 @@ class TestPages:
 
     def test_every_picture_is_there_and_said_in_words(self, folder, content):
         images = _Tags(content).of("img")
-        assert len(images) == 13
+        assert len(images) == 18
         for image in images:
             assert (folder / str(image["src"])).is_file()
             assert len(str(image["alt"])) > 20
@@ -455,9 +467,17 @@ class TestPages:
             target = str(link.get("href") or link.get("srcset"))
             if not target.startswith("#"):
                 assert (folder / target).is_file(), target
-        for number in range(1, 9):
+        for name in (*(f"figure-{k}" for k in range(1, 9)), *(f"figure-{k}-best" for k in range(4, 9))):
             for suffix in ("png", "svg", "pdf"):
-                assert (folder / "figures" / f"figure-{number}.{suffix}").stat().st_size > 1000
+                assert (folder / "figures" / f"{name}.{suffix}").stat().st_size > 1000
+
+    def test_what_the_best_gains_reached_stands_beside_what_the_shared_ones_did(self, content, paper):
+        for number, case in ((4, "a"), (6, "b"), (8, "other")):
+            part = content.partition(f'id="figure-{number}"')[2].partition("</section>")[0]
+            for runs in (paper.figures, paper.best_figures):
+                finals = [runs[f"{case}/{law}"].history.mean_distance[-1] for law in ("rapf", "rpf")]
+                assert "{:.3f} m, RPF with {:.3f} m".format(*finals) in plain(part)
+            assert part.count("<img") == 2
 
     def test_the_protocol_tells_all_that_is_needed_to_do_it_again(self, content, paper):
         said = plain(content)
@@ -494,6 +514,27 @@ class TestPages:
         quick = replace(beyond, plan=replace(TINY, beyond=replace(TINY.beyond, tuning=())))
         said = plain(pages.beyond_page({}, quick))
         assert "default gains: those that the full study" in said and "120 s on 4 generated maps" in said
+
+    def test_energy_has_its_unit(self, more, beyond):
+        for row in ranked_rows(beyond):
+            assert amount(row.medians["work"], "J") in plain(more)
+        assert "in joules" in more and "before any limit" in more
+
+    def test_every_controller_has_a_row_of_what_it_bears(self, more, beyond):
+        table = more.partition('class="evidence heat"')[2].partition("</table>")[0]
+        known = {(each.controller, each.axis, each.value): each for each in beyond.degradations}
+        assert table.count('<th scope="row">') == len(CONTROLLERS)
+        for name in CONTROLLERS:
+            row = table.partition(f'href="#controller-{name}"')[2].partition("</tr>")[0]
+            at = ("ideal", None), *((axis, values[2]) for axis, values in studies.AXES.items())
+            cells = [f"{known[name, *each].ratio.estimate:.2f}" for each in at]
+            assert re.findall(r"<td.*?>(.*?)</td>", row) == [*cells, "1"]
+        many = replace(TINY.beyond, conditions_maps=tuple("abcdefghijkl"))
+        told = pages.beyond_page({}, replace(beyond, plan=replace(TINY, beyond=many)))
+        assert (
+            "<small>"
+            in told.partition('class="evidence heat"')[2].partition("<tbody>")[2].partition("</table>")[0]
+        )
 
     def test_it_says_what_ours_reached_on_maps_of_other_families(self, more, beyond):
         assert {scenario.map for scenario in beyond.unseen.scenarios} == {
