@@ -2,10 +2,10 @@
 
 COMMANDS = {  # module, and one line
     "demo": ("demo", "open the interactive window: watch, touch, compare, go back in time"),
-    "run": ("run", "do one run without a window; save record, cost, pictures and film in a folder"),
+    "run": ("run", "do one run without a window; save numbers, pictures and film in a folder"),
     "compare": ("compare", "run several controllers from the same starts, side by side"),
     "sweep": ("sweep", "do many runs in parallel from a study file; resumable; one table of all"),
-    "replay": ("replay", "show a saved run or comparison again: in the window, or as frames and a film"),
+    "replay": ("replay", "show a saved run or comparison again: in the window, or as a film"),
     "report": ("report", "make one HTML page of runs, comparisons and sweeps, with a replay; no network"),
     "metrics": ("metrics", "measure saved runs: area in sight, energy, path length, connectivity, clearance"),
     "paper": ("paper", "make the paper's figures again, and test its claims over many maps"),
