@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from html.parser import HTMLParser
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,6 +16,8 @@ from robocov.controllers import CONTROLLERS
 from robocov_app.cli import COMMANDS, main
 from robocov_app.commands.handbook import sources
 
+ROOT = Path(__file__).parents[1]
+ROOTS = ROOT / "app/robocov_app", ROOT / "coverage/robocov"
 PAGES = {page.name: page.read_text() for page in sources().glob("*.md")}
 WITH_SPHINX = all(find_spec(name) for name in ("sphinx", "furo", "myst_parser"))
 
@@ -41,6 +44,19 @@ def test_every_page_is_in_the_contents_once() -> None:
         r"^([\w-]+)$", "\n".join(re.findall(r"```{toctree}(.*?)```", PAGES["index.md"], re.S)), re.M
     )
     assert sorted(f"{name}.md" for name in listed) == sorted(PAGES.keys() - {"index.md"})
+
+
+def test_every_public_name_is_in_use_on_a_page() -> None:
+    used = set(re.findall(r"\brc\.(\w+)", PAGES["names-in-use.md"]))
+    assert used == {*rc.__all__}
+
+
+def test_every_extra_and_every_environment_variable_is_explained() -> None:
+    source = "".join(path.read_text() for root in ROOTS for path in root.rglob("*.py"))
+    for variable in re.findall(r'"(ROBOCOV_[A-Z]+)"', source):
+        assert f"`{variable}`" in PAGES["install.md"]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert not [name for name in extras.keys() - {"all", "test"} if f"`{name}`" not in PAGES["install.md"]]
 
 
 def test_without_sphinx_it_says_what_to_install(

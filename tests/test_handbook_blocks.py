@@ -19,7 +19,7 @@ from robocov_app.commands.handbook import sources
 from robocov_app.terminal.arguments import parsed
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted(sources().glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / ".readme/package.md", *sorted(sources().glob("*.md"))]
 
 _SHOWN = {"demo", "edit", "handbook"}  # they open windows: their words are parsed
 _SHORTER = {
@@ -57,7 +57,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_the_blocks_of_a_page_run_one_after_the_other(page: Path, folder: Path) -> None:
     text = page.read_text()
-    if "first-run" in text and page.stem not in ("README", "first-run"):
+    if "first-run" in text and page.stem not in ("README", "package", "first-run"):
         assert main(["run", "rooms", "--duration", "25", "--no-pictures", "--out", "first-run"]) == 0
     if page.stem == "python":
         (folder / "study.toml").write_text('maps = ["square"]\ncontrollers = ["rapf"]\nduration = 0.5\n')

@@ -63,7 +63,8 @@ def test_the_readme_is_one_screen() -> None:
 def test_pictures_and_pages_that_it_links_to_are_there(page: Path) -> None:
     names = re.findall(r'(?:src|srcset)="([^"]+)"|\]\(([\w./-]+)\)', page.read_text())
     for name in ("".join(pair) for pair in names):
-        assert (page.parent / name).is_file(), name
+        made = name.startswith("reference/")  # when the pages are built, with a test of their links
+        assert made or (page.parent / name).is_file(), name
 
 
 def test_a_map_may_begin_with_its_schema(tmp_path: Path) -> None:

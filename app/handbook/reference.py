@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import io
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sphinx.pycode import ModuleAnalyzer
+
 import robocov as rc
 from robocov.controllers import controller_kinds, gains_of, information_of
+from robocov.controllers.base import Law
 from robocov.controllers.gains import Option, value_text
 from robocov.mapfile import map_schema
 from robocov.metrics.run_metrics import COLUMNS
 from robocov_app.cli import COMMANDS, main
+from robocov_app.sweep import table
+from robocov_app.sweep.study_file import _STUDY, _Table
 from robocov_app.viewer.session.file import session_schema
 
 if TYPE_CHECKING:
@@ -23,6 +29,7 @@ if TYPE_CHECKING:
 def setup(app: Sphinx) -> dict[str, Any]:
     """Write the pages before Sphinx looks for sources."""
     app.connect("builder-inited", write)
+    app.connect("autodoc-process-signature", gains_as_signature)
     return {"parallel_read_safe": True}
 
 
@@ -33,6 +40,12 @@ def write(app: Sphinx) -> None:
     for page in (commands, gains, formats, metrics):
         (folder / f"{page.__name__}.md").write_text(page(), encoding="utf-8")
     (folder / "names.rst").write_text(names(), encoding="utf-8")
+
+
+def gains_as_signature(*event: Any) -> tuple[str, None] | None:
+    """Return the gains of a control law in the place of what its ``__new__`` takes."""
+    _, what, _, value = event[:4]
+    return (str(inspect.signature(value)), None) if what == "class" and issubclass(value, Law) else None
 
 
 def commands() -> str:
@@ -49,38 +62,55 @@ def commands() -> str:
 
 def gains() -> str:
     """Return a table of gains for every controller."""
-    text = "# Controllers and their gains\n"
+    text = "# Controllers and their gains\n\n`--set GAIN=VALUE` sets a gain in every command, "
+    text += (
+        "`rc.Rapf(k_rep=1.0)` in Python. [Control laws](../controllers.md) says where each law comes from.\n"
+    )
     for name, kind in controller_kinds().items():
-        text += f"\n## {name}\n\n{kind.summary}. Goes by: {information_of(kind)}.\n".replace("..", ".")
+        summary = f"{kind.summary[0].upper()}{kind.summary[1:].rstrip('.')}."
+        text += f"\n## {name}\n\n{summary} Information that it uses: {information_of(kind)}.\n"
         rows = gains_of(kind).values()
-        text += "\n| gain | default | unit | range | |\n|---|---|---|---|---|\n" if rows else ""
+        text += "\n| gain | meaning | default | unit | range |\n|---|---|---|---|---|\n" if rows else ""
         for gain in rows:
             if isinstance(gain, Option):
                 span = ", ".join(gain.words)
             else:
                 span = f"{gain.low:g} to {gain.high:g}{', or null' * gain.optional}"
             default = value_text(gain.default, none="null")
-            text += f"| `{gain.name}` | {default} | {gain.unit} | {span} | {_cell(gain.meaning)} |\n"
+            text += f"| `{gain.name}` | {_cell(gain.meaning)} | {default} | {gain.unit} | {span} |\n"
     return text
 
 
 def formats() -> str:
-    """Return the fields of map and session files by their schemas."""
-    text = "# File formats\n\nAs `robocov schema map` and `robocov schema session` give them to editors.\n"
+    """Return the fields of map and session files by their schemas, and the keys of study files."""
+    text = (
+        "# File formats\n\nMaps and sessions are JSON, studies TOML; [the folder of a run](../results.md) is "
+    )
+    text += "described by itself. `robocov schema map` and `robocov schema session` print the schemas.\n"
     for title, schema in (("Maps", map_schema()), ("Sessions", session_schema())):
         text += f"\n## {title}\n"
         parts = {str(schema.get("title", title)): schema, **schema.get("$defs", {})}
         for name, part in parts.items():
             if not part.get("properties"):
                 continue
-            text += f"\n### {title}: {name}\n\n{_prose(part.get('description', ''))}\n\n"
-            text += "| field | type | default | |\n|---|---|---|---|\n"
+            text += f"\n### {name}\n\n{_prose(part.get('description', ''))}\n\n"
+            text += "| field | meaning | type | default |\n|---|---|---|---|\n"
             needed = part.get("required", [])
             for field, of in part["properties"].items():
                 default = "required" if field in needed else f"`{_cell(json.dumps(of.get('default')))}`"
                 said = _cell(of.get("description", ""))
-                text += f"| `{field}` | {_cell(_type(of))} | {default} | {said} |\n"
-    return text
+                text += f"| `{field}` | {said} | {_cell(_type(of))} | {default} |\n"
+    text += "\n## Studies\n\n[A sweep](../sweeps.md) reads these keys.\n\n| key | value |\n|---|---|\n"
+    return text + "".join(f"| `{key}` | {_cell(wanted)} |\n" for key, wanted in _keys(_STUDY))
+
+
+def _keys(within: Any, above: str = "") -> list[tuple[str, str]]:
+    found = []
+    for key, of in within.keys.items():
+        name = f"{above}{key.replace('*', 'NAME')}"
+        found += [(name, of.wanted.rstrip(",") + ", required" * (key in within.required))]
+        found += _keys(of, f"{name}.") if isinstance(of, _Table) else []
+    return found
 
 
 def _type(of: dict[str, Any]) -> str:
@@ -97,10 +127,17 @@ def _type(of: dict[str, Any]) -> str:
 
 
 def metrics() -> str:
-    """Return the columns of ``metrics.csv`` and the attributes they come from."""
-    text = "# Metrics\n\nThe columns of `metrics.csv`, written by `robocov metrics`; [RunMetrics](names.rst) "
-    text += "explains each.\n\n| column | attribute of `rc.RunMetrics` |\n|---|---|\n"
-    return text + "".join(f"| `{column}` | `{name}` |\n" for name, column in COLUMNS.items())
+    """Return the columns of ``metrics.csv`` and of the table of a sweep."""
+    told = ModuleAnalyzer.for_module("robocov.metrics.run_metrics").find_attr_docs()
+    text = "# Metrics\n\n## Along a run\n\nThe columns of `metrics.csv`, which `robocov metrics` writes; in "
+    text += "Python the attributes of [RunMetrics](names.rst).\n\n| column | meaning | attribute |\n"
+    text += "|---|---|---|\n"
+    for name, column in COLUMNS.items():
+        text += f"| `{column}` | {_cell(' '.join(told['RunMetrics', name]))} | `{name}` |\n"
+    text += "\n## Of a whole run\n\nThe columns of a sweep's `results.csv`, after what was run; most stand "
+    text += "in `summary` of each `run.json`, too.\n\n| column | unit | meaning |\n|---|---|---|\n"
+    columns = (*table._FIGURES, table._TIME, *table._METRICS)
+    return text + "".join(f"| `{each.name}` | {each.unit} | {_cell(each.meaning)} |\n" for each in columns)
 
 
 def names() -> str:

@@ -14,6 +14,7 @@ Names are loaded on first use: importing the package costs next to nothing.
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
 
 # fmt: off
@@ -104,7 +105,10 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
-        raise AttributeError(f"module 'robocov' has no attribute {name!r}")
+        # with the object, of which Python finds the nearest name
+        raise AttributeError(
+            f"module 'robocov' has no attribute {name!r}", name=name, obj=sys.modules[__name__]
+        )
     value = getattr(importlib.import_module(f"robocov.{_HOME[name]}"), name)
     if name == "CONTROLLERS":  # with those of installed packages
         value = importlib.import_module("robocov.controllers").controller_kinds()

@@ -307,7 +307,7 @@ class Start:
         """
         for name, value, least in (("robots", n, 1), ("seed", seed, 0)):
             if not is_number(value, Integral) or value < least:
-                raise self._error(f"{name}: {value!r}, but a whole number was wanted")
+                raise self._error(f"{name}: {value!r}, but a whole number from {least} was wanted")
         if not 0.0 < radius < math.inf:
             raise self._error(f"radius: {radius!r} m, but a number above 0 was wanted")
         if isinstance(self.spec, PointsStart):

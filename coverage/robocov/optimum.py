@@ -15,8 +15,8 @@ from numbers import Integral
 from typing import Any
 
 import numpy as np
+import scipy
 import shapely
-from scipy.optimize import LbfgsInvHessProduct
 from scipy.spatial import cKDTree
 from shapely import MultiPolygon
 from shapely.geometry.base import BaseGeometry
@@ -340,5 +340,5 @@ def _direction(slope: Array, scale: Array, learnt: deque[tuple[Array, Array]]) -
     # in coordinates in which the curvature is about 1, from which scipy's recursion begins
     scale = np.broadcast_to(scale, slope.shape).ravel()
     root = np.sqrt(scale * (bend[-1] @ (bend[-1] / scale) / (step[-1] @ bend[-1])))
-    way = LbfgsInvHessProduct(step * root, bend / root) @ (slope.ravel() / root)
+    way = scipy.optimize.LbfgsInvHessProduct(step * root, bend / root) @ (slope.ravel() / root)
     return np.asarray(-(way / root).reshape(slope.shape))

@@ -128,7 +128,7 @@ class Simulation:
         check_dt(dt)
         controller = for_team(controller)
         if isinstance(controller, type) or not isinstance(controller, Controller):
-            wanted = "a controller, as in Rapf(), was wanted"
+            wanted = "a controller, as in Rapf(), with a method decide or force, was wanted"
             raise ParameterError(f"controller: {shown(controller)}, but {wanted}")
         if velocities is not None:
             velocities = numeric("velocities", velocities, "[x, y] of each robot in m/s", StartError)

@@ -79,6 +79,7 @@ def test_keys_of_any_length_leave_messages_readable() -> None:
 
 ROOMS = rc.load_map("rooms")
 ONE = [[1.0, 1.0]]
+STILL = rc.Simulation(ROOMS, rc.Rapf(), ONE).run(0.0)
 
 
 @pytest.mark.parametrize(
@@ -97,8 +98,13 @@ ONE = [[1.0, 1.0]]
         (lambda: rc.Team.homogeneous("a"), "robots: 'a', but a whole number of at least 1 was wanted"),
         (lambda: rc.Team.homogeneous(2, mass="a"), "team.mass: 'a', but a number was wanted"),
         (lambda: rc.load_map(3), "map: 3, but a path, or the name of a bundled map, was wanted"),
+        (lambda: rc.Simulation(ROOMS, rc.Rapf, ONE), "controller: <class 'robocov.controllers.rep"),
+        (lambda: rc.make_controller(3), "controller: 3, but a name, as in 'rapf' or 'mine.py:MyController'"),
+        (lambda: rc.cost_history("run", rc.CoverageCost(ROOMS, 4)), "record: 'run', but a Record, as "),
+        (lambda: rc.cost_history(STILL, ROOMS), "cost: <Environment Rooms, 12 x 9 m"),
+        (lambda: ROOMS.start().sample(0), "start 'corridor': robots: 0, but a whole number from 1"),
     ],
-    ids=range(13),
+    ids=range(18),
 )  # fmt: skip
 def test_mistakes_in_python_are_told_as_those_in_files(call: Callable[[], object], told: str) -> None:
     with pytest.raises(InputError) as caught:
@@ -111,6 +117,21 @@ def test_a_package_whose_controller_cannot_be_loaded_is_told(monkeypatch: pytest
     monkeypatch.setattr("robocov.controllers.entry_points", lambda group: [broken])
     with pytest.warns(UserWarning, match="controller 'theirs' of entry point"):
         assert "theirs" not in controller_kinds()
+
+
+def test_a_package_that_takes_the_name_of_a_built_in_controller_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    theirs = EntryPoint("rapf", "robocov.controllers.lloyd:Lloyd", "robocov.controllers")
+    monkeypatch.setattr("robocov.controllers.entry_points", lambda group: [theirs])
+    with pytest.warns(UserWarning, match="'rapf' of entry point .* the name is that of a built-in one"):
+        assert controller_kinds()["rapf"] is rc.Rapf
+
+
+def test_the_nearest_name_of_the_package_is_known_to_python() -> None:
+    with pytest.raises(AttributeError) as caught:
+        rc.Rpaf  # type: ignore[attr-defined]
+    assert caught.value.name == "Rpaf" and "Rapf" in dir(caught.value.obj)
 
 
 def test_controllers_of_packages_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -238,7 +238,7 @@ def test_a_decision_must_be_one(empty: Environment) -> None:
     with pytest.raises(ParameterError, match=r"'wild': KeyError: 'late' \(test_simulation.py, line \d+\)"):
         Simulation(empty, Late(np.zeros((2, 2))), starts)
     for wrong in (Rapf, "rapf"):
-        with pytest.raises(ParameterError, match=r"but a controller, as in Rapf\(\), was wanted"):
+        with pytest.raises(ParameterError, match=r"but a controller, as in Rapf\(\), with a method"):
             Simulation(empty, wrong, starts)  # type: ignore[arg-type]
     simulation = Simulation(empty, Wild([[0, 0], [0, 0]]), starts)  # type: ignore[arg-type]
     simulation.step()

@@ -20,8 +20,6 @@ HALL = Environment(
     "A hall", ((0.0, 0.0), (8.0, 0.0), (8.0, 3.0), (0.0, 3.0)), (), {"door": DiscStart((1, 1), 0.6)}
 )
 
-TABLES = ("results.csv", "results.parquet")
-
 HEAD = """
 import os, signal, time
 from dataclasses import dataclass
@@ -58,7 +56,7 @@ def controller(folder: Path, law: str, name: str = "mine.py") -> str:
 
 
 def tables(folder: Path) -> list[bytes]:
-    return [(folder / name).read_bytes() for name in TABLES]
+    return [path.read_bytes() for path in sorted(folder.glob("results.*"))]
 
 
 def run_folders(folder: Path) -> list[str]:

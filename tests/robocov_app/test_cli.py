@@ -1,4 +1,5 @@
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,10 @@ def test_every_command_explains_itself_with_an_example(name: str, capsys: pytest
     out = capsys.readouterr().out
     assert f"usage: robocov {name}" in out
     assert f"Example: robocov {name}" in out
+    assert not re.findall(r"None|\d\.\d{6}", out), "no value that somebody would type"
+    positional = out.partition("positional arguments")[2].partition("╰")[0]
+    needed = re.findall(r"^│ \w[^│]*│(?:\n│  [^│]*│)*", positional, re.M)
+    assert not any("(default:" in each for each in needed), "what may be left out stands in brackets"
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

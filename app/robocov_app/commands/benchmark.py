@@ -37,7 +37,7 @@ class Arguments(JsonOption):
 
     action: Annotated[
         tyro.conf.Positional[Literal["run", "suite", "verify", "page", "references"]],
-        tyro.conf.arg(metavar="ACTION"),
+        tyro.conf.arg(metavar="[ACTION]"),
     ] = "run"
     """run, suite, verify, page or references."""
     paths: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="[DIR ...]")] = ()

@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+import tyro
 
 from robocov.errors import ParameterError
 from robocov_app.runs.options import RunOptions
@@ -33,7 +36,7 @@ class Arguments(RunOptions):
     Example: robocov compare office --controllers rapf rpf lloyd --video --out office
     """
 
-    controllers: tuple[str, ...] = ("rapf", "rpf", "lloyd")
+    controllers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("rapf", "rpf", "lloyd")
     """Controllers by name, or mine.py:MyController."""
 
 

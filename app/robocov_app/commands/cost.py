@@ -30,8 +30,7 @@ class Arguments(PlotOptions):
     positions: Annotated[Path, tyro.conf.arg(metavar="FILE")]
     """JSON file with a list of [x, y] in metres, one for each robot."""
     speeds: tuple[float, ...] = ()
-    """How fast each robot goes in m/s, in the order of the positions; one number stands for all. Then the one
-    counts that is first at a place, and the cost is in seconds as well."""
+    """Speed of each robot in m/s, or one for all: who is first at a place counts; cost also in seconds."""
     lattice: int = 128
     """Evaluate on N x N sites over the map."""
     sites: Annotated[Path | None, tyro.conf.arg(metavar="FILE.npz")] = None

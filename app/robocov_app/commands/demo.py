@@ -33,7 +33,7 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
     Example: robocov demo museum --controllers rapf rpf lloyd --robots 8
     """
 
-    controllers: tuple[str, ...] = ("rapf",)
+    controllers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("rapf",)
     """Up to four, side by side: names, or mine.py:MyController."""
     gains: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="GAIN=VALUE ...")] = ()
     """Gains of the first controller, as in --set k_rep=0.3."""

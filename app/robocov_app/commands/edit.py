@@ -21,8 +21,7 @@ class Arguments(WindowOptions):
     """
 
     map: Annotated[tyro.conf.Positional[str | None], tyro.conf.arg(metavar="[MAP]")] = None
-    """A map JSON, which need not be there yet; the name of a bundled map, of which a copy is opened; or a
-    file of a foreign format, which is imported as you choose. Without it an empty sheet."""
+    """A map JSON, new or not, a bundled map, of which a copy is opened, or a foreign file to import."""
     background: Path | None = None
     """A picture to put under the map, such as a scanned floor plan."""
     screenshot: Path | None = None

@@ -13,19 +13,21 @@ import tyro
 
 from robocov.errors import InputError, OutputError, RobocovError
 
+_BROUGHT = Path(__file__).parents[1] / "pages"  # those that a wheel brings
+
 
 @dataclass
 class Arguments:
     """Open the handbook in a browser: tutorials, guides, and a reference of every command and name.
 
-    It is built at first use, and again after the program has changed (pip install "robocov[docs]"), and
-    kept in the user's cache; reading and searching it needs no network.
+    Installed packages bring it. In a checkout it is built at first use, and again after the program has
+    changed (pip install "robocov[docs]"), and kept in the user's cache. Searching it needs no network.
 
     Example: robocov handbook --out site
     """
 
     out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    """Build it into this new folder, as static pages for any host, instead of opening it."""
+    """Put it into this new folder, as static pages for any host, instead of opening it."""
 
 
 def command(options: Arguments) -> None:
@@ -35,6 +37,13 @@ def command(options: Arguments) -> None:
         return
     import webbrowser
 
+    index = (_BROUGHT if _BROUGHT.is_dir() else _kept()) / "index.html"
+    print(index)
+    webbrowser.open(index.as_uri())
+
+
+def _kept() -> Path:
+    """Return the pages in the user's cache, which are built where they are not those of this program."""
     import robocov
     from robocov.files.array_files import ArrayCache
 
@@ -45,14 +54,12 @@ def command(options: Arguments) -> None:
     files = sorted(file for root in roots for file in root.rglob("*") if file.suffix in (".py", ".md"))
     written = [file for file in files if sources() / "reference" not in file.parents]
     pages = home / ArrayCache.key(*(f"{file} {file.stat().st_mtime_ns}" for file in written))
-    index = pages / "index.html"
-    if not index.is_file():
+    if not (pages / "index.html").is_file():
         if cache is not None:
             shutil.rmtree(home, ignore_errors=True)  # those of an earlier state
         print("building the handbook, once ...", file=sys.stderr)
         built(pages)
-    print(index)
-    webbrowser.open(index.as_uri())
+    return pages
 
 
 def sources() -> Path:
@@ -61,9 +68,12 @@ def sources() -> Path:
 
 
 def built(folder: Path) -> None:
-    """Build the pages into a new folder; InputError where it is none, RobocovError where Sphinx complains."""
+    """Put the pages into a new folder; InputError where it is none, RobocovError where Sphinx complains."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: exists already; a new or an empty folder was wanted")
+    if _BROUGHT.is_dir():
+        shutil.copytree(_BROUGHT, folder, dirs_exist_ok=True)
+        return
     needed = "sphinx", "furo", "myst_parser"
     if missing := [name for name in needed if importlib.util.find_spec(name) is None]:
         text = f"the pages can be read as text, too: {sources() / 'index.md'}"

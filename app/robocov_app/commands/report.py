@@ -29,8 +29,7 @@ class Arguments(JsonOption):
     """
 
     folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="DIR [DIR ...]")]
-    """Folders of runs, comparisons, sweeps or stories, or sessions of the window, story.robocov, whose
-    branches are all made again; several make a section each."""
+    """Folders of runs, comparisons and sweeps, and sessions of the window (all branches); a section each."""
     out: Path | None = None
     """The page; by default report.html in the (first) folder."""
     overwrite: bool = False
@@ -40,8 +39,7 @@ class Arguments(JsonOption):
     theme: Literal["auto", "light", "dark"] = "auto"
     """Colours; auto follows the reader's preference."""
     optimum: bool = False
-    """Search for the centralised reference of each map and team, some seconds each, and tell how far every
-    run stays above it; those that were found before are in the page anyway."""
+    """Search for the best placement on each map, some seconds each; those found before are used anyway."""
 
 
 def command(options: Arguments) -> None:

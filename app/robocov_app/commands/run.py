@@ -3,7 +3,9 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import tyro
 
 from robocov_app.runs.options import RunOptions
 from robocov_app.terminal.arguments import parsed_gains
@@ -13,22 +15,22 @@ from robocov_app.terminal.output import listed, tell
 
 @dataclass
 class Arguments(RunOptions):
-    """One headless run: a team under one controller, everything saved in a folder.
+    """Do one run without a window: a team under one controller, everything saved in a folder.
 
     The folder holds run.json and record.npz (all of the run), cost.csv, trajectories and cost as
     PNG and SVG, and on request frames and a film.
 
-    For MAP a session of the window may stand, story.robocov: it is made again, touch by touch.
+    MAP may also be a session that the window saved, story.robocov: it is done again, touch by touch.
 
     Example: robocov run rooms --controller rapf --set k_rep=0.3 --robots 8 --video --out eight
     """
 
-    controller: str = "rapf"
-    """A controller by name, or mine.py:MyController. Of a session: yours that it may run, as a.py:A,b.py:B"""
+    controller: Annotated[str, tyro.conf.arg(metavar="NAME")] = "rapf"
+    """A controller by name, or mine.py:MyController; for a session, those it may load: a.py:A,b.py:B."""
     branch: str | None = None
-    """Of a session, the story to make again: its name, or its number; by default the one it was saved in."""
+    """Branch of a session to do again, by name or number; by default the one it was saved in."""
     all_branches: bool = False
-    """Of a session, all stories, each in a folder of its own."""
+    """Do all branches of a session, each into a folder of its own."""
 
 
 def command(options: Arguments) -> int:

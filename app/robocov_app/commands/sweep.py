@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import tyro
 
 from robocov.errors import ParameterError, checked, counted
+from robocov.extras import extra
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
 from robocov_app.terminal.output import tell
@@ -18,7 +19,7 @@ FAILED = 1
 class Arguments(JsonOption):
     """Many runs in parallel: every combination of what a study file lists, each done once.
 
-    The folder holds results.csv and results.parquet, one row a run, and a folder of each run.
+    The folder holds results.csv, one row a run, and a folder of each run.
     Whatever ends a sweep, the same command goes on where it was. Runs whose files were damaged, and runs
     of other versions or of other code of your controllers, are done again. For the same map and seed every
     controller begins in the same places. The exit status is 1 when runs have failed.
@@ -37,6 +38,8 @@ class Arguments(JsonOption):
     """Processes on this machine; by default one a processor."""
     scheduler: str | None = None
     """Address of a Dask scheduler, as in tcp://host:8786, whose workers do the runs."""
+    parquet: bool = False
+    """Write the table as results.parquet too (pip install "robocov[parquet]")."""
     retry_failed: bool = False
     """Do runs again that have failed."""
     keep_versions: bool = False
@@ -52,6 +55,8 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> int:
+    if options.parquet:
+        extra("pyarrow", "parquet")
     from robocov_app.sweep.executors import Cluster, processors
     from robocov_app.sweep.study_file import read_study
     from robocov_app.sweep.sweeping import duration, rehearsed, sweep
@@ -77,7 +82,8 @@ def command(options: Arguments) -> int:
         tell(options, {"out": str(out), "workers": workers, **asdict(rehearsal)}, *lines)
         return 0
     where: dict[str, Any] = {"workers": options.workers, "scheduler": options.scheduler}
-    totals, runs = sweep(study, out, **where, **again, quiet=options.json), len(study)
+    how: dict[str, Any] = {**where, **again, "parquet": options.parquet, "quiet": options.json}
+    totals, runs = sweep(study, out, **how), len(study)
     lines = [f"{totals.done} runs done" + f", {totals.reused} were there already" * bool(totals.reused)]
     if totals.failed:
         lines += [f"{totals.failed} of {runs} runs failed:"]
@@ -92,6 +98,7 @@ def command(options: Arguments) -> int:
         if not totals.table_replaced:
             lines += ["the table stays as it was: it is replaced when all runs are done"]
     else:
-        lines += [f"the table is {out / 'results.csv'}, and as Parquet {out / 'results.parquet'}"]
+        parquet = out / "results.parquet"
+        lines += [f"the table is {out / 'results.csv'}" + f", and as Parquet {parquet}" * parquet.exists()]
     tell(options, {"out": str(out), "runs": runs, **asdict(totals)}, *lines)
     return INTERRUPTED if totals.interrupted else FAILED if totals.failed else 0

@@ -249,11 +249,10 @@ def matched_distance(first: Array, second: Array) -> float:
 
 def _rows(folder: Path, scenarios: Iterable[Scenario]) -> Iterator[tuple[int, dict[str, Any]]]:
     place = {scenario: k for k, scenario in enumerate(scenarios)}
-    for batch in read_results(folder).batches():
-        for row in batch.to_pylist():
-            at = place.get(Scenario(row["map"], row["start"], row["seed"]))
-            if at is not None and row["error"] is None:
-                yield at, row
+    for row in read_results(folder).rows():
+        at = place.get(Scenario(row["map"], row["start"], row["seed"]))
+        if at is not None and row["error"] is None:
+            yield at, row
 
 
 def _law(controller: str, gains: Mapping[str, Any]) -> tuple[Any, ...]:

@@ -283,7 +283,7 @@ def run_figures(
 
 def _figure_runs(folder: Path) -> Iterator[tuple[dict[str, Any], FigureRun]]:
     results = read_results(folder)
-    for row in results.to_table().to_pylist():
+    for row in results.rows():
         if row["error"] is not None:
             raise InputError(f"{folder}: a run that a figure shows failed: {row['error']}")
         yield row, FigureRun(results.record(row["run"]), results.history(row["run"]))
@@ -403,7 +403,7 @@ def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
 def _finals(folder: Path, column: str = "", only: float | None = None) -> Finals:
     """Return the final costs of a sweep; without the column its value is `only`."""
     found: Finals = {}
-    for row in read_results(folder).to_table().to_pylist():
+    for row in read_results(folder).rows():
         if row["mean_distance_m"] is not None:
             group = found.setdefault((row["controller"], row.get(column, only)), {})
             group[row["map"], row["seed"]] = float(row["mean_distance_m"])

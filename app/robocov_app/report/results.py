@@ -285,7 +285,7 @@ def _of_sweep(folder: Path) -> Result:
     except Exception as error:
         raise InputError(f"{path}: the study cannot be read: {type(error).__name__}: {error}") from error
     swept = [name for name in UNITS if len({team.get(name) for team in teams}) > 1]
-    rows = results.to_table().to_pylist()
+    rows = list(results.rows())
     if not rows:
         raise InputError(f"{folder}: not one of the {wanted} runs of the sweep is done")
     entries = []
@@ -316,9 +316,8 @@ def _of_sweep(folder: Path) -> Result:
             if entry.error is None:
                 facts["versions"] = _json(entry.folder / "run.json").get("versions")
                 break
-    columns = {column.name: column.metadata or {} for column in results.dataset.schema}
-    meta = {name: columns.get(gain_column(name), {}) for own in gains.values() for name in own}
-    text = {name: [own.get(key, b"").decode() for key in (b"unit", b"meaning")] for name, own in meta.items()}
+    columns = {each["name"]: (each["unit"], each["meaning"]) for each in study.get("columns", ())}
+    text = {name: columns.get(gain_column(name), ("", "")) for own in gains.values() for name in own}
     maps = {printable(name): environment for name, environment in maps.items()}
     known = _known_gains(entries, text)
     return Result("sweep", folder, _labelled(entries), maps, wanted, *known, facts, {})
@@ -338,7 +337,9 @@ def _gains(gains: Mapping[str, Value]) -> Gains:
     return tuple((printable(name), value) for name, value in known)
 
 
-def _known_gains(entries: list[Entry], others: dict[str, list[str]]) -> tuple[dict[str, str], dict[str, str]]:
+def _known_gains(
+    entries: list[Entry], others: Mapping[str, tuple[str, str]]
+) -> tuple[dict[str, str], dict[str, str]]:
     """Return units and meanings of gains: of the built-in controllers, and what a table says of others."""
     kinds = dict.fromkeys(CONTROLLERS[each.controller] for each in entries if each.controller in CONTROLLERS)
     gains = {name: gain for kind in kinds for name, gain in gains_of(kind).items()}

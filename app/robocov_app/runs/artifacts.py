@@ -1,30 +1,31 @@
 """Artifacts of runs: a folder with numbers, pictures and a film of one, or of several side by side."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from robocov.compiled import compile_kernels
 from robocov.controllers import controller_kind, gains_of
 from robocov.cost import CoverageCost, MomentaryCost
 from robocov.errors import ParameterError, counted, unknown_name
 from robocov.files.result_folder import Kind, results
-from robocov_app.figures.coverage import Moment, plot_coverage
-from robocov_app.figures.curves import Curve
-from robocov_app.figures.files import save_figure
-from robocov_app.figures.runs import plot_comparison, plot_trajectories
-from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.runs.cost import built_cost, cost_for_pictures
-from robocov_app.runs.film import save_moving
 from robocov_app.runs.options import RunOptions
 from robocov_app.runs.run import Run, saved_run
 from robocov_app.runs.spec import RunSpec
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import finite, write_csv, write_json
 from robocov_app.terminal.progress import counting, progress
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from robocov_app.figures.coverage import Moment
+    from robocov_app.figures.curves import Curve
 
 _HEAD = {"format": "robocov-comparison", "version": 1}
 _FIGURES = (
@@ -53,7 +54,10 @@ def performed(
         else:
             save_pictures(list(runs.values()), cost, result.new, options)
         result.keep()
-        save_moving(list(runs.values()), cost, result.new, options.film, stop, quiet=options.json)
+        if options.film.video or options.film.frames:
+            from robocov_app.runs.film import save_moving
+
+            save_moving(list(runs.values()), cost, result.new, options.film, stop, quiet=options.json)
     return runs, stop.requested
 
 
@@ -111,6 +115,10 @@ def save_pictures(
     """Draw ``trajectories.png|svg`` and ``cost.png|svg`` of a run, or of a comparison, if wanted."""
     if options.no_pictures:
         return
+    from robocov_app.figures.coverage import plot_coverage
+    from robocov_app.figures.files import save_figure
+    from robocov_app.figures.runs import plot_comparison, plot_trajectories
+
     records, times = [run.record for run in runs], [run.final_time for run in runs]
     finals = [float(run.history.mean_distance[-1]) for run in runs]
     film = options.film
@@ -145,6 +153,9 @@ def save_pictures(
 
 def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
     """Return the last moments of runs on one map, but for robots that failed at other places, to be drawn."""
+    from robocov_app.figures.coverage import Moment
+    from robocov_app.render.distance_field import Field, FieldLattice
+
     drawn, moments = runs[0].record.environment, []
     cost = cost_for_pictures(drawn, cost)
     for run in runs:

@@ -205,8 +205,7 @@ class ScenarioOptions:
     radius: float = 0.1
     """Radius of a robot in metres."""
     team: Annotated[Path | None, tyro.conf.arg(metavar="TEAM.toml")] = None
-    """Robots that differ: a TOML or JSON file of groups, [[group]] with count, max_speed, radius, ...; it
-    says how many there are, and what a group leaves open is as the options say."""
+    """TOML or JSON file of a mixed team: [[group]] with count, max_speed, ...; options give the rest."""
     lattice: int = 128
     """The coverage cost is evaluated on a lattice of N x N sites over the map."""
     conditions: tyro.conf.OmitArgPrefixes[ConditionOptions] = field(default_factory=ConditionOptions)

@@ -1,7 +1,6 @@
 """Executors of a sweep's tasks: processes of this machine, or the workers of a Dask cluster."""
 
 import asyncio
-import importlib.util
 import logging
 import math
 import os
@@ -19,6 +18,7 @@ from contextlib import suppress
 from typing import Any, NamedTuple, Self, TypeAlias
 
 from robocov.errors import InputError, OutputError
+from robocov.extras import extra
 from robocov_app.sweep.study import Task
 from robocov_app.sweep.worker import Outcome, failed, perform
 from robocov_app.toolkit.worker import READY, asked, ended, receive, started
@@ -231,9 +231,7 @@ class Cluster(Executor):
 
     def __init__(self, address: str) -> None:
         super().__init__()
-        if importlib.util.find_spec("distributed") is None:
-            raise InputError('--scheduler: Dask is not installed; pip install "robocov[dask]" was wanted')
-        dask: Any = importlib.import_module("distributed")  # it has no types
+        dask = extra("distributed", "dask", "--scheduler: ")
         self._address, self._killed = address, dask.KilledWorker
         self._futures: set[Any] = set()
 

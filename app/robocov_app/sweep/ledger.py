@@ -20,7 +20,7 @@ from robocov_app.sweep.worker import FIGURES, Outcome, made_with
 from robocov_app.terminal.output import write_json
 
 RUNS = "runs"  # name of the folder of the runs' folders
-STUDY = "study.json"
+STUDY, CSV = "study.json", "results.csv"
 _ROW = "row.json"  # what the table holds of a run, in its folder
 _HEAD = {"format": "robocov-row", "version": 2}
 _LEFT_OVER = re.compile(
@@ -173,13 +173,28 @@ def opened(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
                 if _LEFT_OVER.fullmatch(part.name):
                     _remove(part)
             # first: it says that the folder is ours
-            if not (folder / "results.parquet").exists():
+            if not has_all_rows(folder):
                 write_json(folder / STUDY, study)
             (folder / RUNS).mkdir(exist_ok=True)
         except OSError as error:
             at = error.filename or folder
             raise OutputError(f"{at}: cannot be used for results: {error.strerror or error}") from error
         yield ledger
+
+
+def rows_in(folder: Path) -> int:
+    """Return the number of rows in the table of a sweep, 0 where there is none."""
+    with suppress(OSError), (folder / CSV).open("rb") as file:
+        return max(0, sum(1 for _ in file) - 1)
+    return 0
+
+
+def has_all_rows(folder: Path) -> bool:
+    """Return whether the table of a sweep has a row for each run of ``study.json``."""
+    try:
+        return rows_in(folder) >= int(json.loads(_content(folder / STUDY))["runs"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return False
 
 
 def is_sweep(folder: Path) -> bool:

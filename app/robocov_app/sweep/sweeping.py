@@ -152,6 +152,7 @@ def sweep(
     scheduler: str | None = None,
     retry_failed: bool = False,
     keep_versions: bool = False,
+    parquet: bool = False,
     quiet: bool = False,
     title: str = "sweep",
     stop: Interruption | None = None,
@@ -160,7 +161,8 @@ def sweep(
 
     Whatever ends it, the same call goes on where it was, and ends with the same table, byte for byte.
     `scheduler`: the address of a Dask scheduler whose workers do the runs, in place of `workers` processes
-    (one a processor). `keep_versions`: use runs of other versions, which are done again else. Raises
+    (one a processor). `keep_versions`: use runs of other versions, which are done again else. `parquet`:
+    write the table as ``results.parquet`` too, which needs ``robocov[parquet]``. Raises
     InputError when the folder holds something else, OutputError when workers end again and again or something
     cannot be written; what is done is kept.
     """
@@ -169,9 +171,10 @@ def sweep(
     folder = Path(folder)
     with ExitStack() as stack:
         stopped = stack.enter_context(Interruption()) if stop is None else stop
-        content = study.to_json()
+        columns = columns_of(study)
+        content = study.to_json() | {"columns": [column._asdict() for column in columns]}
         ledger = stack.enter_context(opened(folder, content))
-        table = stack.enter_context(Table(folder, columns_of(study), json_text(content).encode()))
+        table = stack.enter_context(Table(folder, columns, json_text(content).encode(), parquet=parquet))
         count = Count(len(study))
         tell = stack.enter_context(sweep_progress(title, count, quiet=quiet))
         looked = takewhile(lambda _: not stopped.requested, tasks_of(study))

@@ -1,4 +1,4 @@
-"""The table of a sweep: ``results.csv``, which grows in a first sweep, and ``results.parquet``."""
+"""The table of a sweep: ``results.csv``, which grows in a first sweep, and as Parquet ``results.parquet``."""
 
 from __future__ import annotations
 
@@ -8,20 +8,23 @@ import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from robocov.controllers import gains_of
 from robocov.controllers.gains import Option
 from robocov.errors import OutputError
+from robocov.extras import extra
 from robocov.files.atomic import on_disk, writable
-from robocov_app.sweep.ledger import STUDY, Entry
+from robocov.metrics.results import read_rows
+from robocov_app.sweep.ledger import CSV, STUDY, Entry, has_all_rows, rows_in
 from robocov_app.sweep.study import CONDITIONS, UNITS, WORDS, Study, Task, parameter_column
 from robocov_app.sweep.worker import FIGURES, TIMED
 
-CSV, PARQUET = "results.csv", "results.parquet"
+PARQUET = "results.parquet"
 _CSV_PART, _PARQUET_PART = ".results.part.csv", ".results.part.parquet"  # names while a table is written
-ROW_GROUP = 4096  # rows of a row group, and the most that are in memory
+ROW_GROUP = 4096  # rows of a row group of Parquet, and the most that are in memory
 
 
 class Column(NamedTuple):
@@ -97,42 +100,35 @@ def row_of(task: Task, entry: Entry) -> dict[str, Any]:
 class Table:
     """Writes the rows of a sweep in the order in which they come; a context.
 
-    Both files are written aside, and replace earlier ones, with ``study.json``, when the context ends well;
+    The files are written aside, and replace earlier ones, with ``study.json``, when the context ends well;
     if not `complete`, none with more rows. A first ``results.csv`` appears as soon as it is no shorter than
     what is there, and grows. `replaced`: whether the files are of these rows. No half of a row is ever left.
+    Parquet is written on request, and where a file of it is there already.
     """
 
-    def __init__(self, folder: Path, columns: Sequence[Column], study: bytes | None = None) -> None:
+    def __init__(
+        self, folder: Path, columns: Sequence[Column], study: bytes | None = None, *, parquet: bool = False
+    ) -> None:
         self.complete, self.replaced = True, False
+        self._names = (CSV, *[PARQUET] * (parquet or (folder / PARQUET).exists()))
         self._folder, self._columns, self._study = folder, columns, study
         self._broken: OutputError | None = None
-        self._rows: list[dict[str, Any]] = []
         self._size, self._count = 0, -1  # the header is no row
 
     def __enter__(self) -> Table:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        for name in (CSV, PARQUET):
+        for name in self._names:
             writable(self._folder / name)
-        self._former = 0  # rows of an earlier table, which only one that grows replaces before the end
-        with suppress(OSError), (self._folder / CSV).open("rb") as file:
-            self._former = max(0, sum(1 for _ in file) - 1)
-        self._shown_from = math.inf if (self._folder / PARQUET).exists() else self._former
-        fields = (
-            pa.field(name, kind, metadata={"unit": unit, "meaning": meaning})
-            for name, kind, unit, meaning in self._columns
-        )
-        self._schema = pa.schema(fields, metadata={"format": "robocov-results", "version": "1"})
+            if name == PARQUET:
+                extra("pyarrow", "parquet", f"{self._folder / name}: ")
+        # rows of an earlier table, which only one that grows replaces before the end
+        self._former = rows_in(self._folder)
+        self._shown_from = math.inf if has_all_rows(self._folder) else self._former
         with ExitStack() as stack:
             for part in (_CSV_PART, _PARQUET_PART):
                 stack.callback((self._folder / part).unlink, missing_ok=True)
             with _told(self._folder / CSV):
                 self._csv = (self._folder / _CSV_PART).open("wb", buffering=0)
             stack.callback(lambda: self._csv.close())  # it may be another one by then
-            with _told(self._folder / PARQUET):
-                self._parquet = pq.ParquetWriter(self._folder / _PARQUET_PART, self._schema)
-            stack.callback(self._close_parquet)
             self._write(_csv_line(column.name for column in self._columns))
             self._stack = stack.pop_all()
         return self
@@ -142,14 +138,14 @@ class Table:
         with self._stack:
             if exception[0] is not None:
                 return
-            self._flush()
-            with _told(self._folder / PARQUET):
-                self._parquet.close()
             self._csv.close()
             if not self.complete and self._count < self._former and not self.replaced:
                 return
-            names = {PARQUET: _PARQUET_PART} | ({} if self.replaced else {CSV: _CSV_PART})
-            with _told(self._folder / PARQUET):
+            names = {} if self.replaced else {CSV: _CSV_PART}
+            with _told(self._folder / self._names[-1]):
+                if PARQUET in self._names:
+                    names = {PARQUET: _PARQUET_PART} | names
+                    self._write_parquet(self._folder / names.get(CSV, CSV))
                 study = self._folder / STUDY
                 if self._study is not None and not (study.is_file() and study.read_bytes() == self._study):
                     names[STUDY] = ".study.part.json"
@@ -165,15 +161,8 @@ class Table:
         """Append a row; what it does not hold is null."""
         if self._broken is not None:
             raise self._broken
-        values = {column.name: row.get(column.name) for column in self._columns}
-        for name, kind, *_ in self._columns:
-            if kind == "string" and values[name] is not None:
-                values[name] = str(values[name])
         try:
-            self._write(_csv_line(values.values()))
-            self._rows.append(values)
-            if len(self._rows) == ROW_GROUP:
-                self._flush()
+            self._write(_csv_line(row.get(column.name) for column in self._columns))
         except OutputError as error:
             self._broken = error
             raise
@@ -197,18 +186,19 @@ class Table:
                 self._csv = (self._folder / CSV).open("ab", buffering=0)
                 self._shown_from, self.replaced = math.inf, True
 
-    def _flush(self) -> None:
+    def _write_parquet(self, table: Path) -> None:
         import pyarrow as pa
+        import pyarrow.parquet as pq
 
-        if self._rows:
-            table = pa.Table.from_pylist(self._rows, schema=self._schema)
-            self._rows.clear()
-            with _told(self._folder / PARQUET):
-                self._parquet.write_table(table, row_group_size=ROW_GROUP)
-
-    def _close_parquet(self) -> None:
-        with suppress(OSError):
-            self._parquet.close()
+        fields = (
+            pa.field(name, kind, metadata={"unit": unit, "meaning": meaning})
+            for name, kind, unit, meaning in self._columns
+        )
+        schema = pa.schema(fields, metadata={"format": "robocov-results", "version": "1"})
+        rows = read_rows(table, {column.name: column.kind for column in self._columns})
+        with pq.ParquetWriter(self._folder / _PARQUET_PART, schema) as writer:
+            while group := list(islice(rows, ROW_GROUP)):
+                writer.write_table(pa.Table.from_pylist(group, schema))
 
 
 @contextmanager

@@ -117,7 +117,7 @@ class Performing:
 
 def failed(message: str, details: str) -> Outcome:
     # one line of what files can hold, whatever a controller of a user's says
-    message = " ".join(message.split()).encode(errors="replace").decode()
+    message = " ".join(message.split()).encode(errors="replace").decode() or "it does not say why"
     return Outcome({"error.json": json_text({"error": message, "traceback": details}).encode()}, {}, message)
 
 

@@ -37,7 +37,7 @@ from robocov.controllers.tangentbug import TangentBug
 from robocov.controllers.user_modules import Source, class_in_file, fault_of
 from robocov.controllers.visibility import Visibility
 from robocov.controllers.voronoi_graph import VoronoiGraphCoverage
-from robocov.errors import ParameterError, unknown_name
+from robocov.errors import ParameterError, required, unknown_name
 
 __all__ = [
     "CONTROLLERS", "FLAGSHIP", "Adaptive", "Atlas", "AtlasShared", "Barrier", "Boosting", "Controller",
@@ -91,9 +91,11 @@ def _offered(only: str | None = None) -> dict[str, type[Any]]:
     """Return the controllers that installed packages offer and that load, or the one called `only`."""
     kinds: dict[str, type[Any]] = {}
     for entry in entry_points(group="robocov.controllers"):
-        if entry.name in CONTROLLERS or (only is not None and entry.name != only):
+        if only is not None and entry.name != only:
             continue
         try:
+            if entry.name in CONTROLLERS:
+                raise ParameterError("the name is that of a built-in one")
             kinds[entry.name] = _named(entry.load(), entry.name)
         except (Exception, SystemExit) as error:
             where = f"controller {entry.name!r} of entry point {entry.value!r} cannot be loaded"
@@ -118,6 +120,7 @@ def controller_kind(name: str, *, source: Source | None = None) -> type[Any]:
     `source` is the file with the modules that it imports, which then need not be there. A ParameterError
     gives the nearest name, or what is wrong with the file.
     """
+    required("controller", name, str, "a name, as in 'rapf' or 'mine.py:MyController',")
     if ".py:" in name or name.endswith(".py"):
         return _named(class_in_file(name, source), name.rpartition(":")[2])
     if name in CONTROLLERS:

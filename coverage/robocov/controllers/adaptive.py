@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+import scipy
 
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
@@ -149,11 +149,12 @@ class Adaptive(Law):
             if np.array_equal(measured[i], memory.measured[i], equal_nan=True):
                 continue
             cross, within = lattice.cross[:, known], lattice.within[known][:, known]
-            factor = cho_factor(within + _NOISE * np.eye(len(within)))
-            estimate = self.prior + cross @ cho_solve(factor, measured[i, known] - self.prior)
+            factor = scipy.linalg.cho_factor(within + _NOISE * np.eye(len(within)))
+            estimate = self.prior + cross @ scipy.linalg.cho_solve(factor, measured[i, known] - self.prior)
             if self.explore:
                 near = lattice.within[:, known]
-                variance = np.maximum(1.0 - (near * cho_solve(factor, near.T).T).sum(axis=1), 0.0)
+                solved = scipy.linalg.cho_solve(factor, near.T).T
+                variance = np.maximum(1.0 - (near * solved).sum(axis=1), 0.0)
                 estimate += self.explore * self.prior * np.sqrt(variance)[lattice.cross.argmax(axis=1)]
             estimates[i] = np.maximum(estimate, self.least)
         return replace(memory, estimates=estimates, measured=measured)

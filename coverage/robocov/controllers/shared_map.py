@@ -11,7 +11,7 @@ from functools import cache
 from typing import ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import Information, Law
@@ -97,7 +97,7 @@ class Candidates(NamedTuple):
     def nearest(self, places: Array) -> IntArray:
         """Return one for each of (k, 2) places, no two the same: those nearest on the whole."""
         square = ((places[:, None] - self.places) ** 2).sum(axis=2)
-        return np.asarray(linear_sum_assignment(square)[1], dtype=np.intp)
+        return np.asarray(scipy.optimize.linear_sum_assignment(square)[1], dtype=np.intp)
 
     def refined(self, now: Situation, weights: Array, chosen: IntArray) -> Array:
         """Return the places, (k, 2) m, to which Lloyd's iteration leads among the nodes near the chosen."""
@@ -115,7 +115,7 @@ def assigned(now: Situation, places: Array) -> Array:
     """
     nodes = [now.ways.nearest(place) for place in places]
     away = np.array([now.ways.from_places(at[None])[nodes] for at in now.at])
-    return np.asarray(places[linear_sum_assignment(np.minimum(away, _FAR) ** 2)[1]])
+    return np.asarray(places[scipy.optimize.linear_sum_assignment(np.minimum(away, _FAR) ** 2)[1]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -138,7 +138,7 @@ class ArrayCache:
         """Keep arrays under a key, if that is possible."""
         buffer = io.BytesIO()
         np.savez(buffer, **arrays)  # type: ignore[arg-type]
-        payload = buffer.getbuffer()
+        payload = buffer.getvalue()
         if len(payload) > self.limit:
             return
         with suppress(OSError, OutputError):
@@ -166,5 +166,5 @@ class ArrayCache:
             total -= size
 
 
-def _digest(payload: memoryview) -> bytes:
+def _digest(payload: bytes | memoryview) -> bytes:
     return hashlib.blake2b(payload, digest_size=_DIGEST).digest()

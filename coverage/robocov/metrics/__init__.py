@@ -11,7 +11,7 @@ from robocov.arrays import Array, IntArray
 from robocov.compiled import inlined_kernel, kernel
 from robocov.cost import CoverageCost, MomentaryCost
 from robocov.drawing import Drawable
-from robocov.errors import counted
+from robocov.errors import counted, required
 from robocov.record import Record, nearest_moments
 from robocov.sensor import RangeSensor
 from robocov.world.solid import movers, solid_pieces
@@ -62,6 +62,8 @@ def cost_history(
     Robots count while they work, and obstacles that move stand where they are at each moment. `rate` is in
     samples per simulated second, see `sample_moments`; `on_sample` is called after every evaluation.
     """
+    required("record", record, Record, 'a Record, as Simulation.run and Record.load("run") return,')
+    required("cost", cost, CoverageCost, "a CoverageCost")
     moments = sample_moments(record, rate)
     rows = np.empty((len(moments), 3))
     speeds = record.team.max_speed if record.team.mixed_speeds else None

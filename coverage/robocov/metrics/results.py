@@ -6,6 +6,7 @@ import csv
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,18 +18,15 @@ from robocov.metrics import CostHistory
 from robocov.record import Record
 
 if TYPE_CHECKING:
-    import pyarrow as pa
     from pandas import DataFrame
-    from pyarrow.compute import Expression
-    from pyarrow.dataset import Dataset
 
 _HISTORY = ("time_s", "mean_distance_m", "cost_m3", "uncovered_area_m2")
 _TIME = "mean_time_s"
 """A last column, where robots are not equally fast."""
 
-_TEXTS = frozenset(("map", "controller", "start", "run", "error"))
-_WHOLES = frozenset(("robots", "seed", "contacts", "stuck_robots"))
-"""Columns that hold no floats."""
+_KINDS = dict.fromkeys(("map", "controller", "start", "run", "error"), "string")
+_KINDS |= dict.fromkeys(("robots", "seed", "contacts", "stuck_robots"), "int64")
+"""Kinds of columns of every study, where they hold no floats."""
 
 _SHOWN_ROWS = 10
 """Rows that notebooks show."""
@@ -37,22 +35,23 @@ _SHOWN_ROWS = 10
 class Results:
     """The table of a sweep, one row a run, and the folders of the runs; all is read when it is asked for.
 
-    `dataset` is the table as pyarrow knows it, with the `columns`: where a run stands (``map``,
-    ``controller``, ``robots``, ``start``, ``seed``), gains and whatever else was varied; figures with their
-    units; ``run``, the name of its folder, and ``error``.
+    Its `columns` say what was run (``map``, ``controller``, ``robots``, ``start``, ``seed``, gains, whatever
+    else was varied), the figures with their units, the name of the run's folder (``run``), and its ``error``.
 
     >>> results = read_results("study")  # doctest: +SKIP
     >>> results.to_pandas().groupby("controller")["mean_distance_m"].median()  # doctest: +SKIP
     """
 
-    def __init__(self, folder: Path, dataset: Dataset) -> None:
+    def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.dataset = dataset
-        self.columns: tuple[str, ...] = tuple(dataset.schema.names)
+        self._table = folder / "results.csv"
+        self.columns: tuple[str, ...] = tuple(next(_lines(self._table), ()))
+        if not {"run", "error"} <= set(self.columns):
+            raise InputError(f"{self._table}: line 1: the header of a table of results was wanted")
 
     def __len__(self) -> int:
         """Number of runs, failed ones included."""
-        return int(self.dataset.count_rows())
+        return sum(1 for _ in _lines(self._table)) - 1
 
     def __repr__(self) -> str:
         return f"<Results {self.folder}, {counted(len(self), 'run')}>"
@@ -66,31 +65,26 @@ class Results:
         except (OSError, ValueError, RecursionError) as error:
             raise InputError(f"{path}: cannot be read: {error}") from error
 
-    def to_table(self, columns: Sequence[str] | None = None, filter: Expression | None = None) -> pa.Table:
-        """Return rows as a pyarrow Table, by default all, with all columns.
+    def rows(self, columns: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
+        """Yield the rows in order, as dicts by column, all columns or those named; None where nothing is.
 
-        A filter is as in ``pyarrow.compute.field("robots") == 6``. Raises InputError when there is no such
-        column; the message gives the nearest.
+        Raises InputError when there is no such column; the message gives the nearest.
         """
-        return self.dataset.to_table(columns=self._known(columns), filter=filter)
+        for name in columns or ():
+            if name not in self.columns:
+                raise InputError(f"{self.folder}: {unknown_name('column', name, self.columns)}")
+        return read_rows(self._table, self._kinds(), columns)
 
-    def to_pandas(self, columns: Sequence[str] | None = None, filter: Expression | None = None) -> DataFrame:
-        """Return the rows as a data frame, as `to_table`; pandas comes with ``robocov[pandas]``."""
-        extra("pandas", "pandas")
-        frame: DataFrame = self.to_table(columns, filter).to_pandas()
-        return frame
-
-    def batches(
-        self, columns: Sequence[str] | None = None, filter: Expression | None = None
-    ) -> Iterator[pa.RecordBatch]:
-        """Yield the rows part by part, in order; the parameters are those of `to_table`."""
-        yield from self.dataset.to_batches(columns=self._known(columns), filter=filter)
+    def to_pandas(self, columns: Sequence[str] | None = None) -> DataFrame:
+        """Return the rows as a data frame, as `rows`; pandas comes with ``robocov[pandas]``."""
+        pandas, names, kinds = extra("pandas", "pandas"), list(columns or self.columns), self._kinds()
+        frame: DataFrame = pandas.DataFrame(list(self.rows(names)), columns=names)
+        empty = [name for name in names if kinds.get(name) != "string" and frame[name].isna().all()]
+        return frame.astype(dict.fromkeys(empty, float))
 
     def failures(self) -> list[dict[str, Any]]:
         """Return the rows of the runs that failed, as dicts by column; why is in ``error``."""
-        from pyarrow.compute import field
-
-        return list(self.to_table(filter=field("error").is_valid()).to_pylist())
+        return [row for row in self.rows() if row["error"] is not None]
 
     def record(self, run: str | int | Mapping[str, Any]) -> Record:
         """Return the record of a run; its moments are as far apart as the study wanted it.
@@ -104,18 +98,19 @@ class Results:
         """Return the coverage cost along a run, which is named as in `record`; it raises the same."""
         return read_history(self._folder_of(run) / "cost.csv")
 
-    def _known(self, columns: Sequence[str] | None) -> list[str] | None:
-        for name in columns or ():
-            if name not in self.columns:
-                raise InputError(f"{self.folder}: {unknown_name('column', name, self.columns)}")
-        return None if columns is None else list(columns)
+    def _kinds(self) -> dict[str, str]:
+        """Return the kinds of columns that are known; a table without its study is read all the same."""
+        try:
+            return _KINDS | {each["name"]: str(each["kind"]) for each in self.study["columns"]}
+        except (InputError, KeyError, TypeError, ValueError):
+            return _KINDS
 
     def _folder_of(self, run: str | int | Mapping[str, Any]) -> Path:
         if isinstance(run, int | np.integer):
             number, count = int(run), len(self)
             if not -count <= number < count:
                 raise InputError(f"{self.folder}: row {number}, but there are {counted(count, 'row')}")
-            run = str(self.dataset.take([number % count], columns=["run"])["run"][0].as_py())
+            run = str(next(islice(self.rows(["run"]), number % count, None))["run"])
         elif not isinstance(run, str):
             run = str(run["run"])
         folder = self.folder / "runs" / run
@@ -128,7 +123,7 @@ class Results:
 
     def _repr_html_(self) -> str:
         """Show the first rows in notebooks."""
-        head, count = self.dataset.head(_SHOWN_ROWS).to_pylist(), len(self)
+        head, count = list(islice(self.rows(), _SHOWN_ROWS)), len(self)
         cells = [[f"<th>{escape(name)}</th>" for name in self.columns]]
         cells += [[f"<td>{escape(_cell(row[name]))}</td>" for name in self.columns] for row in head]
         rows = [f"<tr>{''.join(row)}</tr>" for row in cells]
@@ -144,22 +139,36 @@ class Results:
 def read_results(folder: Path | str) -> Results:
     """Return the results in the folder of a sweep.
 
-    While the sweep is still going on, or was killed, they are those in ``results.csv``, which grows. Raises
-    InputError when the folder holds no sweep, or its table cannot be read.
+    While the sweep is still going on, or was killed, they are those that are there. Raises InputError when
+    the folder holds no sweep, or its table cannot be read.
     """
-    from pyarrow import ArrowException
-    from pyarrow import dataset as datasets
-
     folder = Path(folder)
-    whole, growing = folder / "results.parquet", folder / "results.csv"
-    path = whole if whole.is_file() else growing
-    if not path.is_file():
-        raise InputError(f"{folder}: not the folder of a sweep (there is no results.parquet)")
+    if not (folder / "results.csv").is_file():
+        raise InputError(f"{folder}: not the folder of a sweep (there is no results.csv)")
+    return Results(folder)
+
+
+def read_rows(
+    table: Path, kinds: Mapping[str, str], columns: Sequence[str] | None = None
+) -> Iterator[dict[str, Any]]:
+    """Yield the rows of ``results.csv`` as dicts; `kinds` are those that Parquet has, by column."""
+    lines = _lines(table)
+    names = next(lines)
+    chosen = [(name, names.index(name), kinds.get(name)) for name in columns or names]
+    for k, line in enumerate(lines):
+        try:
+            yield {name: _value(line[at], kind) for name, at, kind in chosen}
+        except (ValueError, IndexError) as error:
+            raise InputError(f"{table}: row {k}: cannot be read: {error}") from error
+
+
+def _lines(table: Path) -> Iterator[list[str]]:
+    """Yield the header, and then the rows as texts."""
     try:
-        form = "parquet" if path is whole else _csv_format(path)
-        return Results(folder, datasets.dataset(path, format=form))
-    except (OSError, ArrowException, ValueError) as error:
-        raise InputError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
+        with table.open(encoding="utf-8", newline="") as file:
+            yield from csv.reader(file)
+    except (OSError, ValueError, csv.Error) as error:
+        raise InputError(f"{table}: cannot be read: {error}") from error
 
 
 def read_history(path: Path) -> CostHistory:
@@ -183,34 +192,17 @@ def read_history(path: Path) -> CostHistory:
     return CostHistory(*rows.T)
 
 
-def _csv_format(path: Path) -> Any:
-    """Return how a table is to be read of which CSV does not say what its columns hold."""
-    from pyarrow import csv as csv_files
-    from pyarrow import dataset as datasets
-    from pyarrow import float64, int64, string
-
-    with path.open(encoding="utf-8", newline="") as file:
-        names = next(csv.reader(file), [])
-    if not {"run", "error"} <= set(names):
-        raise ValueError("line 1: the header of a table of results was wanted")
-    texts = _TEXTS | _word_columns(path.with_name("study.json"))
-    types = {name: string() if name in texts else int64() if name in _WHOLES else float64() for name in names}
-    # a map may be called NA
-    options = csv_files.ConvertOptions(
-        column_types=types, null_values=[""], strings_can_be_null=True, quoted_strings_can_be_null=False
-    )
-    return datasets.CsvFileFormat(convert_options=options)
-
-
-def _word_columns(study: Path) -> set[str]:
-    """Return which columns hold gains that are words, by the content of ``study.json``."""
+def _value(text: str, kind: str | None) -> Any:
+    if not text or kind == "string":
+        return text or None
+    if kind == "int64":
+        return int(text)
     try:
-        laws = json.loads(study.read_bytes())["gains"].values()
-        choices = [choice for law in laws for choice in law["choices"]]
-        names = {name for choice in choices for name, value in choice.items() if isinstance(value, str)}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return set()  # a table without its study is read all the same, as one of numbers
-    return names | {f"gain_{name}" for name in names}
+        return float(text)
+    except ValueError:
+        if kind is None:  # the table of an earlier version, whose study does not say that these are words
+            return text
+        raise
 
 
 def _reason(path: Path) -> str:

@@ -42,29 +42,29 @@ class RunMetrics:
     """Metrics along a run, at K of its moments. Only robots that work count."""
 
     time: Array
-    """(K,) s, as all arrays."""
+    """Simulated time of each moment, s; (K,), as all arrays."""
     sensed_area: Array
-    """m², the free area within the sensing range of a robot and in its line of sight,"""
+    """Free area within the sensing range of a robot and in its line of sight, m²."""
     range_area: Array
-    """within the sensing range of a robot, walls or not (blanket coverage by discs),"""
+    """Free area within the sensing range of a robot, walls or not, m² (blanket coverage by discs)."""
     visible_area: Array
-    """and in line of sight of a robot at any distance (an art gallery's guards)."""
+    """Free area in line of sight of a robot at any distance, m² (the guards of an art gallery)."""
     work: Array
-    """J, the integral of ``|F v|`` over the time so far, summed over the robots. F is the force that the
-    controller asked for, before any limit."""
+    """Integral of ``|F v|`` so far, all robots together, J; F is the controller's force before any limit."""
     effort: Array
-    """N² s, the same of ``|F|²``."""
+    """Integral of ``|F|²`` so far, all robots together, N² s."""
     path_length: Array
-    """m so far, mean over the robots."""
+    """Distance travelled so far, mean over the robots, m."""
     components: IntArray
-    """Of the graph of who hears whom, see `connections`, as the"""
+    """Parts into which the team falls that hear each other, see `connections`."""
     algebraic_connectivity: Array
+    """Second smallest eigenvalue of the Laplacian of who hears whom; 0 for a team in several parts."""
     wall_clearance: Array
-    """m, the smallest gap between a robot's rim and a wall since the moment before, inf for none,"""
+    """Smallest gap between a robot's rim and a wall since the moment before, m; inf for none."""
     robot_clearance: Array
-    """and between the rims of two robots."""
+    """Smallest gap between the rims of two robots since the moment before, m; inf for none."""
     free_area: float
-    """m², of which the areas are parts."""
+    """Free area of the map, of which the areas are parts, m²."""
 
     def __repr__(self) -> str:
         share = f"{self.sensed_area[-1] / self.free_area:.0%} of the free area sensed at the end"

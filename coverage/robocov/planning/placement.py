@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from robocov.arrays import Array, BoolArray
 from robocov.density import Density
@@ -114,7 +114,7 @@ def team_places(
     mobile = np.flatnonzero(~fixed)
     entry = [int(((nodes - now[k]) ** 2).sum(axis=1).argmin()) for k in mobile]
     square = np.minimum(distance[entry][:, sources[chosen[mobile]]] ** 2, _FAR)
-    _, column = linear_sum_assignment(square)
+    _, column = scipy.optimize.linear_sum_assignment(square)
     stay = np.arange(len(mobile))
     if swapping and square[stay, column].sum() > (1.0 - swapping) * square[stay, stay].sum():
         column = stay

@@ -1,16 +1,15 @@
 from __future__ import annotations
 
+import csv
+import json
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv
-import pyarrow.parquet as pq
 import pytest
-from pyarrow.compute import field
 
 import robocov as rc
 from robocov import extras
@@ -45,27 +44,19 @@ ROWS = [
         "error": 'no "room", none',
     },
 ]
-SCHEMA = pa.schema(
-    [
-        *((name, pa.string()) for name in ("map", "controller")),
-        ("robots", pa.int64()),
-        ("start", pa.string()),
-        ("seed", pa.int64()),
-        *((name, pa.float64()) for name in ("k_rep", "mean_distance_m")),
-        ("contacts", pa.int64()),
-        ("settled_at_s", pa.float64()),
-        *((name, pa.string()) for name in ("run", "error")),
-    ]
-)
+KINDS = {"k_rep": "double", "mean_distance_m": "double", "settled_at_s": "double"}
 
 
-def table(times: int = 1) -> pa.Table:
-    return pa.Table.from_pylist(ROWS * times, schema=SCHEMA)
+def write_table(folder: Path, rows: list[dict[str, Any]]) -> None:
+    with (folder / "results.csv").open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, list(ROWS[0]), lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
 
 
 @pytest.fixture
 def folder(tmp_path: Path, cluttered: rc.Environment) -> Path:
-    pq.write_table(table(), tmp_path / "results.parquet")
+    write_table(tmp_path, ROWS)
     run = tmp_path / "runs" / "a-run"
     run.mkdir(parents=True)
     simulation = rc.Simulation(cluttered, rc.Rapf(), cluttered.start().sample(2), dt=0.1)
@@ -76,7 +67,9 @@ def folder(tmp_path: Path, cluttered: rc.Environment) -> Path:
     failure = tmp_path / "runs" / "a-failure"
     failure.mkdir()
     (failure / "error.json").write_text('{"error": "no room"}')
-    (tmp_path / "study.json").write_text('{"format": "robocov-study", "seeds": [0]}')
+    columns = [{"name": name, "kind": kind} for name, kind in KINDS.items()]
+    study = {"format": "robocov-study", "seeds": [0], "columns": columns}
+    (tmp_path / "study.json").write_text(json.dumps(study))
     return tmp_path
 
 
@@ -84,20 +77,29 @@ def test_a_table_is_read(folder: Path) -> None:
     results = rc.read_results(str(folder))
     assert isinstance(results, rc.Results)
     assert len(results) == 2
-    assert results.columns == tuple(SCHEMA.names)
-    assert results.to_table().to_pylist() == ROWS
+    assert results.columns == tuple(ROWS[0])
+    assert list(results.rows()) == ROWS
     assert results.study["seeds"] == [0]
     assert repr(results) == f"<Results {folder}, 2 runs>"
 
 
-def test_columns_and_rows_can_be_chosen(folder: Path) -> None:
+def test_columns_can_be_chosen(folder: Path) -> None:
     results = read_results(folder)
-    assert results.to_table(["seed", "map"]).column_names == ["seed", "map"]
-    assert results.to_table(filter=field("contacts") > 1)["run"].to_pylist() == ["a-run"]
-    frame = results.to_pandas(["controller", "mean_distance_m"], field("controller") == "rapf")
-    assert frame.to_dict("list") == {"controller": ["rapf"], "mean_distance_m": [1.5]}
+    assert list(results.rows(["seed", "map"])) == [{"seed": row["seed"], "map": row["map"]} for row in ROWS]
+    assert [list(row) for row in results.rows(["seed", "map"])] == [["seed", "map"]] * 2
     with pytest.raises(InputError, match="unknown column 'mean_distance': did you mean 'mean_distance_m'"):
-        results.to_table(["mean_distance"])
+        results.rows(["mean_distance"])
+
+
+def test_rows_are_a_data_frame(folder: Path) -> None:
+    pytest.importorskip("pandas")
+    frame = read_results(folder).to_pandas()
+    assert list(frame) == list(ROWS[0])
+    assert {str(frame[name].dtype) for name in ("k_rep", "mean_distance_m", "settled_at_s")} == {"float64"}
+    assert frame["map"].to_list() == ["NA", "<b>rooms</b>"] and frame["seed"][0] == 2**60
+    assert frame["error"].isna().to_list() == [True, False]
+    few = read_results(folder).to_pandas(["controller", "mean_distance_m"])
+    assert few.dropna().to_dict("list") == {"controller": ["rapf"], "mean_distance_m": [1.5]}
 
 
 def test_failures_are_rows(folder: Path) -> None:
@@ -134,31 +136,36 @@ def test_runs_that_are_not_there_are_named(folder: Path, run: Any, message: str)
         assert message in str(caught.value)
 
 
-def test_a_growing_table_is_read_as_it_is(folder: Path) -> None:
-    (folder / "results.parquet").unlink()
-    pyarrow.csv.write_csv(table(), folder / "results.csv", pa.csv.WriteOptions(quoting_style="needed"))
-    results = read_results(folder)
-    assert results.to_table().to_pylist() == ROWS
-    assert results.to_table().schema.remove_metadata() == SCHEMA
-    assert len(results) == 2
+@pytest.mark.parametrize("study", [None, "{", "[]", '{"columns": [1]}'])
+def test_a_table_without_its_study_is_read_by_its_values(folder: Path, study: str | None) -> None:
+    (folder / "study.json").unlink()
+    if study is not None:
+        (folder / "study.json").write_text(study)
+    assert list(read_results(folder).rows()) == ROWS
+    write_table(folder, [{**ROWS[0], "k_rep": "soft"}])
+    assert next(read_results(folder).rows())["k_rep"] == "soft"
 
 
-def test_rows_come_part_by_part_and_only_when_they_are_wanted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with pq.ParquetWriter(tmp_path / "results.parquet", SCHEMA) as writer:
-        for _ in range(50):
-            writer.write_table(table(500), row_group_size=1000)
-    before = pa.total_allocated_bytes()
+def test_a_number_that_is_none_is_told_with_its_row(folder: Path) -> None:
+    for change in ({"k_rep": "soft"}, {"seed": "1.5"}):
+        write_table(folder, [ROWS[0], ROWS[0] | change])
+        with pytest.raises(InputError, match=r"results.csv: row 1: cannot be read: "):
+            list(read_results(folder).rows())
+
+
+def test_a_gain_that_is_a_word_here_and_a_number_there_is_a_word(folder: Path) -> None:
+    (folder / "study.json").write_text('{"columns": [{"name": "k_rep", "kind": "string"}]}')
+    assert [row["k_rep"] for row in read_results(folder).rows()] == ["0.30000000000000004", None]
+
+
+def test_rows_come_one_by_one_and_only_when_they_are_wanted(tmp_path: Path) -> None:
+    write_table(tmp_path, ROWS * 10_000)
+    tracemalloc.start()
     results = read_results(tmp_path)
-    assert len(results) == 50_000
-    assert pa.total_allocated_bytes() - before < 100_000
-    batches = results.batches(["seed"])
-    first = next(batches)
-    assert first.num_rows == 1000
-    assert first.schema.names == ["seed"]
-    assert 1000 + sum(batch.num_rows for batch in batches) == 50_000
-    assert sum(batch.num_rows for batch in results.batches(filter=field("seed") == 0)) == 25_000
+    assert len(results) == 20_000
+    assert sum(row["seed"] == 0 for row in results.rows(["seed"])) == 10_000
+    assert tracemalloc.get_traced_memory()[1] < 500_000
+    tracemalloc.stop()
 
 
 def test_notebooks_show_the_first_rows(folder: Path, tmp_path: Path) -> None:
@@ -168,7 +175,7 @@ def test_notebooks_show_the_first_rows(folder: Path, tmp_path: Path) -> None:
     assert shown.count("<tr>") == 1 + 2
     many = tmp_path / "many"
     many.mkdir()
-    pq.write_table(table(20), many / "results.parquet")
+    write_table(many, ROWS * 20)
     shown = read_results(many)._repr_html_()
     assert shown.count("<tr>") == 1 + 10
     assert "40 runs of" in shown and "the first 10" in shown
@@ -177,14 +184,13 @@ def test_notebooks_show_the_first_rows(folder: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("notes.txt", b"", "not the folder of a sweep (there is no results.parquet)"),
-        ("results.parquet", b"no parquet", "results.parquet: cannot be read: "),
+        ("notes.txt", b"", "not the folder of a sweep (there is no results.csv)"),
         (
             "results.csv",
             b"",
-            "results.csv: cannot be read: line 1: the header of a table of results was wanted",
+            "results.csv: line 1: the header of a table of results was wanted",
         ),
-        ("results.csv", b"a,b\n1,2\n", "results.csv: cannot be read: line 1: "),
+        ("results.csv", b"a,b\n1,2\n", "results.csv: line 1: "),
         ("results.csv", b"\xff\xfe", "results.csv: cannot be read: "),
     ],
 )
@@ -236,9 +242,8 @@ def test_a_file_that_is_no_history_is_named_with_its_line(tmp_path: Path, text: 
 def test_reading_does_not_load_what_is_not_needed(folder: Path) -> None:
     script = (
         "import sys, robocov as rc\n"
-        "assert 'pyarrow' not in sys.modules\n"
         f"results = rc.read_results({str(folder)!r})\n"
-        "assert 'matplotlib' not in sys.modules\n"
+        "assert not {'matplotlib', 'pandas', 'pyarrow'} & set(sys.modules)\n"
         "print(len(results))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)

@@ -183,10 +183,7 @@ class TestDegradations:
                 def __init__(self, folder):
                     self.name = folder.name
 
-                def to_table(self):
-                    return self
-
-                def to_pylist(self):
+                def rows(self):
                     values = (0.6, 0.9) if self.name == "conditions-loss" else (0.6,)
                     others = "others" in self.name
                     rows = [

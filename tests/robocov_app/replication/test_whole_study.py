@@ -150,7 +150,7 @@ class TestRuns:
         for law, grid in paper.gains.items():
             assert of[f"{law}-best"].gains == grid.gains[int(np.argmin(grid.excess.mean(axis=1)))]
         assert set(beyond.gains) == set(GRIDS)
-        table = read_results(folder / "studies" / "rivals").to_table().to_pylist()
+        table = list(read_results(folder / "studies" / "rivals").rows())
         for name, grid in beyond.gains.items():
             assert {(each.map, each.seed) for each in grid.scenarios} == {("generated-101", TINY.tuning_seed)}
             best = grid.gains[int(np.argmin(grid.excess.mean(axis=1)))]
@@ -203,11 +203,9 @@ class TestRuns:
         both = {"one": Study(controllers=("rpf",), **common)}
         both["two"] = Study(controllers=("rpf", "lloyd"), **common)
         results.run_together(both, tmp_path, options(), "x")
-        tables = [read_results(tmp_path / "studies" / name).to_table() for name in both]
+        tables = [list(read_results(tmp_path / "studies" / name).rows()) for name in both]
         assert [len(table) for table in tables] == [2, 4]
-        finals = [
-            dict(zip(t["run"].to_pylist(), t["mean_distance_m"].to_pylist(), strict=True)) for t in tables
-        ]
+        finals = [{row["run"]: row["mean_distance_m"] for row in table} for table in tables]
         assert finals[0].items() <= finals[1].items()
 
 
@@ -238,7 +236,7 @@ class TestBeyond:
         judge = CoverageCost(known.record.environment, TINY.lattice)
         costs = [judge(each.record.positions[-1]).mean_distance for each in (known, ignored)]
         assert beyond.density.costs == pytest.approx(tuple(costs))
-        table = read_results(folder / "studies" / "density").to_table().to_pylist()
+        table = list(read_results(folder / "studies" / "density").rows())
         finals = beyond.density.outcomes.of("known", "final")
         assert finals == pytest.approx([row["mean_distance_m"] for row in table])
 

@@ -111,7 +111,6 @@ def test_failed_runs_have_their_error_and_no_figures(folder) -> None:
 def test_an_unfinished_sweep_says_what_is_missing(folder, tmp_path) -> None:
     copy = tmp_path / "part"
     shutil.copytree(folder, copy)
-    (copy / "results.parquet").unlink()
     lines = (copy / "results.csv").read_text().splitlines()
     (copy / "results.csv").write_text("\n".join(lines[:8]) + "\n")
     result = gathered(copy)
@@ -143,13 +142,13 @@ def broken(folder: Path, name: str, text: str) -> Path:
             lambda copy: broken(copy, "study.json", '{"runs": 3}'),
             "study.json: the study cannot be read: KeyError",
         ),
-        (lambda copy: broken(copy, "results.parquet", "PAR"), "results.parquet: cannot be read"),
+        (lambda copy: broken(copy, "results.csv", "PAR"), "results.csv: line 1: the header of a table"),
     ],
 )
 def test_what_cannot_be_read_is_named(folder, tmp_path, spoil, message) -> None:
     copy = tmp_path / "copy"
     copy.mkdir()
-    for name in ("study.json", "results.csv", "results.parquet"):
+    for name in ("study.json", "results.csv"):
         shutil.copy(folder / name, copy)
     (copy / "runs").mkdir()
     with pytest.raises(InputError) as caught:

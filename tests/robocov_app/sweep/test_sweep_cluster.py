@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import builtins
-import importlib.util
 import logging
 import socket
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +15,7 @@ import pytest
 from called import answer
 from swept import controller, small_study, tables
 
-from robocov.errors import InputError, OutputError
+from robocov.errors import OutputError, RobocovError
 from robocov_app.cli import main
 from robocov_app.sweep import executors as cluster_module
 from robocov_app.sweep.executors import Cluster
@@ -142,10 +142,9 @@ def test_nobody_at_the_address_is_one_line(
 
 
 def test_without_dask_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(
-        InputError, match=r'--scheduler: Dask is not installed; pip install "robocov\[dask\]"'
-    ):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    wanted = r'--scheduler: distributed is not installed: pip install "robocov\[dask\]"'
+    with pytest.raises(RobocovError, match=wanted):
         Cluster("tcp://127.0.0.1:9")
 
 

@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import pyarrow.parquet as pq
 import pytest
 from swept import ROOM, controller, run_folders, small_study, tables
 
@@ -109,7 +108,6 @@ def test_the_number_of_workers_changes_nothing(
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         ".lock",
         "results.csv",
-        "results.parquet",
         "runs",
         "study.json",
     ]
@@ -223,7 +221,6 @@ def test_a_stop_keeps_what_is_done_in_the_table(
     done = [task.name for task in tasks_of(study) if task.name in run_folders(tmp_path)]
     assert len(done) == 7 + 1
     assert [row["run"] for row in rows(tmp_path)] == done
-    assert pq.read_table(tmp_path / "results.parquet")["run"].to_pylist() == done
     here._stack.clear()
     here.__init__()
     assert sweep(study, tmp_path, quiet=True) == Totals(10, 0, 8, False)
@@ -281,7 +278,6 @@ def test_a_full_disk_stops_the_sweep_and_the_same_call_goes_on(
     done = run_folders(tmp_path)
     assert len(done) == 30 // 4
     assert sorted(row["run"] for row in rows(tmp_path)) == done
-    assert pq.read_table(tmp_path / "results.parquet").num_rows == len(done)
     assert not list(tmp_path.rglob("*.part*"))
     monkeypatch.setattr(sweeping, "LocalPool", lambda workers: Here())
     assert sweep(study, tmp_path, quiet=True) == Totals(18 - len(done), 0, len(done), False)
@@ -387,7 +383,6 @@ def test_a_sweep_that_is_killed_goes_on(longer: tuple[Path, list[bytes]], tmp_pa
         assert len(workers) == 2
         process.kill()
     assert 5 <= len(done(tmp_path / "out")) < 60
-    assert not (tmp_path / "out" / "results.parquet").exists()
     end = time.monotonic() + PATIENCE
     while any(map(runs, workers)):
         assert time.monotonic() < end, "workers end with whom they work for"
@@ -428,7 +423,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(
     assert 5 <= count < 60
     assert f"{count} runs done" in said
     assert f"stopped, {60 - count} runs are left" in said
-    assert pq.read_table(out / "results.parquet").num_rows == len(rows(out)) == count
+    assert len(rows(out)) == count
     assert main(["sweep", str(file), "--out", str(out), "--workers", "2"]) == 0
     assert f"{count} were there already" in capsys.readouterr().out
     assert tables(out) == expected

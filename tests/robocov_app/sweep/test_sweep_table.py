@@ -2,17 +2,21 @@ from __future__ import annotations
 
 import csv
 import errno
+import json
 import math
 import os
+import re
+import sys
 from pathlib import Path
 from typing import Any
 
-import pyarrow.parquet as pq
 import pytest
 from swept import small_study, tables
 
 from robocov.controllers import Rapf, gains_of
-from robocov.errors import OutputError
+from robocov.errors import OutputError, RobocovError
+from robocov.metrics.results import read_results
+from robocov_app.cli import main
 from robocov_app.sweep import table as table_module
 from robocov_app.sweep.ledger import Entry
 from robocov_app.sweep.study import Study, tasks_of
@@ -33,8 +37,14 @@ FIGURED = Entry(
 FAILED = Entry({}, 'a "start", and no room')
 
 
-def written(folder: Path, study: Study, entries: list[Entry]) -> None:
-    with Table(folder, columns_of(study)) as table:
+def study_json(study: Study) -> bytes:
+    return json.dumps(
+        {"runs": len(study), "columns": [each._asdict() for each in columns_of(study)]}
+    ).encode()
+
+
+def written(folder: Path, study: Study, entries: list[Entry], *, parquet: bool = False) -> None:
+    with Table(folder, columns_of(study), study_json(study), parquet=parquet) as table:
         for task, entry in zip(tasks_of(study), entries, strict=True):
             table.add(row_of(task, entry))
 
@@ -59,12 +69,11 @@ def test_a_gain_that_is_called_as_another_column_gets_a_name_of_its_own() -> Non
     assert gain_column("radius_m") == "gain_radius_m"
 
 
-def test_csv_and_parquet_hold_the_same_exactly(tmp_path: Path) -> None:
+def test_the_table_holds_every_figure_exactly(tmp_path: Path) -> None:
     study = small_study(max_speed=[0.5, 1.0], seeds=(2**63 - 1,))
     entries = [FIGURED, FAILED, FIGURED, FIGURED]
     written(tmp_path, study, entries)
-    table = pq.read_table(tmp_path / "results.parquet")
-    rows = table.to_pylist()
+    rows = list(read_results(tmp_path).rows())
     with (tmp_path / "results.csv").open(newline="", encoding="utf-8") as file:
         lines = list(csv.DictReader(file))
     assert len(rows) == len(lines) == 4
@@ -86,9 +95,11 @@ def test_csv_and_parquet_hold_the_same_exactly(tmp_path: Path) -> None:
     assert rows[1]["attraction_limit"] is None, "repulsion alone has none"
 
 
-def test_columns_say_what_they_are(tmp_path: Path) -> None:
-    study = small_study()
-    written(tmp_path, study, [FIGURED] * len(study))
+def test_parquet_holds_the_same_and_its_columns_say_what_they_are(tmp_path: Path) -> None:
+    pq = pytest.importorskip("pyarrow.parquet")
+    study = small_study(max_speed=[0.5, 1.0], seeds=(2**63 - 1,))
+    written(tmp_path, study, [FIGURED, FAILED, FIGURED, FIGURED], parquet=True)
+    assert pq.read_table(tmp_path / "results.parquet").to_pylist() == list(read_results(tmp_path).rows())
     schema = pq.read_schema(tmp_path / "results.parquet")
     assert schema.metadata[b"format"] == b"robocov-results"
     for field in schema:
@@ -102,26 +113,63 @@ def test_columns_say_what_they_are(tmp_path: Path) -> None:
 
 
 def test_the_same_rows_give_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pq = pytest.importorskip("pyarrow.parquet")
     monkeypatch.setattr(table_module, "ROW_GROUP", 3)
     study = small_study(seeds=range(5))
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        written(tmp_path / name, study, [FIGURED] * len(study))
+        written(tmp_path / name, study, [FIGURED] * len(study), parquet=True)
+    assert len(tables(tmp_path / "one")) == 2
     assert tables(tmp_path / "one") == tables(tmp_path / "two")
     groups = pq.ParquetFile(tmp_path / "one" / "results.parquet").metadata
     assert [groups.row_group(k).num_rows for k in range(groups.num_row_groups)] == [3, 3, 3, 1]
 
 
+@pytest.fixture
+def no_pyarrow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+
+
+@pytest.mark.usefixtures("no_pyarrow")
+def test_without_pyarrow_there_is_csv_and_parquet_is_refused_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = small_study()
+    written(tmp_path, study, [FIGURED] * len(study))
+    assert [len(row) for row in read_results(tmp_path).rows()] == [len(columns_of(study))] * len(study)
+    wanted = 'pyarrow is not installed: pip install "robocov[parquet]"'
+    for dry in ([], ["--dry-run"]):
+        assert main(["sweep", "study.toml", "--parquet", *dry]) == 2
+        assert capsys.readouterr().err == f"robocov: error: {wanted}\n"
+    before = tables(tmp_path)
+    (tmp_path / "results.parquet").touch()  # of an earlier version, say: it would not be of these rows
+    for asked in (True, False):
+        refused = pytest.raises(RobocovError, match=re.escape(f"{tmp_path}/results.parquet: {wanted}"))
+        with refused, Table(tmp_path, columns_of(study), parquet=asked):
+            pass
+    assert tables(tmp_path) == [*before, b""]
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_parquet_that_is_there_is_kept_up_to_date(tmp_path: Path) -> None:
+    pq = pytest.importorskip("pyarrow.parquet")
+    for study in (small_study(), small_study(seeds=range(5))):
+        written(tmp_path, study, [FIGURED] * len(study), parquet=len(study) == 4)
+        assert pq.read_table(tmp_path / "results.parquet").num_rows == len(study)
+
+
 def test_a_table_without_rows_has_columns(tmp_path: Path) -> None:
-    with Table(tmp_path, columns_of(small_study())):
+    pq = pytest.importorskip("pyarrow.parquet")
+    with Table(tmp_path, columns_of(small_study()), parquet=True):
         pass
-    assert pq.read_table(tmp_path / "results.parquet").num_rows == 0
+    assert pq.read_table(tmp_path / "results.parquet").num_rows == len(read_results(tmp_path)) == 0
 
 
 def test_in_a_first_sweep_csv_grows_and_parquet_appears_at_the_end(tmp_path: Path) -> None:
+    pq = pytest.importorskip("pyarrow.parquet")
     study = small_study()
     tasks = list(tasks_of(study))
-    with Table(tmp_path, columns_of(study), b"{}") as table:
+    with Table(tmp_path, columns_of(study), b"{}", parquet=True) as table:
         for k, task in enumerate(tasks):
             table.add(row_of(task, FIGURED))
             assert len((tmp_path / "results.csv").read_text().splitlines()) == k + 2
@@ -133,29 +181,26 @@ def test_in_a_first_sweep_csv_grows_and_parquet_appears_at_the_end(tmp_path: Pat
     ]
 
 
-@pytest.mark.parametrize("parquet", [True, False])
+@pytest.mark.parametrize("finished", [True, False])
 @pytest.mark.parametrize(("complete", "rows"), [(True, 3), (False, 3), (False, 4)])
 def test_a_table_is_replaced_whole_and_never_by_a_shorter_one_that_is_not_complete(
-    tmp_path: Path, complete: bool, rows: int, parquet: bool
+    tmp_path: Path, complete: bool, rows: int, finished: bool
 ) -> None:
     study = small_study()
     written(tmp_path, study, [FIGURED] * len(study))
-    if not parquet:  # as a sweep leaves it that was killed
-        (tmp_path / "results.parquet").unlink()
-    names = ("results.csv", *["results.parquet"] * parquet)
-    before = [(tmp_path / name).read_bytes() for name in names]
+    if not finished:  # as a sweep leaves it that was killed
+        (tmp_path / "study.json").write_bytes(study_json(small_study(seeds=range(5))))
+    before = [(tmp_path / name).read_bytes() for name in ("results.csv", "study.json")]
     with Table(tmp_path, columns_of(study), b"{}") as table:
         for k, task in enumerate(list(tasks_of(study))[:rows]):
             table.add(row_of(task, FAILED))
-            if k == 3 and not parquet:
+            if k == 3 and not finished:
                 break  # it has grown as long, and may be seen
-            assert [(tmp_path / name).read_bytes() for name in names] == before
-            assert not (tmp_path / "study.json").exists()
+            assert [(tmp_path / name).read_bytes() for name in ("results.csv", "study.json")] == before
         table.complete = complete
     replaced = complete or rows == 4  # no shorter
-    assert table.replaced == replaced == (tmp_path / "study.json").exists()
+    assert table.replaced == replaced == ((tmp_path / "study.json").read_bytes() == b"{}")
     assert len((tmp_path / "results.csv").read_text().splitlines()) == (1 + rows if replaced else 5)
-    assert (tmp_path / "results.parquet").exists() == (replaced or parquet)
     assert not list(tmp_path.glob(".*"))
 
 
@@ -164,7 +209,7 @@ def test_a_table_that_grows_appears_when_it_is_as_long_as_the_one_of_a_sweep_tha
 ) -> None:
     study = small_study()
     written(tmp_path, study, [FIGURED] * len(study))
-    (tmp_path / "results.parquet").unlink()
+    (tmp_path / "study.json").unlink()
     lengths = []
     with Table(tmp_path, columns_of(study)) as table:
         for task in [*tasks_of(study)] * 2:
@@ -178,7 +223,7 @@ def test_a_table_that_grows_appears_when_it_is_as_long_as_the_one_of_a_sweep_tha
 def test_what_is_no_file_is_not_replaced(tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()
     told = pytest.raises(OutputError, match=f"{name}: is a folder, but a file was wanted")
-    with told, Table(tmp_path, columns_of(small_study())):
+    with told, Table(tmp_path, columns_of(small_study()), parquet=True):
         pass
 
 
@@ -225,17 +270,17 @@ def test_a_full_disk_leaves_no_half_of_a_row(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
 
 
-@pytest.mark.parametrize("broken", ["write_table", "close"])
+@pytest.mark.parametrize("broken", ["write_table", "__exit__"])
 def test_a_full_disk_leaves_no_half_of_parquet(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, broken: str
 ) -> None:
     def full(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
+    pq = pytest.importorskip("pyarrow.parquet")
     study = small_study()
-    monkeypatch.setattr(table_module, "ROW_GROUP", 1)
     told = pytest.raises(OutputError, match=r"results.parquet: cannot be written: No space left")
-    with told, Table(tmp_path, columns_of(study)) as table:
+    with told, Table(tmp_path, columns_of(study), parquet=True) as table:
         monkeypatch.setattr(pq.ParquetWriter, broken, full)
         table.add(row_of(next(tasks_of(study)), FIGURED))
     monkeypatch.undo()
