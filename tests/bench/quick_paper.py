@@ -37,4 +37,4 @@ def test_the_quick_study_finds_what_is_plain(tmp_path):
         for suffix in ("png", "svg", "pdf"):
             assert (out / "figures" / f"figure-{number}.{suffix}").is_file()
     assert len((out / "index.html").read_bytes()) < 1_500_000
-    assert (out / "studies" / "claims" / "results.parquet").is_file()
+    assert (out / "studies" / "claims" / "results.csv").is_file()
