@@ -26,9 +26,9 @@ def line(law: str, track: str) -> str:
     above = sum(median > 0.05 for median in medians.values())
     touched = sum(row["contacts"] > 0 for row in rows)
     gap, way = 100.0 * rating.gap.estimate, rating.median("path_length_m")
-    cells = f"{gap:.1f} %", f"{above} of {len(medians)}", f"{touched} of {len(rows)}"
+    cells = f"{gap:.1f}", f"{above} of {len(medians)}", f"{touched} of {len(rows)}"
     rest = 100.0 * rating.at_rest()[0]
-    return f"| `{law}` | {' | '.join(cells)} | {rest:.0f} % | {way:.1f} m |"
+    return f"| `{law}` | {' | '.join(cells)} | {rest:.0f} | {way:.1f} |"
 
 
 RIVALS = ("rapf", "frontier-median", "greedy-submodular")
