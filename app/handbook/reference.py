@@ -45,7 +45,9 @@ def write(app: Sphinx) -> None:
 def gains_as_signature(*event: Any) -> tuple[str, None] | None:
     """Return the gains of a control law in the place of what its ``__new__`` takes."""
     _, what, _, value = event[:4]
-    return (str(inspect.signature(value)), None) if what == "class" and issubclass(value, Law) else None
+    if what != "class" or not issubclass(value, Law):
+        return None
+    return str(inspect.signature(value, eval_str=True)).removesuffix(" -> None"), None
 
 
 def commands() -> str:
