@@ -2,6 +2,7 @@
 
 import asyncio
 import multiprocessing
+import os
 import secrets
 from _thread import interrupt_main
 from collections.abc import Callable
@@ -140,7 +141,8 @@ class Sessions:
         context = multiprocessing.get_context("spawn")
         said, says = context.Pipe(duplex=False)
         process = context.Process(target=_session, args=(self._command, own, says), daemon=False)
-        resource_tracker.ensure_running()  # which would unblock what is blocked here
+        if os.name == "posix":
+            resource_tracker.ensure_running()  # which would unblock what is blocked here
         interruptible(False)
         process.start()
         interruptible(True)
