@@ -1,5 +1,6 @@
 """The plot of the cost against time, and the time line below it."""
 
+import math
 from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
@@ -164,7 +165,10 @@ class Chart:
             y = bottom - (bottom - top) * (mark - low) / (high - low)
             canvas.surface.fill(faint, (round(left), round(y), round(right - left), 1))
             note(f"{mark:.6g}", (left - 7 * scale, y), anchor="right")
-        for mark in np.arange(0.0, end + 1e-9, max(round_length(end / 6.0), 1.0)):
+        seconds = max(round_length(end / 6.0), 1.0)
+        room = max(seconds * (right - left) / end, 1.0)  # px from one to the next
+        seconds *= math.ceil((canvas.text_width(f"{end:.0f} s", theme.small_text) + 4 * scale) / room)
+        for mark in np.arange(0.0, end + 1e-9, seconds):
             note(f"{mark:g} s", (self.column(mark), height - 0.5 * BOTTOM * scale), anchor="middle")
         for event in session.events:
             self._rule(canvas.surface, self.column(event.time), mix(theme.panel, theme.ink, 0.3), 0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from driven_window import Driver, opened
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robocov_app.render.canvas import Canvas
 from robocov_app.viewer.chart import curve_colours, spread, time_axis, value_axis
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.session.scenario import ControllerChoice
@@ -53,6 +55,27 @@ def test_words_at_the_right_keep_apart_and_in_the_chart(wanted: list[float]) -> 
     rows = spread(np.sort(wanted), 15.0, 200.0)
     assert all(below - above >= 15.0 - 1e-9 for above, below in pairwise(rows))
     assert max(rows) <= 200.0 + 1e-9
+
+
+@pytest.mark.parametrize("width", [480, 900])
+def test_times_keep_apart_in_a_narrow_chart(
+    tmp_path: Path, width: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ends: list[tuple[float, float]] = []
+    write = Canvas.text
+
+    def noted(canvas: Canvas, text: str, at: Any, **how: Any) -> int:
+        wide = write(canvas, text, at, **how)
+        if how.get("anchor") == "middle":
+            ends.append((at[0] - wide / 2, at[0] + wide / 2))
+        return wide
+
+    monkeypatch.setattr(Canvas, "text", noted)
+    with opened(tmp_path, size=(width, 1200), scale=3.0) as driver:
+        ends.clear()
+        driver.window.chart._page = None
+        driver.frames(1)
+    assert ends and all(one[1] <= other[0] for one, other in pairwise(ends))
 
 
 def test_columns_and_times_are_the_same_thing(driver: Driver) -> None:
