@@ -1,4 +1,4 @@
-"""What people install: the wheel, the source archive, the extras, and the description on package indexes."""
+"""The wheel, the source archive, the extras, and the description on package indexes."""
 
 from __future__ import annotations
 

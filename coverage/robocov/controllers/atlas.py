@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -69,15 +69,18 @@ class Teammates(NamedTuple):
         later.places[here], later.since[here] = self.places[there], self.since[there]
         return later
 
-    def joined(self, report: Teammates, i: int, gone: Mapping[int, float]) -> Teammates:
+    def joined(self, reports: Sequence[Teammates], i: int, gone: Mapping[int, float]) -> Teammates:
         """Return it with what robot i is told of others that were heard later, and after they were `gone`."""
-        since = [math.inf if j == i else gone.get(j, -1.0) for j in report.robots.tolist()]
-        new = report.heard > np.array(since)
-        told = report._replace(away=np.full(len(new), math.inf))
-        both = [np.concatenate([mine, theirs[new]]) for mine, theirs in zip(self, told, strict=True)]
-        order = np.lexsort((-both[2], both[0]))
-        order = order[np.unique(both[0][order], return_index=True)[1]]
-        return Teammates(*(each[order] for each in both))
+        every: list[Sequence[Any]] = [self]
+        for report in reports:
+            since = [math.inf if j == i else gone.get(j, -1.0) for j in report.robots.tolist()]
+            new = report.heard > np.array(since)
+            told = report._replace(away=np.full(len(new), math.inf))
+            every.append([each[new] for each in told])
+        merged = [np.concatenate(each) for each in zip(*every, strict=True)]
+        order = np.lexsort((-merged[2], merged[0]))  # stable: of reports as late the first one counts
+        order = order[np.unique(merged[0][order], return_index=True)[1]]
+        return Teammates(*(each[order] for each in merged))
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +132,7 @@ class AtlasMemory:
 
     @property
     def reports(self) -> tuple[Teammates, ...]:
-        """Where each robot knows others to be, which it tells where maps are shared."""
+        """Last known positions of the others, of each robot, which it tells where maps are shared."""
         return tuple(state.others for state in self.states)
 
 
@@ -321,13 +324,11 @@ class Atlas(Law):
         away = np.sqrt(((known.at - place) ** 2).sum(axis=1))
         missed = (silence > _MISSED) & (away < _IN_RANGE * hears)
         lost = known.robots[failed | missed].tolist()
-        met, gone = (
-            state.met - {*known.robots[failed].tolist()},
-            {**state.gone, **dict.fromkeys(lost, seen.time)},
-        )
+        met = state.met - {*known.robots[failed].tolist()}
+        gone = {**state.gone, **dict.fromkeys(lost, seen.time)}
         known = known.updated(robots, at, place, seen.time, failed | missed)
-        for report in reports:
-            known = known.joined(report, i, gone)
+        if reports:
+            known = known.joined(reports, i, gone)
         return replace(state, others=known, met=met | {*known.robots.tolist()}, gone=gone)
 
     def _plan_for_all(

@@ -279,7 +279,7 @@ def test_the_latest_report_of_a_robot_counts() -> None:
     mine = known((2, 0.2, 5.0), (3, 0.3, 1.0), (6, 0.6, 4.0))
     # itself, older, later, then missed before, missed since, and just as old news
     report = known((0, 9.0, 9.0), (2, 9.0, 4.0), (3, 0.33, 2.0), (4, 0.4, 3.0), (5, 9.0, 3.0), (6, 9.0, 4.0))
-    told = mine.joined(report, 0, {4: 2.5, 5: 3.5})
+    told = mine.joined([report], 0, {4: 2.5, 5: 3.5})
     assert (told.robots.tolist(), told.at[:, 0].tolist()) == ([2, 3, 4, 6], [0.2, 0.33, 0.4, 0.6])
     assert told.heard.tolist() == [5.0, 2.0, 3.0, 4.0]
     # who was never near cannot be missed for its silence
