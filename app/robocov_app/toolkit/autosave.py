@@ -3,7 +3,6 @@
 import json
 import os
 import secrets
-import shutil
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -20,6 +19,7 @@ from robocov.files.atomic import locked, written
 from robocov.files.strictjson import parse, read_bytes
 
 FOLDER = "ROBOCOV_DRAFTS"  # environment variable with another folder to keep work in; empty for none
+SERVED_FOLDER = ".drafts"  # folder for drafts below the folder of a window that is shown in browsers
 _FILE = "draft.json"
 _PAUSE = 0.25  # seconds between two writings
 _SHARE = 10.0  # times as long as the last writing took: large work does not stutter
@@ -95,7 +95,7 @@ class Autosaver:
             with suppress(OSError):
                 (self._place / _FILE).unlink()
             self._lock.close()  # where files that are open cannot be removed, the lock goes first
-            shutil.rmtree(self._place, ignore_errors=True)
+            remove_draft(self._place)
         self._lock.close()
         self._place = None
 
@@ -143,9 +143,26 @@ class Autosaver:
                 self._changed.notify_all()
 
 
-def autosave_folder() -> Path | None:
-    folder = os.environ.get(FOLDER, str(user_state_path("robocov", appauthor=False) / "drafts"))
-    return Path(folder) if folder else None
+def autosave_folder(served_from: Path | None = None) -> Path | None:
+    """Return the folder for drafts.
+
+    Parameters
+    ----------
+    served_from : Path, optional
+        Folder of a window that is shown in browsers. Such a window writes nowhere else, so its drafts are
+        in the hidden folder `SERVED_FOLDER` below it.
+
+    Returns
+    -------
+    folder : Path or None
+        None if the environment variable `FOLDER` is set and empty: no drafts are kept then.
+    """
+    named = os.environ.get(FOLDER)
+    if named == "":
+        return None
+    if served_from is not None:
+        return served_from / SERVED_FOLDER
+    return Path(named) if named else user_state_path("robocov", appauthor=False) / "drafts"
 
 
 def recoverable(folder: Path | None, kind: str, read: Callable[[Record], _Work | None]) -> tuple[_Work, ...]:
@@ -159,12 +176,20 @@ def recoverable(folder: Path | None, kind: str, read: Callable[[Record], _Work |
             if record is not None and work is not None:
                 found.append((record.when, work))
             elif time.time() - place.stat().st_mtime > _YOUNG:
-                shutil.rmtree(place, ignore_errors=True)
+                remove_draft(place)
     return tuple(work for _, work in sorted(found, key=lambda pair: pair[0], reverse=True))
 
 
-def discard(folder: Path) -> None:
-    shutil.rmtree(folder, ignore_errors=True)
+def remove_draft(folder: Path) -> None:
+    """Remove the folder of one draft, as far as it can be removed.
+
+    Each file is named in full: `shutil.rmtree` names them relative to an open folder, which a window that
+    may use one folder alone cannot allow (see `robocov_app.web.confined`).
+    """
+    with suppress(OSError):
+        for file in list(folder.iterdir()):
+            file.unlink()
+        folder.rmdir()
 
 
 def opened_elsewhere(folder: Path | None, kind: str, path: Path) -> bool:

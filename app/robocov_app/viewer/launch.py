@@ -58,7 +58,7 @@ class Launcher:
     also: frozenset[str] = frozenset()  # names of layers
     without: frozenset[str] = frozenset()
     headless: bool = False  # draw without a display, in steps of 1 / `HEADLESS_FPS`, whatever that takes
-    served: bool = False  # draw without a display, but live; nothing is remembered
+    served: bool = False  # draw without a display, but live; no settings are kept, drafts below `folder`
     laws: tuple[str, ...] = ()  # names of controllers to choose from beside the built-in ones
     lattice: int = LATTICE
     file: Path | None = None
@@ -75,8 +75,8 @@ class Launcher:
                 settings, trouble = loaded(Settings, file)
                 window = self._opened(settings)
                 window.viewer.say(trouble)
-                if not self._alone and (left := recoverable(autosave_folder())):
-                    window.offer_recovery(left)
+                if found := recoverable(self._drafts):
+                    window.offer_recovery(found)
                 elif self.offers_lesson and file is not None and not file.exists():
                     window.offer_lesson()
                 keeper, begun = window.keeper, self._settings_of(window, settings)
@@ -98,6 +98,13 @@ class Launcher:
     def _alone(self) -> bool:
         return self.headless or self.served
 
+    @property
+    def _drafts(self) -> Path | None:
+        """The folder for drafts; None if none are kept."""
+        if self.headless:
+            return None
+        return autosave_folder(self.folder if self.served else None)
+
     def _opened(self, settings: Settings) -> Window:
         self._usual = {layer.name for layer in standard_layers() if layer.default}
         if settings.shown is not None:
@@ -113,8 +120,16 @@ class Launcher:
             self.session.clock.budget = FRAME_BUDGET
         costs = Costs(self.lattice, direct=self.headless)
         try:
-            kept_in, known = None if self._alone else autosave_folder(), (self.map_name, self.laws)
-            viewer = Presenter(self.session, costs, shown, self.folder, *known, kept_in, self.file)
+            viewer = Presenter(
+                self.session,
+                costs,
+                shown,
+                self.folder,
+                map_name=self.map_name,
+                laws=self.laws,
+                kept_in=self._drafts,
+                file=self.file,
+            )
             viewer.theme = self.theme or settings.theme
             viewer.fade, viewer.suggests, viewer.recent = settings.fade, settings.suggests, [*settings.recent]
             window = Window(viewer, size, scale, patient=self.headless)

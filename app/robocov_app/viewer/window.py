@@ -13,7 +13,7 @@ from robocov.errors import RobocovError
 from robocov_app.render.picture import standard_layers
 from robocov_app.render.theme import theme_named
 from robocov_app.terminal.output import free_name
-from robocov_app.toolkit.autosave import Record, discard
+from robocov_app.toolkit.autosave import Record, remove_draft
 from robocov_app.toolkit.command import Command, Commands, draw_keys, palette
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Option, Question, file_choice, list_choice
 from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, SLIP, WHEEL, show_cursor, wheel_notches
@@ -480,7 +480,7 @@ class Window(BaseWindow):
             viewer.attempt(lambda: viewer.recover(newest))
 
         def drop() -> None:
-            discard(newest.folder)
+            remove_draft(newest.folder)
             later()
             if found[1:]:
                 self.offer_recovery(found[1:])

@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 
 from robocov.errors import RobocovError
 from robocov.extras import extra
+from robocov_app.toolkit.autosave import FOLDER as DRAFTS
 
 
 class LiveWindow:
@@ -24,7 +25,10 @@ class LiveWindow:
         extra("websockets", "web")
         call = [sys.executable, "-m", "robocov_app", *arguments, "--serve", "--port", "0"]
         pipe, none = subprocess.PIPE, subprocess.DEVNULL
-        self._process = subprocess.Popen(call, stdin=none, stdout=pipe, stderr=pipe, text=True)
+        environment = {**os.environ, DRAFTS: ""}  # the cell makes the window again, there is nothing to offer
+        self._process = subprocess.Popen(
+            call, stdin=none, stdout=pipe, stderr=pipe, text=True, env=environment
+        )
         self.close = weakref.finalize(self, _ended, self._process)
         assert self._process.stdout is not None
         self.height = height

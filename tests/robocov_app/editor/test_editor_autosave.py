@@ -11,7 +11,7 @@ from robocov.environment import CircleObstacle
 from robocov.errors import MapError
 from robocov_app.editor.model.document import KIND, Autosave, content, recoverable, state_of, write_sketch
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.toolkit.autosave import Autosaver, discard
+from robocov_app.toolkit.autosave import Autosaver, remove_draft
 
 SKETCH = Sketch("Hall", boundary=HALL)
 
@@ -51,7 +51,7 @@ def test_one_that_vanishes_meanwhile_is_said(tmp_path):
     kept(tmp_path, SKETCH)
     (found,) = recoverable(tmp_path)
     assert found.words().endswith("never saved")
-    discard(found.folder)
+    remove_draft(found.folder)
     with pytest.raises(MapError, match="no such file"):
         found.sketch()
 

@@ -17,10 +17,11 @@ from robocov_app.toolkit.autosave import (
     FOLDER,
     Autosaver,
     autosave_folder,
-    discard,
     opened_elsewhere,
     recoverable,
+    remove_draft,
 )
+from robocov_app.web.confined import confined
 
 KIND = "robocov-test"
 
@@ -98,7 +99,7 @@ def test_what_a_killed_program_did_is_found_again_and_goes_on(folder, tmp_path):
     keeper.close(discard=False)
     (record,) = found(folder)
     assert (record.path, record.content) == (path, {"work": 5})
-    discard(record.folder)
+    remove_draft(record.folder)
     assert found(folder) == ()
     assert list(folder.iterdir()) == []
 
@@ -253,6 +254,24 @@ def test_the_folder_can_be_named(monkeypatch, tmp_path):
     assert autosave_folder() is None
     monkeypatch.delenv(FOLDER)
     assert autosave_folder().name == "drafts"
+
+
+def test_drafts_of_a_served_window_are_hidden_in_its_folder(monkeypatch, tmp_path):
+    monkeypatch.setenv(FOLDER, str(tmp_path / "elsewhere"))
+    assert autosave_folder(tmp_path) == tmp_path / ".drafts"
+    monkeypatch.delenv(FOLDER)
+    assert autosave_folder(tmp_path) == tmp_path / ".drafts"
+    monkeypatch.setenv(FOLDER, "")
+    assert autosave_folder(tmp_path) is None
+
+
+def test_drafts_are_removed_where_only_one_folder_may_be_used(tmp_path, folder):
+    keeper = Autosaver(folder, KIND)
+    keeper.keep(lambda: {"work": 1})
+    assert keeper.flush()
+    with confined(folder):
+        keeper.close(discard=True)
+    assert list(folder.iterdir()) == []
 
 
 def test_a_record_says_what_it_is(folder, tmp_path):

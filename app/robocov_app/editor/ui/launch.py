@@ -12,7 +12,7 @@ from robocov_app.editor.tools.snapping import SNAPS
 from robocov_app.editor.ui.editor import FILE, KEPT, SHOWN, Editor, EditorSettings
 from robocov_app.editor.ui.file_commands import heading, lay_under, opened
 from robocov_app.editor.ui.window import EditorWindow
-from robocov_app.toolkit.autosave import autosave_folder, discard
+from robocov_app.toolkit.autosave import autosave_folder, remove_draft
 from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
 from robocov_app.toolkit.window import display, fitting, screen_scale
 
@@ -34,13 +34,22 @@ def editor_window(
     headless: bool = False,
     served: bool = False,
 ) -> Iterator[EditorWindow]:
-    """Open the editor; settings are read before and kept afterwards.
+    """Open the editor.
 
-    `headless`: draw without a display. `served`: that too, but live; nothing is remembered either.
+    Parameters
+    ----------
+    path : Path or None
+        Map to open, or foreign file to import; None for a new map.
+    folder : Path
+        Folder for what is saved without a path. Drafts of a `served` window are in it, too.
+    headless : bool
+        Draw without a display; keep neither settings nor drafts.
+    served : bool
+        Draw without a display, but live; keep no settings.
     """
     alone = headless or served
-    drafts = None if alone else autosave_folder()
-    if path is not None and not alone and opened_elsewhere(drafts, path=path):
+    drafts = None if headless else autosave_folder(folder if served else None)
+    if path is not None and opened_elsewhere(drafts, path=path):
         raise InputError(f"{path}: another editor has it open; close that one, or open a copy")
     # what is wrong with the file is told before a window flashes up
     found = Document.new(drafts) if path is None else opened(path, drafts)
@@ -64,8 +73,7 @@ def editor_window(
         window.panel.show_tab(settings.tab)
         if document.path is not None:
             window.documents.remember(document.path)
-        if not alone:
-            offer(window, recoverable(drafts))
+        offer(window, recoverable(drafts))
         if path is not None and not isinstance(found, Document):
             window.documents.ask_import(path, found)
         begun, discarding = settings_of(window, settings), False
@@ -85,7 +93,7 @@ def offer(window: EditorWindow, found: Sequence[Autosave]) -> None:
     draft, rest = found[0], found[1:]
 
     def throw_away() -> None:
-        discard(draft.folder)
+        remove_draft(draft.folder)
         offer(window, rest)
 
     recover = partial(window.documents.recover, draft)
