@@ -51,6 +51,7 @@ _OPTIONS: dict[str, list[Any]] = {
     "outlines": ["free", "solid"],
     "boundary": ["boundary", "desk", "nobody"],
     "around": [0.01, 1.0, 50.0],
+    "snap": [0.0, 0.05, 1.0],
     "only": [["walls"], ["desk", "boundary"]],
     "skip": [["walls"], ["boundary"]],
     "hatches": [True],

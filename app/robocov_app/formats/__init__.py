@@ -44,7 +44,8 @@ __all__ = [
     "ReadOptions", "Shaping", "WriteOptions", "detect", "export_map", "exporter", "import_map", "importer",
     "read_map", "shaped",
 ]  # fmt: skip
-_DRAWN = ("thickness", "pillar", "outlines", "boundary", "around", "only", "skip")  # options of drawings
+# options of drawings
+_DRAWN = ("thickness", "pillar", "outlines", "boundary", "around", "snap", "only", "skip")
 # the first whose `sniff` says yes has a file: the surest come first
 IMPORTERS: dict[str, Importer] = {each.name: each for each in (
     # a .yaml is this by its content only
@@ -68,23 +69,23 @@ IMPORTERS: dict[str, Importer] = {each.name: each for each in (
              frozenset({"cell", "unknown", "threshold", "invert"})),
     Importer("osm", "OpenStreetMap (.osm): buildings, water, walls, fences, hedges", (".osm",),
              lambda path, head: osm.ROOT.match(head) is not None, osm.read,
-             frozenset({"water", "outlines", "thickness", "pillar", "boundary", "around", "only", "skip"})),
+             frozenset({"water", *_DRAWN})),
     Importer("svg", "SVG drawings: filled shapes, strokes as walls", (".svg", ".svgz"),
              lambda path, head: svg.ROOT.search(head) is not None or path.suffix.lower() == ".svgz", svg.read,
-             frozenset({"scale", "thickness", "outlines", "boundary", "around", "only", "skip"})),
+             frozenset({"scale", "thickness", "outlines", "boundary", "around", "snap", "only", "skip"})),
     Importer("dxf", "DXF drawings (with ezdxf): closed outlines, lines as walls, blocks", (".dxf",),
              lambda path, head: head.startswith(dxf.BINARY) or dxf.TEXT.match(head) is not None, dxf.read,
              frozenset({"scale", *_DRAWN, "hatches"})),
     Importer("wkt", "well-known text (JuPedSim, PostGIS, shapely): polygons, lines, collections",
              (".wkt", ".ewkt"), lambda path, head: wkt.BEGIN.match(head) is not None, wkt.read,
-             frozenset({"scale", "units", "thickness", "pillar", "outlines", "around"})),
+             frozenset({"scale", "units", "thickness", "pillar", "outlines", "around", "snap"})),
     Importer("geojson", "GeoJSON, in degrees (with pyproj) or metres: polygons, lines, points", (".geojson",),
              lambda path, head: files.begins_with(head, b"{") and geojson.TYPE.search(head) is not None,
              geojson.read, frozenset({"scale", "units", *_DRAWN})),
     Importer("houseexpo", "HouseExpo floor plans (JSON with verts in metres)", (".json",),
              lambda path, head: files.begins_with(head, b"{") and b'"verts"' in head, houseexpo.read),
     Importer("rings", "lists of rings (JSON as earcut takes it): outline and holes", (".json",),
-             rings.sniff, rings.read, frozenset({"scale", "outlines", "around"})),
+             rings.sniff, rings.read, frozenset({"scale", "outlines", "around", "snap"})),
 )}  # fmt: skip
 # the formats that can be written
 EXPORTERS: dict[str, Exporter] = {each.name: each for each in (

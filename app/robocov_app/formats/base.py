@@ -159,6 +159,9 @@ class ReadOptions(Options):
     """Name, id, class or layer of the shape that is the outer boundary."""
     around: float | None = None
     """Room in metres around the shapes where none of them is the boundary."""
+    snap: float | None = None
+    """Gaps in metres between outlines of free space that are narrower than this are closed where they cut
+    it apart; 0 keeps all. By default 0.01, or a thousandth of the drawing if that is less."""
     only: tuple[str, ...] | None = None
     """Names, ids, classes or layers that are read; all else is left out."""
     skip: tuple[str, ...] | None = None
@@ -168,7 +171,7 @@ class ReadOptions(Options):
 
     def __post_init__(self) -> None:
         lengths = dict.fromkeys(("cell", "scale", "thickness", "pillar", "around"), _LENGTH)
-        self.require(threshold=(0.0, 1.0, ""), **lengths)
+        self.require(threshold=(0.0, 1.0, ""), snap=(0.0, 10.0, "m"), **lengths)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from robocov.mapfile.models import FARTHEST, LARGEST, LONGEST_LABEL, SMALLEST
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.polygons import Crossings, Rule, enclosed, polygons_of, united
+from robocov_app.formats.geometry.snapping import close_gaps, default_snap
 
 Kind: TypeAlias = Literal["polygon", "line", "point"]
 THICKNESS = 0.1  # width of walls that are drawn as lines without one, in metres
@@ -327,7 +328,7 @@ class Shapes:
             boundary = boundary or self.surrounding()
             area = boundary.area
         else:
-            area = _together([o.area for o in self.outlines if not boundary or o not in boundary.outlines])
+            area = self._joined([o.area for o in self.outlines if not boundary or o not in boundary.outlines])
             if area.is_empty and boundary is not None:
                 area = boundary.area
         if area.is_empty:
@@ -383,6 +384,14 @@ class Shapes:
             dropped=self.dropped,
             notes=tuple(notes),
         )
+
+    def _joined(self, areas: Sequence[BaseGeometry]) -> MultiPolygon:
+        """Return areas of free space as one, hairline gaps between them closed and counted."""
+        snap = default_snap(areas) if self.options.snap is None else self.options.snap
+        joined = close_gaps(areas, snap)
+        if joined.number:
+            self.notes.append(joined.describe())
+        return joined.area
 
     def surrounding(self) -> _Enclosure:
         """Return what the shapes enclose as walls, else a rectangle around them."""
