@@ -98,8 +98,10 @@ def _guarded(name: str, rest: list[str]) -> int:
 
         if fault := users_fault(error):
             return _complain(str(fault))
-        traceback.print_exc()
-        print("robocov: this is a fault of robocov, not of your input; please report it", file=sys.stderr)
+        from robocov_app.terminal.output import echo
+
+        echo(traceback.format_exc(), end="", to_stderr=True)
+        echo("robocov: this is a fault of robocov, not of your input; please report it", to_stderr=True)
         return FAILED
 
 
@@ -136,12 +138,14 @@ def _prepare_output() -> None:
 
 
 def _complain(message: str) -> int:
+    from robocov_app.terminal.output import echo
+
     if os.environ.get(TRACEBACK):
-        traceback.print_exc()
+        echo(traceback.format_exc(), end="", to_stderr=True)
     # names of files and gains may hold line breaks, or thousands of characters; an error is one line
     line = " ".join(message.splitlines())
     line = line if len(line) <= _LONGEST else f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 3 :]}"
-    print(f"robocov: error: {line}", file=sys.stderr)
+    echo(f"robocov: error: {line}", to_stderr=True)
     return BAD_INPUT
 
 

@@ -23,6 +23,7 @@ from robocov.metrics import CostHistory, cost_history
 from robocov.record import Record
 from robocov.robots import Team
 from robocov.simulation import Simulation
+from robocov.text import escape_controls
 from robocov_app.figures.files import figure_png
 from robocov_app.render.camera import length_label, round_length
 from robocov_app.render.density import mean_label
@@ -126,7 +127,7 @@ def environment_html(environment: Environment) -> str:
         f"{counted(len(environment.obstacles), 'obstacle')}; "
         f"start{'s' if len(environment.starts) > 1 else ''} {starts}"
     )
-    return (
+    return escape_controls(
         f"<style>{theme_rules('.robocov-map')}{asset('picture.css')}{_MAP_CSS}</style>"
         f'<figure class="robocov-map" style="max-width:{frame.width + 24:.0f}px">'
         f"<figcaption><b>{escape(environment.name)}</b> {escape(facts)}</figcaption>"

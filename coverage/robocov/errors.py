@@ -19,6 +19,8 @@ from difflib import get_close_matches
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeGuard
 
+from robocov.text import escape_controls
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -108,8 +110,8 @@ def shown_json(value: object) -> str:
 
 
 def one_line(text: object) -> str:
-    """Return `text` as messages can hold it: without line breaks and other control characters."""
-    return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in str(text))
+    """Return `text` as one line of a message, with escapes for line breaks and other control characters."""
+    return escape_controls(str(text), single_line=True)
 
 
 def reason(error: Exception) -> str:

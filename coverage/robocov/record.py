@@ -21,7 +21,7 @@ from robocov.controllers import Controller, gain_values, short_name
 from robocov.controllers.gains import Value
 from robocov.drawing import Drawable
 from robocov.environment import Environment
-from robocov.errors import InputError, OutputError, ParameterError, counted, reason, shown
+from robocov.errors import InputError, OutputError, ParameterError, counted, one_line, reason, shown
 from robocov.extras import extra
 from robocov.files.array_files import read_arrays
 from robocov.files.atomic import written
@@ -375,7 +375,7 @@ class Recorder:
         names = (*ARRAYS, TURNING) if self.team.turns.any() else ARRAYS
         columns = zip(*self._moments, strict=True) if self._moments else [()] * len(names)
         arrays: dict[str, Any] = {name: np.array(rows) for name, rows in zip(names, columns, strict=True)}
-        law = str(self.name), self.controller.label, self._gains
+        law = str(self.name), one_line(self.controller.label), self._gains
         origin = self.start, self.seed, self.dt
         return Record(self.environment, self.team, *law, *origin, conditions=self.conditions, **arrays)
 

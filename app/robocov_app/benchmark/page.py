@@ -11,6 +11,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from robocov import __version__
 from robocov.arrays import Array
 from robocov.errors import ParameterError, counted
+from robocov.text import escape_controls
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.ratings import Rating, number
 from robocov_app.figures.files import plain_style
@@ -60,7 +61,7 @@ def page_of(results: Sequence[Mapping[str, Any]], title: str) -> str:
     }
     if not tracks:
         raise ParameterError("DIR: the results have no run in common, so there is nothing to compare")
-    return template("benchmark.html.jinja").render(
+    page = template("benchmark.html.jinja").render(
         title=title,
         suite=suite.VERSION,
         version=__version__,
@@ -73,6 +74,7 @@ def page_of(results: Sequence[Mapping[str, Any]], title: str) -> str:
         method=list(dict.fromkeys(words for each in results for words in each["method"])),
         entries=_entries(results, labels),
     )
+    return escape_controls(page)
 
 
 def _overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]) -> Table:

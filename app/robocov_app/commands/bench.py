@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import os
 import platform
-import sys
 from dataclasses import dataclass
 from importlib.metadata import version
 from itertools import groupby
@@ -15,7 +14,7 @@ import tyro
 
 from robocov.errors import ParameterError
 from robocov_app.runs.options import PlotOptions
-from robocov_app.terminal.output import RIGHT, console, print_table, tell
+from robocov_app.terminal.output import RIGHT, console, echo, print_table, tell
 from robocov_app.terminal.progress import progress, tell_of_compiling
 
 if TYPE_CHECKING:
@@ -69,7 +68,7 @@ def command(options: Arguments) -> None:
         missing = "scikit-fmm, the yardstick of the cost, is not installed: pip install 'robocov[bench]'"
         if options.part == "cost":
             raise ParameterError(missing)
-        print(f"robocov: {missing}", file=sys.stderr)
+        echo(f"robocov: {missing}", to_stderr=True)
     cases = [case for part in parts for case in getattr(modules[part], PARTS[part][2])(quick=options.quick)]
     rows, stopped = [], None
     try:
@@ -111,7 +110,7 @@ def print_tables(rows: Sequence[Row]) -> None:
             cells.append((*case, *times, *ratios, goals(row), yardstick, row.note))
             former = words
         print_table(columns, cells, title=PARTS[part][0])
-        print()
+        echo()
 
 
 def goals(row: Row) -> str:

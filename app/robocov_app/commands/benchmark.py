@@ -10,7 +10,7 @@ from robocov.errors import InputError, ParameterError, checked, counted
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.arguments import parsed_gains
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
-from robocov_app.terminal.output import BOLD, RIGHT, print_table, tell
+from robocov_app.terminal.output import BOLD, RIGHT, echo, print_table, tell
 
 FAILED = 1
 _USED = {  # the options that each action has beside --json
@@ -127,7 +127,7 @@ def _suite(options: Arguments) -> int:
         rows.append((name, *map(str, counts), track.summary))
     columns = [("Track", BOLD), ("Maps", RIGHT), ("Runs", RIGHT), ("Robots", RIGHT), ("", {})]
     print_table(columns, rows, title=f"Suite {suite.VERSION}; --quick takes {', '.join(suite.QUICK)}")
-    print()
+    echo()
     families = [(name, ", ".join(own)) for name, own in suite.FAMILIES.items()]
     print_table([("Family", BOLD), ("Maps", {})], families)
     return 0

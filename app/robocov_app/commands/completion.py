@@ -10,6 +10,7 @@ from robocov.controllers import CONTROLLERS
 from robocov.mapfile import bundled_maps
 from robocov_app.commands import COMMANDS
 from robocov_app.terminal.arguments import groups_of
+from robocov_app.terminal.output import echo
 
 _BASH = """\
 _robocov() {{
@@ -57,16 +58,16 @@ def command(options: Arguments) -> None:
         mapped += [name] * bool({"map", "files"} & positionals)
     maps, controllers = " ".join(bundled_maps()), " ".join(CONTROLLERS)
     if options.shell == "fish":
-        print("complete -c robocov -n __fish_use_subcommand -f")
+        echo("complete -c robocov -n __fish_use_subcommand -f")
         for name, (_, line) in COMMANDS.items():
             told = line.replace("'", "\\'")
-            print(f"complete -c robocov -n __fish_use_subcommand -f -a {name} -d '{told}'")
+            echo(f"complete -c robocov -n __fish_use_subcommand -f -a {name} -d '{told}'")
             seen = f"complete -c robocov -n '__fish_seen_subcommand_from {name}'"
             for flag in flags[name]:
                 more = f" -x -a '{controllers}'" if flag in ("--controller", "--controllers") else ""
-                print(f"{seen} -l {flag[2:]}{more}")
+                echo(f"{seen} -l {flag[2:]}{more}")
             if offered := maps if name in mapped else " ".join(words[name]):
-                print(f"{seen} -a '{offered}'")
+                echo(f"{seen} -a '{offered}'")
         return
     cases = [
         "\n".join(f'                {name}) names="{" ".join(own)}" ;;' for name, own in some.items() if own)
@@ -74,7 +75,7 @@ def command(options: Arguments) -> None:
     ]
     names: dict[str, str] = {"commands": " ".join(COMMANDS), "controllers": controllers, "maps": maps}
     script = _BASH.format(**names, mapped="|".join(mapped), options=cases[0], words=cases[1])
-    print(_ZSH * (options.shell == "zsh") + script, end="")
+    echo(_ZSH * (options.shell == "zsh") + script, end="")
 
 
 def _described(kind: Any) -> tuple[list[str], list[str], set[str]]:

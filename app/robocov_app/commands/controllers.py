@@ -8,6 +8,7 @@ from rich.text import Text
 
 from robocov.controllers import FLAGSHIP, controller_kinds, gains_of, information_of
 from robocov.controllers.gains import Gain, Option, value_text
+from robocov.text import escape_controls
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.output import console, tell
 
@@ -25,7 +26,7 @@ class Arguments(JsonOption):
 def command(options: Arguments) -> None:
     out, rows = console(), []
     for name, kind in controller_kinds().items():
-        label, summary = getattr(kind, "label", name), getattr(kind, "summary", "")
+        label, summary = str(getattr(kind, "label", name)), str(getattr(kind, "summary", ""))
         information, gains = information_of(kind), gains_of(kind).values()
         row = {"name": name, "label": label, "summary": summary, "flagship": name == FLAGSHIP}
         rows.append(row | {"information": information, "gains": list(map(_told, gains))})
@@ -33,8 +34,8 @@ def command(options: Arguments) -> None:
             continue
         mark = "   (recommended)" * (name == FLAGSHIP)
         mark += f"   (informed: {information})" * (information != "own")
-        out.print(Text.assemble((name, "bold"), f"   {label}{mark}"))
-        out.print(Text(f"  {summary}"))
+        out.print(Text.assemble((escape_controls(name), "bold"), escape_controls(f"   {label}{mark}")))
+        out.print(Text(escape_controls(f"  {summary}")))
         table = Table(box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 0))
         for gain in gains:
             default = value_text(gain.default, none="null")
@@ -42,7 +43,8 @@ def command(options: Arguments) -> None:
                 span = " | ".join(gain.words)
             else:
                 span = f"{gain.low:g} to {gain.high:g}{', or null' if gain.optional else ''}"
-            table.add_row("   ", gain.name, f"{default} {gain.unit}", span, gain.meaning)
+            cells = ("   ", gain.name, f"{default} {gain.unit}", span, gain.meaning)
+            table.add_row(*map(escape_controls, cells))
         out.print(table)
     own = "A law of your own: robocov run rooms --controller mine.py:MyController (see robocov handbook)."
     tell(options, {"controllers": rows}, own, indent=1)

@@ -13,6 +13,7 @@ from robocov.errors import ParameterError, checked
 from robocov_app.runs.options import LayerOptions, ScenarioOptions, WindowOptions, robots_of
 from robocov_app.terminal.arguments import parsed_gains, window_size
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
+from robocov_app.terminal.output import echo
 from robocov_app.terminal.progress import progress
 
 if TYPE_CHECKING:
@@ -168,5 +169,5 @@ def rendered(opening: Launcher, options: Arguments) -> int:
             out = None if result is None else result.new
             save_moving_picture(frames(), out, options.video, HEADLESS_FPS)
     for target in filter(None, (options.out, options.video)):
-        print(f"saved {target}")
+        echo(f"saved {target}")
     return INTERRUPTED if stop.requested else 0

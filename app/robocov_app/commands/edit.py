@@ -9,6 +9,7 @@ import tyro
 from robocov.errors import MapError, ParameterError
 from robocov_app.runs.options import WindowOptions
 from robocov_app.terminal.arguments import window_size
+from robocov_app.terminal.output import echo
 
 
 @dataclass
@@ -66,5 +67,5 @@ def command(options: Arguments) -> int:
             window.frame(0.2)
         with written(options.screenshot) as part:
             part.write_bytes(png_bytes(pixels(window.screen)))
-    print(f"saved {options.screenshot}")
+    echo(f"saved {options.screenshot}")
     return 0

@@ -12,6 +12,7 @@ from typing import Annotated
 import tyro
 
 from robocov.errors import InputError, OutputError, RobocovError
+from robocov_app.terminal.output import echo
 
 _BROUGHT = Path(__file__).parents[1] / "pages"  # those that a wheel brings
 
@@ -33,12 +34,12 @@ class Arguments:
 def command(options: Arguments) -> None:
     if options.out is not None:
         built(options.out)
-        print(f"saved in {options.out}/: begin with index.html")
+        echo(f"saved in {options.out}/: begin with index.html")
         return
     import webbrowser
 
     index = (_BROUGHT if _BROUGHT.is_dir() else _kept()) / "index.html"
-    print(index)
+    echo(index)
     webbrowser.open(index.as_uri())
 
 
@@ -57,7 +58,7 @@ def _kept() -> Path:
     if not (pages / "index.html").is_file():
         if cache is not None:
             shutil.rmtree(home, ignore_errors=True)  # those of an earlier state
-        print("building the handbook, once ...", file=sys.stderr)
+        echo("building the handbook, once ...", to_stderr=True)
         built(pages)
     return pages
 

@@ -1,6 +1,5 @@
 """`robocov paper`."""
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,7 +9,7 @@ import tyro
 from robocov.errors import InputError, checked, counted
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
-from robocov_app.terminal.output import BOLD, RIGHT, print_table, tell
+from robocov_app.terminal.output import BOLD, RIGHT, echo, print_table, tell
 
 
 @dataclass
@@ -83,7 +82,7 @@ def command(options: Arguments) -> int:
                     long = f"{duration(expected.seconds * workers)} of computing, on a Dask cluster"
                 words = f"{expected.runs:,} runs{there}, about {long} (measured: {each} a run)"
                 words += "; Ctrl-C keeps what is done"
-            print(f"paper ({plan.name}): {words}", file=sys.stderr, flush=True)
+            echo(f"paper ({plan.name}): {words}", to_stderr=True, flush=True)
         try:
             if with_claims:
                 paper = results.run_paper(out, plan, runner)

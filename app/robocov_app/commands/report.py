@@ -1,6 +1,5 @@
 """`robocov report`."""
 
-import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -15,7 +14,7 @@ from robocov.files.atomic import writable, written
 from robocov.files.result_folder import REPORT, extended, is_report
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import Interruption
-from robocov_app.terminal.output import tell
+from robocov_app.terminal.output import echo, tell
 from robocov_app.terminal.progress import progress
 
 SESSION = ".robocov"
@@ -91,7 +90,7 @@ def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: 
         folder, each = damaged[0]
         raise InputError(f"{folder}: {each.folder}: {each.reason}; no run is left to report")
     for folder, each in () if options.json else damaged:
-        print(f"robocov: warning: {folder}: {each.folder} is left out: {each.reason}", file=sys.stderr)
+        echo(f"robocov: warning: {folder}: {each.folder} is left out: {each.reason}", to_stderr=True)
     for k, result in enumerate(results):
         quiet, total = options.json or not options.optimum, len({entry.setting for entry in result.fine})
         with progress("searching", total, quiet=quiet) as update:

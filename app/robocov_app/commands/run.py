@@ -10,7 +10,7 @@ import tyro
 from robocov_app.runs.options import RunOptions
 from robocov_app.terminal.arguments import parsed_gains
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
-from robocov_app.terminal.output import listed, tell
+from robocov_app.terminal.output import echo, listed, tell
 
 
 @dataclass
@@ -80,8 +80,8 @@ def remade(options: Arguments) -> int:
             for row in answer["runs"]:
                 told = answer["parts"][row["part"] - 1]
                 span = f"{told['from_s']:6.1f} to {told['to_s']:.1f} s"
-                print(f"{span}  {row['controller']}  {row['mean_distance_m']:.3f} m  {told['words']}")
-            print(f"saved in {answer['out']}/: {listed(Path(answer['out']))}")
+                echo(f"{span}  {row['controller']}  {row['mean_distance_m']:.3f} m  {told['words']}")
+            echo(f"saved in {answer['out']}/: {listed(Path(answer['out']))}")
     tell(options, answers[0] if len(answers) == 1 else {"stories": answers})
     return INTERRUPTED if stop.requested else 0
 

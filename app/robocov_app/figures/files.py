@@ -11,6 +11,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from robocov.errors import OutputError, ParameterError, shown
 from robocov.files.atomic import writable, written
+from robocov.text import escape_controls
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,10 +63,19 @@ def save_figure(figure: Figure, path: Path | str) -> None:
 
 def _write(figure: Figure, file: Path | IO[bytes], kind: str) -> None:
     import matplotlib
+    from matplotlib.text import Text
 
+    for text in figure.findobj(Text):
+        text.set_text(escape_controls(text.get_text()))
     page: Any = {"dpi": figure.dpi, "facecolor": figure.get_facecolor()}
     with plain_style(), matplotlib.rc_context(_STYLE):
         figure.savefig(file, format=kind, metadata=_METADATA[kind], **page)
+    if kind == "svg" and isinstance(file, Path):
+        # labels of ticks, which are only known now, may hold characters that XML does not allow
+        content = file.read_text("utf-8")
+        safe = escape_controls(content)
+        if safe != content:
+            file.write_text(safe, "utf-8", newline="\n")
 
 
 def check_figure_path(path: Path) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pygame
 
+from robocov.text import escape_controls
 from robocov_app.render.surface_cache import kept
 from robocov_app.render.theme import Colour
 
@@ -30,7 +31,7 @@ def _font(size: int, bold: bool) -> pygame.font.Font:
 @kept(8_000_000)
 def label(text: str, size: int, colour: Colour, bold: bool = False) -> pygame.Surface:
     """Return a line of text as a picture, `size` px high; kept, rendering costs more than blitting."""
-    return _living(size, bold).render(text, True, colour)
+    return _living(size, bold).render(escape_controls(text, single_line=True), True, colour)
 
 
 def _living(size: int, bold: bool) -> pygame.font.Font:
@@ -44,7 +45,7 @@ def _living(size: int, bold: bool) -> pygame.font.Font:
 
 
 def text_width(text: str, size: int, bold: bool = False) -> int:
-    return _living(size, bold).size(text)[0]
+    return _living(size, bold).size(escape_controls(text, single_line=True))[0]
 
 
 def shortened(text: str, size: int, width: float, bold: bool = False) -> str:

@@ -16,6 +16,7 @@ from robocov.files.atomic import written
 from robocov.files.result_folder import for_results
 from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
 from robocov.record import Record, versions
+from robocov.text import escape_controls
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.statistics import RESAMPLES
 from robocov_app.replication import claims, contenders, evidence, figures, step_times, studies
@@ -210,7 +211,7 @@ def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
     known(page=PAGE, beyond_page=BEYOND_PAGE, version=__version__, plan=plan, quick=plan.name == "quick")
     own = (ASSETS / "paper.css").read_text("utf-8")
     style = Markup(theme_rules(":root") + replay_css() + asset("report.css") + own)
-    return environment.get_template(template).render(style=style, **context)
+    return escape_controls(environment.get_template(template).render(style=style, **context))
 
 
 def span(numbers: Sequence[int]) -> str:

@@ -11,6 +11,7 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
 from robocov import __version__
+from robocov.text import escape_controls
 from robocov_app.figures.styles import MARKS
 from robocov_app.report import facts, plots, replay, tables
 from robocov_app.report import groups as grouped
@@ -46,7 +47,7 @@ def report(results: Sequence[Result], *, title: str | None = None, theme: str = 
         digest=base64.b64encode(hashlib.sha256(code.encode()).digest()).decode(),
         marks=MARKS,
     )
-    return Report(html, tuple(section["shown"] for section in sections))
+    return Report(escape_controls(html), tuple(section["shown"] for section in sections))
 
 
 def _section(result: Result, key: str, budget: int) -> dict[str, Any]:

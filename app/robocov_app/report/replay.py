@@ -22,6 +22,7 @@ from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.metrics import CostHistory
 from robocov.record import Record
+from robocov.text import escape_controls
 from robocov_app.figures.styles import MARKS, CurveStyle, styles_of
 from robocov_app.report.pictures import density_picture, has_path, lives, rings_of, run_picture
 from robocov_app.report.theme_css import theme_rules
@@ -150,8 +151,20 @@ def embedded(
 
 def script_json(content: Any) -> str:
     """Return JSON that may stand in a script element, whatever names are in it."""
-    text = json.dumps(content, separators=(",", ":"), allow_nan=False)  # ASCII: no U+2028 is left
+    # ASCII: no U+2028 is left
+    text = json.dumps(_escape_texts(content), separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _escape_texts(content: Any) -> Any:
+    """Return JSON content whose texts a page can display as they are, see `escape_controls`."""
+    if isinstance(content, str):
+        return escape_controls(content)
+    if isinstance(content, dict):
+        return {key: _escape_texts(value) for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [_escape_texts(value) for value in content]
+    return content
 
 
 def _affordable(runs: Sequence[ReplayRun], budget: int) -> tuple[float, bool]:

@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING
 
 from robocov.compiled import compile_kernels
 from robocov.errors import OutputError, RobocovError, checked, counted
+from robocov.text import escape_controls
 from robocov_app.sweep.executors import Cluster, Executor, LocalPool, processors
 from robocov_app.sweep.ledger import Ledger, difference_of, opened
 from robocov_app.sweep.study import Study, Task, tasks_of
 from robocov_app.sweep.table import Table, columns_of, row_of
 from robocov_app.sweep.worker import Outcome, perform, prepared
 from robocov_app.terminal.interruption import Interruption
-from robocov_app.terminal.output import json_text
+from robocov_app.terminal.output import echo, json_text
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -94,9 +95,9 @@ class Teller:
 
     def say(self, line: str) -> None:
         if self._bar is not None:
-            self._bar.console.print(line, markup=False, highlight=False)
+            self._bar.console.print(escape_controls(line), markup=False, highlight=False)
         elif not self._quiet:
-            sys.stderr.write(f"{self._title}: {line}\n")
+            echo(f"{self._title}: {line}", to_stderr=True)
 
 
 @contextmanager

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,6 +19,7 @@ from robocov.metrics.results import read_rows
 from robocov_app.sweep.ledger import CSV, STUDY, Entry, has_all_rows, rows_in
 from robocov_app.sweep.study import CONDITIONS, UNITS, WORDS, Study, Task, parameter_column
 from robocov_app.sweep.worker import FIGURES, TIMED
+from robocov_app.terminal.output import csv_line
 
 PARQUET = "results.parquet"
 _CSV_PART, _PARQUET_PART = ".results.part.csv", ".results.part.parquet"  # names while a table is written
@@ -129,7 +128,7 @@ class Table:
             with _told(self._folder / CSV):
                 self._csv = (self._folder / _CSV_PART).open("wb", buffering=0)
             stack.callback(lambda: self._csv.close())  # it may be another one by then
-            self._write(_csv_line(column.name for column in self._columns))
+            self._write(csv_line(column.name for column in self._columns))
             self._stack = stack.pop_all()
         return self
 
@@ -162,7 +161,7 @@ class Table:
         if self._broken is not None:
             raise self._broken
         try:
-            self._write(_csv_line(row.get(column.name) for column in self._columns))
+            self._write(csv_line(row.get(column.name) for column in self._columns))
         except OutputError as error:
             self._broken = error
             raise
@@ -208,10 +207,3 @@ def _told(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
-
-
-def _csv_line(values: Any) -> str:
-    """Return a line of CSV; numbers keep all their digits, and null is nothing."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow(values)
-    return text.getvalue()

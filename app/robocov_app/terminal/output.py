@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 import os
@@ -13,17 +15,31 @@ from typing import TYPE_CHECKING, Any
 
 from robocov.errors import InputError
 from robocov.files.atomic import writable, written
+from robocov.files.csv_cells import quote_cell
+from robocov.text import escape_controls
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 
+def echo(
+    *texts: object, sep: str = " ", end: str = "\n", to_stderr: bool = False, flush: bool = False
+) -> None:
+    """Print texts. Whatever names and messages they contain, the terminal does not obey it.
+
+    All output of the application goes through here or through `console`; see `escape_controls`.
+    """
+    file = sys.stderr if to_stderr else sys.stdout
+    safe = [escape_controls(str(text)) for text in texts]
+    print(*safe, sep=sep, end=end, file=file, flush=flush)
+
+
 def tell(options: Any, answer: Any, *lines: str, indent: int | None = None) -> None:
     """Print an answer: with --json as one JSON object, with null for what is not finite; else as lines."""
     if options.json:
-        print(json.dumps(finite(answer), indent=indent))  # noqa: T201 - it is the answer
+        echo(json.dumps(finite(answer), indent=indent))
     else:
-        print(*lines, sep="\n", end="\n" if lines else "")  # noqa: T201
+        echo(*lines, sep="\n", end="\n" if lines else "")
 
 
 def free_name(folder: Path, stem: str, suffix: str) -> Path:
@@ -64,7 +80,16 @@ def write_csv(path: Path, header: str, rows: Iterable[Iterable[object]]) -> None
 
 
 def csv_text(header: str, rows: Iterable[Iterable[object]]) -> str:
-    return "\n".join([header, *(",".join(map(str, row)) for row in rows)]) + "\n"
+    """Return a table as CSV: None is an empty cell, and no text is taken for a formula by a spreadsheet."""
+    return header + "\n" + "".join(csv_line(row) for row in rows)
+
+
+def csv_line(cells: Iterable[object]) -> str:
+    """Return one line of CSV, with all digits of its numbers."""
+    text = io.StringIO()
+    # the writer puts only those line breaks into quotation marks that end its own lines
+    csv.writer(text, lineterminator="\r\n").writerow(map(quote_cell, cells))
+    return text.getvalue().removesuffix("\r\n") + "\n"
 
 
 def finite(content: Any) -> Any:
@@ -80,10 +105,19 @@ PIPED_WIDTH = 140  # columns of a table that goes to a file or a pipe
 
 
 def console() -> Console:
-    """Return the console of answers, on stdout; names may hold brackets, so none are taken for markup."""
+    """Return the console of answers, on stdout.
+
+    Names may contain brackets, so none are taken for markup. Texts that are printed are safe to display;
+    cells of tables have to be passed through `escape_controls`, as `print_table` does.
+    """
     from rich.console import Console
 
-    return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, highlight=False, markup=False)
+    class SafeConsole(Console):
+        def print(self, *objects: Any, **options: Any) -> None:
+            safe = [escape_controls(each) if isinstance(each, str) else each for each in objects]
+            super().print(*safe, **options)
+
+    return SafeConsole(width=None if sys.stdout.isatty() else PIPED_WIDTH, highlight=False, markup=False)
 
 
 BOLD: Mapping[str, Any] = {"style": "bold", "no_wrap": True}
@@ -100,5 +134,5 @@ def print_table(
     for name, look in columns:
         table.add_column(name, **look)
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(escape_controls, row))
     console().print(table)

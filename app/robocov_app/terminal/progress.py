@@ -6,12 +6,16 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import count
 
+from robocov.text import escape_controls
+from robocov_app.terminal.output import echo
+
 PATIENCE = 1.0  # seconds without a word
 
 
 @contextmanager
 def progress(label: str, total: int, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
     """Show how far `label` is; the value is a function to be called with the number done so far."""
+    label = escape_controls(label)
     if quiet:
         yield lambda done: None
     elif sys.stderr.isatty():
@@ -31,7 +35,7 @@ def progress(label: str, total: int, *, quiet: bool = False) -> Iterator[Callabl
             reached = done
 
         yield note
-        print(f"{label}: {reached} of {total} in {time.perf_counter() - began:.1f} s", file=sys.stderr)
+        echo(f"{label}: {reached} of {total} in {time.perf_counter() - began:.1f} s", to_stderr=True)
 
 
 @contextmanager
@@ -70,4 +74,4 @@ def _tell(_: str) -> None:
     from robocov import compiled
 
     compiled.on_compile.remove(_tell)
-    print("compiling the simulation, once", file=sys.stderr)
+    echo("compiling the simulation, once", to_stderr=True)

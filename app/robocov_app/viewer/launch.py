@@ -1,6 +1,5 @@
 """Opening the window: with a display or without, from the command line's options."""
 
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -11,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from robocov.cost import LATTICE
 from robocov_app.render.picture import standard_layers
+from robocov_app.terminal.output import echo
 from robocov_app.toolkit.autosave import autosave_folder
 from robocov_app.toolkit.layout import SMALLEST
 from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
@@ -92,7 +92,7 @@ class Launcher:
                 keeper.finish()
                 for words, bad in keeper.poll():
                     if bad:
-                        sys.stderr.write(f"robocov: {words}\n")
+                        echo(f"robocov: {words}", to_stderr=True)
 
     @property
     def _alone(self) -> bool:

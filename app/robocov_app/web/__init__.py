@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robocov.extras import extra
+from robocov_app.terminal.output import echo
 
 if TYPE_CHECKING:
     from robocov_app.toolkit.window import BaseWindow
@@ -27,8 +28,8 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
     from robocov_app.web.server import WebDisplay
 
     with WebDisplay(options.host, options.port, folder) as display, confined(folder):
-        print(f"open {display.link}", flush=True)  # noqa: T201 - it is the answer
-        print(f"to watch only: {display.watch_link}", flush=True)  # noqa: T201
+        echo(f"open {display.link}", flush=True)
+        echo(f"to watch only: {display.watch_link}", flush=True)
         window.remote = display
         stopped: list[int] = []
 
@@ -54,5 +55,5 @@ def serve_each(command: Callable[[Any], int], options: Any) -> int:
     from robocov_app.web.each import Sessions
 
     sessions = Sessions(command, options, options.most)
-    asyncio.run(sessions.serve(lambda words: print(words, flush=True)))  # noqa: T201
+    asyncio.run(sessions.serve(lambda words: echo(words, flush=True)))
     return 0

@@ -14,8 +14,10 @@ import numpy as np
 
 from robocov.errors import InputError, counted, shown, unknown_name
 from robocov.extras import extra
+from robocov.files.csv_cells import unquote_cell
 from robocov.metrics import CostHistory
 from robocov.record import Record
+from robocov.text import escape_controls
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -130,7 +132,7 @@ class Results:
         caption = f"{counted(count, 'run')} of {escape(str(self.folder))}"
         if count > len(head):
             caption += f"; the first {len(head)}"
-        return (
+        return escape_controls(
             f'<div style="overflow-x: auto"><table style="white-space: nowrap"><caption>{caption}</caption>'
             f"<thead>{rows[0]}</thead><tbody>{''.join(rows[1:])}</tbody></table></div>"
         )
@@ -194,14 +196,14 @@ def read_history(path: Path) -> CostHistory:
 
 def _value(text: str, kind: str | None) -> Any:
     if not text or kind == "string":
-        return text or None
+        return unquote_cell(text) or None
     if kind == "int64":
         return int(text)
     try:
         return float(text)
     except ValueError:
         if kind is None:  # the table of an earlier version, whose study does not say that these are words
-            return text
+            return unquote_cell(text)
         raise
 
 

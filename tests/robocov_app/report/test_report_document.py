@@ -14,6 +14,7 @@ from reported_results import HOSTILE, Page, entry, result_of, watched
 from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.errors import ParameterError
 from robocov.files.result_folder import is_report
+from robocov.text import escape_controls
 from robocov_app.figures.styles import MARKS
 from robocov_app.report.document import MOST_LETTERS, report
 from robocov_app.report.results import Damaged
@@ -110,8 +111,11 @@ def test_hostile_names_stay_names() -> None:
     assert not page.all("img")
     assert [each.get("type") for each in page.all("script")] == ["application/json", None]
     data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', html)[1])
-    assert data["maps"][0]["name"] == HOSTILE and HOSTILE in data["runs"][0]["title"]
-    assert HOSTILE in "".join(page.words)
+    assert (
+        data["maps"][0]["name"] == escape_controls(HOSTILE)
+        and escape_controls(HOSTILE) in data["runs"][0]["title"]
+    )
+    assert escape_controls(HOSTILE) in "".join(page.words)
     assert "{{7*7}}" in "".join(page.words) and "49" not in re.findall(r"\b49\b", "".join(page.words))
 
 

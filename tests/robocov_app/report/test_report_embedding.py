@@ -14,6 +14,7 @@ from reported_results import HOSTILE, falling, walk
 from robocov.conditions import Conditions
 from robocov.environment import Environment, ObstaclePath, PolygonObstacle
 from robocov.robots import Team
+from robocov.text import escape_controls
 from robocov_app.figures.styles import curve_styles
 from robocov_app.report.pictures import has_path, lives
 from robocov_app.report.replay import (
@@ -207,7 +208,7 @@ def test_what_is_too_much_is_thinned() -> None:
 def test_no_name_ends_its_script_element() -> None:
     text = script_json({"name": HOSTILE, "more": "\u2029<&>"})
     assert not set(text) & set("<>&\u2028\u2029")
-    assert json.loads(text)["name"] == HOSTILE
+    assert json.loads(text)["name"] == escape_controls(HOSTILE)
 
 
 def test_headings_come_along_where_robots_turn() -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from drawn_run import ROOMS
 from reported_results import HOSTILE, Page, falling, walk
 
+from robocov.text import escape_controls
 from robocov_app.report.replay import MOST_PANES, ReplayRun, replay_css, replay_html, replay_js, replay_part
 
 
@@ -54,7 +55,12 @@ def test_no_name_gets_out_of_its_place() -> None:
     page = Page(html)
     assert len(page.all("script")) == 2 and not page.all("img")
     data = data_of(html)
-    assert data["runs"][0]["title"] == data["runs"][0]["facts"] == data["maps"][0]["name"] == HOSTILE
+    assert (
+        data["runs"][0]["title"]
+        == data["runs"][0]["facts"]
+        == data["maps"][0]["name"]
+        == escape_controls(HOSTILE)
+    )
 
 
 def test_the_first_runs_or_those_that_are_wanted_are_shown() -> None:

@@ -7,6 +7,7 @@ import math
 import os
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +94,22 @@ def test_the_table_holds_every_figure_exactly(tmp_path: Path) -> None:
     assert rows[1]["mean_distance_m"] is None
     assert rows[0]["attraction_limit"] == 2.0
     assert rows[1]["attraction_limit"] is None, "repulsion alone has none"
+
+
+def test_a_map_with_the_name_of_a_formula_is_no_formula_in_the_table(tmp_path: Path) -> None:
+    study = small_study()
+    task = replace(next(iter(tasks_of(study))), map="=1+1", start="-1")
+    with Table(tmp_path, columns_of(study), study_json(study), parquet=True) as table:
+        table.add(row_of(task, FAILED._replace(error="+ of 'two'")))
+    line = (tmp_path / "results.csv").read_text().splitlines()[1]
+    assert line.startswith("'=1+1,")
+    assert not re.search(r'(^|,)"?[=@+-][^,0-9]', line)
+    (row,) = read_results(tmp_path).rows()
+    assert (row["map"], row["start"], row["error"]) == ("=1+1", "-1", "+ of 'two'")
+    pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    assert parquet.read_table(tmp_path / "results.parquet").to_pylist()[0]["map"] == "=1+1"
 
 
 def test_parquet_holds_the_same_and_its_columns_say_what_they_are(tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
 """`robocov check`."""
 
 import json
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from robocov.errors import InputError, MapError, place
 from robocov.mapfile import load_map, map_file
 from robocov.mapfile.check import MapReport, check_map
 from robocov_app.runs.options import JsonOption
-from robocov_app.terminal.output import console, tell
+from robocov_app.terminal.output import console, echo, tell
 from robocov_app.terminal.watch import changes
 
 _LISTED = 5  # components whose areas are told
@@ -53,9 +52,9 @@ def command(options: Arguments) -> int:
         valid = isinstance(outcome, MapReport)
         rows.append(_row(name, outcome))
         if valid and not options.json:
-            print(f"{name}: valid", *_lines(outcome), sep="\n")
+            echo(f"{name}: valid", *_lines(outcome), sep="\n")
         for line in () if valid or options.json else _lines(outcome):
-            print(f"robocov: error: {line}", file=sys.stderr)
+            echo(f"robocov: error: {line}", to_stderr=True)
     tell(options, {"maps": rows}, indent=1)
     return 0 if all(row["valid"] for row in rows) else 2
 
@@ -77,7 +76,7 @@ def watch(options: Arguments) -> None:
         valid |= {name: each for name, each in fresh.items() if isinstance(each, MapReport)}
         if options.json:
             for name, outcome in fresh.items():
-                print(json.dumps(_row(name, outcome)), flush=True)
+                echo(json.dumps(_row(name, outcome)), flush=True)
             continue
         if output.is_terminal:
             output.clear()

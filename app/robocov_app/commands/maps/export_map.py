@@ -1,6 +1,5 @@
 """`robocov export`."""
 
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +10,7 @@ from robocov.errors import InputError, one_line
 from robocov.mapfile import load_map
 from robocov_app.formats import EXPORTERS, WriteOptions, export_map, exporter
 from robocov_app.runs.options import JsonOption
-from robocov_app.terminal.output import require_fresh, tell
+from robocov_app.terminal.output import echo, require_fresh, tell
 
 
 @dataclass
@@ -49,5 +48,5 @@ def command(options: Arguments) -> None:
         require_fresh(file, "another -o", overwrite=options.overwrite, source=Path(options.map), read="map")
     report = export_map(load_map(options.map), options.out, format=options.format, options=options.write)
     for line in report.warnings:
-        print(f"robocov: warning: {line}", file=sys.stderr)
+        echo(f"robocov: warning: {line}", to_stderr=True)
     tell(options, report.to_dict(), *report.lines())

@@ -14,7 +14,7 @@ from robocov.files.atomic import writable
 from robocov.mapfile import bundled_maps, dump_map, load_map, save_map
 from robocov.mapfile.check import check_map
 from robocov_app.runs.options import PlotOptions
-from robocov_app.terminal.output import require_fresh, tell
+from robocov_app.terminal.output import echo, require_fresh, tell
 from robocov_app.terminal.progress import progress
 
 KindName: TypeAlias = Literal["polygons", "blocks", "rooms", "mazes", "caves"]
@@ -96,7 +96,7 @@ def command(options: Arguments) -> None:
                 raise ParameterError(f"--{error}{of_seed}") from None
             made.append(environment)
             if path is None:
-                print(dump_map(environment), end="")
+                echo(dump_map(environment), end="")
             else:
                 save_map(environment, path)
                 rows.append({"file": str(path), **check_map(environment).to_dict()})

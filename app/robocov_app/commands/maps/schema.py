@@ -7,6 +7,7 @@ from typing import Literal
 import tyro
 
 from robocov_app.runs.options import JsonOption
+from robocov_app.terminal.output import echo
 
 
 @dataclass
@@ -25,4 +26,4 @@ def command(options: Arguments) -> None:
         from robocov.mapfile import map_schema as schema
     else:
         from robocov_app.viewer.session.file import session_schema as schema
-    print(json.dumps(schema(), indent=1))
+    echo(json.dumps(schema(), indent=1))

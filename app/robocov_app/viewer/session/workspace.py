@@ -15,7 +15,7 @@ from typing import Any
 from robocov.controllers import CONTROLLERS
 from robocov.errors import OutputError
 from robocov_app.runs.saved import folder_names
-from robocov_app.terminal.output import free_name
+from robocov_app.terminal.output import echo, free_name
 from robocov_app.toolkit import autosave
 from robocov_app.viewer.session.changes import Restart, SetController
 from robocov_app.viewer.session.file import SUFFIX, save_session, session_json, session_of
@@ -133,7 +133,7 @@ class RunSaver:
                 with suppress(subprocess.TimeoutExpired):
                     job.process.wait(0.5)
                 if k == 0 and job.process.poll() is None:
-                    sys.stderr.write("saving runs; Ctrl-C gives up\n")
+                    echo("saving runs; Ctrl-C gives up", to_stderr=True)
                 job.process.wait()
         except BaseException:
             for job in self._jobs:

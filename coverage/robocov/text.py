@@ -1,0 +1,48 @@
+"""Text of others, made safe to display."""
+
+from __future__ import annotations
+
+import re
+
+_CONTROLS = (
+    r"\x00-\x08\x0b-\x1f\x7f-\x9f"  # C0 (without tab and line feed), DEL and C1: they drive terminals
+    r"\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069"  # marks, embeddings and isolates that reorder text
+    r"\xad\u180e\u200b\u2060-\u2065\u206a-\u206f\ufeff\ufff9-\ufffb\U000e0000-\U000e007f"  # not seen
+    r"\u2028\u2029"  # line and paragraph separators
+    r"\ud800-\udfff"  # bytes of file names that are no text
+)
+_UNSAFE = re.compile(f"[{_CONTROLS}]")
+_UNSAFE_IN_LINE = re.compile(f"[{_CONTROLS}\t\n]")
+
+
+def escape_controls(text: str, *, single_line: bool = False) -> str:
+    r"""Return a text with visible escapes in place of its control characters.
+
+    Names and messages from files and from controllers of users may hold characters that colour or overwrite
+    a terminal, or that display text in another order than it has. Joiners, which some scripts need, stay.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+    single_line : bool
+        Also escape tabs and line feeds.
+
+    Returns
+    -------
+    str
+        The text, unchanged if it has no such characters.
+
+    Examples
+    --------
+    >>> print(escape_controls("boom\x1b[31m"))
+    boom\x1b[31m
+    >>> print(escape_controls("map \u202ename"))
+    map \u202ename
+    """
+    pattern = _UNSAFE_IN_LINE if single_line else _UNSAFE
+    return pattern.sub(_escape_match, text)
+
+
+def _escape_match(found: re.Match[str]) -> str:
+    return ascii(found[0])[1:-1]
