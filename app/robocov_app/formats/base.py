@@ -166,6 +166,8 @@ class ReadOptions(Options):
     """Names, ids, classes or layers that are read; all else is left out."""
     skip: tuple[str, ...] | None = None
     """Names, ids, classes or layers that are left out."""
+    level: str | None = None
+    """Floor of a building that is read, by its number or name. By default the ground floor, 0."""
     hatches: bool = False
     """Hatches are areas, as outlines are."""
 

@@ -29,6 +29,8 @@ MAX_CELLS = 64_000_000  # largest raster, in cells: 8000 x 8000
 MAX_VERTICES = 500_000  # most vertices of a foreign map
 MAX_SHAPES = 20_000  # of a drawing, of a file: each costs a quarter of a millisecond, whatever its size
 MAX_DEPTH = 32  # deepest nesting of collections, groups, blocks, lists
+MAX_INCLUDED_FILES = 200  # files that a map may include, counted each time that one is read
+MAX_INCLUDED_BYTES = 20_000_000  # size of all of them together, in bytes
 HEAD = 1 << 20  # so much of a file is looked at, in bytes, to know its format
 _LONG = 400  # longest name of a file, in characters
 Value: TypeAlias = "str | list[Value] | dict[str, Value]"  # text is as it is written
@@ -60,6 +62,48 @@ def content(path: Path, most: int = MAX_BYTES) -> bytes:
     if path.stat().st_size > most or len(data := head(path, most + 1)) > most:
         raise MapError(f"{one_line(path)}: larger than {most / 1e6:g} MB, but a smaller file was wanted")
     return data
+
+
+class IncludeBudget:
+    """The files that a map includes, which are limited together: a few kB can name billions of them.
+
+    Parameters
+    ----------
+    max_files : int
+        Number of files that may be read. A file that is included twice counts twice.
+    max_bytes : int
+        Size of all of them together.
+    """
+
+    def __init__(self, max_files: int = MAX_INCLUDED_FILES, max_bytes: int = MAX_INCLUDED_BYTES) -> None:
+        self.max_files = max_files
+        self.max_bytes = max_bytes
+        self.files_read = 0
+        self.bytes_read = 0
+
+    def take(self, path: Path, at: str) -> None:
+        """Count a file that is about to be read.
+
+        Parameters
+        ----------
+        path : Path
+        at : str
+            Place that names the file, for messages.
+
+        Raises
+        ------
+        MapError
+            When the map includes too many files or too many bytes, or there is no such file.
+        """
+        head(path, 0)
+        self.files_read += 1
+        self.bytes_read += path.stat().st_size
+        if self.files_read > self.max_files:
+            found = f"more than {self.max_files} files are included"
+            raise MapError(f"{at}: {found}, expected at most {self.max_files}, each counted as often as it is read")
+        if self.bytes_read > self.max_bytes:
+            found = f"the included files have more than {self.max_bytes / 1e6:g} MB together"
+            raise MapError(f"{at}: {found}, expected at most that")
 
 
 def require_cells(width: int, height: int, where: str) -> None:

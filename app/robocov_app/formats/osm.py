@@ -1,188 +1,279 @@
 """OpenStreetMap extracts, in metres east and north of their middle.
 
-Buildings, also those that relations make up of several ways, and water (unless the option ``water`` says that
-it is free) are solid; walls, fences, hedges and the like are walls of their tag ``width``, or of the option
-``thickness``; bollards, blocks and trees are points. The bounds are the boundary. What is below the ground,
-roofs, and ways whose nodes the extract lacks are left out.
+Outdoors, buildings, also those that relations make up of several ways, and water (unless the option ``water``
+says that it is free) are solid; walls, fences, hedges and the like are walls of their tag ``width``, or of the
+option ``thickness``; bollards, blocks and trees are points. The bounds are the boundary. What is below the
+ground, roofs, and ways whose nodes the extract lacks are left out.
+
+Indoors, as of https://wiki.openstreetmap.org/wiki/Simple_Indoor_Tagging, rooms, corridors and areas of one
+level are free; rooms have walls, which doors open; ``indoor=wall`` is a wall; stairs and lifts are solid. The
+inside is read if the option ``level`` names a floor, or if most of the buildings in the extract have one.
 """
 
 import re
-from array import array
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from pathlib import Path
-from typing import NoReturn
-from xml.parsers import expat
 
 import numpy as np
 import shapely
 
 from robocov.arrays import Array
-from robocov.errors import MapError, counted, one_line
+from robocov.errors import ParameterError, counted, shown
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes
 from robocov_app.formats.georeference import DEGREES, in_metres
+from robocov_app.formats.indoor import (
+    DOOR_WIDTH_M,
+    MAX_FLOORS,
+    IndoorFigure,
+    Role,
+    build_floor,
+    choose_floor,
+    list_floors,
+)
+from robocov_app.formats.osm_data import OsmData, OsmElement, is_osm, read_osm
 
-ROOT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?xml[^>]*\?>\s*)?(?:<!--.*?-->\s*)*<osm[\s>]", re.DOTALL)
+_TEXT = "Imported from OpenStreetMap, © OpenStreetMap contributors."
 # barriers that are walls; gates, kerbs and chains are not
 _WALLS = {"wall", "city_wall", "retaining_wall", "fence", "hedge", "guard_rail", "jersey_barrier"}
 _POSTS = {"bollard", "block", "tree"}
-_KEYS = {"area", "barrier", "building", "layer", "location", "name", "natural", "tunnel", "type", "width"}
-_KEYS |= {"waterway", "water"}
+_GATES = ("gate", "lift_gate")
 _OPEN = {"no", "roof"}  # buildings that robots pass: a roof stands on posts
 _METRES = re.compile(r"(\d{1,3}(?:\.\d+)?)\s*m?")
+_SPACES: dict[str, Role] = {"room": "walled", "corridor": "open", "area": "open"}
+_STAIRS = {"stairs", "elevator", "escalator", "steps"}  # what robots do not drive on
+_MIN_INDOOR_SHARE = 0.5  # of the area of buildings, above which an extract is one of their inside
+_LEVEL = re.compile(r"(-?\d{1,3}(?:\.\d+)?)(?:-(-?\d{1,3}(?:\.\d+)?))?")
 
 
-@dataclass(eq=False, slots=True)
-class _Thing:
-    """A node, a way with its nodes, or a relation with its ways."""
-
-    kind: str
-    number: int
-    tags: dict[str, str] = field(default_factory=dict)
-    members: list[int] = field(default_factory=list)
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        found = [self.tags[key] for key in ("name", "barrier", "building", "natural") if key in self.tags]
-        found += [key for key in ("barrier", "building", "natural", "waterway") if key in self.tags]
-        return tuple(dict.fromkeys(one_line(label) for label in found if label != "yes"))
+def sniff(path: Path, head: bytes) -> bool:
+    return is_osm(head)
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
-    where = one_line(path)
-    extract = _Extract(where, files.content(path, files.MAX_TEXT_BYTES))
-    shapes = Shapes(where, options)
-    figures = list(extract.figures(shapes, water=options.water != "free"))
+    data = read_osm(path)
+    shapes = Shapes(data.where, options)
+    shapes.notes += data.notes
+    floors = _measure_floors(data)
+    if options.level is not None and not floors:
+        raise ParameterError(f"{data.where}: level: expected none, got {shown(options.level)}: no indoor spaces")
+    name = files.name_of_map(path)
+    if floors and (options.level is not None or _is_indoor(data, floors)):
+        floor = choose_floor(floors, options.level, data.where)
+        if len(floors) > 1:
+            shapes.notes.append(f"level {floor:g} of {list_floors(floors)} (--level)")
+        return build_floor(shapes, _place_floor(data, floor, shapes), name, _TEXT)
+    if floors:
+        shapes.notes.append(f"indoor spaces on level {list_floors(floors)} left out (--level reads a floor)")
+    return _read_outdoors(data, shapes, name)
+
+
+def _read_outdoors(data: OsmData, shapes: Shapes, name: str) -> ForeignMap:
+    figures = list(_find_outdoors(data, shapes))
     origin = None
-    if extract.bounds:
-        bounds = np.array(extract.bounds)
-        (west, _, south, _), (_, east, _, north) = bounds.min(axis=0), bounds.max(axis=0)
-        origin = (float(west + east) / 2, float(south + north) / 2)
+    if data.bounds:
+        bounds = np.array(data.bounds)
+        west, south = bounds.min(axis=0)[:2].tolist()
+        east, north = bounds.max(axis=0)[2:].tolist()
+        origin = ((west + east) / 2, (south + north) / 2)
         corners = np.array([[west, south], [east, south], [east, north], [west, north]])
         figures.append(Figure("polygon", (corners,), (BOUNDARY,), "bounds"))
     shapes.add_all(in_metres(figures, shapes, DEGREES, origin=origin))
-    if extract.gates:
-        shapes.notes.append(f"{counted(extract.gates, 'gate')} taken as closed")
-    text = "Imported from OpenStreetMap, © OpenStreetMap contributors."
-    return shapes.foreign_map(files.name_of_map(path), text, solid=True)
+    gates = sum(node.tags.get("barrier") in _GATES for node in data.nodes.values())
+    if gates:
+        shapes.notes.append(f"{counted(gates, 'gate')} taken as closed")
+    return shapes.foreign_map(name, _TEXT, solid=True)
 
 
-class _Extract:
-    """Handlers for expat that collect nodes, ways, and the relations that are areas."""
-
-    def __init__(self, where: str, content: bytes) -> None:
-        self.where = where
-        for start in (b"<node", b"<nd", b"<tag"):  # to count takes a moment, to parse seconds
-            files.require_vertices(content.count(start) // (2 if start == b"<tag" else 1), where)
-        self.bounds: list[list[float]] = []
-        self.gates = self.drawn = 0
-        self.places: dict[int, int] = {}
-        self.coordinates = array("d")
-        self.things: dict[str, dict[int, _Thing]] = {"node": {}, "way": {}, "relation": {}}
-        self.thing: _Thing | None = None
-        self.depth = 0
-        self.parser = expat.ParserCreate()
-        self.parser.StartElementHandler = self._start
-        self.parser.EndElementHandler = self._end
-        self.parser.StartDoctypeDeclHandler = lambda *_: self._refuse("a document type, but none was wanted")
-        try:
-            self.parser.Parse(content, True)
-        except (expat.ExpatError, ValueError, LookupError) as error:
-            line = self.parser.ErrorLineNumber
-            raise MapError(f"{where}:{line}: not XML: {one_line(error)[:80]}") from None
-
-    def figures(self, shapes: Shapes, *, water: bool) -> Iterable[Figure]:
-        """Yield what stands on the ground, in degrees; tell `shapes` what is left out."""
-        points = np.array(self.coordinates).reshape(-1, 2)
-        for thing in (thing for kind in self.things.values() for thing in kind.values()):
-            at, tags = f"{thing.kind} {thing.number}", thing.tags
-            built = tags.get("building", "no") not in _OPEN
-            wet = tags.get("natural") == "water" or tags.get("waterway") == "riverbank"
-            wall = tags.get("barrier") in _WALLS
-            post = thing.kind == "node" and bool(_POSTS & {tags.get("barrier"), tags.get("natural")})
-            if not (built or wall or post or (wet and water)):
-                continue
-            under = tags.get("location") == "underground" or tags.get("layer", "0").startswith("-")
-            if under or tags.get("tunnel", "no") != "no":
-                shapes.leave_out("thing", "below the ground")
-            elif thing.kind == "node":
-                if post:
-                    yield Figure("point", (points[[self.places[thing.number]]],), thing.labels, at)
-            elif (lines := self._lines(thing, points)) is None:
-                shapes.leave_out(thing.kind, "of which the file does not have all")
-            elif thing.kind == "way" and wall and not built and tags.get("area") != "yes":
-                width = _METRES.fullmatch(tags.get("width", "").strip())
-                yield Figure("line", (lines[0],), thing.labels, at, width=float(width[1]) if width else None)
-            else:
-                merged = shapely.line_merge(shapely.MultiLineString([shapely.LineString(x) for x in lines]))
-                rings = [shapely.get_coordinates(part) for part in shapely.get_parts(merged)]
-                if all((ring[0] == ring[-1]).all() for ring in rings):
-                    yield Figure("polygon", tuple(rings), thing.labels, at, rule="evenodd")
-                else:
-                    shapes.leave_out(thing.kind, "that does not close")
-
-    def _lines(self, thing: _Thing, points: Array) -> list[Array] | None:
-        """Return the points of each way of something, None where some are missing."""
-        ways = [self.things["way"].get(k) for k in thing.members] if thing.kind == "relation" else [thing]
-        self.drawn += sum(len(way.members) for way in ways if way)  # a way may be a part of many relations
-        files.require_vertices(self.drawn, self.where)
-        found = [[self.places.get(k, -1) for k in way.members] if way else [] for way in ways]
-        if not found or any(len(places) < 2 or min(places) < 0 for places in found):
-            return None
-        return [points[places] for places in found]
-
-    def _start(self, name: str, given: dict[str, str]) -> None:
-        self.depth += 1
-        if self.depth == 1 and name != "osm":
-            self._refuse(f"<{one_line(name)[:40]}>, but <osm> was wanted")
-        try:
-            self._take(name, given)
-        except (KeyError, ValueError) as error:
-            what = f"no {error.args[0]}" if isinstance(error, KeyError) else one_line(error)[:80]
-            self._refuse(f"<{name}>: {what}, but what OpenStreetMap writes was wanted")
-
-    def _take(self, name: str, given: dict[str, str]) -> None:
-        thing = self.thing
-        if name == "bounds":
-            most = {"minlon": 360.0, "maxlon": 360.0, "minlat": 90.0, "maxlat": 90.0}
-            self.bounds.append([_degrees(given, key, value) for key, value in most.items()])
-        elif self.depth == 2 and name in self.things:
-            number = int(given["id"])
-            self.thing = _Thing(name, number)
-            if given.get("action") == "delete" or given.get("visible") == "false":
-                return
-            if name == "node":
-                self.places[number] = len(self.coordinates) // 2
-                self.coordinates.extend((_degrees(given, "lon", 360.0), _degrees(given, "lat", 90.0)))
-            else:
-                self.things[name][number] = self.thing
-        elif thing is None:
-            return
-        elif name == "nd" or (name == "member" and given["type"] == "way"):
-            thing.members.append(int(given["ref"]))
-        elif name == "tag" and given["k"] in _KEYS:
-            thing.tags[given["k"]] = given["v"]
-
-    def _end(self, name: str) -> None:
-        self.depth -= 1
-        thing = self.thing
-        if self.depth != 1 or thing is None:
-            return
-        self.thing = None
-        if thing.kind == "node" and thing.tags and thing.number in self.places:
-            self.gates += thing.tags.get("barrier") in ("gate", "lift_gate")
-            self.things["node"][thing.number] = thing
-        elif thing.kind == "relation" and thing.tags.get("type") != "multipolygon":
-            self.things["relation"].pop(thing.number, None)
-
-    def _refuse(self, what: str) -> NoReturn:
-        raise MapError(f"{self.where}:{self.parser.CurrentLineNumber}: {what}")
+def _find_outdoors(data: OsmData, shapes: Shapes) -> Iterator[Figure]:
+    """Yield what stands on the ground, in degrees; tell `shapes` what is left out."""
+    for element in data.elements:
+        tags = element.tags
+        is_building = tags.get("building", "no") not in _OPEN
+        is_water = tags.get("natural") == "water" or tags.get("waterway") == "riverbank"
+        is_wall = tags.get("barrier") in _WALLS
+        is_post = element.kind == "node" and bool(_POSTS & {tags.get("barrier"), tags.get("natural")})
+        is_wet = is_water and shapes.options.water != "free"
+        if not (is_building or is_wall or is_post or is_wet):
+            continue
+        if _is_below_ground(tags):
+            shapes.leave_out("thing", "below the ground")
+        elif is_post:
+            yield Figure("point", (data.point(element)[None],), element.labels, element.place)
+        elif element.kind != "node":
+            is_line = is_wall and not is_building and element.kind == "way" and tags.get("area") != "yes"
+            figure = _to_line(data, element, shapes) if is_line else _to_polygon(data, element, shapes)
+            if figure is not None:
+                yield figure
 
 
-def _degrees(given: dict[str, str], key: str, most: float) -> float:
-    value = float(given[key])
-    if not abs(value) <= most:
-        raise ValueError(f"{key} {value:g}")
-    return value
+def _is_below_ground(tags: dict[str, str]) -> bool:
+    is_under = tags.get("location") == "underground" or tags.get("layer", "0").startswith("-")
+    return is_under or tags.get("tunnel", "no") != "no"
+
+
+def _to_line(data: OsmData, way: OsmElement, shapes: Shapes) -> Figure | None:
+    lines = data.lines(way)
+    if lines is None:
+        shapes.leave_out("way", "of which the file does not have all")
+        return None
+    return Figure("line", (lines[0],), way.labels, way.place, width=_width(way.tags))
+
+
+def _to_polygon(data: OsmData, element: OsmElement, shapes: Shapes) -> Figure | None:
+    """Return the area of a way or of the ways of a relation; None, and say why, where there is none."""
+    lines = data.lines(element)
+    if lines is None:
+        shapes.leave_out(element.kind, "of which the file does not have all")
+        return None
+    merged = shapely.line_merge(shapely.MultiLineString([shapely.LineString(line) for line in lines]))
+    rings = [shapely.get_coordinates(part) for part in shapely.get_parts(merged)]
+    if not rings:  # all nodes are at one place
+        shapes.leave_out(element.kind, "without an area")
+        return None
+    if not all((ring[0] == ring[-1]).all() for ring in rings):
+        shapes.leave_out(element.kind, "that does not close")
+        return None
+    return Figure("polygon", tuple(rings), element.labels, element.place, rule="evenodd")
+
+
+def _width(tags: dict[str, str]) -> float | None:
+    match = _METRES.fullmatch(tags.get("width", "").strip())
+    return float(match[1]) if match else None
+
+
+def _levels(tags: dict[str, str]) -> set[float]:
+    """Return the levels that an element is on, as of its tags ``level`` and ``repeat_on``.
+
+    Values are numbers, lists of them (``0;1``) and ranges (``-1-2``). What has no level is on level 0.
+    """
+    found: set[float] = set()
+    for part in re.split(r"[;,]", f"{tags.get('level', '')};{tags.get('repeat_on', '')}"):
+        match = _LEVEL.fullmatch(part.strip())
+        if match is None:
+            continue
+        low = float(match[1])
+        high = low if match[2] is None else float(match[2])
+        if low <= high < low + MAX_FLOORS:
+            found |= {low + step for step in range(int(high - low) + 1)}
+    return found or {0.0}
+
+
+def _is_stairs(tags: dict[str, str]) -> bool:
+    return bool(_STAIRS & {tags.get("room"), tags.get("highway"), tags.get("indoor")}) or tags.get("stairs") == "yes"
+
+
+def _role(element: OsmElement) -> Role | None:
+    """Return what an element is on a floor, None for nothing."""
+    tags = element.tags
+    indoor = tags.get("indoor", "")
+    if element.kind == "node":
+        if {"door", "entrance"} & tags.keys() or indoor == "door":
+            return "opening"
+        return "post" if indoor in ("column", "pillar") else None
+    if _is_stairs(tags) and indoor not in ("", "no"):
+        return "solid"
+    if indoor in ("column", "pillar") or (indoor == "wall" and tags.get("area") == "yes"):
+        return "solid"
+    if indoor == "wall":
+        return "wall" if element.kind == "way" else "solid"
+    return _SPACES.get(indoor)
+
+
+def _measure_floors(data: OsmData) -> dict[float, float]:
+    """Return the levels with spaces, and the area of these in square degrees of the equator."""
+    floors: dict[float, float] = {}
+    for element in data.elements:
+        if _role(element) not in ("open", "walled"):
+            continue
+        area = _measure_area(data, element)
+        for level in _levels(element.tags):
+            floors[level] = floors.get(level, 0.0) + area
+    return {level: area for level, area in floors.items() if area > 0.0}
+
+
+def _measure_area(data: OsmData, element: OsmElement) -> float:
+    """Return the area within the ways of an element, which is exact for a single closed one."""
+    area = 0.0
+    for line in data.lines(element) or []:
+        x, y = (line - line[0]).T
+        area += abs(float(x[:-1] @ y[1:] - x[1:] @ y[:-1])) / 2
+    return area
+
+
+def _is_indoor(data: OsmData, floors: dict[float, float]) -> bool:
+    """Return whether the inside of buildings is what an extract shows most of."""
+    buildings = [each for each in data.elements if each.tags.get("building", "no") not in _OPEN]
+    covered = sum(_measure_area(data, each) for each in buildings if each.kind != "node")
+    return max(floors.values()) >= _MIN_INDOOR_SHARE * covered
+
+
+def _place_floor(data: OsmData, floor: float, shapes: Shapes) -> list[IndoorFigure]:
+    """Return the parts of a level, in metres."""
+    roles: list[Role] = []
+    figures: list[Figure] = []
+    doors: list[OsmElement] = []
+    walls: list[OsmElement] = []
+    stairs = 0
+    for element in data.elements:
+        role = _role(element)
+        if role is None or floor not in _levels(element.tags):
+            continue
+        if role == "opening":
+            doors.append(element)
+            continue
+        if role in ("walled", "wall"):
+            walls.append(element)
+        if role == "post":
+            figure: Figure | None = Figure("point", (data.point(element)[None],), element.labels, element.place)
+        elif role == "wall":
+            figure = _to_line(data, element, shapes)
+        else:
+            figure = _to_polygon(data, element, shapes)
+        stairs += role == "solid" and _is_stairs(element.tags)
+        if figure is not None:
+            roles.append(role)
+            figures.append(figure)
+    if stairs:
+        shapes.notes.append(f"stairs and lifts taken as solid: {stairs}")
+    door_lines = _find_doors(data, doors, walls)
+    if lost := len(doors) - len(door_lines):
+        shapes.leave_out("door", "in no wall of this level", lost)
+    placed = in_metres([*figures, *door_lines], shapes, DEGREES)
+    floor_figures = [IndoorFigure(role, figure) for role, figure in zip(roles, placed, strict=False)]
+    return floor_figures + [IndoorFigure("opening", _span_door(figure)) for figure in placed[len(figures) :]]
+
+
+def _find_doors(data: OsmData, doors: list[OsmElement], walls: list[OsmElement]) -> list[Figure]:
+    """Return doors as lines of three points, in degrees: the node before it in its wall, its own, the next."""
+    wanted = {door.number for door in doors}
+    beside: dict[int, tuple[int, int]] = {}
+    for element in walls:
+        ways = [data.ways.get(k) for k in element.members] if element.kind == "relation" else [element]
+        for way in ways:
+            nodes = [] if way is None else way.members
+            closed = len(nodes) > 2 and nodes[0] == nodes[-1]
+            for k, number in enumerate(nodes):
+                if number in wanted and number not in beside:
+                    before = nodes[k - 1] if k > 0 else (nodes[-2] if closed else number)
+                    after = nodes[k + 1] if k + 1 < len(nodes) else (nodes[1] if closed else number)
+                    beside[number] = (before, after)
+    lines = []
+    for door in doors:
+        if door.number not in beside:
+            continue
+        before, after = beside[door.number]
+        line = data.lines(OsmElement("way", door.number, members=[before, door.number, after]))
+        if line is not None:
+            lines.append(Figure("line", (line[0],), ("door",), door.place, width=_width(door.tags)))
+    return lines
+
+
+def _span_door(figure: Figure) -> Figure:
+    """Return the line across an opening, in metres, of a door as of `_find_doors`."""
+    before, middle, after = figure.rings[0]
+    along = after - before if (after != before).any() else after - middle
+    length = float(np.hypot(*along))
+    half: Array = along * ((figure.width or DOOR_WIDTH_M) / 2 / max(length, 1e-9))
+    return Figure("line", (np.array([middle - half, middle + half]),), figure.labels, figure.at)

@@ -36,7 +36,7 @@ from robocov_app.formats.geometry.shapes import Outline, Shapes
 from robocov_app.formats.geometry.vectorize import free_area, vertices_of
 from robocov_app.formats.picture import read_picture
 
-MAX_BYTES = 5_000_000  # largest file of a world, in bytes
+MAX_BYTES = 5_000_000  # largest file of a world, and of all that it includes together, in bytes
 MOST_TOKENS, MOST_ENTITIES = 200_000, 10_000  # words and numbers; models and blocks that macros make of them
 _DARK = 127 / 255  # pixels that are not brighter are solid
 _TOKEN = re.compile(
@@ -123,7 +123,8 @@ class _World:
         self.macros: dict[str, _Entity] = {}
         self.bitmaps: dict[Path, tuple[MultiPolygon, int, int]] = {}
         self.rooms: list[_Room] = []
-        self._split(path, 0)
+        self.includes = files.IncludeBudget(max_bytes=MAX_BYTES)
+        self._split(path, (path,))
         self.root = _Entity("world", shapes.where)
         self._fill(self.root, 0)
         self.metre = _LENGTHS.get(self.root.text("unit_length", "m"), 1.0)
@@ -133,7 +134,8 @@ class _World:
         notes, anywhere = self.shapes.notes, self.shapes.options.anywhere
         return files.named_file(self.path, name, what, at, notes, anywhere)
 
-    def _split(self, path: Path, depth: int) -> None:
+    def _split(self, path: Path, including: tuple[Path, ...]) -> None:
+        """Append the tokens of a file and of those that it includes; `including` leads from the world to it."""
         world = files.content(path, MAX_BYTES).decode("utf-8", "replace")
         line, name, include = 1, one_line(path), False
         for found in _TOKEN.finditer(world):
@@ -146,15 +148,23 @@ class _World:
                 strange = world[found.start() : found.start() + 20]
                 token._replace(text=strange).refuse("a word, a number or a bracket")
             if include:
-                if token.kind != "string" or depth >= files.MAX_DEPTH:
-                    token.refuse("a file to include, which does not include itself,")
-                self._split(self._named(token.text, "file", token.at), depth + 1)
+                self._include(token, including)
             elif token[:2] != ("word", "include"):
                 if len(self.tokens) >= MOST_TOKENS:
                     what = f"more than {MOST_TOKENS} words and numbers"
                     raise MapError(f"{token.at}: {what}, but fewer were wanted")
                 self.tokens.append(token)
             include = not include and token[:2] == ("word", "include")
+
+    def _include(self, token: _Token, including: tuple[Path, ...]) -> None:
+        if token.kind != "string":
+            token.refuse("a file to include")
+        path = self._named(token.text, "file", token.at)
+        is_own_part = any(path.resolve() == each.resolve() for each in including)
+        if is_own_part or len(including) > files.MAX_DEPTH:
+            token.refuse("a file to include, which does not include itself,")
+        self.includes.take(path, token.at)
+        self._split(path, (*including, path))
 
     def _fill(self, entity: _Entity, depth: int) -> None:
         end = _Token("", "the end of the file", entity.at)

@@ -29,7 +29,7 @@ from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import frame, moved
 from robocov_app.formats.geometry.shapes import Line, Shapes
 from robocov_app.formats.geometry.vectorize import free_area, vertices_of
-from robocov_app.formats.xml_tree import Element, read_xml_tree
+from robocov_app.formats.xml_tree import MOST_ELEMENTS, Element, read_xml_tree
 
 MOST_TILES, MOST_READ = 4_000_000, 16_000_000  # of a map, and of all its layers together
 MOST_PARTS = 10_000  # collision objects, each as often as its tile is there, and tiles beside the grid
@@ -118,6 +118,8 @@ class _Map:
 
     def _tiles(self) -> dict[int, _Tile]:
         found: dict[int, _Tile] = {}
+        budget = files.IncludeBudget()
+        elements = 0
         for tileset in self.root.children:
             if tileset.tag != "tileset":
                 continue
@@ -126,7 +128,11 @@ class _Map:
             if source is not None:
                 at, anywhere = f"{tileset.where}:{tileset.line}", self.options.anywhere
                 file = files.named_file(self.path, source, "tileset", at, self.shapes.notes, anywhere)
+                budget.take(file, at)
                 tileset = read_xml_tree(file, "tileset", "TSX")
+                elements += sum(1 for _ in tileset.everything())
+                if elements > MOST_ELEMENTS:
+                    raise MapError(f"{at}: tilesets of more than {MOST_ELEMENTS} elements, expected at most that")
             size = np.array([_number(tileset, name) for name in ("tilewidth", "tileheight")])
             drawn = tileset.child("tileoffset")
             offset = np.zeros(2) if drawn is None else np.array([_number(drawn, name) for name in "xy"])
@@ -211,24 +217,31 @@ class _Map:
         full = np.isin(ids & _ID, [gid for gid, tile in tiles.items() if not tile.parts])
         if not np.isin(ids & _ID, [*tiles]).any():
             full = (ids & _ID != 0) & layer.wall
-        for gid in np.unique(ids).tolist():
-            tile = tiles.get(gid & _ID)
-            if tile is None or not tile.parts:
-                continue
-            figures = [_figure(part) for part in tile.parts]
-            if any(np.array_equal(points, _RECTANGLE * self.tile) for _, points in figures):
-                full |= ids == gid
-                continue
-            for row, column in np.argwhere(ids == gid).tolist():
-                corner = place + [column, row + 1] * self.tile - [0.0, tile.size[1]] + tile.offset
-                for part, (kind, points) in zip(tile.parts, figures, strict=True):
-                    self._add_part(part, kind, corner + _turned(points, gid, tile.size), layer.labels)
+        in_parts = np.isin(ids & _ID, [gid for gid, tile in tiles.items() if tile.parts])
+        cells = np.argwhere(in_parts)
+        gids, kinds = np.unique(ids[in_parts], return_inverse=True)
+        own_figures = {gid: [_figure(part) for part in tiles[gid].parts] for gid in {*(gids & _ID).tolist()}}
+        figures = [own_figures[gid] for gid in (gids & _ID).tolist()]
+        is_whole = np.array([self._fills_tile(each) for each in figures], dtype=bool)
+        rows, columns = cells[is_whole[kinds]].T
+        full[rows, columns] = True
+        # by kind, and of a kind row by row
+        for k in np.flatnonzero(~is_whole[kinds])[np.argsort(kinds[~is_whole[kinds]], kind="stable")].tolist():
+            gid = int(gids[kinds[k]])
+            row, column = cells[k].tolist()
+            tile = tiles[gid & _ID]
+            corner = place + [column, row + 1] * self.tile - [0.0, tile.size[1]] + tile.offset
+            for part, (kind, points) in zip(tile.parts, figures[kinds[k]], strict=True):
+                self._add_part(part, kind, corner + _turned(points, gid, tile.size), layer.labels)
         if layer.offset.any():  # beside the grid
             for row, column in np.argwhere(full).tolist():
                 cell = place + np.add(_RECTANGLE, [column, row]) * self.tile
                 self._add_part(layer.element, "polygon", cell, layer.labels)
             full = np.zeros_like(full)
         return full
+
+    def _fills_tile(self, figures: list[tuple[str, Array]]) -> bool:
+        return any(np.array_equal(points, _RECTANGLE * self.tile) for _, points in figures)
 
     def _add_part(self, element: Element, kind: str, points: Array, labels: tuple[str, ...]) -> None:
         self.parts += 1
