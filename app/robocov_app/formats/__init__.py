@@ -16,6 +16,7 @@ from robocov_app.formats import (
     files,
     geojson,
     houseexpo,
+    imdf,
     irsim,
     movingai,
     osm,
@@ -79,9 +80,11 @@ IMPORTERS: dict[str, Importer] = {each.name: each for each in (
     Importer("wkt", "well-known text (JuPedSim, PostGIS, shapely): polygons, lines, collections",
              (".wkt", ".ewkt"), lambda path, head: wkt.BEGIN.match(head) is not None, wkt.read,
              frozenset({"scale", "units", "thickness", "pillar", "outlines", "around", "snap"})),
-    Importer("geojson", "GeoJSON, in degrees (with pyproj) or metres: polygons, lines, points", (".geojson",),
-             lambda path, head: files.begins_with(head, b"{") and geojson.TYPE.search(head) is not None,
-             geojson.read, frozenset({"scale", "units", *_DRAWN})),
+    Importer("geojson", "GeoJSON and sequences of it, in degrees (with pyproj) or metres",
+             (".geojson", ".geojsonl", ".geojsons", ".ndjson"), geojson.sniff, geojson.read,
+             frozenset({"scale", "units", *_DRAWN})),
+    Importer("imdf", "IMDF: a level of a venue, from a zip or folder of GeoJSON (with pyproj)",
+             (".zip", ".imdf"), imdf.sniff, imdf.read, frozenset({"level", "thickness", "snap", "only", "skip"})),
     Importer("houseexpo", "HouseExpo floor plans (JSON with verts in metres)", (".json",),
              lambda path, head: files.begins_with(head, b"{") and b'"verts"' in head, houseexpo.read),
     Importer("rings", "lists of rings (JSON as earcut takes it): outline and holes", (".json",),
@@ -112,7 +115,11 @@ def importer(name: str) -> Importer:
 def detect(path: str | Path) -> Importer:
     """Return the format of the file at `path`: by its content, or else by its suffix."""
     path = Path(path)
+    if imdf.is_archive_folder(path):
+        return IMPORTERS["imdf"]
     head = files.head(path)
+    if imdf.sniff(path, head):
+        return IMPORTERS["imdf"]
     if (kind := named_kind(path, head)) is not None:
         raise MapError(f"{one_line(path)}: {one_line(kind)}")
     for candidate in IMPORTERS.values():

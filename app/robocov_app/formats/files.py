@@ -1,7 +1,7 @@
 """Foreign files: size limits, text, JSON, YAML, and files that they name.
 
-Tags, anchors and aliases are refused, so that no text can stand for more than what is written, nor for
-anything but text: what a value is, who asks for it decides.
+YAML has no tags here, so that no text can stand for anything but text: what a value is, who asks for it
+decides. Aliases may repeat a value, within a limit on all values together.
 """
 
 import codecs
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from itertools import takewhile
 from pathlib import Path, PureWindowsPath
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import yaml
@@ -35,7 +35,8 @@ HEAD = 1 << 20  # so much of a file is looked at, in bytes, to know its format
 _LONG = 400  # longest name of a file, in characters
 Value: TypeAlias = "str | list[Value] | dict[str, Value]"  # text is as it is written
 MAX_YAML_BYTES = 262_144  # which take a second to read: a map has 200, a world some thousand
-DEEPEST = 12  # deepest nesting of lists and mappings
+MAX_YAML_VALUES = 50_000  # values of a text, each counted as often as an alias repeats it
+DEEPEST = 12  # deepest nesting of lists and mappings, also through aliases
 _MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
 
 
@@ -100,7 +101,9 @@ class IncludeBudget:
         self.bytes_read += path.stat().st_size
         if self.files_read > self.max_files:
             found = f"more than {self.max_files} files are included"
-            raise MapError(f"{at}: {found}, expected at most {self.max_files}, each counted as often as it is read")
+            raise MapError(
+                f"{at}: {found}, expected at most {self.max_files}, each counted as often as it is read"
+            )
         if self.bytes_read > self.max_bytes:
             found = f"the included files have more than {self.max_bytes / 1e6:g} MB together"
             raise MapError(f"{at}: {found}, expected at most that")
@@ -211,11 +214,19 @@ def begins_with(head: bytes, bracket: bytes) -> bool:
 
 
 class JsonFile:
-    """The `document` in a JSON file, what messages call the file, and errors with lines and columns."""
+    """The `document` in a JSON file, what messages call the file, and errors with lines and columns.
 
-    def __init__(self, path: Path) -> None:
+    Parameters
+    ----------
+    path : Path
+        Its name; for a part of an archive, the path of the archive and the name in it.
+    text : bytes, optional
+        What it contains, if it was read already.
+    """
+
+    def __init__(self, path: Path, text: bytes | None = None) -> None:
         self.where = one_line(path)
-        self._content = content(path, MAX_TEXT_BYTES)
+        self._content = content(path, MAX_TEXT_BYTES) if text is None else text
         # each point is a list of two or three: to count takes a moment, to parse minutes
         require_vertices(max(self._content.count(b"["), self._content.count(b",") // 3), self.where)
         self.document: Any = parse(self._content, self.where)
@@ -245,56 +256,140 @@ def is_number(value: object) -> bool:
 
 
 def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
-    """Return the mapping in a text of UTF-8, without tags, anchors, aliases and keys that stand twice."""
+    """Return the mapping in a YAML text.
+
+    Anchors and aliases, and the merge key ``<<``, mean what they mean in YAML 1.1.
+
+    Parameters
+    ----------
+    text : bytes
+        UTF-8.
+    where : str
+        What messages call the file.
+
+    Raises
+    ------
+    MapError
+        When the text is no YAML, no mapping, too large or too deep, or has tags, keys that are given twice, or
+        more than `MAX_YAML_VALUES` values once its aliases are followed.
+    """
     if len(text) > MAX_YAML_BYTES:
         raise MapError(f"{where}: larger than {MAX_YAML_BYTES // 1024} kB, but the YAML of a map was wanted")
     try:
         decoded = text.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise MapError(f"{where}: byte {error.start}: not UTF-8, but YAML in UTF-8 was wanted") from None
-    result: Any = {}
     try:
-        events = _events(decoded, where)
-        for event, line in events:
-            if isinstance(event, yaml.DocumentStartEvent) and result:
-                raise MapError(f"{line}: a second document, but one was wanted")
-            if isinstance(event, yaml.SequenceStartEvent | yaml.ScalarEvent):
-                found = shown(event.value) if isinstance(event, yaml.ScalarEvent) else "a list"
-                raise MapError(f"{line}: {found}, but a mapping (name: value) was wanted")
-            if isinstance(event, yaml.MappingStartEvent):
-                result = _value(event, line, events)
+        return _YamlReader(decoded, where).read()
     except yaml.MarkedYAMLError as error:
         line = f"line {error.problem_mark.line + 1}: " if error.problem_mark is not None else ""
         raise MapError(f"{where}: {line}not YAML: {one_line(error.problem or error.context)}") from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise MapError(f"{where}: not YAML: {one_line(error)[:200]}") from None
-    return result  # type: ignore[no-any-return]
 
 
-def _events(text: str, where: str) -> Iterator[tuple[Any, str]]:
-    """Yield events as they are read, with their lines: a bomb is refused at its first fuse."""
-    for event in yaml.parse(text, Loader=yaml.BaseLoader):
-        line = f"{where}: line {event.start_mark.line + 1 if event.start_mark else 0}"
-        if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None:
-            raise MapError(f"{line}: an anchor or alias, but a plain value was wanted")
-        if (tag := getattr(event, "tag", None)) is not None:
-            raise MapError(f"{line}: the tag {shown(tag)}, but a plain value was wanted")
-        yield event, line
+class _Counted(NamedTuple):
+    """A value, how many values are in it, itself included, and how deep lists and mappings are nested."""
+
+    value: Value
+    size: int
+    depth: int
 
 
-def _value(event: Any, line: str, events: Iterator[tuple[Any, str]], depth: int = 1) -> Value:
-    if isinstance(event, yaml.ScalarEvent):
-        return event.value
-    if depth > DEEPEST:
-        raise MapError(f"{line}: nested too deeply, but at most {DEEPEST} levels were wanted")
-    inside = takewhile(lambda item: not isinstance(item[0], yaml.CollectionEndEvent), events)
-    if isinstance(event, yaml.SequenceStartEvent):
-        return [_value(*item, events, depth + 1) for item in inside]
-    found: dict[str, Value] = {}
-    for name, at in inside:
-        if not isinstance(name, yaml.ScalarEvent):
-            raise MapError(f"{at}: a name that is a collection, but a word was wanted")
-        if name.value in found:
-            raise MapError(f"{at}: {one_line(name.value)}: given twice, but once was wanted")
-        found[name.value] = _value(*next(events), events, depth + 1)
-    return found
+class _YamlReader:
+    """Builds values from the events of the parser as they come: what is too much is refused at once."""
+
+    def __init__(self, text: str, where: str) -> None:
+        self.where = where
+        self.events = yaml.parse(text, Loader=yaml.BaseLoader)
+        self.anchors: dict[str, _Counted] = {}
+        self.count = 0
+
+    def read(self) -> dict[str, Value]:
+        result: dict[str, Value] = {}
+        for event in self.events:
+            if isinstance(event, yaml.DocumentStartEvent) and result:
+                raise MapError(f"{self._line(event)}: a second document, but one was wanted")
+            if isinstance(event, yaml.SequenceStartEvent | yaml.ScalarEvent):
+                found = shown(event.value) if isinstance(event, yaml.ScalarEvent) else "a list"
+                raise MapError(f"{self._line(event)}: {found}, but a mapping (name: value) was wanted")
+            if isinstance(event, yaml.NodeEvent):
+                value = self._build(event, depth=1).value
+                assert isinstance(value, dict)
+                result = value
+        return result
+
+    def _line(self, event: yaml.Event) -> str:
+        return f"{self.where}: line {event.start_mark.line + 1 if event.start_mark else 0}"
+
+    def _build(self, event: Any, depth: int) -> _Counted:
+        """Return the value that begins with an event; `depth` is that of a list or mapping there."""
+        if isinstance(event, yaml.AliasEvent):
+            found = self.anchors.get(str(event.anchor))
+            if found is None:
+                known = "expected the name of an anchor before it"
+                raise MapError(f"{self._line(event)}: {known}, got the alias {shown(event.anchor)}")
+            self._require_few(event, found.size, depth - 1 + found.depth)
+            return found
+        if event.tag is not None:
+            raise MapError(f"{self._line(event)}: the tag {shown(event.tag)}, but a plain value was wanted")
+        before = self.count
+        if isinstance(event, yaml.ScalarEvent):
+            self._require_few(event, 1, 0)
+            value: Value = event.value
+            inner_depth = 0
+        else:
+            self._require_few(event, 1, depth)
+            is_list = isinstance(event, yaml.SequenceStartEvent)
+            value, inner_depth = self._list(depth) if is_list else self._mapping(depth)
+            inner_depth += 1
+        counted_value = _Counted(value, self.count - before, inner_depth)
+        if event.anchor is not None:
+            self.anchors[str(event.anchor)] = counted_value
+        return counted_value
+
+    def _require_few(self, event: Any, count: int, depth: int) -> None:
+        self.count += count
+        if self.count > MAX_YAML_VALUES:
+            many = f"more than {MAX_YAML_VALUES} values, aliases followed"
+            raise MapError(f"{self._line(event)}: expected a smaller file, got {many}")
+        if depth > DEEPEST:
+            raise MapError(f"{self._line(event)}: nested too deeply, but at most {DEEPEST} levels were wanted")
+
+    def _inside(self) -> Iterator[Any]:
+        """Yield the events up to the end of the list or mapping that has begun."""
+        return takewhile(lambda event: not isinstance(event, yaml.CollectionEndEvent), self.events)
+
+    def _list(self, depth: int) -> tuple[list[Value], int]:
+        items = [self._build(event, depth + 1) for event in self._inside()]
+        return [item.value for item in items], max((item.depth for item in items), default=0)
+
+    def _mapping(self, depth: int) -> tuple[dict[str, Value], int]:
+        found: dict[str, Value] = {}
+        merged: list[Value] = []
+        deepest = 0
+        for event in self._inside():
+            if not isinstance(event, yaml.ScalarEvent):
+                kind = "an alias" if isinstance(event, yaml.AliasEvent) else "a collection"
+                raise MapError(f"{self._line(event)}: a name that is {kind}, but a word was wanted")
+            name = self._build(event, depth).value
+            assert isinstance(name, str)
+            item = self._build(next(self.events), depth + 1)
+            deepest = max(deepest, item.depth)
+            if name == "<<" and event.style is None:
+                merged += self._merged(item.value, event)
+            elif name in found:
+                raise MapError(f"{self._line(event)}: {one_line(name)}: given twice, but once was wanted")
+            else:
+                found[name] = item.value
+        for other in merged:
+            assert isinstance(other, dict)
+            found = other | found
+        return found, deepest
+
+    def _merged(self, value: Value, event: Any) -> list[Value]:
+        """Return the mappings that a merge key names, those that count more first."""
+        mappings: list[Value] = value if isinstance(value, list) else [value]
+        if not all(isinstance(each, dict) for each in mappings):
+            raise MapError(f"{self._line(event)}: <<: expected a mapping, or a list of them, got another value")
+        return mappings

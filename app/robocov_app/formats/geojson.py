@@ -5,10 +5,14 @@ What polygons and lines are is found out as in `Shapes.foreign_map`; the propert
 projected to metres, if that makes a map of at most 10 km; else they are metres. The member ``crs`` of the
 older standard is obeyed, as is a member ``units`` (``metres`` or ``degrees``), which `robocov export` writes;
 the option overrules both.
+
+A file may also be a sequence of such texts (GeoJSONSeq, RFC 8142): each after a record separator, or, as many
+programs write it, each on a line of its own.
 """
 
 import json
 import re
+from codecs import BOM_UTF8
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +28,7 @@ from robocov.errors import JsonPath as Steps
 from robocov.errors import ParameterError, RobocovError, one_line, place, shown
 from robocov.extras import extra
 from robocov.files.atomic import written
+from robocov_app.formats import files
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import JsonFile, is_number
 from robocov_app.formats.geometry.polygons import DIGITS, free_area, on_grid
@@ -33,16 +38,27 @@ from robocov_app.formats.georeference import LocalPlane, in_metres
 
 _PLURAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
 _GEOMETRIES = ("Point", "LineString", "Polygon", *_PLURAL, "GeometryCollection")
-TYPE = re.compile(rb'"type"\s*:\s*"(?:FeatureCollection|Feature|%s)"' % "|".join(_GEOMETRIES).encode())
+_TYPE = re.compile(rb'"type"\s*:\s*"(?:FeatureCollection|Feature|%s)"' % "|".join(_GEOMETRIES).encode())
 _NAMES = ("name", "kind", "id")  # properties of a feature that name its shapes; its own id does too
+_RECORD_SEPARATOR = b"\x1e"
+_LINES_SUFFIXES = (".geojsonl", ".geojsons", ".geojsonseq", ".jsonl", ".ldjson", ".ndjson")
+_SECOND_RECORD = re.compile(rb"\}[ \t]*\r?\n\s*\{")
 _FINER = 6  # so many more decimals have degrees: one is about a hundred kilometres
 
 
+def sniff(path: Path, head: bytes) -> bool:
+    begin = head.removeprefix(BOM_UTF8).lstrip(b" \t\r\n" + _RECORD_SEPARATOR)
+    return begin.startswith(b"{") and _TYPE.search(head) is not None
+
+
 def read(path: Path, options: ReadOptions) -> ForeignMap:
-    file = JsonFile(path)
-    document, shapes = file.document, Shapes(file.where, options)
-    found = _Found(file, shapes)
-    found.read()
+    content = files.content(path, files.MAX_TEXT_BYTES)
+    sequence = _as_list(content, path.suffix.lower())
+    file = JsonFile(path, content if sequence is None else sequence)
+    shapes = Shapes(file.where, options)
+    found = FigureCollector(file, shapes)
+    found.collect(is_sequence=sequence is not None)
+    document = file.document if isinstance(file.document, dict) else {}
     units, origin = document.get("units"), document.get("origin")
     if units not in (None, "metres", "degrees") and options.units is None:
         raise file.refused(("units",), units, "metres or degrees was")
@@ -59,28 +75,77 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     return shapes.foreign_map(name or "map", text, solid=False)
 
 
-class _Found:
+def _as_list(content: bytes, suffix: str) -> bytes | None:
+    """Return a sequence of GeoJSON texts as a JSON list with the same lines; None where it is no sequence."""
+    text = content.removeprefix(BOM_UTF8)
+    if text.lstrip().startswith(_RECORD_SEPARATOR):
+        separator, records = b"", text.split(_RECORD_SEPARATOR)
+    else:
+        separator, records = b"\n", text.split(b"\n")
+        first = next((line for line in records if line.strip()), b"")
+        is_named_so = suffix in _LINES_SUFFIXES
+        if not (is_named_so or _SECOND_RECORD.search(text)) or not _is_json(first):
+            return None
+    pieces = []
+    has_record = False
+    for record in records:
+        if record.strip():
+            pieces.append(b"," + record if has_record else record)
+            has_record = True
+        else:
+            pieces.append(record)
+    return b"[" + separator.join(pieces) + b"]"
+
+
+def _is_json(line: bytes) -> bool:
+    try:
+        json.loads(line)
+    except (ValueError, RecursionError):
+        return False
+    return True
+
+
+class FigureCollector:
+    """Goes through GeoJSON and collects its geometries, with the names of the features that hold them.
+
+    Attributes
+    ----------
+    figures : list of Figure
+        In the coordinates of the file.
+    crs : str or None
+        Reference system that the file names.
+    """
+
     def __init__(self, file: JsonFile, shapes: Shapes) -> None:
-        self.file, self.shapes = file, shapes
+        self.file = file
+        self.shapes = shapes
         self.figures: list[Figure] = []
         self.crs: str | None = None
 
-    def read(self) -> None:
-        document = self.file.document
-        kind = document.get("type") if isinstance(document, dict) else None
+    def collect(self, *, is_sequence: bool = False) -> None:
+        """Add what the file holds: one GeoJSON text, or a list of them that stands for a sequence."""
+        if not is_sequence:
+            self._add_text(self.file.document, ())
+            return
+        for k, text in enumerate(self.file.document):
+            self._add_text(text, (k,))
+
+    def _add_text(self, text: Any, at: Steps) -> None:
+        """Add a GeoJSON text: a geometry, a feature or a collection of features."""
+        kind = text.get("type") if isinstance(text, dict) else None
         if kind == "FeatureCollection":
-            features = document.get("features")
+            features = text.get("features")
             if not isinstance(features, list):
-                raise self.file.refused(("features",), features, "a list of features was")
-            self._see_system(document, ())
+                raise self.file.refused((*at, "features"), features, "a list of features was")
+            self._see_system(text, at)
             for k, feature in enumerate(features):
-                self._feature(feature, ("features", k))
+                self._feature(feature, (*at, "features", k))
         elif kind == "Feature":
-            self._feature(document, ())
+            self._feature(text, at)
         elif kind == "Topology":
-            raise self.file.refused(("type",), kind, "GeoJSON, not TopoJSON, was")
+            raise self.file.refused((*at, "type"), kind, "GeoJSON, not TopoJSON, was")
         else:
-            self._geometry(document, (), ())
+            self.add_geometry(text, at, ())
 
     def _feature(self, feature: Any, at: Steps) -> None:
         if not isinstance(feature, dict) or feature.get("type") != "Feature":
@@ -97,9 +162,11 @@ class _Found:
         if feature.get("geometry") is None:
             self.shapes.leave_out("feature", "without a geometry")
         else:
-            self._geometry(feature["geometry"], (*at, "geometry"), tuple(dict.fromkeys(filter(None, labels))))
+            self.add_geometry(
+                feature["geometry"], (*at, "geometry"), tuple(dict.fromkeys(filter(None, labels)))
+            )
 
-    def _geometry(self, geometry: Any, at: Steps, labels: tuple[str, ...]) -> None:
+    def add_geometry(self, geometry: Any, at: Steps, labels: tuple[str, ...]) -> None:
         kind = geometry.get("type") if isinstance(geometry, dict) else None
         if kind not in _GEOMETRIES:
             value, where = (geometry, at) if kind is None else (kind, (*at, "type"))
@@ -112,7 +179,7 @@ class _Found:
         if not isinstance(parts, list):
             raise self.file.refused((*at, "geometries"), parts, "a list of geometries was")
         for k, part in enumerate(parts):
-            self._geometry(part, (*at, "geometries", k), labels)
+            self.add_geometry(part, (*at, "geometries", k), labels)
 
     def _coordinates(self, kind: str, value: Any, at: Steps, labels: tuple[str, ...]) -> None:
         if kind in _PLURAL:

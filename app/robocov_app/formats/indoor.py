@@ -173,9 +173,7 @@ def _cut_walls(walls: list[BaseGeometry], gaps: list[BaseGeometry]) -> list[Arra
     if gaps:
         lines = shapely.difference(lines, shapely.union_all(gaps))
     merged = shapely.line_merge(lines)
-    return [
-        shapely.get_coordinates(part) for part in shapely.get_parts(merged) if part.length > _MIN_WALL_M
-    ]
+    return [shapely.get_coordinates(part) for part in shapely.get_parts(merged) if part.length > _MIN_WALL_M]
 
 
 def _add_obstacles(shapes: Shapes, figures: list[IndoorFigure], floor: MultiPolygon) -> None:

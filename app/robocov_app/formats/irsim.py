@@ -10,6 +10,7 @@ counted. The states of robots are a start.
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import re
 from dataclasses import dataclass
@@ -53,6 +54,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         free = free_area(light, (width, height), (float(corner[0]), float(corner[1])), where)
         shapes.cell = max(width, height)
         shapes.count(vertices_of(free))
+    drawer = _ShapeDrawer(shapes)
     count = moving = 0
     for kind in ("robot", "obstacle"):
         for group in root[kind].items(one=True):
@@ -77,7 +79,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
                         continue
                     moving += group["kinematics"].given
                     figures = group["shape"].items(one=True) or [group["shape"]]
-                    _draw(figures[min(k, len(figures) - 1)], frame(x, y, turn), shapes, labels)
+                    drawer.draw(figures[min(k, len(figures) - 1)], frame(x, y, turn), labels)
     if moving:
         words = "with kinematics taken as standing where the file has them"
         shapes.notes.append(f"{counted(moving, 'obstacle')} {words}")
@@ -95,6 +97,9 @@ def _picture(world: _Node, path: Path, shapes: Shapes) -> BoolArray:
         source = source["path"]
     notes, anywhere = shapes.notes, shapes.options.anywhere
     file = files.named_file(path, source.text(), "picture", source.at, notes, anywhere)
+    if not file.is_file():
+        file = _find_bundled(source)
+        notes.append(f"{source.at.rpartition(': ')[2]}: {shown(file.name)} taken from the installed ir-sim")
     picture = read_picture(file, one_line(file))
     every = int(step.number(1.0))
     if every < 1:
@@ -102,6 +107,29 @@ def _picture(world: _Node, path: Path, shapes: Shapes) -> BoolArray:
     # IR-SIM counts rows from the bottom
     light = 2 * picture.level.astype(np.uint32) >= picture.full
     return light[::-1][::every, ::every][::-1]
+
+
+def _find_bundled(source: _Node) -> Path:
+    """Return a picture of the maps that IR-SIM brings along, as it does itself where there is no such file.
+
+    IR-SIM is only looked for, not imported.
+
+    Raises
+    ------
+    MapError
+        When IR-SIM is not installed, or has no such picture.
+    """
+    name = source.text()
+    missing = f"{source.at}: expected a picture beside the file, or one that IR-SIM brings along, got {shown(name)}"
+    package = importlib.util.find_spec("irsim")
+    if package is None or not package.submodule_search_locations:
+        raise MapError(f"{missing}. IR-SIM is not installed (pip install ir-sim).")
+    maps = Path(package.submodule_search_locations[0]) / "world" / "map"
+    bundled = {file.name: file for file in sorted(maps.rglob("*.png"), reverse=True)}
+    if name not in bundled:
+        known = f" (it has {', '.join(sorted(bundled)[:20])})" if bundled else ""
+        raise MapError(f"{missing}. The installed IR-SIM has no such picture{known}.")
+    return bundled[name]
 
 
 def _states(group: _Node, number: int, centre: Array, radius: float) -> list[Array] | None:
@@ -122,31 +150,47 @@ def _states(group: _Node, number: int, centre: Array, radius: float) -> list[Arr
     return [state.numbers([1.0, 1.0, 0.0]) for state in (states if nested else [group["state"]])]
 
 
-def _draw(shape: _Node, around: Array, shapes: Shapes, labels: tuple[str, ...]) -> None:
-    name, at = shape["name"].text("circle").lower(), shape.at.partition(": ")[2]
-    shift = np.array([shape["wheelbase"].number(0.0) / 2, 0.0])
-    if shape["random_shape"].text().lower() in _TRUE:
-        shapes.leave_out("shape", "by chance")
-    elif name == "circle":
-        centre = shape["center"].numbers([0.0, 0.0])[:2] + shift
-        shapes.add_circle(moved(around, centre[None])[0], shape["radius"].length(0.2), labels, at=at)
-    elif name == "rectangle":
-        size = np.array([shape["length"].length(1.0), shape["width"].length(1.0)])
-        shapes.add_outline([moved(around, UNIT_SQUARE * size + shift)], labels, at=at)
-    elif name in ("polygon", "linestring"):
+class _ShapeDrawer:
+    """Adds the shapes of obstacles: so many objects may have so many parts that they are counted first."""
+
+    def __init__(self, shapes: Shapes) -> None:
+        self.shapes = shapes
+        self.count = 0
+
+    def draw(self, shape: _Node, around: Array, labels: tuple[str, ...]) -> None:
+        """Add a shape in a frame, a (3, 3) matrix to metres."""
+        self.count += 1
+        files.require_shapes(self.count, self.shapes.where)
+        name, at = shape["name"].text("circle").lower(), shape.at.partition(": ")[2]
+        shift = np.array([shape["wheelbase"].number(0.0) / 2, 0.0])
+        if shape["random_shape"].text().lower() in _TRUE:
+            self.shapes.leave_out("shape", "by chance")
+        elif name == "circle":
+            centre = shape["center"].numbers([0.0, 0.0])[:2] + shift
+            radius = shape["radius"].length(0.2)
+            self.shapes.add_circle(moved(around, centre[None])[0], radius, labels, at=at)
+        elif name == "rectangle":
+            size = np.array([shape["length"].length(1.0), shape["width"].length(1.0)])
+            self.shapes.add_outline([moved(around, UNIT_SQUARE * size + shift)], labels, at=at)
+        elif name in ("polygon", "linestring"):
+            self._draw_points(shape, around, labels, at)
+        elif name == "compound":
+            for part in shape["parts"].items():
+                pose = part["pose"].numbers([0.0, 0.0, 0.0])[:3]
+                self.draw(part, around @ frame(*pose), labels)
+        else:
+            shape["name"].refuse("circle, rectangle, polygon, linestring or compound")
+
+    def _draw_points(self, shape: _Node, around: Array, labels: tuple[str, ...], at: str) -> None:
+        is_line = shape["name"].text().lower() == "linestring"
         points = [point.numbers([0.0, 0.0])[:2] for point in shape["vertices"].items()]
-        if len(points) < (3 if name == "polygon" else 2):
+        if len(points) < (2 if is_line else 3):
             shape["vertices"].refuse("a list of points [x, y]")
         places = moved(around, np.array(points))
-        if name == "linestring":
-            shapes.add_line(Line(places, shapes.thickness, labels), at=at)
+        if is_line:
+            self.shapes.add_line(Line(places, self.shapes.thickness, labels), at=at)
         else:
-            shapes.add_outline([places], labels, at=at, thing="polygon")
-    elif name == "compound":
-        for part in shape["parts"].items():
-            _draw(part, around @ frame(*part["pose"].numbers([0.0, 0.0, 0.0])[:3]), shapes, labels)
-    else:
-        shape["name"].refuse("circle, rectangle, polygon, linestring or compound")
+            self.shapes.add_outline([places], labels, at=at, thing="polygon")
 
 
 @dataclass(frozen=True)

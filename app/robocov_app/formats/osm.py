@@ -1,8 +1,8 @@
 """OpenStreetMap extracts, in metres east and north of their middle.
 
-Outdoors, buildings, also those that relations make up of several ways, and water (unless the option ``water``
-says that it is free) are solid; walls, fences, hedges and the like are walls of their tag ``width``, or of the
-option ``thickness``; bollards, blocks and trees are points. The bounds are the boundary. What is below the
+Outdoors, buildings, also those that relations make up of several ways, and water (unless the option
+``water`` says that it is free) are solid; walls, fences, hedges and the like are walls of their tag
+``width``, or of the option ``thickness``; bollards, blocks and trees are points. The bounds are the boundary. What is below the
 ground, roofs, and ways whose nodes the extract lacks are left out.
 
 Indoors, as of https://wiki.openstreetmap.org/wiki/Simple_Indoor_Tagging, rooms, corridors and areas of one
@@ -57,7 +57,9 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     shapes.notes += data.notes
     floors = _measure_floors(data)
     if options.level is not None and not floors:
-        raise ParameterError(f"{data.where}: level: expected none, got {shown(options.level)}: no indoor spaces")
+        raise ParameterError(
+            f"{data.where}: level: expected none, got {shown(options.level)}: no indoor spaces"
+        )
     name = files.name_of_map(path)
     if floors and (options.level is not None or _is_indoor(data, floors)):
         floor = choose_floor(floors, options.level, data.where)
@@ -161,7 +163,10 @@ def _levels(tags: dict[str, str]) -> set[float]:
 
 
 def _is_stairs(tags: dict[str, str]) -> bool:
-    return bool(_STAIRS & {tags.get("room"), tags.get("highway"), tags.get("indoor")}) or tags.get("stairs") == "yes"
+    return (
+        bool(_STAIRS & {tags.get("room"), tags.get("highway"), tags.get("indoor")})
+        or tags.get("stairs") == "yes"
+    )
 
 
 def _role(element: OsmElement) -> Role | None:
@@ -226,7 +231,9 @@ def _place_floor(data: OsmData, floor: float, shapes: Shapes) -> list[IndoorFigu
         if role in ("walled", "wall"):
             walls.append(element)
         if role == "post":
-            figure: Figure | None = Figure("point", (data.point(element)[None],), element.labels, element.place)
+            figure: Figure | None = Figure(
+                "point", (data.point(element)[None],), element.labels, element.place
+            )
         elif role == "wall":
             figure = _to_line(data, element, shapes)
         else:
@@ -246,7 +253,7 @@ def _place_floor(data: OsmData, floor: float, shapes: Shapes) -> list[IndoorFigu
 
 
 def _find_doors(data: OsmData, doors: list[OsmElement], walls: list[OsmElement]) -> list[Figure]:
-    """Return doors as lines of three points, in degrees: the node before it in its wall, its own, the next."""
+    """Return doors as lines of three points, in degrees: the node before in its wall, its own, the next."""
     wanted = {door.number for door in doors}
     beside: dict[int, tuple[int, int]] = {}
     for element in walls:

@@ -2,7 +2,7 @@
 
 XML is what openstreetmap.org, JOSM and osmium write: https://wiki.openstreetmap.org/wiki/OSM_XML. JSON is
 what Overpass answers to ``[out:json]``, also with ``out geom``, and what the API writes as ``map.json``:
-https://wiki.openstreetmap.org/wiki/OSM_JSON. What the data means is the business of `robocov_app.formats.osm`.
+https://wiki.openstreetmap.org/wiki/OSM_JSON. `robocov_app.formats.osm` knows what the data means.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ XML_ROOT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?xml[^>]*\?>\s*)?(?:<!--.*?-->
 _JSON_ELEMENTS = re.compile(rb'"elements"\s*:\s*\[')
 _JSON_SOURCE = re.compile(rb'"osm3s"\s*:|"generator"\s*:\s*"[^"]*(?:Overpass|OpenStreetMap|CGImap)')
 _KEYS = {
-    "area", "barrier", "building", "door", "entrance", "highway", "indoor", "layer", "level", "location", "name",
-    "natural", "repeat_on", "room", "stairs", "tunnel", "type", "water", "waterway", "width",
+    "area", "barrier", "building", "door", "entrance", "highway", "indoor", "layer", "level", "location",
+    "name", "natural", "repeat_on", "room", "stairs", "tunnel", "type", "water", "waterway", "width",
 }  # fmt: skip
 _LABEL_KEYS = ("name", "room", "indoor", "barrier", "building", "natural")
 _MAX_READINGS = 4  # times that all vertices are looked at: areas are measured, doors found, shapes drawn
@@ -52,7 +52,9 @@ class OsmElement:
         """What names the element: its name, the values of its main tags, and their keys."""
         values = [self.tags[key] for key in _LABEL_KEYS if key in self.tags]
         keys = [key for key in (*_LABEL_KEYS[1:], "waterway") if key in self.tags]
-        return tuple(dict.fromkeys(one_line(label) for label in (*values, *keys) if label not in ("yes", "no")))
+        return tuple(
+            dict.fromkeys(one_line(label) for label in (*values, *keys) if label not in ("yes", "no"))
+        )
 
 
 class OsmData:
@@ -123,7 +125,9 @@ class OsmData:
 
     def lines(self, element: OsmElement) -> list[Array] | None:
         """Return the (k, 2) longitudes and latitudes of each way of an element; None if nodes are missing."""
-        ways = [self.ways.get(number) for number in element.members] if element.kind == "relation" else [element]
+        ways = (
+            [self.ways.get(number) for number in element.members] if element.kind == "relation" else [element]
+        )
         # a way may be a part of many relations
         self._vertices_used += sum(len(way.members) for way in ways if way is not None)
         if self._vertices_used > _MAX_READINGS * files.MAX_VERTICES:
@@ -235,7 +239,9 @@ def _read_json(path: Path) -> OsmData:
         try:
             data.bounds.append(_bounds(bounds))
         except (KeyError, ValueError, TypeError):
-            raise file.refused(("bounds",), bounds, "minlat, minlon, maxlat and maxlon in degrees were") from None
+            raise file.refused(
+                ("bounds",), bounds, "minlat, minlon, maxlat and maxlon in degrees were"
+            ) from None
     if isinstance(remark := document.get("remark"), str):
         data.notes.append(f"Overpass says: {one_line(remark)[:200]}")
     for k, given in enumerate(elements):

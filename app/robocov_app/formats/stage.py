@@ -135,7 +135,7 @@ class _World:
         return files.named_file(self.path, name, what, at, notes, anywhere)
 
     def _split(self, path: Path, including: tuple[Path, ...]) -> None:
-        """Append the tokens of a file and of those that it includes; `including` leads from the world to it."""
+        """Append the tokens of a file and of those that it includes; `including` are the files above it."""
         world = files.content(path, MAX_BYTES).decode("utf-8", "replace")
         line, name, include = 1, one_line(path), False
         for found in _TOKEN.finditer(world):

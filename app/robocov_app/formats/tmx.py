@@ -132,7 +132,9 @@ class _Map:
                 tileset = read_xml_tree(file, "tileset", "TSX")
                 elements += sum(1 for _ in tileset.everything())
                 if elements > MOST_ELEMENTS:
-                    raise MapError(f"{at}: tilesets of more than {MOST_ELEMENTS} elements, expected at most that")
+                    raise MapError(
+                        f"{at}: tilesets of more than {MOST_ELEMENTS} elements, expected at most that"
+                    )
             size = np.array([_number(tileset, name) for name in ("tilewidth", "tileheight")])
             drawn = tileset.child("tileoffset")
             offset = np.zeros(2) if drawn is None else np.array([_number(drawn, name) for name in "xy"])
@@ -226,7 +228,9 @@ class _Map:
         rows, columns = cells[is_whole[kinds]].T
         full[rows, columns] = True
         # by kind, and of a kind row by row
-        for k in np.flatnonzero(~is_whole[kinds])[np.argsort(kinds[~is_whole[kinds]], kind="stable")].tolist():
+        for k in np.flatnonzero(~is_whole[kinds])[
+            np.argsort(kinds[~is_whole[kinds]], kind="stable")
+        ].tolist():
             gid = int(gids[kinds[k]])
             row, column = cells[k].tolist()
             tile = tiles[gid & _ID]

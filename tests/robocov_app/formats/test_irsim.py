@@ -167,7 +167,7 @@ def test_pictures_are_only_read_from_the_folder(tmp_path: Path) -> None:
         ("obstacle:\n  - {number: 9e6}", "obstacle[0].number: '9e6', but a number of at most 4000"),
         ("obstacle:\n  - {distribution: {name: x}}", "obstacle[0].distribution.name: 'x', but manual"),
         ("obstacle:\n  shape: {name: polygon, vertices: [[0, 0]]}", "shape.vertices: [['0', '0']], but "),
-        ("obstacle:\n  - &a {shape: *a}", "line 7: an anchor or alias"),
+        ("obstacle:\n  - &a {shape: *a}", "line 7: expected the name of an anchor before it, got the alias 'a'"),
         ("obstacle: " + "[" * 20, "nested too deeply, but at most 12 levels"),
     ],
 )  # fmt: skip
@@ -189,3 +189,75 @@ def test_turns_are_in_radians() -> None:
     from robocov_app.formats.geometry.frames import frame
 
     assert frame(1.0, 2.0, math.pi / 2) == pytest.approx(np.array([[0, -1, 1], [1, 0, 2], [0, 0, 1]]))
+
+
+def test_anchors_and_aliases_repeat_shapes(tmp_path: Path) -> None:
+    foreign = read(
+        tmp_path,
+        """
+obstacle:
+  - shape: &box {name: 'rectangle', length: 1.0, width: 0.5}
+    state: [2, 5, 0]
+  - shape: *box
+    state: [6, 5, 0]
+  - {shape: {<<: *box, length: 2}, state: [4, 3.5]}
+""",
+    )
+    wanted = shapely.union_all([box(1.5, 4.75, 2.5, 5.25), box(5.5, 4.75, 6.5, 5.25), box(3, 3.25, 5, 3.75)])
+    assert solid(foreign).symmetric_difference(wanted).area < 1e-6
+
+
+PARTS = ", ".join(["*a"] * 100)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        # 4,000 objects of 100 parts, or of 10,000
+        f"parts:\n  - &a {{name: circle, random_shape: true}}\n  - &b [{PARTS}]\nobstacle:\n"
+        "  - {number: 4000, shape: {name: compound, parts: *b}}",
+        "obstacle:\n  - {number: 4000, shape: {name: compound, parts: [" + "{name: compound}, " * 10_000 + "]}}",
+    ],
+    ids=["aliases", "parts"],
+)
+def test_parts_of_many_objects_are_counted_together(tmp_path: Path, text: str) -> None:
+    with pytest.raises(MapError, match="shapes, but at most 20000 were wanted"):
+        read(tmp_path, text)
+
+
+# Maps that IR-SIM brings along
+
+
+def install(folder: Path, monkeypatch: pytest.MonkeyPatch, content: bytes) -> None:
+    """Put a package that looks like IR-SIM, and may not be imported, where Python looks for packages."""
+    maps = folder / "site" / "irsim" / "world" / "map" / "more"
+    maps.mkdir(parents=True)
+    (folder / "site" / "irsim" / "__init__.py").write_text("raise RuntimeError('imported')")
+    (maps / "cave.png").write_bytes(content)
+    monkeypatch.syspath_prepend(folder / "site")
+
+
+BUNDLED = "  obstacle_map: cave.png\n"
+
+
+def test_a_bundled_map_is_found_where_irsim_is_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cells = np.full((6, 10), 255, np.uint8)
+    cells[0, 0] = 0
+    install(tmp_path, monkeypatch, pgm(cells))
+    foreign = read(tmp_path, BUNDLED)
+    assert solid(foreign).equals(box(-1, 7, 0, 8))
+    assert "world.obstacle_map: 'cave.png' taken from the installed ir-sim" in foreign.notes
+    with pytest.raises(MapError, match=r"got 'hall.png'. The installed IR-SIM has no such picture \(it has cave.png\)"):
+        read(tmp_path, "  obstacle_map: hall.png\n")
+    # one beside the file counts more
+    (tmp_path / "cave.png").write_bytes(pgm(np.full((6, 10), 255, np.uint8)))
+    assert solid(read(tmp_path, BUNDLED)).is_empty
+
+
+def test_without_irsim_a_bundled_map_is_said_to_need_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(MapError) as caught:
+        read(tmp_path, BUNDLED)
+    place = f"{tmp_path / 'world.yaml'}: world.obstacle_map: "
+    wanted = "expected a picture beside the file, or one that IR-SIM brings along, got 'cave.png'. "
+    assert str(caught.value) == place + wanted + "IR-SIM is not installed (pip install ir-sim)."

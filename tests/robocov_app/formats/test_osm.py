@@ -1,5 +1,6 @@
 """OpenStreetMap: buildings, relations of several ways, barriers, bounds, and what is refused."""
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import shapely
 from shapely import box
 
 from robocov.environment import CircleObstacle, WallObstacle
-from robocov.errors import MapError
+from robocov.errors import MapError, ParameterError
 from robocov_app.formats import IMPORTERS, ReadOptions, detect, import_map
 
 PLANE = pyproj.Proj(proj="aeqd", lon_0=6.1, lat_0=50.7, ellps="WGS84")
@@ -180,3 +181,214 @@ def test_what_is_refused(tmp_path: Path, text: str, wanted: str) -> None:
         IMPORTERS["osm"].read(path, ReadOptions())
     assert wanted in str(caught.value)
     assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
+
+
+# Degenerate ways
+
+
+@pytest.mark.parametrize("tags", [{"building": "yes"}, {"barrier": "wall"}, {"natural": "water"}])
+def test_a_way_of_one_repeated_node_is_no_outline(tmp_path: Path, tags: dict[str, str]) -> None:
+    extract = Extract()
+    node = extract.node(0, 0)
+    extract.way_of([node] * 4, **tags)
+    path = tmp_path / "town.osm"
+    path.write_text(extract.text(None))
+    with pytest.raises(MapError, match="no closed outline and no line"):
+        IMPORTERS["osm"].read(path, ReadOptions())
+
+
+def test_a_degenerate_way_beside_others_is_left_out(tmp_path: Path) -> None:
+    extract = Extract()
+    extract.way(square(0, 0, 5), building="yes")
+    extract.way_of([1, 1, 1], building="yes")
+    extract.way_of([1, 2, 1], building="yes")
+    extract.relation((999, "outer"), building="yes")
+    extract.ways.append('<way id="999">' + '<nd ref="1"/>' * 3 + "</way>")
+    assert solid(tmp_path, extract).area == pytest.approx(25, abs=0.05)
+    foreign = IMPORTERS["osm"].read(tmp_path / "town.osm", ReadOptions())
+    wanted = ("1 outline without an area", "1 relation without an area", "1 way without an area")
+    assert foreign.dropped == wanted
+
+
+# JSON of Overpass
+
+
+def overpass(*elements: dict[str, Any], **more: Any) -> str:
+    return json.dumps({"version": 0.6, "generator": "Overpass API 0.7.62", "elements": elements, **more})
+
+
+def nodes(points: list[tuple[float, float]], first: int = 1) -> list[dict[str, Any]]:
+    found = []
+    for k, (x, y) in enumerate(points):
+        longitude, latitude = PLANE(x, y, inverse=True)
+        found.append({"type": "node", "id": first + k, "lat": latitude, "lon": longitude})
+    return found
+
+
+def geometry(points: list[tuple[float, float]]) -> list[dict[str, float]]:
+    return [{"lat": each["lat"], "lon": each["lon"]} for each in nodes(points)]
+
+
+def bounds_of(points: list[tuple[float, float]]) -> dict[str, float]:
+    low, _, high, _ = geometry(points)
+    return {"minlat": low["lat"], "minlon": low["lon"], "maxlat": high["lat"], "maxlon": high["lon"]}
+
+
+ROOM = square(-20, -20, 40)
+DESK = square(0, 0, 10)
+
+
+@pytest.mark.parametrize("style", ["out", "out geom", "out ids geom"])
+def test_overpass_json_is_as_xml(tmp_path: Path, style: str) -> None:
+    ring = [*DESK, DESK[0]]
+    way: dict[str, Any] = {"type": "way", "id": 10, "tags": {"building": "yes"}}
+    post = {**nodes([(-10, -10)], 50)[0], "tags": {"barrier": "bollard"}}
+    before: list[dict[str, Any]] = [post]
+    if style == "out":
+        before += nodes(DESK)
+    if style != "out ids geom":
+        way["nodes"] = [1, 2, 3, 4, 1]
+    if style != "out":
+        way["geometry"] = geometry(ring)
+    path = tmp_path / "town.json"
+    path.write_text(overpass(*before, way, bounds=bounds_of(ROOM), remark="runtime error: Query timed out"))
+    assert detect(path) is IMPORTERS["osm"]
+    foreign = IMPORTERS["osm"].read(path, ReadOptions(pillar=0.5))
+    assert foreign.free.area == pytest.approx(1600 - 100 - math.pi / 4, rel=1e-3)
+    assert "Overpass says: runtime error: Query timed out" in foreign.notes
+
+
+def test_overpass_relations_hold_their_ways(tmp_path: Path) -> None:
+    members = [
+        {"type": "way", "ref": 7, "role": "outer", "geometry": geometry([*ROOM, ROOM[0]])},
+        {"type": "way", "ref": 8, "role": "inner", "geometry": geometry([*DESK, DESK[0]])},
+        {"type": "node", "ref": 9, "role": "label"},
+    ]
+    tags = {"type": "multipolygon", "building": "yes"}
+    path = tmp_path / "town.json"
+    house = {"type": "relation", "id": 1, "members": members, "tags": tags}
+    path.write_text(overpass(house, bounds=bounds_of(square(-30, -30, 60))))
+    foreign = IMPORTERS["osm"].read(path, ReadOptions())
+    assert foreign.free.area == pytest.approx(3600 - 1600 + 100, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("elements", "wanted"),
+    [
+        ("{}", ": elements: {}, but a list of elements was wanted"),
+        ("[3]", ": elements[0]: 3, but an element"),
+        ('[{"type": "node", "id": "1"}]', 'elements[0].id: "1", but a whole number'),
+        ('[{"type": "node", "id": 1, "lat": 91, "lon": 0}]', "elements[0].lat: 91, but degrees"),
+        ('[{"type": "node", "id": 1, "lat": true, "lon": 0}]', "elements[0].lat: true, but degrees"),
+        ('[{"type": "way", "id": 1, "nodes": 5}]', "elements[0].nodes: 5, but a list"),
+        (
+            '[{"type": "way", "id": 1, "geometry": [[0, 1]]}]',
+            "elements[0].geometry[0]: [0, 1], but lat and lon",
+        ),
+        ('[{"type": "way", "id": 1, "tags": []}]', "elements[0].tags: [], but an object"),
+        ('[{"type": "relation", "id": 1, "members": [1]}]', "elements[0].members[0]: 1, but a member"),
+        ('[{"type": "area", "id": 1}]', "no closed outline and no line"),
+    ],
+)
+def test_overpass_json_that_is_refused(tmp_path: Path, elements: str, wanted: str) -> None:
+    path = tmp_path / "town.json"
+    path.write_text('{"osm3s": {}, "elements": ' + elements + "}")
+    with pytest.raises(MapError) as caught:
+        import_map(path, format="osm")
+    assert wanted in str(caught.value)
+
+
+# Indoors
+
+
+def floor_plan(doors: bool = True) -> Extract:
+    """Return a corridor with a room north of it, entered by a door, one south of it, and stairs."""
+    extract = Extract()
+    names = ("a", "b", "c", "d", "e", "f")
+    corner = dict(
+        zip(
+            names,
+            (extract.node(*at) for at in ((0, 0), (20, 0), (20, 4), (10, 4), (0, 4), (0, 10))),
+            strict=True,
+        )
+    )
+    door = extract.node(5, 4, door="yes", width="1.2", level="0") if doors else extract.node(5, 4)
+    north = extract.node(10, 10)
+    south = [extract.node(0, -6), extract.node(20, -6)]
+    corridor = [corner[name] for name in ("a", "b", "c", "d")] + [door, corner["e"], corner["a"]]
+    extract.way_of(corridor, indoor="corridor", level="0")
+    extract.way_of(
+        [corner["e"], door, corner["d"], north, corner["f"], corner["e"]], indoor="room", level="0"
+    )
+    extract.way_of([corner["a"], *south, corner["b"], corner["a"]], indoor="room", level="0;1", name="store")
+    extract.way([(16, 1), (18, 1), (18, 3), (16, 3)], indoor="area", room="stairs", level="0")
+    extract.way([(0, 0), (20, 0), (20, 4), (0, 4)], indoor="corridor", level="2")
+    extract.way([(0, -6), (20, -6), (20, 10), (0, 10)], building="yes")
+    return extract
+
+
+def indoors(folder: Path, extract: Extract, **options: Any) -> Any:
+    path = folder / "house.osm"
+    path.write_text(extract.text(None))
+    return IMPORTERS["osm"].read(path, ReadOptions(**options))
+
+
+def in_plan(free: Any) -> Any:
+    """Return free space of the whole ground floor as `floor_plan` has it."""
+    return shapely.transform(free, lambda points: points + [10, 2])
+
+
+def test_rooms_of_a_level_are_free_and_joined_by_doors(tmp_path: Path) -> None:
+    foreign = indoors(tmp_path, floor_plan(), thickness=0.1)
+    free = in_plan(foreign.free)
+    corridor = next(part for part in free.geoms if part.contains(shapely.Point(5, 2)))
+    assert corridor.contains(shapely.Point(5, 8)), "the north room has a door"
+    assert not corridor.contains(shapely.Point(5, -3)), "the south room has none"
+    assert not free.contains(shapely.Point(17, 2)), "stairs are solid"
+    # the door is as wide as it says
+    assert corridor.contains(box(4.42, 3.9, 5.58, 4.1))
+    assert not free.intersects(box(1, 3.98, 4.38, 4.02)) and not free.intersects(box(5.62, 3.98, 9, 4.02))
+    assert "level 0 of 0, 1, 2 (--level)" in foreign.notes
+    assert "stairs and lifts taken as solid: 1" in foreign.notes
+
+
+def test_without_doors_rooms_are_open_to_what_adjoins(tmp_path: Path) -> None:
+    foreign = indoors(tmp_path, floor_plan(doors=False))
+    assert len(foreign.free.geoms) == 1
+    assert foreign.free.area == pytest.approx(20 * 10 + 10 * 6 - 4, rel=1e-3)
+
+
+def test_a_level_is_chosen(tmp_path: Path) -> None:
+    assert indoors(tmp_path, floor_plan(), level="1").free.area == pytest.approx(120, rel=1e-3)
+    assert indoors(tmp_path, floor_plan(), level="2").free.area == pytest.approx(80, rel=1e-3)
+    for asked in ("3", "x", "nan"):
+        with pytest.raises(ParameterError, match=f"level: expected one of 0, 1, 2, got '{asked}'"):
+            indoors(tmp_path, floor_plan(), level=asked)
+    town = Extract()
+    town.way(square(0, 0, 9), building="yes")
+    with pytest.raises(ParameterError, match="level: expected none, got '0': no indoor spaces"):
+        indoors(tmp_path, town, level="0")
+
+
+def test_a_town_with_one_house_from_inside_is_read_outdoors(tmp_path: Path) -> None:
+    extract = floor_plan()
+    extract.way(square(30, 0, 25), building="yes")
+    extract.way(square(30, 30, 25), building="yes")
+    foreign = indoors(tmp_path, extract)
+    assert "indoor spaces on level 0, 1, 2 left out (--level reads a floor)" in foreign.notes
+    assert indoors(tmp_path, extract, level="2").free.area == pytest.approx(80, rel=1e-3)
+
+
+def test_walls_columns_and_levels_as_they_are_written(tmp_path: Path) -> None:
+    extract = Extract()
+    extract.way(square(0, 0, 10), indoor="area", level="-1-1")
+    extract.way([(5, 0), (5, 6)], closed=False, indoor="wall", level="1", width="0.5")
+    extract.way(square(8, 8, 1), indoor="column", repeat_on="0,1")
+    extract.node(2, 2, indoor="column", level="1")
+    extract.way(square(0, 0, 10), indoor="corridor", level="7--3")
+    found = {
+        level: indoors(tmp_path, extract, level=level, pillar=0.1).free.area for level in ("-1", "0", "1")
+    }
+    assert found["-1"] == pytest.approx(100, rel=1e-3)
+    assert found["0"] == pytest.approx(99, rel=1e-3)
+    assert found["1"] == pytest.approx(100 - 1 - 6 * 0.1 - math.pi / 100, rel=1e-3)

@@ -34,14 +34,35 @@ BOMB = b"a: &a [x,x,x]\n" + b"".join(
 )
 
 
+DEEP = b"a: &a [x]\n" + b"".join(b"%c: &%c [*%c]\n" % (k, k, k - 1) for k in range(98, 118))
+
+
+def test_aliases_repeat_values() -> None:
+    text = b"a: &box {w: 1, h: [2, 3]}\nb: [*box, *box]\nc: &word x\nd: *word\ne: &box y\nf: *box"
+    box = {"w": "1", "h": ["2", "3"]}
+    assert parse(text, "m") == {"a": box, "b": [box, box], "c": "x", "d": "x", "e": "y", "f": "y"}
+
+
+def test_merge_keys_give_what_is_not_given() -> None:
+    text = b"a: &a {x: 1, y: 2}\nb: &b {y: 3, z: 4}\nc: {<<: *a, y: 5}\nd: {z: 6, <<: [*a, *b]}\ne: {'<<': 7}"
+    found = parse(text, "m")
+    assert found["c"] == {"x": "1", "y": "5"}
+    assert found["d"] == {"x": "1", "y": "2", "z": "6"}
+    assert found["e"] == {"<<": "7"}
+
+
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
         (b"a: !!python/object/apply:os.system [ls]", "m: line 1: the tag 'tag:yaml.org,2002:python/object"),
         (b"a: 1\nb: !x 2", "m: line 2: the tag '!x', but a plain value"),
-        (b"a: &x 1\nb: *x", "m: line 1: an anchor or alias"),
-        (BOMB, "m: line 1: an anchor or alias"),
-        (b"<<: *x", "m: line 1: an anchor or alias"),
+        (b"a: *x\nb: &x 1", "m: line 1: expected the name of an anchor before it, got the alias 'x'"),
+        (b"a: &x [1, *x]", "m: line 1: expected the name of an anchor before it, got the alias 'x'"),
+        (BOMB, "m: line 10: expected a smaller file, got more than 50000 values, aliases followed"),
+        (DEEP, "m: line 12: nested too deeply, but at most 12 levels were wanted"),
+        (b"<<: *x", "m: line 1: expected the name of an anchor before it, got the alias 'x'"),
+        (b"a: &x 1\nb: {<<: *x}", "m: line 2: <<: expected a mapping, or a list of them, got another value"),
+        (b"a: &x b\n*x : 1", "m: line 2: a name that is an alias, but a word was wanted"),
         (b"a: 1\na: 2", "m: line 2: a: given twice"),
         (b"- 1\n- 2", "m: line 1: a list, but a mapping"),
         (b"just a word", "m: line 1: 'just a word', but a mapping"),

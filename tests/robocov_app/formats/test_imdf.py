@@ -1,0 +1,221 @@
+"""Indoor Mapping Data Format: levels, units, openings and fixtures, from a folder and from a zip."""
+
+import io
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pyproj
+import pytest
+import shapely
+from shapely import Point, box
+
+from robocov.errors import MapError, ParameterError
+from robocov_app.formats import IMPORTERS, ReadOptions, detect, import_map
+
+# with the corners of the rooms beside it
+WALKWAY = [(0, 8), (30, 8), (30, 12), (20, 12), (10, 12), (0, 12)]
+PLANE = pyproj.Proj(proj="aeqd", lon_0=8.4, lat_0=49.0, ellps="WGS84")
+GROUND, UPSTAIRS = "11111111-0000", "11111111-0001"
+
+
+def degrees(points: list[tuple[float, float]]) -> list[list[float]]:
+    return [[round(value, 9) for value in PLANE(x, y, inverse=True)] for x, y in points]
+
+
+def feature(kind: str, geometry: Any, **properties: Any) -> dict[str, Any]:
+    return {
+        "id": f"{kind}-0",
+        "type": "Feature",
+        "feature_type": kind,
+        "geometry": geometry,
+        "properties": {"name": None, **properties},
+    }
+
+
+def polygon(*points: tuple[float, float]) -> dict[str, Any]:
+    return {"type": "Polygon", "coordinates": [degrees([*points, points[0]])]}
+
+
+def area(x: float, y: float, right: float, top: float) -> dict[str, Any]:
+    return polygon((x, y), (right, y), (right, top), (x, top))
+
+
+def line(*points: tuple[float, float]) -> dict[str, Any]:
+    return {"type": "LineString", "coordinates": degrees([*points])}
+
+
+def unit(category: str, *sides: float, level: str = GROUND, name: str | None = None) -> dict[str, Any]:
+    names = None if name is None else {"en": name}
+    return feature("unit", area(*sides), category=category, level_id=level, name=names)
+
+
+def venue() -> dict[str, list[dict[str, Any]]]:
+    """Return a walkway between rooms: A with an edge in common, B behind a wall, C without an opening."""
+    levels = []
+    for number, ordinal, short, name in ((GROUND, 0, "EG", "Ground"), (UPSTAIRS, 1, "OG", "Upper floor")):
+        one = feature(
+            "level", area(0, 0, 30, 20), ordinal=ordinal, short_name={"de": short}, name={"en": name}
+        )
+        levels.append({**one, "id": number})
+    return {
+        "venue": [feature("venue", area(0, 0, 30, 20), name={"en": "Old mill"}, category="museum")],
+        "level": levels,
+        "unit": [
+            feature("unit", polygon(*WALKWAY), category="walkway", level_id=GROUND),
+            unit("office", 0, 12, 10, 20, name="A"),
+            unit("office", 0, 0, 10, 7.8, name="B"),
+            unit("office", 20, 12, 30, 20, name="C"),
+            unit("stairs", 20, 0, 30, 8),
+            unit("column", 14, 9, 15, 10),
+            unit("walkway", 0, 0, 30, 20, level=UPSTAIRS),
+        ],
+        "opening": [
+            feature("opening", line((4, 12), (5.5, 12)), category="pedestrian", level_id=GROUND),
+            feature("opening", line((4, 7.8), (5, 7.8)), category="pedestrian", level_id=GROUND),
+        ],
+        "fixture": [feature("fixture", area(2, 16, 4, 18), category="desk", level_id=GROUND)],
+    }
+
+
+def as_folder(folder: Path, given: dict[str, list[dict[str, Any]]]) -> Path:
+    folder.mkdir()
+    for name, features in given.items():
+        document = {"type": "FeatureCollection", "features": features}
+        (folder / f"{name}.geojson").write_text(json.dumps(document))
+    (folder / "manifest.json").write_text('{"version": "1.0.0"}')
+    return folder
+
+
+def as_zip(path: Path, given: dict[str, list[dict[str, Any]]], within: str = "") -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, features in given.items():
+            document = {"type": "FeatureCollection", "features": features}
+            archive.writestr(f"{within}{name}.geojson", json.dumps(document))
+    return path
+
+
+def read(path: Path, **options: Any) -> Any:
+    assert detect(path) is IMPORTERS["imdf"]
+    return IMPORTERS["imdf"].read(path, ReadOptions(**options))
+
+
+def moved(free: Any) -> Any:
+    """Return free space with the lower left corner of the floor at [0, 0]: it is about the middle."""
+    return shapely.transform(free, lambda points: points + [15, 10])
+
+
+@pytest.mark.parametrize("kind", ["folder", "zip", "zip in a folder"])
+def test_units_are_free_and_joined_through_openings(tmp_path: Path, kind: str) -> None:
+    given = venue()
+    if kind == "folder":
+        path = as_folder(tmp_path / "mill", given)
+    else:
+        path = as_zip(tmp_path / "mill.zip", given, "mill/" if kind.endswith("folder") else "")
+    foreign = read(path, thickness=0.1)
+    free = moved(foreign.free)
+    part = next(part for part in free.geoms if part.contains(Point(1, 10)))
+    assert part.contains(Point(5, 15)), "A has an edge in common with the walkway, and an opening"
+    assert part.contains(Point(5, 4)), "B is behind a wall of 20 cm, with an opening in it"
+    assert not part.contains(Point(25, 16)), "C has no opening"
+    assert not free.contains(Point(25, 4)), "nobody drives on stairs"
+    assert not free.contains(Point(14.5, 9.5)) and not free.contains(Point(3, 17))
+    assert not free.intersects(box(0.5, 11.99, 3.9, 12.01)), "the wall of A goes on beside the opening"
+    assert free.contains(box(4.05, 11.8, 5.45, 12.2))
+    assert foreign.name == "Old mill"
+    assert "level 0 ('EG') of 0, 1 (--level)" in foreign.notes
+    assert "stairs, lifts and openings to below taken as solid: 1" in foreign.notes
+
+
+def test_an_imported_venue_is_a_map(tmp_path: Path) -> None:
+    environment, report, _ = import_map(as_folder(tmp_path / "mill", venue()))
+    # the walls stand on the outlines, half of them in each room
+    walkway, rooms = 30 * 4 - 1, 10 * 8 + 10 * 7.8 - 4
+    assert environment.free_area == pytest.approx(walkway + rooms, abs=8)
+    assert report.format == "imdf"
+
+
+@pytest.mark.parametrize("asked", ["1", "1.0", "OG", "upper floor", UPSTAIRS])
+def test_a_level_is_chosen_by_number_or_name(tmp_path: Path, asked: str) -> None:
+    foreign = read(as_folder(tmp_path / "mill", venue()), level=asked)
+    assert foreign.free.area == pytest.approx(600, rel=1e-4)
+
+
+def test_a_level_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"level: expected 0, 1 or a name \(EG, OG\), got '7'"):
+        read(as_folder(tmp_path / "mill", venue()), level="7")
+
+
+def test_without_openings_units_are_open_to_each_other(tmp_path: Path) -> None:
+    given = venue()
+    del given["opening"]
+    foreign = read(as_folder(tmp_path / "mill", given))
+    part = next(part for part in moved(foreign.free).geoms if part.contains(Point(1, 10)))
+    assert part.contains(Point(5, 15)) and part.contains(Point(25, 16))
+    assert "no door or opening on this level: 3 rooms are open to what adjoins" in foreign.notes
+
+
+def bomb() -> bytes:
+    """Return a zip of 100 kB that unpacks to 100 MB."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("unit.geojson", b" " * 100_000_000)
+    return file.getvalue()
+
+
+def many() -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        for k in range(1001):
+            archive.writestr(f"{k}/unit.geojson", b"")
+    return file.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("content", "wanted"),
+    [
+        (bomb(), "expected at most 50 MB when unpacked, got more"),
+        (many(), "expected an archive of at most 1000 files, got more"),
+        (bomb()[:50_000], "expected a whole zip archive, got a broken one: File is not a zip file"),
+        (many()[:300] + bomb()[300:], "expected a whole zip archive, got a broken one"),
+    ],
+    ids=["bomb", "many", "cut", "mixed"],
+)
+def test_archives_that_are_refused(tmp_path: Path, content: bytes, wanted: str) -> None:
+    path = tmp_path / "mill.zip"
+    path.write_bytes(content)
+    with pytest.raises(MapError) as caught:
+        read(path)
+    assert wanted in str(caught.value)
+    assert str(caught.value).startswith(str(path)) and str(caught.value).isprintable()
+
+
+def test_content_that_is_refused(tmp_path: Path) -> None:
+    cases: list[tuple[str, Any, str]] = [
+        ("level", [], "expected units on its levels, got none"),
+        ("unit", [], "expected units on its levels, got none"),
+        ("unit", [3], "unit.geojson:1:44: features[0]: 3, but a feature with properties was wanted"),
+        ("level", [feature("level", None)], "features[0].properties.ordinal: null"),
+        ("unit", [unit("office", 0, 0, 0, 0)], "expected spaces with an area on this level, got none"),
+        ("unit", [unit("column", 0, 0, 1, 1)], "expected spaces with an area on this level, got none"),
+    ]
+    for k, (name, features, wanted) in enumerate(cases):
+        path = as_folder(tmp_path / f"mill{k}", {**venue(), name: features})
+        with pytest.raises(MapError) as caught:
+            read(path)
+        assert wanted in str(caught.value)
+
+
+def test_a_folder_or_zip_of_something_else_is_none(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(MapError, match="is a folder"):
+        detect(tmp_path / "empty")
+    other = tmp_path / "other.zip"
+    with zipfile.ZipFile(other, "w") as archive:
+        archive.writestr("readme.txt", b"hello")
+    with pytest.raises(MapError, match="zip archive"):
+        detect(other)
+    half = as_zip(tmp_path / "half.zip", {"unit": venue()["unit"]})
+    with pytest.raises(MapError, match=r"expected level\.geojson in it"):
+        read(half)
