@@ -270,8 +270,8 @@ def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
     Raises
     ------
     MapError
-        When the text is no YAML, no mapping, too large or too deep, or has tags, keys that are given twice, or
-        more than `MAX_YAML_VALUES` values once its aliases are followed.
+        When the text is no YAML, no mapping, too large or too deep, or has tags, keys that are given twice,
+        or more than `MAX_YAML_VALUES` values once its aliases are followed.
     """
     if len(text) > MAX_YAML_BYTES:
         raise MapError(f"{where}: larger than {MAX_YAML_BYTES // 1024} kB, but the YAML of a map was wanted")
@@ -354,7 +354,9 @@ class _YamlReader:
             many = f"more than {MAX_YAML_VALUES} values, aliases followed"
             raise MapError(f"{self._line(event)}: expected a smaller file, got {many}")
         if depth > DEEPEST:
-            raise MapError(f"{self._line(event)}: nested too deeply, but at most {DEEPEST} levels were wanted")
+            raise MapError(
+                f"{self._line(event)}: nested too deeply, but at most {DEEPEST} levels were wanted"
+            )
 
     def _inside(self) -> Iterator[Any]:
         """Yield the events up to the end of the list or mapping that has begun."""
@@ -391,5 +393,7 @@ class _YamlReader:
         """Return the mappings that a merge key names, those that count more first."""
         mappings: list[Value] = value if isinstance(value, list) else [value]
         if not all(isinstance(each, dict) for each in mappings):
-            raise MapError(f"{self._line(event)}: <<: expected a mapping, or a list of them, got another value")
+            raise MapError(
+                f"{self._line(event)}: <<: expected a mapping, or a list of them, got another value"
+            )
         return mappings

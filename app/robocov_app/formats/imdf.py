@@ -1,8 +1,8 @@
 """Indoor Mapping Data Format: https://docs.ogc.org/cs/20-094/index.html.
 
-An archive is a zip, or a folder, of GeoJSON files. The units of one level are free space, unless their category
-says that nobody drives there (columns, stairs, openings to the floor below); fixtures and kiosks are solid.
-Units have walls along their outlines, which openings cut, except for walkways and the like.
+An archive is a zip, or a folder, of GeoJSON files. The units of one level are free space, unless their
+category says that nobody drives there (columns, stairs, openings to the floor below); fixtures and kiosks are
+solid. Units have walls along their outlines, which openings cut, except for walkways and the like.
 """
 
 from __future__ import annotations

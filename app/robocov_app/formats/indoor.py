@@ -21,6 +21,7 @@ from robocov.errors import MapError, ParameterError, counted, shown
 from robocov_app.formats.base import ForeignMap
 from robocov_app.formats.geometry.polygons import Crossings, enclosed, polygons_of, united
 from robocov_app.formats.geometry.shapes import Figure, Line, Shapes
+from robocov_app.formats.geometry.snapping import close_gaps, default_snap
 
 Role: TypeAlias = Literal["open", "walled", "solid", "wall", "opening", "post"]
 DOOR_WIDTH_M = 0.9  # of a door without a width
@@ -149,7 +150,11 @@ def _opening_area(figure: Figure) -> BaseGeometry:
 
 def _join(spaces: list[MultiPolygon], gaps: list[BaseGeometry], shapes: Shapes) -> MultiPolygon:
     """Return all spaces as one area, with a passage through each opening where a wall is between them."""
-    floor = polygons_of(united(spaces))
+    snap = default_snap(spaces) if shapes.options.snap is None else shapes.options.snap
+    joined = close_gaps(spaces, snap)
+    if joined.number:
+        shapes.notes.append(joined.describe())
+    floor = joined.area
     tree = shapely.STRtree(list(floor.geoms))
     passages = []
     for gap in gaps:

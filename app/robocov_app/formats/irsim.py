@@ -120,7 +120,9 @@ def _find_bundled(source: _Node) -> Path:
         When IR-SIM is not installed, or has no such picture.
     """
     name = source.text()
-    missing = f"{source.at}: expected a picture beside the file, or one that IR-SIM brings along, got {shown(name)}"
+    missing = (
+        f"{source.at}: expected a picture beside the file, or one that IR-SIM brings along, got {shown(name)}"
+    )
     package = importlib.util.find_spec("irsim")
     if package is None or not package.submodule_search_locations:
         raise MapError(f"{missing}. IR-SIM is not installed (pip install ir-sim).")

@@ -2,8 +2,8 @@
 
 Outdoors, buildings, also those that relations make up of several ways, and water (unless the option
 ``water`` says that it is free) are solid; walls, fences, hedges and the like are walls of their tag
-``width``, or of the option ``thickness``; bollards, blocks and trees are points. The bounds are the boundary. What is below the
-ground, roofs, and ways whose nodes the extract lacks are left out.
+``width``, or of the option ``thickness``; bollards, blocks and trees are points. The bounds are the boundary.
+What is below the ground, roofs, and ways whose nodes the extract lacks are left out.
 
 Indoors, as of https://wiki.openstreetmap.org/wiki/Simple_Indoor_Tagging, rooms, corridors and areas of one
 level are free; rooms have walls, which doors open; ``indoor=wall`` is a wall; stairs and lifts are solid. The

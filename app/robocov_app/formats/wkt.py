@@ -2,29 +2,41 @@
 
 The grammar is that of OGC 06-103r4, section 7, with the prefix ``SRID=...;`` of PostGIS.
 
-Polygons are free space, all of them together, and their holes are obstacles: JuPedSim's accessible areas.
-Only where all other polygons lie wholly in one, to which they would add nothing, they are obstacles in it;
-where there are only lines they are walls. The option ``outlines`` says it otherwise; see
-`Shapes.foreign_map`. Coordinates are metres, unless a prefix ``SRID=...;`` names another system.
+Polygons are free space, all of them together, whether they overlap or lie in each other, and their holes are
+obstacles, also where another polygon overlaps them: JuPedSim unites accessible areas, and then takes out what
+is excluded (``build_geometry`` in the manual, https://www.jupedsim.org). Only a polygon that lies wholly in a
+hole is free there, as in a MULTIPOLYGON. Where there are only lines they are walls. The option ``outlines``
+says it otherwise; see `Shapes.foreign_map`. Coordinates are metres, unless a prefix ``SRID=...;`` names
+another system.
 """
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
+import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array
 from robocov.environment import Environment
-from robocov.errors import MapError, shown
+from robocov.errors import MapError, counted, shown
 from robocov.files.atomic import written
 from robocov.files.strictjson import line_and_column
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import MAX_DEPTH, name_of_map, read_text
-from robocov_app.formats.geometry.polygons import DIGITS, decimal, on_grid, rings
+from robocov_app.formats.geometry.polygons import (
+    DIGITS,
+    Crossings,
+    decimal,
+    on_grid,
+    polygons_of,
+    rings,
+    united,
+)
 from robocov_app.formats.geometry.rasterize import not_held
 from robocov_app.formats.geometry.shapes import Figure, Shapes
 from robocov_app.formats.georeference import in_metres
@@ -41,6 +53,8 @@ _KIND = re.compile(rf"((?ai:{'|'.join(KINDS)}))\s*((?ai:ZM|Z|M))?(?![A-Za-z_])")
 _POINTS = re.compile(r"\(([-+.\deE\s,]*)\)", re.ASCII)
 _NO_POINT = re.compile(r"[^-+.\deE\s,]", re.ASCII)
 _BEYOND = 1e100
+MAX_OVERLAPS = 50_000  # of a hole and a polygon
+_HOLES_TOGETHER = 20  # so many holes are looked at together, which bounds the memory
 _SRID = re.compile(r"SRID\s*=\s*(\d{1,9})\s*;", re.IGNORECASE)
 _COMMENT = re.compile(r"^[ \t]*(?:#|--).*$", re.MULTILINE)
 BEGIN = re.compile(
@@ -207,9 +221,65 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     text, where = read_text(path, b",")
     shapes = Shapes(where, options)
     parsed = WktText(text, where, shapes)
-    figures = parsed.figures()
-    shapes.add_all(in_metres(figures, shapes, f"EPSG:{parsed.srid}" if parsed.srid else None))
+    figures = in_metres(parsed.figures(), shapes, f"EPSG:{parsed.srid}" if parsed.srid else None)
+    if options.outlines is None and any(figure.kind == "polygon" for figure in figures):
+        shapes.options = replace(options, outlines="free")
+        figures = _exclude_holes(figures, shapes)
+    shapes.add_all(figures)
     return shapes.foreign_map(name_of_map(path), "Imported from WKT.", solid=False, overlap=True)
+
+
+def _exclude_holes(figures: list[Figure], shapes: Shapes) -> list[Figure]:
+    """Return figures whose polygons do not fill the holes of others, unless they lie wholly in one."""
+    valid: dict[int, Polygon] = {}
+    for k, figure in enumerate(figures):
+        if figure.kind == "polygon" and all(len(ring) >= 4 for ring in figure.rings):
+            polygon = Polygon(figure.rings[0], figure.rings[1:])
+            if polygon.is_valid:  # others are repaired later, each by itself
+                valid[k] = polygon
+    polygons = [*valid.values()]
+    holes = [Polygon(ring) for polygon in polygons for ring in polygon.interiors]
+    if len(polygons) < 2 or not holes:
+        return figures
+    Crossings(shapes.where).add([ring for polygon in polygons for ring in shapely.get_rings(polygon)])
+    taken: dict[int, list[Polygon]] = {}
+    for hole, k in _find_overlaps(holes, polygons, shapes.where):
+        taken.setdefault(k, []).append(hole)
+    if not taken:
+        return figures
+    found = {k: polygons_of(shapely.difference(polygons[k], united(some))) for k, some in taken.items()}
+    changed = {number: found[k] for k, number in enumerate(valid) if k in found}
+    shapes.notes.append(
+        f"holes excluded from polygons that overlap them, as in JuPedSim: {counted(len(changed), 'polygon')}"
+    )
+    result: list[Figure] = []
+    for number, figure in enumerate(figures):
+        if number not in changed:
+            result.append(figure)
+            continue
+        for part in changed[number].geoms:
+            rings_left = tuple(np.array(ring.coords) for ring in shapely.get_rings(part))
+            result += [replace(figure, rings=rings_left)]
+    return result
+
+
+def _find_overlaps(
+    holes: list[Polygon], polygons: list[Polygon], where: str
+) -> Iterator[tuple[Polygon, int]]:
+    """Yield holes with the index of each polygon that overlaps them, other than those that lie in them."""
+    tree = shapely.STRtree(polygons)
+    number = 0
+    for begin in range(0, len(holes), _HOLES_TOGETHER):
+        some = np.array(holes[begin : begin + _HOLES_TOGETHER], dtype=object)
+        one, other = tree.query(some, predicate="intersects")
+        number += len(one)
+        if number > MAX_OVERLAPS:
+            limit = f"at most {MAX_OVERLAPS} overlaps of holes and polygons"
+            raise MapError(f"{where}: expected {limit}, got more")
+        areas = tree.geometries[other]
+        have_common_area = shapely.relate_pattern(some[one], areas, "T********")
+        overlaps = have_common_area & ~shapely.covered_by(areas, some[one])
+        yield from zip(some[one[overlaps]], other[overlaps].tolist(), strict=True)
 
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:

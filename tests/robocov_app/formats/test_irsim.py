@@ -167,7 +167,7 @@ def test_pictures_are_only_read_from_the_folder(tmp_path: Path) -> None:
         ("obstacle:\n  - {number: 9e6}", "obstacle[0].number: '9e6', but a number of at most 4000"),
         ("obstacle:\n  - {distribution: {name: x}}", "obstacle[0].distribution.name: 'x', but manual"),
         ("obstacle:\n  shape: {name: polygon, vertices: [[0, 0]]}", "shape.vertices: [['0', '0']], but "),
-        ("obstacle:\n  - &a {shape: *a}", "line 7: expected the name of an anchor before it, got the alias 'a'"),
+        ("obstacle:\n  - &a {shape: *a}", "line 7: expected the name of an anchor before it"),
         ("obstacle: " + "[" * 20, "nested too deeply, but at most 12 levels"),
     ],
 )  # fmt: skip
@@ -216,7 +216,9 @@ PARTS = ", ".join(["*a"] * 100)
         # 4,000 objects of 100 parts, or of 10,000
         f"parts:\n  - &a {{name: circle, random_shape: true}}\n  - &b [{PARTS}]\nobstacle:\n"
         "  - {number: 4000, shape: {name: compound, parts: *b}}",
-        "obstacle:\n  - {number: 4000, shape: {name: compound, parts: [" + "{name: compound}, " * 10_000 + "]}}",
+        "obstacle:\n  - {number: 4000, shape: {name: compound, parts: ["
+        + "{name: compound}, " * 10_000
+        + "]}}",
     ],
     ids=["aliases", "parts"],
 )
@@ -240,21 +242,27 @@ def install(folder: Path, monkeypatch: pytest.MonkeyPatch, content: bytes) -> No
 BUNDLED = "  obstacle_map: cave.png\n"
 
 
-def test_a_bundled_map_is_found_where_irsim_is_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bundled_map_is_found_where_irsim_is_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     cells = np.full((6, 10), 255, np.uint8)
     cells[0, 0] = 0
     install(tmp_path, monkeypatch, pgm(cells))
     foreign = read(tmp_path, BUNDLED)
     assert solid(foreign).equals(box(-1, 7, 0, 8))
     assert "world.obstacle_map: 'cave.png' taken from the installed ir-sim" in foreign.notes
-    with pytest.raises(MapError, match=r"got 'hall.png'. The installed IR-SIM has no such picture \(it has cave.png\)"):
+    with pytest.raises(
+        MapError, match=r"got 'hall.png'. The installed IR-SIM has no such picture \(it has cave.png\)"
+    ):
         read(tmp_path, "  obstacle_map: hall.png\n")
     # one beside the file counts more
     (tmp_path / "cave.png").write_bytes(pgm(np.full((6, 10), 255, np.uint8)))
     assert solid(read(tmp_path, BUNDLED)).is_empty
 
 
-def test_without_irsim_a_bundled_map_is_said_to_need_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_irsim_a_bundled_map_is_said_to_need_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(MapError) as caught:
         read(tmp_path, BUNDLED)

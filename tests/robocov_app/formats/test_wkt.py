@@ -7,7 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely import box
+from shapely import Polygon, box
 from vector_files import read
 
 from robocov.errors import MapError
@@ -75,12 +75,48 @@ def test_accessible_areas_that_overlap_are_one_free_space(tmp_path: Path, layout
     environment, report, _ = import_map(tmp_path / "plan.wkt")
     assert environment.free_area == pytest.approx(shapely.union_all(areas).area)
     assert (len(environment.obstacles), report.dropped) == (0, ())
-    # one that all others lie in has obstacles: as free space they would say nothing
+    # also where all others lie in one
     nested = [areas[0], box(3, 8, 4, 9), box(6, 5, 7, 9)]
     text = ",".join(area.wkt for area in nested)
-    assert read(tmp_path, "wkt", text).free.area == pytest.approx(200 - 5)
-    assert read(tmp_path, "wkt", text, outlines="free").free.area == pytest.approx(200)
+    assert read(tmp_path, "wkt", text).free.area == pytest.approx(200)
+    assert read(tmp_path, "wkt", text, outlines="solid").free.area == pytest.approx(200 - 5)
     assert read(tmp_path, "wkt", ",".join(area.wkt for area in areas), outlines="solid").free.area < 200
+
+
+HOLED = Polygon(box(0, 0, 10, 10).exterior, [box(2, 2, 6, 6).exterior])
+
+
+@pytest.mark.parametrize(
+    ("others", "excluded"),
+    [
+        ([box(4, -2, 8, 8)], box(2, 2, 6, 6)),  # across the hole
+        ([box(0, 0, 10, 10)], box(2, 2, 6, 6)),  # over all of it
+        ([box(1, 1, 7, 7), box(3, 3, 4, 4)], box(2, 2, 6, 6) - box(3, 3, 4, 4)),  # and an island
+        ([box(2, 2, 6, 6)], Polygon()),  # exactly in it
+        (
+            [HOLED, Polygon(box(8, 0, 20, 10).exterior, [box(9, 1, 12, 4).exterior])],
+            box(2, 2, 6, 6) | box(9, 1, 12, 4),
+        ),
+    ],
+    ids=["across", "over", "island", "filled", "two"],
+)
+def test_holes_are_excluded_from_the_union(tmp_path: Path, others: list[Polygon], excluded: Any) -> None:
+    # as JuPedSim takes excluded areas out of the union of all accessible ones
+    areas = [HOLED, *others]
+    wanted = shapely.union_all([Polygon(area.exterior) for area in areas]) - excluded
+    for text in (shapely.GeometryCollection(areas).wkt, "\n".join(area.wkt for area in areas[::-1])):
+        free = read(tmp_path, "wkt", text).free
+        assert free.symmetric_difference(wanted).area < 1e-6
+
+
+def test_many_holes_under_many_polygons_are_refused(tmp_path: Path) -> None:
+    hole = [box(x, y, x + 0.5, y + 0.5).exterior for x in range(1, 21) for y in range(1, 21)]
+    areas = [
+        Polygon(box(0, 0, 30, 30).exterior, hole),
+        *(box(0.1, 0.1, 29, 28 + k / 1000) for k in range(200)),
+    ]
+    with pytest.raises(MapError, match="expected at most 50000 overlaps of holes and polygons, got more"):
+        read(tmp_path, "wkt", shapely.GeometryCollection(areas).wkt)
 
 
 def test_collections_of_everything(tmp_path: Path) -> None:
@@ -91,7 +127,7 @@ def test_collections_of_everything(tmp_path: Path) -> None:
         "TIN(((10 1,11 1,11 2,10 1)),((12 1,13 1,13 2,12 1)))),MULTILINESTRING((5 0,5 2),EMPTY,(5 2,7 2)),"
         "MULTIPOINT((15 5),(16 5)),MULTIPOINT(17 5,18 5))"
     )
-    foreign = read(tmp_path, "wkt", text, pillar=0.25)
+    foreign = read(tmp_path, "wkt", text, pillar=0.25, outlines="solid")
     solid = 1 + 0.96 + 2 + 0.5 + 0.5 + 0.1 * 4
     pillars = foreign.notes[-1]
     assert pillars == "4 points taken as pillars"

@@ -30,7 +30,9 @@ class Arguments(JsonOption):
                  worlds of these simulators, robots as a start: --only --skip --anywhere
       tmx        map of Tiled, --only LAYER says which tiles are solid: --cell --scale --skip --thickness
       houseexpo  JSON with "verts" in metres
-      osm        OpenStreetMap's buildings, water and barriers: --water --thickness --pillar --skip
+      osm        OpenStreetMap's buildings, water and barriers, XML or the JSON of Overpass: --water
+                 --thickness --pillar --skip; or the rooms of a floor: --level
+      imdf       a floor of an indoor map, zip or folder: --level --thickness --only --skip
       wkt, geojson, svg, dxf, rings
                  drawings and geometries: --scale --thickness --outlines --boundary --around and others;
                  a wrong one is answered with those that there are
