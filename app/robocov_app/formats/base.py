@@ -23,7 +23,8 @@ class ForeignMap:
     """Raw content of a foreign file. Readers only read: `robocov_app.formats.geometry.conversion` cleans.
 
     `free`, m, y up: may be invalid, empty, of many parts, and stick out of `boundary`. `boundary`, m: what is
-    inside of it and not free becomes obstacles; without it the outline of the free space is the boundary.
+    inside of it and not free becomes obstacles; without it, or where walls separate the free space from it,
+    the outline of the free space is the boundary. `has_named_boundary`: it stays even there.
     `vertices_read`: of a raster, corners of the outline of its free cells. `cell`, m: the longer side of one.
     `specks`, m²: smaller obstacles are noise of how such maps are made. `cut_corners`: by a step or two of a
     grid, so that `geometry.simplify.sharpened` makes them whole. `primitives`: obstacles that the file draws
@@ -35,7 +36,8 @@ class ForeignMap:
     description: str
     free: MultiPolygon
     format: str = ""
-    boundary: Polygon | None = None
+    boundary: Polygon | MultiPolygon | None = None
+    has_named_boundary: bool = False
     vertices_read: int = 0
     cell: float | None = None
     specks: float = 0.0

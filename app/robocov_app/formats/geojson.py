@@ -181,12 +181,14 @@ class FigureCollector:
         for k, part in enumerate(parts):
             self.add_geometry(part, (*at, "geometries", k), labels)
 
-    def _coordinates(self, kind: str, value: Any, at: Steps, labels: tuple[str, ...]) -> None:
+    def _coordinates(
+        self, kind: str, value: Any, at: Steps, labels: tuple[str, ...], whole: str = ""
+    ) -> None:
         if kind in _PLURAL:
             if not isinstance(value, list):
                 raise self.file.refused(at, value, "a list was")
             for k, part in enumerate(value):
-                self._coordinates(_PLURAL[kind], part, (*at, k), labels)
+                self._coordinates(_PLURAL[kind], part, (*at, k), labels, whole=place(at))
         elif value == []:
             self.shapes.leave_out("geometry", "without coordinates")
         elif kind == "Point":
@@ -197,7 +199,7 @@ class FigureCollector:
             raise self.file.refused(at, value, "a list of rings was")
         else:
             rings = [self._points(ring, (*at, k), 1) for k, ring in enumerate(value)]
-            self.figures.append(self.shapes.polygon(rings, labels, place(at)))
+            self.figures.append(self.shapes.polygon(rings, labels, place(at), whole))
 
     def _points(self, value: Any, at: Steps, least: int) -> Array:
         return self.shapes.flat(self.file.positions(value, at, least, 2, 4))

@@ -105,9 +105,9 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
             shapes.outlines.append(Outline(dark, room.labels))
     free = None if main is None else main.free
     if free is None and shapes.outlines:
-        found = shapes.surrounding()
+        found = shapes.find_surrounding()
         free = found.area
-        shapes.notes.append(f"the boundary is {found.words}")
+        shapes.notes.append(f"the boundary is {found.source}")
     shapes.cell = max((room.cell for room in rooms if room.cell is not None), default=None)
     name = world.root.text("name") or path.stem
     return shapes.foreign_map(name, "A world of Stage, imported.", solid=True, world=free)

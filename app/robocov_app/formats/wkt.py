@@ -107,7 +107,7 @@ class WktText:
             self._polygon(measured, place)
         elif kind in ("MULTIPOLYGON", "POLYHEDRALSURFACE", "TIN"):
             for number in self._items():
-                self._polygon(measured, f"{place}.{number}")
+                self._polygon(measured, f"{place}.{number}", whole=place)
         elif kind == "MULTILINESTRING":
             for _ in self._items():
                 add(Figure("line", (self._points(measured, 2),), at=place))
@@ -153,9 +153,9 @@ class WktText:
             self.at += 1
         self._expect(")")
 
-    def _polygon(self, measured: bool, place: str) -> None:
+    def _polygon(self, measured: bool, place: str, whole: str = "") -> None:
         if rings := [self._points(measured, 1) for _ in self._items()]:
-            self._figures.append(self.shapes.polygon(rings, (), place))
+            self._figures.append(self.shapes.polygon(rings, (), place, whole))
 
     def _points(self, measured: bool, least: int) -> Array:
         """Read points in brackets; return them as (k, 2)."""

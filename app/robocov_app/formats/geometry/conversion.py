@@ -172,6 +172,8 @@ class _Shaper:
 
     def _valid_boundary(self) -> Polygon | None:
         outer = self.foreign.boundary
+        if isinstance(outer, MultiPolygon):
+            outer = outer.geoms[0] if len(outer.geoms) == 1 else None
         if outer is None or outer.is_valid:
             return None if outer is None else Polygon(outer.exterior)
         self.repaired.append(f"the boundary met itself: {_reason(outer)}")

@@ -2,9 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Literal, NamedTuple, TypeAlias
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -12,93 +10,19 @@ from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
-from robocov.environment import GRID, CircleObstacle, WallObstacle
-from robocov.errors import MapError, ParameterError, counted, one_line, shown, unknown_name
-from robocov.mapfile.models import FARTHEST, LARGEST, LONGEST_LABEL, SMALLEST
+from robocov.environment import CircleObstacle
+from robocov.errors import MapError, ParameterError, counted, unknown_name
+from robocov.mapfile.models import FARTHEST, SMALLEST
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
-from robocov_app.formats.geometry.polygons import Crossings, Rule, enclosed, polygons_of, united
-from robocov_app.formats.geometry.snapping import close_gaps, default_snap
+from robocov_app.formats.geometry.figures import BOUNDARY, Figure, Line, Outline, name_of
+from robocov_app.formats.geometry.interpretation import Boundary, Drawing, find_surrounding, interpret
+from robocov_app.formats.geometry.polygons import Crossings, Rule, enclosed
 
-Kind: TypeAlias = Literal["polygon", "line", "point"]
+__all__ = ["BOUNDARY", "Figure", "Line", "Outline", "Shapes"]
 THICKNESS = 0.1  # width of walls that are drawn as lines without one, in metres
-BOUNDARY = "boundary"  # a shape of this name, id, class or layer is the boundary
-AROUND = 1.0  # room left around the shapes where none of them is the boundary, in metres
-_MOST = 0.5  # a boundary holds more of the other shapes; walls that are one leave so much of it open
-_FARTHEST_PARTS = 10.0 * LARGEST  # m; shapes farther from each other are of no map: unions take seconds
 _SHOWN = 20  # names that are listed where one is wrong
 _DIGITS = 9
-
-
-@dataclass(frozen=True, eq=False)
-class Figure:
-    """A geometry of a file, before it is known what its coordinates are; `at` is its place, for messages.
-
-    `rule`: as of `polygons.enclosed`. `width`, m: of a line, where the file says it.
-    """
-
-    kind: Kind
-    rings: tuple[Array, ...]
-    labels: tuple[str, ...] = ()
-    at: str = ""
-    rule: Rule = "holes"
-    width: float | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Outline:
-    """A closed outline: its valid area, m; labels, the most particular first; the disc that it is, if any."""
-
-    area: MultiPolygon
-    labels: tuple[str, ...] = ()
-    circle: CircleObstacle | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Line:
-    """A line, (k, 2) m, open or closed, that is a wall; `cap` and `join` are shapely's words.
-
-    `stretched`: of a pen that is no circle, (k, 2) points, a width and the (3, 3) matrix that makes them
-    metres.
-    """
-
-    points: Array
-    width: float
-    labels: tuple[str, ...] = ()
-    cap: Literal["flat", "square", "round"] = "flat"
-    join: Literal["mitre", "bevel", "round"] = "mitre"
-    mitre_limit: float = 4.0  # as of walls in `robocov.environment`
-    stretched: tuple[Array, float, Array] | None = None
-
-    @cached_property
-    def solid(self) -> BaseGeometry:
-        points, width, matrix = self.stretched or (self.points, self.width, None)
-        solid = LineString(points).buffer(
-            width / 2, cap_style=self.cap, join_style=self.join, mitre_limit=self.mitre_limit
-        )
-        if matrix is None:
-            return solid
-        return shapely.transform(solid, lambda places: places @ matrix[:2, :2].T + matrix[:2, 2])
-
-    @property
-    def wall(self) -> WallObstacle | None:
-        """The same as an obstacle of a map, but for its corners; None where its ends are of another kind."""
-        if self.stretched is not None or self.cap == "round":
-            return None
-        points = self.points.copy()
-        for end, inner in ((0, 1), (-1, -2)) if self.cap == "square" else ():
-            along = points[end] - self.points[inner]
-            points[end] += along / max(np.hypot(*along), 1e-300) * self.width / 2
-        return WallObstacle(tuple((x, y) for x, y in points.tolist()), self.width, name_of(self.labels))
-
-
-class _Enclosure(NamedTuple):
-    """A boundary that was found: its area with whatever holes it has, and the shapes that made it."""
-
-    area: MultiPolygon
-    words: str
-    outlines: frozenset[Outline] = frozenset()
-    lines: frozenset[Line] = frozenset()
 
 
 class Shapes:
@@ -157,11 +81,11 @@ class Shapes:
             width = figure.width if figure.width and self.options.thickness is None else self.thickness
             self.add_line(Line(figure.rings[0], width, figure.labels), at=figure.at)
         else:
-            self.add_outline(figure.rings, figure.labels, rule=figure.rule, at=figure.at)
+            self.add_outline(figure.rings, figure.labels, rule=figure.rule, at=figure.at, whole=figure.whole)
 
     def add_outline(
         self, rings: Sequence[Array], labels: Sequence[str] = (), *,
-        rule: Rule = "holes", at: str = "", thing: str = "outline",
+        rule: Rule = "holes", at: str = "", thing: str = "outline", whole: str = "",
     ) -> bool:  # fmt: skip
         """Add the area of rings, (k, 2) m; without one the `thing`, if it has a name, is counted."""
         rings = self._checked(rings, at)
@@ -171,7 +95,7 @@ class Shapes:
         if reason is not None:
             self._met.append(f"{at}: {reason}" if at else reason)
         if not area.is_empty:
-            self.outlines.append(Outline(area, tuple(labels)))
+            self.outlines.append(Outline(area, tuple(labels), whole=whole))
         elif thing:
             self.leave_out(thing, "without an area")
         return not area.is_empty
@@ -212,12 +136,12 @@ class Shapes:
         else:
             self.pillars.append(CircleObstacle((x, y), self.options.pillar, name_of(labels)))
 
-    def polygon(self, rings: Iterable[Array], labels: tuple[str, ...], at: str) -> Figure:
+    def polygon(self, rings: Iterable[Array], labels: tuple[str, ...], at: str, whole: str = "") -> Figure:
         """Return a polygon of a format that closes rings; those that are not closed are counted."""
         rings = tuple(rings)
         if unclosed := sum(bool((ring[0] != ring[-1]).any()) for ring in rings):
             self.mended["ring", "closed: the last point was not the first"] += unclosed
-        return Figure("polygon", rings, labels, at)
+        return Figure("polygon", rings, labels, at, whole=whole)
 
     def flat(self, points: Array) -> Array:
         """Return (k, 2) of points, whose third coordinates are counted."""
@@ -232,12 +156,12 @@ class Shapes:
         self.left_out[thing, why] += count
 
     @property
-    def areas(self) -> list[BaseGeometry]:
-        return [outline.area for outline in self.outlines]
-
-    @property
-    def paths(self) -> list[BaseGeometry]:
-        return [shapely.linestrings(line.points) for line in self.lines]
+    def geometries(self) -> list[BaseGeometry]:
+        """All outlines and lines, m."""
+        return [
+            *(outline.area for outline in self.outlines),
+            *(LineString(line.points) for line in self.lines),
+        ]
 
     @property
     def repaired(self) -> tuple[str, ...]:
@@ -290,157 +214,62 @@ class Shapes:
     ) -> ForeignMap:
         """Return the map that the shapes of a file stand for.
 
-        Closed outlines are either *free space*, all of them together; or they are *solid*, but for one which
-        is the boundary. Lines and pillars are obstacles in both. The boundary is, in this order,
+        The rules are those of `robocov_app.formats.geometry.interpretation`.
 
-        1. the shape whose name, id, class or layer the option ``boundary`` gives, or that is called so; lines
-           of that name are one when they enclose an area; outlines around it are frames, and left out;
-        2. the largest closed outline, if it is the only shape, or more than half of the others lie in it;
-        3. the outer edge of the walls, if they close and what they enclose is mostly open;
-        4. a rectangle around everything, at the distance of the option ``around``.
+        Parameters
+        ----------
+        name, text : str
+            Name and description of the map.
+        solid : bool
+            Whether closed outlines are solid unless the option ``outlines`` says it. Otherwise they are free
+            space, except for those that lie in a larger one.
+        overlap : bool
+            Outlines may overlap and are all free, as JuPedSim's accessible areas.
+        world : MultiPolygon or None, m
+            What is free before the shapes stand in it, if the format says so.
 
-        `solid`: what closed outlines are unless the option ``outlines`` says it: True is solid; False is
-        free, but solid where 1 or 2 (of outlines alone) finds a boundary of others, or where there are only
-        lines. `overlap`: outlines may overlap and are all free, as JuPedSim's accessible areas: then 2 holds
-        only where all others lie wholly in the largest. `world`, m: what is free before the shapes stand in
-        it, where the format says so. Raises MapError when there are no shapes, the boundary has no area, or
-        they cross too often; ParameterError when a name in the options is none of the file's.
+        Raises
+        ------
+        MapError
+            If there are no shapes, if the boundary has no area, or if they cross too often.
+        ParameterError
+            If a name in the options is none of the file's.
         """
         self.require_known_names()
         if world is None and not self.outlines and not self.lines:
             dropped = f" ({'; '.join(self.dropped)} left out)" if self.dropped else ""
             raise MapError(f"{self.where}: no closed outline and no line{dropped}, but a drawing was wanted")
-        everything = [*self.areas, *self.paths, *([] if world is None else [world])]
-        # one of many parts may be a map, if they are not all too far from each other
-        _require_size(shapely.total_bounds(everything), self.where, _FARTHEST_PARTS)
-        # nor may they cross each other so often that what is free among them cannot be computed
-        Crossings(self.where).add([*shapely.get_rings(shapely.get_parts(self.areas)), *self.paths])
-        asked = self.options.outlines
-        boundary = self._named() if world is None else _Enclosure(world, "")
-        if boundary is None and asked != "free":
-            boundary = self._largest(solid or asked == "solid", wholly=overlap and asked is None)
-        if asked is not None:
-            solid = asked == "solid"
-        elif not solid:
-            others = boundary is not None and len(self.outlines) > len(boundary.outlines)
-            solid = not self.outlines or others
-        if solid:
-            boundary = boundary or self.surrounding()
-            area = boundary.area
-        else:
-            area = self._joined([o.area for o in self.outlines if not boundary or o not in boundary.outlines])
-            if area.is_empty and boundary is not None:
-                area = boundary.area
-        if area.is_empty:
-            raise MapError(f"{self.where}: no closed outline, but one that encloses free space was wanted")
-        _require_size(area.geoms[0].bounds, self.where)
-        used = boundary or _Enclosure(area, "")
-        inner = [outline for outline in self.outlines if solid and outline not in used.outlines]
-        walls = [line for line in self.lines if line not in used.lines]
-        blocks = np.array([outline.area for outline in inner], dtype=object)
-        shapely.prepare(area)
-        around = shapely.covered_by(area, blocks)
-        solids = [*blocks[~around], *(line.solid for line in walls), *(each.polygon for each in self.pillars)]
-        if outside := int((~shapely.intersects(area, solids)).sum() + around.sum()):
-            self.leave_out("shape", "outside of the boundary", outside)
-        free = polygons_of(shapely.difference(area, united(solids), grid_size=GRID)) if solids else area
-        # what is free of a grid has its own outline
-        plain = world is None or (len(world.geoms) == 1 and not world.geoms[0].interiors)
-        if boundary is not None and (solid or boundary.area is not area) and plain:
-            outer = Polygon(boundary.area.geoms[0].exterior)
-        elif (walls or self.pillars) and len(area.geoms) == len(free.geoms) == 1:
-            # walls that begin at the edge are no part of it
-            outer = Polygon(area.geoms[0].exterior)
-        else:
-            outer = None
-        notes = [*self.notes]
-        if boundary and boundary.words and solid:
-            notes.append(f"the boundary is {boundary.words}")
-        many = counted(int((~around).sum()), "closed outline")
-        told = boundary is None or boundary.words  # else the format says what all of it is
-        if told and not around.all():
-            notes.append(f"{many} taken as solid (--outlines free: as free space)")
-        elif not solid and len(self.outlines) > 1:
-            many = counted(len(self.outlines), "closed outline")
-            notes.append(f"{many} taken as free space (--outlines solid: as obstacles)")
-        if walls:
-            narrow, wide = (f"{most(line.width for line in walls):.3g}" for most in (min, max))
-            span = narrow if narrow == wide else f"{narrow} to {wide}"
-            notes.append(f"{counted(len(walls), 'line')} taken as walls, {span} m wide (--thickness)")
-        if self.pillars:
-            notes.append(f"{counted(len(self.pillars), 'point')} taken as pillars")
-        circles = (outline.circle for outline in inner if outline.circle is not None)
-        straight = (wall for line in walls if (wall := line.wall) is not None)
+        found = interpret(self._to_drawing(world), solid=solid, overlap=overlap)
+        if found.outside:
+            self.leave_out("shape", "outside of the boundary", found.outside)
         return ForeignMap(
             name=name,
             description=text,
-            free=free,
-            boundary=outer,
+            free=found.free,
+            boundary=found.boundary,
+            has_named_boundary=found.has_named_boundary,
             vertices_read=self.vertices,
             cell=self.cell,
-            primitives=(*circles, *straight, *self.pillars),
+            primitives=found.primitives,
             robots=tuple(self.robots),
-            repaired=self.repaired,
+            repaired=(*self.repaired, *found.repaired),
             dropped=self.dropped,
-            notes=tuple(notes),
+            notes=(*self.notes, *found.notes),
         )
 
-    def _joined(self, areas: Sequence[BaseGeometry]) -> MultiPolygon:
-        """Return areas of free space as one, hairline gaps between them closed and counted."""
-        snap = default_snap(areas) if self.options.snap is None else self.options.snap
-        joined = close_gaps(areas, snap)
-        if joined.number:
-            self.notes.append(joined.describe())
-        return joined.area
-
-    def surrounding(self) -> _Enclosure:
+    def find_surrounding(self) -> Boundary:
         """Return what the shapes enclose as walls, else a rectangle around them."""
-        solids = [*self.areas, *(line.solid for line in self.lines)]
-        solid = _together(solids)
-        fills = [Polygon(part.exterior) for part in solid.geoms]
-        if fills:  # else what there is is thinner than the grid
-            k = int(np.argmax([fill.area for fill in fills]))
-            fill, area = fills[k], fills[k].area
-            if solid.geoms[k].area <= (1.0 - _MOST) * area and _holds(fill, list(solid.geoms)):
-                return _Enclosure(MultiPolygon([fill]), f"the outer edge of the walls, around {area:.4g} m²")
-        around = AROUND if self.options.around is None else self.options.around
-        x, y, right, top = shapely.total_bounds(solids)
-        box = shapely.box(x - around, y - around, right + around, top + around)
-        words = f"a rectangle {around:g} m around everything (--around): no shape holds the others"
-        return _Enclosure(MultiPolygon([box]), words)
+        return find_surrounding(self._to_drawing(None))
 
-    def _named(self) -> _Enclosure | None:
-        wanted = self.options.boundary
-        key = (wanted or BOUNDARY).casefold()
-        outlines = frozenset(o for o in self.outlines if key in map(str.casefold, o.labels))
-        lines = frozenset(line for line in self.lines if key in map(str.casefold, line.labels))
-        noded = shapely.union_all([LineString(line.points) for line in lines])
-        rooms = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
-        area = _together([*(o.area for o in outlines), shapely.union_all(rooms)])
-        if not area.is_empty:
-            return _Enclosure(area, f"what is called {shown(wanted or BOUNDARY)}", outlines, lines)
-        if wanted is not None:
-            what = f"boundary {shown(wanted)}: encloses no area, but a closed outline was wanted"
-            raise MapError(f"{self.where}: {what}")
-        return None
-
-    def _largest(self, solid: bool, *, wholly: bool) -> _Enclosure | None:
-        """Return the largest closed outline if most others lie in it, or all wholly; if solid, lines too."""
-        if not self.outlines:
-            return None
-        outline = max(self.outlines, key=_filled)
-        inner = [area for area in self.areas if area is not outline.area]
-        if solid:
-            inner += [*self.paths, *(pillar.polygon for pillar in self.pillars)]
-            # walls as one shape have rooms as holes
-            if outline.area.area < _MOST * _filled(outline):
-                return None
-        wholly |= not inner
-        if not (shapely.covers(outline.area, inner).all() if wholly else _holds(outline.area, inner)):
-            return None
-        called = f", {shown(outline.labels[0])}," if outline.labels else ""
-        words = f"the largest closed outline{called} of {_filled(outline):.4g} m²"
-        return _Enclosure(outline.area, words if inner else "the only closed outline", frozenset([outline]))
+    def _to_drawing(self, world: MultiPolygon | None) -> Drawing:
+        return Drawing(
+            where=self.where,
+            outlines=self.outlines,
+            lines=self.lines,
+            pillars=self.pillars,
+            options=self.options,
+            world=world,
+        )
 
 
 def _many(count: int, thing: str) -> str:
@@ -448,35 +277,3 @@ def _many(count: int, thing: str) -> str:
     if count != 1 and thing.endswith(("y", "x")):
         return f"{count} {thing[:-1]}ies" if thing[-1] == "y" else f"{count} {thing}es"
     return counted(count, thing)
-
-
-def name_of(labels: Sequence[str]) -> str | None:
-    """Return what an obstacle with these labels is called in a map; layer 0 of a drawing is no name."""
-    names = (one_line(label)[:LONGEST_LABEL].strip() for label in labels[:1] if label != "0")
-    return next(names, None) or None
-
-
-def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) -> None:
-    x, y, right, top = bounds
-    if max(right - x, top - y) > most:
-        wanted = f"at most {LARGEST / 1000:g} km was wanted: is the scale right?"
-        raise MapError(f"{where}: {right - x:.6g} x {top - y:.6g} m, but {wanted}")
-
-
-def _filled(outline: Outline) -> float:
-    return float(sum(Polygon(part.exterior).area for part in outline.area.geoms))
-
-
-def _holds(outer: BaseGeometry, inner: Sequence[BaseGeometry]) -> bool:
-    """Return whether most of the inner shapes lie in the outer one, each by a place on it."""
-    shapely.prepare(outer)
-    return bool(shapely.covers(outer, shapely.point_on_surface(inner)).mean() > _MOST)
-
-
-def _together(areas: Sequence[BaseGeometry]) -> MultiPolygon:
-    """Return areas as one; a single one stays exactly as it is."""
-    areas = [area for area in areas if not area.is_empty]
-    if len(areas) == 1:
-        return polygons_of(areas[0])
-    # to unite first and round then takes a tenth of the time
-    return polygons_of(shapely.set_precision(united(areas), GRID))

@@ -61,7 +61,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     except ValueError as error:
         root.refuse(str(error))
     drawing.draw(matrix, width, height)
-    everything = [*shapes.areas, *shapes.paths]
+    everything = shapes.geometries
     if options.scale is None and everything:
         x, y, right, top = shapely.total_bounds(everything)
         if max(right - x, top - y) < _SMALLEST:
