@@ -1,4 +1,4 @@
-"""Text of others, made safe to display."""
+"""Text of others, made safe to display and to take in."""
 
 from __future__ import annotations
 
@@ -42,6 +42,35 @@ def escape_controls(text: str, *, single_line: bool = False) -> str:
     """
     pattern = _UNSAFE_IN_LINE if single_line else _UNSAFE
     return pattern.sub(_escape_match, text)
+
+
+def remove_controls(text: str, *, single_line: bool = False) -> str:
+    r"""Return a text without control characters.
+
+    Whatever enters a window passes through this function: clipboard, keyboard, input methods, messages of a
+    page. SDL refuses NUL and halves of surrogate pairs, and others would spoil names and files.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+    single_line : bool
+        Also remove tabs and line feeds.
+
+    Returns
+    -------
+    str
+        The text, unchanged if it has no such characters; line ends are line feeds.
+
+    Examples
+    --------
+    >>> remove_controls("a\x00b\u202ec")
+    'abc'
+    >>> remove_controls("one\ttwo\r\n", single_line=True)
+    'onetwo'
+    """
+    pattern = _UNSAFE_IN_LINE if single_line else _UNSAFE
+    return pattern.sub("", text.replace("\r\n", "\n").replace("\r", "\n"))
 
 
 def _escape_match(found: re.Match[str]) -> str:

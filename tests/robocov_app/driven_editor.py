@@ -76,6 +76,7 @@ class Hands(Driver):
 
     def __init__(self, window: EditorWindow) -> None:
         self.window = window
+        window.contains_faults = False
         self.editor = window.editor
         self.at = (5, 5)
 

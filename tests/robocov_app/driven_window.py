@@ -101,6 +101,7 @@ class Driver:
 
     def __init__(self, window: Window) -> None:
         self.window = window
+        window.contains_faults = False
         self.viewer = window.viewer
         self.at = (5, 5)
 

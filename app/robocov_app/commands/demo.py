@@ -76,17 +76,25 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
 
 
 def command(options: Arguments) -> int:
+    from robocov_app.toolkit.termination import ending_on_signals
+    from robocov_app.web import serve_each
+
+    if options.each:
+        return serve_each(command, options)
+    headless = options.frames is not None or options.video is not None
+    with nullcontext() if headless else ending_on_signals():
+        return _open_window(options, headless=headless)
+
+
+def _open_window(options: Arguments, *, headless: bool) -> int:
     from robocov.compiled import on_compile
     from robocov.controllers import controller_kinds
     from robocov_app.toolkit.window import show_compiling
     from robocov_app.viewer.launch import Launcher
     from robocov_app.viewer.session.file import SUFFIX, load_session
     from robocov_app.viewer.session.session import Session
-    from robocov_app.web import serve_each, show
+    from robocov_app.web import show
 
-    if options.each:
-        return serve_each(command, options)
-    headless = options.frames is not None or options.video is not None
     if not headless and not options.serve:
         on_compile.append(lambda _: show_compiling(window_size(options.size) or (900, 600)))
     file, name, laws = None, options.map, (*controller_kinds(), *options.controllers)

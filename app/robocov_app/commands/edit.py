@@ -1,5 +1,6 @@
 """``robocov edit``: the map editor."""
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -40,12 +41,21 @@ class Arguments(WindowOptions):
 
 
 def command(options: Arguments) -> int:
-    from robocov.mapfile import bundled_maps, map_file
-    from robocov_app.editor.ui.launch import editor_window
-    from robocov_app.web import serve_each, show
+    from robocov_app.toolkit.termination import ending_on_signals
+    from robocov_app.web import serve_each
 
     if options.each:
         return serve_each(command, options)
+    headless = options.screenshot is not None
+    with nullcontext() if headless else ending_on_signals():
+        return _open_editor(options)
+
+
+def _open_editor(options: Arguments) -> int:
+    from robocov.mapfile import bundled_maps, map_file
+    from robocov_app.editor.ui.launch import editor_window
+    from robocov_app.web import show
+
     look: dict[str, Any] = {"theme": options.theme, "size": window_size(options.size), "scale": options.scale}
     look |= {"headless": options.screenshot is not None, "served": options.serve}
     path = None if options.map is None else Path(options.map)

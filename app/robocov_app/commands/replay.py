@@ -63,6 +63,15 @@ class Arguments(JsonOption, WebOptions):
 
 
 def command(options: Arguments) -> int:
+    if options.headless:
+        return _replay(options)
+    from robocov_app.toolkit.termination import ending_on_signals
+
+    with ending_on_signals():
+        return _replay(options)
+
+
+def _replay(options: Arguments) -> int:
     from robocov_app.runs.saved import load_saved
 
     options.film.layers()

@@ -26,6 +26,8 @@ _SHARE = 10.0  # times as long as the last writing took: large work does not stu
 _PATIENCE = 2.0  # seconds until it is tried again when work could not be written
 _TRIES = 3  # folders that are tried to work in
 _YOUNG = 60.0  # seconds in which a folder without work may be one that a program is just making
+_open_savers: list["Autosaver"] = []
+_open_lock = threading.Lock()
 _Work = TypeVar("_Work")
 _Content = Callable[[], Mapping[str, Any]]
 
@@ -59,6 +61,8 @@ class Autosaver:
             return
         self._thread = threading.Thread(target=self._work, name="autosave", daemon=True)
         self._thread.start()
+        with _open_lock:
+            _open_savers.append(self)
         if resumed is None:
             self.keep(None)  # so that other programs know of the file
 
@@ -91,6 +95,8 @@ class Autosaver:
                 self._wanted = None
             self._changed.notify_all()
         self._thread.join()
+        with _open_lock:
+            _open_savers.remove(self)
         if discard or not self._holds:
             with suppress(OSError):
                 (self._place / _FILE).unlink()
@@ -131,9 +137,10 @@ class Autosaver:
                 record: dict[str, Any] = {"format": self._kind, "version": 1, "path": file, "when": when}
                 record |= content() if content is not None else {}
                 with written(self._place / _FILE) as part:
-                    part.write_text(json.dumps(record, ensure_ascii=False), encoding="utf-8")
+                    # paths may hold bytes that are no UTF-8, which JSON can escape alone
+                    part.write_text(json.dumps(record, ensure_ascii=True), encoding="utf-8")
                 self._holds = content is not None
-            except (OSError, OutputError) as error:
+            except Exception as error:  # the thread goes on: later work may be kept again
                 trouble = f"work is not kept aside: {error}"
             pause = max(_PAUSE, _SHARE * (time.perf_counter() - began))
             with self._changed:
@@ -141,6 +148,15 @@ class Autosaver:
                 if trouble and self._wanted is None and not self._closed:
                     self._wanted, pause = job, _PATIENCE  # perhaps there is room later
                 self._changed.notify_all()
+
+
+def flush_all(timeout: float) -> None:
+    """Write the drafts of all open documents at once, and wait at most `timeout` seconds for that."""
+    with _open_lock:
+        savers = list(_open_savers)
+    until = time.monotonic() + timeout
+    for saver in savers:
+        saver.flush(max(until - time.monotonic(), 0.0))
 
 
 def autosave_folder(served_from: Path | None = None) -> Path | None:

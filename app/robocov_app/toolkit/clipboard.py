@@ -1,20 +1,28 @@
-"""Text on the system's clipboard, or within the program where the display has none."""
+"""Text on the system's clipboard, or within the program if the display has none."""
 
 from contextlib import suppress
 
 import pygame
 
-_ours = ""
+from robocov.text import remove_controls
+
+_NOT_AVAILABLE = (pygame.error, AttributeError, ValueError)  # ValueError: a text that is not UTF-8
+
+_own_text = ""
 
 
 def get() -> str:
-    with suppress(pygame.error, AttributeError):
-        return (pygame.scrap.get_text() if pygame.scrap.has_text() else "") or _ours
-    return _ours
+    """Return the text on the clipboard without control characters; empty if there is none."""
+    text = ""
+    with suppress(*_NOT_AVAILABLE):
+        if pygame.scrap.has_text():
+            text = pygame.scrap.get_text()
+    return remove_controls(text) or _own_text
 
 
 def put(text: str) -> None:
-    global _ours
-    _ours = text
-    with suppress(pygame.error, AttributeError):
-        pygame.scrap.put_text(text)
+    """Put a text on the clipboard, without control characters."""
+    global _own_text
+    _own_text = remove_controls(text)
+    with suppress(*_NOT_AVAILABLE):
+        pygame.scrap.put_text(_own_text)

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from itertools import islice
@@ -292,6 +293,12 @@ class Dialogs:
         asked, self.asked = self.asked, None
         if asked is not None:
             asked.cancelled()
+
+    def drop(self) -> None:
+        """Remove a dialog that cannot be drawn, even if it cannot be closed in an orderly way."""
+        with suppress(Exception):
+            self.close()
+        self.asked = None
 
     def take(self, event: pygame.event.Event) -> bool:
         asked = self.asked

@@ -1,14 +1,31 @@
-"""Names of keys, and the state of the mouse that every window keeps."""
+"""Names of keys, events without control characters, and the state of the mouse that every window keeps."""
 
 from contextlib import suppress
 
 import pygame
+
+from robocov.text import remove_controls
 
 KEY_REPEAT = (350, 40)  # milliseconds until a held key is pressed again, the first time and from then on
 DOUBLE = 0.35  # seconds between the two clicks of a double click, at most
 SLIP = 5.0  # pixels that a click may move
 WHEEL = 1.15  # magnification of one notch of the wheel
 OF_THE_MOUSE = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
+
+
+def clean_event(event: pygame.event.Event) -> pygame.event.Event | None:
+    """Return an event without control characters in its text; None if nothing is left of that.
+
+    The name of a dropped file may hold any character but NUL, and stays as it is otherwise.
+    """
+    if event.type in (pygame.TEXTINPUT, pygame.TEXTEDITING):
+        text = remove_controls(event.text, single_line=True)
+        if not text and event.text:
+            return None
+        return pygame.event.Event(event.type, {**event.dict, "text": text})
+    if event.type == pygame.DROPFILE:
+        return pygame.event.Event(event.type, {**event.dict, "file": str(event.file).replace("\0", "")})
+    return event
 
 
 def key_of(event: pygame.event.Event) -> str:

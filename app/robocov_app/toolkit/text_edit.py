@@ -4,8 +4,10 @@ import re
 from dataclasses import dataclass, field
 from typing import Self
 
+from robocov.text import remove_controls
 from robocov_app.toolkit import clipboard
 
+MAX_CHARS = 10_000  # characters of a field: as many as the longest texts in maps have
 _State = tuple[str, int, int]
 
 
@@ -41,8 +43,10 @@ class TextEdit:
                 self.anchor, self.caret = word.span()
 
     def type(self, text: str) -> None:
-        """Replace what is selected by a text; line ends become blanks, what cannot be printed is left out."""
-        text = "".join(filter(str.isprintable, " ".join(text.splitlines())))
+        """Replace the selection by a text on one line; line ends become blanks, what is too long is cut."""
+        low, high = self.selection
+        free = MAX_CHARS - len(self.text) + (high - low)
+        text = remove_controls(" ".join(text.splitlines()), single_line=True)[: max(free, 0)]
         if text:
             self._replace(*self.selection, text, typing=len(text) == 1)
         self.composed = ""

@@ -13,6 +13,7 @@ this run: a button True, others the new value, None where nothing happened::
 Keys of widgets are unique within a page. Where `why` is given a widget is disabled, and says so in its tip.
 """
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -612,9 +613,15 @@ class Ui:
         return given
 
     def _caret_at(self, edit: TextEdit, rect: Rect) -> int:
+        """Return the caret position next to the mouse; texts are wider the longer they are, so bisect."""
         x = self.at[0] - rect.left - self.px(6) + self._shifted(edit, rect)
-        widths = [text_width(edit.text[:k], self.px(TEXT)) for k in range(len(edit.text) + 1)]
-        return min(range(len(widths)), key=lambda k: abs(widths[k] - x))
+
+        def width_before(caret: int) -> int:
+            return text_width(edit.text[:caret], self.px(TEXT))
+
+        after = bisect_left(range(len(edit.text) + 1), x, key=width_before)
+        nearby = range(max(after - 1, 0), min(after, len(edit.text)) + 1)
+        return min(nearby, key=lambda caret: abs(width_before(caret) - x))
 
     def _shifted(self, edit: TextEdit, rect: Rect) -> int:
         """Return by how much a long text stands further left, so that its caret is in sight."""

@@ -4,7 +4,7 @@ import gc
 import os
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
@@ -16,14 +16,21 @@ from pygame import Surface
 
 from robocov.errors import InputError
 from robocov.files.atomic import written
+from robocov.text import remove_controls
 from robocov_app.render.fonts import label
+from robocov_app.render.theme import LIGHT
 from robocov_app.terminal.output import free_name
-from robocov_app.toolkit.input import KEY_REPEAT
+from robocov_app.toolkit.faults import FaultLog
+from robocov_app.toolkit.input import KEY_REPEAT, clean_event
 from robocov_app.toolkit.layout import SMALLEST
+from robocov_app.toolkit.overlay import draw_message
+from robocov_app.toolkit.termination import is_ending
 
 FPS = 60  # frames per second while something moves
 CALM = 0.8  # seconds of peace after which the loop waits for events; tool tips appear earlier
 PAUSE = 0.1  # seconds between two looks for something new, at most, while it waits
+_MAX_FAULTS_IN_A_ROW = 5  # of updating or drawing; after that it is tried again only now and then:
+_RETRY_S = 1.0
 
 
 class Remote(Protocol):
@@ -40,7 +47,13 @@ class Remote(Protocol):
 
 
 class BaseWindow:
-    """A window that is drawn while something moves, and otherwise only when something is different."""
+    """A window that is drawn while something moves, and otherwise only when something is different.
+
+    An unexpected exception never ends it. It is logged by `faults` and reported in the window, what an event
+    has half changed is taken back, and the loop goes on.
+    """
+
+    contains_faults = True  # tests set it to False on their windows, to see what is raised
 
     def __init__(self, size: tuple[int, int], screen: Surface | None = None) -> None:
         self.screen = screen or open_window(size)
@@ -48,6 +61,9 @@ class BaseWindow:
         self.closed = False
         self.inner: BaseWindow | None = None  # one that is shown in its place for a while
         self.remote: Remote | None = None
+        self.faults = FaultLog()
+        self._faults_in_a_row: dict[str, int] = {}
+        self._retry_at: dict[str, float] = {}
         self.rate, self._calm, self._touched = float(FPS), 0.0, False
         self._drawn: object = None
 
@@ -70,11 +86,18 @@ class BaseWindow:
     def suit(self, scale: float, theme: str, *, panel: bool | None) -> None:
         """Take the look of where the window is shown; `panel`: to show or hide it, None to leave it."""
 
+    def save_point(self) -> Callable[[], None]:
+        """Return a function that takes back all changes since now; it is called if an event raises."""
+        return lambda: None
+
+    def report_fault(self, message: str, *, in_drawing: bool) -> None:
+        """Show a message on an unexpected exception; if drawing raised it, close what may be the cause."""
+
     def run(self) -> None:
         clock, before = pygame.time.Clock(), perf_counter()
         try:
             with undisturbed():
-                while not self.closed:
+                while not (self.closed or is_ending()):
                     now = perf_counter()
                     self.frame(now - before)
                     before = now
@@ -86,7 +109,7 @@ class BaseWindow:
                     while self.resting and perf_counter() - now < PAUSE and not pygame.event.peek():
                         clock.tick(FPS)
         finally:
-            self.close()
+            self._run_contained("closing", self.close)
 
     @property
     def resting(self) -> bool:
@@ -97,29 +120,113 @@ class BaseWindow:
         self.advance(seconds)
         if self.closed:
             return
+        self._run_contained("drawing", lambda: self._draw_if_changed(seconds, rested=rested))
+        if self.remote is not None:
+            remote = self.remote
+            self._run_contained("sending a picture", lambda: remote.send(self.screen))
+
+    def _draw_if_changed(self, seconds: float, *, rested: bool) -> None:
         shown = self.inner or self
         look = shown.look()
         self._calm = 0.0 if self._touched or look is None else self._calm + seconds
         if not (rested and self.resting and look == self._drawn):
+            self._drawn = None  # if drawing fails, it is done again
             shown.draw()
         self._drawn = look
-        if self.remote is not None:
-            self.remote.send(self.screen)
 
     def advance(self, seconds: float) -> None:
+        """Take all events that have come, and let `seconds` pass."""
         if self.remote is not None:
-            self.remote.receive(self)
+            remote = self.remote
+            self._run_contained("taking messages of a page", lambda: remote.receive(self))
         events = pygame.event.get()
         self._touched = bool(events)
         for event in events:
             if event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
                 self.screen = pygame.display.get_surface() or self.screen
-            (self.inner or self).take(event)
+            self._take_safely(event)
         if self.closed:
             return
         if seconds > 0 and not self.resting:
             self.rate += 0.05 * (min(1.0 / seconds, 1000.0) - self.rate)
-        self.update(seconds)
+        self._run_contained("updating", lambda: self.update(seconds), save_point=self._save_point_of_update)
+
+    def _take_safely(self, event: pygame.event.Event) -> None:
+        cleaned = clean_event(event)
+        if cleaned is None:
+            return
+        target = self.inner or self
+        action = f"handling {pygame.event.event_name(event.type)}"
+        succeeded = self._run_contained(action, lambda: target.take(cleaned), save_point=target.save_point)
+        if event.type == pygame.QUIT and not succeeded:
+            self.closed = True  # the draft stays
+
+    def _save_point_of_update(self) -> Callable[[], None]:
+        return (self.inner or self).save_point()
+
+    def _run_contained(
+        self,
+        action: str,
+        call: Callable[[], object],
+        *,
+        save_point: Callable[[], Callable[[], None]] | None = None,
+    ) -> bool:
+        """Do one part of a frame; log and report what it raises, and take back what it has half changed.
+
+        What fails again and again is done only now and then, so that the window stays usable. Running out of
+        memory, and the end of the display, are passed on.
+
+        Returns
+        -------
+        bool
+            Whether it was done.
+        """
+        if perf_counter() < self._retry_at.get(action, 0.0):
+            return False
+        if not self.contains_faults:
+            call()
+            return True
+        take_back: Callable[[], None] | None = None
+        try:
+            take_back = save_point() if save_point is not None else None
+            call()
+        except MemoryError:
+            raise
+        except Exception as error:
+            if not pygame.display.get_init():
+                raise
+            self._handle_fault(error, action, take_back)
+            return False
+        self._faults_in_a_row.pop(action, None)
+        self._retry_at.pop(action, None)
+        return True
+
+    def _handle_fault(self, error: Exception, action: str, take_back: Callable[[], None] | None) -> None:
+        count = self._faults_in_a_row.get(action, 0) + 1
+        self._faults_in_a_row[action] = count
+        if count >= _MAX_FAULTS_IN_A_ROW:
+            self._retry_at[action] = perf_counter() + _RETRY_S
+        message = self.faults.record(error, action)
+        if take_back is not None:
+            try:
+                take_back()
+                message += " The action was taken back."
+            except Exception as another:
+                self.faults.record(another, "taking an action back")
+        message += " Save your work."
+        in_drawing = action == "drawing"
+        try:
+            (self.inner or self).report_fault(message, in_drawing=in_drawing)
+            if in_drawing:
+                self._draw_fault(message)
+        except Exception as another:
+            self.faults.record(another, "reporting an error")
+
+    def _draw_fault(self, message: str) -> None:
+        """Draw a message alone, over what was drawn before drawing failed."""
+        width, height = self.screen.get_size()
+        draw_message(self.screen, message, (0, 0, width, height), LIGHT, 1.0, trouble=True)
+        pygame.display.flip()
 
     def toggle_fullscreen(self) -> None:
         if self.remote is not None:  # it has the size of a page, which can do this by itself
@@ -134,6 +241,13 @@ class BaseWindow:
         with written(target) as part:
             part.write_bytes(picture.getvalue())
         return f"screenshot saved: {target}"
+
+
+def set_title(title: str) -> None:
+    """Set the title of the window, without control characters, if it is another one than before."""
+    title = remove_controls(title, single_line=True)
+    if title != pygame.display.get_caption()[0]:
+        pygame.display.set_caption(title)
 
 
 @contextmanager

@@ -100,7 +100,14 @@ class LatestWorker(Generic[_Answer]):
         if not self.lives or now - self._since > self._patience:
             self.close()
             self._since = now
-            self.process, self._ended = started(self._service), False
+            try:
+                process = started(self._service)
+            except OSError as error:  # no memory or no process to be had; the next question tries again
+                self._number += 1
+                self._answered = self._number
+                self.trouble = f"the process that {self._doing} cannot be started: {error.strerror or error}"
+                return
+            self.process, self._ended = process, False
             known = self.process, self._wire()
             calls = self._write, self._read
             self._threads = [threading.Thread(target=call, args=known, daemon=True) for call in calls]
@@ -135,12 +142,17 @@ class LatestWorker(Generic[_Answer]):
 
     def _write(self, process: subprocess.Popen[bytes], wire: Wire) -> None:
         assert process.stdin is not None
-        with suppress(OSError), process.stdin as stream:  # when the process has ended, reading says so
-            while self._asked.wait() and self.process is process:
-                self._asked.clear()
-                if self._questions:
-                    number, question = self._questions.pop()
-                    send(stream, (number, wire.encode(question)))
+        try:
+            with suppress(OSError), process.stdin as stream:  # when the process has ended, reading says so
+                while self._asked.wait() and self.process is process:
+                    self._asked.clear()
+                    if self._questions:
+                        number, question = self._questions.pop()
+                        send(stream, (number, wire.encode(question)))
+        except Exception:  # a question that cannot be sent must not be waited for
+            traceback.print_exc()
+            if self.process is process:
+                self._ended = True
 
     def _read(self, process: subprocess.Popen[bytes], wire: Wire) -> None:
         assert process.stdout is not None
@@ -154,6 +166,8 @@ class LatestWorker(Generic[_Answer]):
                     if reply.answer is not None:
                         reply = Reply(reply.number, wire.decode(reply.answer), reply.trouble)
                     self._replies.append(reply)
+        except Exception:  # neither must an answer that cannot be read
+            traceback.print_exc()
         finally:
             self._ended = True
 

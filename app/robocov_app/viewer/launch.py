@@ -12,6 +12,7 @@ from robocov.cost import LATTICE
 from robocov_app.render.picture import standard_layers
 from robocov_app.terminal.output import echo
 from robocov_app.toolkit.autosave import autosave_folder
+from robocov_app.toolkit.faults import FaultLog
 from robocov_app.toolkit.layout import SMALLEST
 from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
 from robocov_app.toolkit.window import display, fitting, screen_scale
@@ -133,6 +134,8 @@ class Launcher:
             viewer.theme = self.theme or settings.theme
             viewer.fade, viewer.suggests, viewer.recent = settings.fade, settings.suggests, [*settings.recent]
             window = Window(viewer, size, scale, patient=self.headless)
+            window.faults = FaultLog(self._drafts)
+            window.contains_faults = not self.headless
         except BaseException:
             costs.close()
             raise

@@ -12,6 +12,7 @@ from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.mapfile import bundled_maps, load_map, save_map
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit.autosave import Record
+from robocov_app.toolkit.faults import describe_os_error
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
@@ -105,6 +106,8 @@ class Presenter:
             words = action()
         except RobocovError as error:
             self.say(plain(str(error)), trouble=True)
+        except OSError as error:
+            self.say(describe_os_error(error), trouble=True)
         else:
             if isinstance(words, str):
                 self.say(words)

@@ -208,7 +208,30 @@ class Window(BaseWindow):
         self._arrange()
         self.draw()
 
+    def save_point(self) -> Callable[[], None]:
+        viewer = self.viewer
+        session = viewer.session
+        point = session.save_point()
+
+        def take_back() -> None:
+            if viewer.session is session:
+                session.roll_back(point, in_step=True)
+            viewer.tool.cancel(viewer.session)
+            viewer.version += 1
+
+        return take_back
+
+    def report_fault(self, message: str, *, in_drawing: bool) -> None:
+        if in_drawing:
+            self.help = False
+            self.dialogs.drop()
+            self._end_tour()
+            self.canvas.fit()
+        self.viewer.say(message, trouble=True)
+        self.viewer.version += 1
+
     def close(self) -> None:
+        self.viewer.workspace.keep(self.viewer.view, at_once=True)
         self._end_tour()  # what was before it is kept
         if self.film is not None:
             self.viewer.attempt(self.toggle_film)

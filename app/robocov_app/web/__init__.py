@@ -24,26 +24,26 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         return
     extra("websockets", "web")
     from robocov_app.terminal.interruption import interruptible
+    from robocov_app.toolkit.termination import ending_on_signals, is_ending
     from robocov_app.web.confined import confined
     from robocov_app.web.server import WebDisplay
 
-    with WebDisplay(options.host, options.port, folder) as display, confined(folder):
+    with WebDisplay(options.host, options.port, folder) as display, confined(folder), ending_on_signals():
         echo(f"open {display.link}", flush=True)
         echo(f"to watch only: {display.watch_link}", flush=True)
         window.remote = display
         stopped: list[int] = []
 
         def stop(number: int, _: object) -> None:
-            if stopped and number == signal.SIGINT:
+            if stopped:
                 raise KeyboardInterrupt  # a second time: at once
             stopped.append(number)
             window.closed = True  # who stops the process cannot be asked about unsaved work
 
-        for each in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(each, stop)
+        signal.signal(signal.SIGINT, stop)  # the window itself sees to SIGTERM
         interruptible(True)
         window.run()
-    if stopped:
+    if stopped or is_ending():
         raise KeyboardInterrupt
 
 

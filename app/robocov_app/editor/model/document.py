@@ -89,6 +89,17 @@ class History:
     def future(self) -> tuple[str, ...]:
         return tuple(step.after.words for step in reversed(self._undone))
 
+    def save_point(self) -> Callable[[], None]:
+        """Return a function that takes everything back to the present state."""
+        state = dict(vars(self))
+        done, undone = [*self._done], [*self._undone]
+
+        def take_back() -> None:
+            vars(self).update(state)
+            self._done, self._undone = done, undone
+
+        return take_back
+
     def mark_saved(self) -> None:
         self.saved = self.sketch
         self.broken = True
@@ -294,6 +305,11 @@ class Document:
             self.autosaver.keep(partial(content, self._kept, self.disk))
         elif before is not self._kept:
             self.autosaver.settle(self.path)
+
+    def keep_draft(self, sketch: Sketch) -> None:
+        """Keep a draft of a sketch that is no part of the history yet, until the next `keep`."""
+        self._kept = sketch
+        self.autosaver.keep(partial(content, sketch, self.disk))
 
     def look(self, now: float) -> State:
         """Return whether the file has changed on the disk, news only once; `now` is any clock, s."""

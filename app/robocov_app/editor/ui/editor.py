@@ -27,6 +27,7 @@ from robocov_app.editor.tools.select import PanTool, SelectTool
 from robocov_app.editor.tools.snapping import SNAPS, vertex_count
 from robocov_app.editor.tools.tool import Tool, Workspace
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Question
+from robocov_app.toolkit.faults import describe_os_error
 from robocov_app.toolkit.worker import Worker
 
 FILE = "editor.json"
@@ -104,7 +105,7 @@ class TeamThread:
         return answer
 
     def close(self) -> None:
-        self._pool.shutdown(cancel_futures=True)
+        self._pool.shutdown(wait=False, cancel_futures=True)
 
 
 class Editor(Workspace):
@@ -202,6 +203,8 @@ class Editor(Workspace):
             self.carry_out(action)
         except RobocovError as error:
             self.say(str(error), trouble=True)
+        except OSError as error:
+            self.say(describe_os_error(error), trouble=True)
 
     def carry_out(self, action: Callable[[], object]) -> None:
         """Do something; a MapError names what is wrong by its name, not by its place in the file."""

@@ -13,6 +13,7 @@ from robocov_app.editor.ui.editor import FILE, KEPT, SHOWN, Editor, EditorSettin
 from robocov_app.editor.ui.file_commands import heading, lay_under, opened
 from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.toolkit.autosave import autosave_folder, remove_draft
+from robocov_app.toolkit.faults import FaultLog
 from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
 from robocov_app.toolkit.window import display, fitting, screen_scale
 
@@ -70,6 +71,8 @@ def editor_window(
         scale = scale or settings.scale or (1.0 if alone else screen_scale())
         editor.say(trouble or (heading(document) if path is not None and document is found else ""))
         window = EditorWindow(editor, wanted, scale, drafts, patient=headless)
+        window.faults = FaultLog(drafts)
+        window.contains_faults = not headless
         window.panel.show_tab(settings.tab)
         if document.path is not None:
             window.documents.remember(document.path)

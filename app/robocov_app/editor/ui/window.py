@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from math import dist
 from pathlib import Path
+from time import monotonic
 
 import pygame
 
@@ -23,7 +24,7 @@ from robocov_app.toolkit.command import Commands, Menu, draw_keys, palette
 from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, SLIP, WHEEL, key_of, show_cursor, wheel_notches
 from robocov_app.toolkit.layout import laid_out
 from robocov_app.toolkit.overlay import draw_message, draw_status
-from robocov_app.toolkit.window import BaseWindow
+from robocov_app.toolkit.window import BaseWindow, set_title
 
 _SHAPES = {"arrow": pygame.SYSTEM_CURSOR_ARROW, "cross": pygame.SYSTEM_CURSOR_CROSSHAIR}
 _SHAPES |= {"hand": pygame.SYSTEM_CURSOR_HAND, "move": pygame.SYSTEM_CURSOR_SIZEALL}
@@ -52,6 +53,7 @@ def facts(editor: Editor, frames: float, team: Team | None) -> list[str]:
 
 # what numbers are typed with, and what may follow in one
 _OF_NUMBERS, _UNITS = frozenset("0123456789.,-+@<*/%°×x; "), frozenset("mcm'\"rad")
+_DRAFT_PAUSE_S = 1.0  # between two drafts of a map that is tried
 _HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no snapping · F1 or Esc closes"
 
 
@@ -88,6 +90,8 @@ class EditorWindow(BaseWindow):
         self._button, self._moved_off = 0, False
         self._pressed_at, self._last_click = (0, 0), (-1.0, (0, 0))
         self.team = TeamThread()
+        self._drafted: object = None  # the map that is tried, when its draft was kept
+        self._draft_due = 0.0
         self._patient = editor.snapper.patient = patient
         self._arranged: tuple[object, ...] | None = None
         self._arrange()
@@ -95,9 +99,41 @@ class EditorWindow(BaseWindow):
         editor.ask_readings()
         self.draw()
 
+    def save_point(self) -> Callable[[], None]:
+        editor = self.editor
+        document = editor.document
+        take_back_history = document.history.save_point()
+
+        def take_back() -> None:
+            self.drag, self._button = "", 0
+            editor.typed = ""
+            if editor.document is document:
+                take_back_history()
+            try:
+                editor.tool.cancel(editor)
+            except Exception:
+                editor.tool = editor.selector  # which forgets what it was doing when it is chosen next
+                raise
+            finally:
+                editor.version += 1
+                document.keep()
+
+        return take_back
+
+    def report_fault(self, message: str, *, in_drawing: bool) -> None:
+        editor = self.editor
+        if in_drawing:
+            self.help = False
+            editor.dialogs.drop()
+            editor.problem = None
+            self.canvas.fit()
+        editor.say(message, trouble=True)
+        editor.version += 1
+
     def close(self) -> None:
-        if self.inner is not None:
-            self.inner.close()
+        if self.trial is not None:
+            self._keep_draft_of(self.trial, at_once=True)
+            self.trial.close()
         self.team.close()
         self.dialogs.close()
         self.editor.snapper.close()
@@ -127,6 +163,9 @@ class EditorWindow(BaseWindow):
             self._play(self.trial, seconds)
             return
         editor = self.editor
+        if self.documents.leaving:
+            self.closed = True
+            return
         editor.pass_time(seconds)
         if not self.drag:
             self.documents.look()
@@ -150,9 +189,8 @@ class EditorWindow(BaseWindow):
             shape = "hand" if self.canvas.hovered else editor.tool.shape_of_cursor(editor)
             shape = "move" if panned else shape
         show_cursor(_SHAPES[shape])
-        caption = f"{'● ' if editor.document.history.unsaved else ''}{editor.document.title} · robocov edit"
-        if caption != pygame.display.get_caption()[0]:
-            pygame.display.set_caption(caption)
+        mark = "● " if editor.document.history.unsaved else ""
+        set_title(f"{mark}{editor.document.title} · robocov edit")
 
     def _arrange(self) -> None:
         editor = self.editor
@@ -215,8 +253,10 @@ class EditorWindow(BaseWindow):
 
     def _play(self, trial: PlayWindow, seconds: float) -> None:
         trial.screen, trial.rate = self.screen, self.rate
-        trial.update(seconds)
         if not (trial.ended or trial.closed):
+            trial.update(seconds)
+        if not (trial.ended or trial.closed):
+            self._keep_draft_of(trial)
             return
         trial.close()
         trial.keeper.finish()
@@ -228,6 +268,8 @@ class EditorWindow(BaseWindow):
         change = brought_back(editor.sketch, viewer.tried, viewer.session.environment)
         if change is not None and not viewer.elsewhere:
             editor.change(change)
+        self._drafted = None
+        editor.document.keep()
         held = pygame.key.get_pressed()[pygame.K_F5]  # its repeated presses would begin anew
         self.commands.forget_keys(*([pygame.K_F5] if held else ()))
         self._arrange()
@@ -236,6 +278,20 @@ class EditorWindow(BaseWindow):
             self.draw()
         else:
             self.do("quit")
+
+    def _keep_draft_of(self, trial: PlayWindow, *, at_once: bool = False) -> None:
+        """Keep a draft of the map with what is changed while it is tried, about once a second."""
+        viewer, document = trial.viewer, self.editor.document
+        environment = viewer.session.environment
+        now = monotonic()
+        if environment is self._drafted or viewer.elsewhere or (now < self._draft_due and not at_once):
+            return
+        self._drafted, self._draft_due = environment, now + _DRAFT_PAUSE_S
+        change = brought_back(self.editor.sketch, viewer.tried, environment)
+        if change is None:
+            document.keep()
+        else:
+            document.keep_draft(change.sketch)
 
     def take(self, event: pygame.event.Event) -> None:
         kind = event.type

@@ -136,6 +136,14 @@ class History:
             self._bytes -= self._sizes.pop()
         self.add(moment)
 
+    def rewind(self, last: Moment) -> None:
+        """Let a moment that is or was the newest be the newest again."""
+        while self.moments and self.last is not last and self.last.step >= last.step:
+            self.moments.pop()
+            self._bytes -= self._sizes.pop()
+        if not self.moments or self.last is not last:
+            self.add(last)
+
     def at(self, time: float) -> int:
         """Return the number of the last moment not after `time`, the first if there is none."""
         return max(bisect_right(self.moments, time / self.dt + 1e-6, key=lambda moment: moment.step) - 1, 0)

@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from operator import attrgetter
 from time import perf_counter
 from typing import Self
@@ -17,7 +17,7 @@ from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
 from robocov.observation import Snapshot
 from robocov_app.render.scene import Sensed
 from robocov_app.viewer.session import changes
-from robocov_app.viewer.session.changes import Drag, Release, Touch, map_change
+from robocov_app.viewer.session.changes import Change, Drag, Release, Touch, map_change
 from robocov_app.viewer.session.clock import Clock
 from robocov_app.viewer.session.curves import Curve, Event, Ghost
 from robocov_app.viewer.session.decision_replay import replayed_snapshot, sensor_in
@@ -33,6 +33,24 @@ PUSHED = 5e-3  # metres from which on a robot counts as pushed: who leans on som
 MOST_SENSED = 300  # moments of another branch from which it is found out anew what was sensed
 _SLIDE = 1.0  # seconds of simulation within which changes of a value, as by a slider, are one touch
 _SLICE = 0.03  # seconds of a frame for making a branch again
+
+
+@dataclass(frozen=True)
+class SavePoint:
+    """What a session has to remember to come back to this state after an unexpected error."""
+
+    head: Node
+    head_changes: tuple[Change, ...]
+    head_texts: tuple[str, str]  # kind and words
+    node_count: int
+    run: Lockstep
+    run_state: tuple[object, ...]
+    panes: tuple[Pane, ...]
+    history: History
+    last: Moment
+    cursor: int | None
+    revision: int
+    recorded_until: float | None
 
 
 class Session:
@@ -419,6 +437,68 @@ class Session:
         self._ghosts, self.settled = None, False
         self.history.amend(run.moment(self.head.number))
 
+    def save_point(self) -> SavePoint:
+        """Return what `roll_back` needs to come back to the present state."""
+        return SavePoint(
+            head=self.head,
+            head_changes=tuple(self.head.changes),
+            head_texts=(self.head.kind, self.head.words),
+            node_count=len(self.document.nodes),
+            run=self._run,
+            run_state=_state_of(self._run),
+            panes=tuple(self.panes),
+            history=self.history,
+            last=self.history.last,
+            cursor=self._cursor,
+            revision=self.revision,
+            recorded_until=self.recorded_until,
+        )
+
+    def roll_back(self, point: SavePoint, *, in_step: bool) -> None:
+        """Come back to an earlier state after an unexpected error, paused; nothing happens if it is the same.
+
+        Parameters
+        ----------
+        point : SavePoint
+            State to come back to.
+        in_step : bool
+            Whether a step of the simulation may have been interrupted, which leaves no other trace.
+        """
+        nodes = self.document.nodes
+        is_same = (
+            self._run is point.run
+            and _state_of(self._run) == point.run_state
+            and self.history is point.history
+            and self.history.last is point.last
+            and self.head is point.head
+            and tuple(self.head.changes) == point.head_changes
+            and len(nodes) == point.node_count
+        )
+        if is_same and not (in_step and self.playing):
+            return
+        del nodes[point.node_count :]
+        for node in nodes:
+            if node.redo is not None and node.redo not in nodes:
+                node.redo = None
+        point.head.changes[:] = point.head_changes
+        point.head.kind, point.head.words = point.head_texts
+        point.history.rewind(point.last)
+        run = point.run
+        with suppress(RobocovError):  # a recorded run that cannot go on stays as it was
+            run = Lockstep.resumed(point.last)
+        former = {pane.number: pane for pane in point.panes}
+        for pane in run.panes:
+            pane.trail, pane.starts = way_of(point.history, pane.number, len(point.history) - 1)
+            if pane.number in former:
+                pane.curves = former[pane.number].curves
+                pane.sensed = former[pane.number].sensed.copy()
+                pane.sensed.cut(run.time)
+        self._remaking, self._script = None, []
+        self._go_on(point.head, run, point.history)
+        self._cursor, self.recorded_until = point.cursor, point.recorded_until
+        self.revision = point.revision
+        self.playing = False
+
     def restart(self, **changed: object) -> None:
         """Begin at time 0, with changes of the scenario if there are any; undo comes back to this run."""
         scenario = self.scenario
@@ -504,6 +584,12 @@ class Session:
         failed = number in self.setup(self.panes[0]).failed
         (self.revive_robot if failed else self.fail_robot)(number)
         return self.head.words
+
+
+def _state_of(run: Lockstep) -> tuple[object, ...]:
+    """Return what of a run differs after it was changed, other than by a step."""
+    panes = [(pane.number, id(pane.setup), id(pane.simulation)) for pane in run.panes]
+    return run.step, run.hand, id(run.scenario), *panes
 
 
 def _sensed_in(history: History, pane: int) -> Sensed:

@@ -41,10 +41,11 @@ class Workspace:
     def unsaved(self) -> bool:
         return self.session.revision != self._saved
 
-    def keep(self, view: Mapping[str, Any]) -> None:
+    def keep(self, view: Mapping[str, Any], *, at_once: bool = False) -> None:
+        """Keep a draft of unsaved work, about once a second; `at_once` also if the last is younger."""
         state = self.session.revision, self.session.step_now
         wanted = self.unsaved and state != self._kept and self.session.can_be_made_again
-        if not wanted or monotonic() - self._when < _PAUSE:
+        if not wanted or (monotonic() - self._when < _PAUSE and not at_once):
             return
         self._kept, self._when = state, monotonic()
         self.session.stow()
@@ -114,8 +115,11 @@ class RunSaver:
         used += [each.law for each in changes if isinstance(each, SetController)]
         if own := [name for name in dict.fromkeys(law.name for law in used) if name not in CONTROLLERS]:
             command += ["--controller", ",".join(own)]
-        with file.with_name(_ERRORS).open("wb") as errors:
-            process = subprocess.Popen(command, stdin=DEVNULL, stdout=DEVNULL, stderr=errors)
+        try:
+            with file.with_name(_ERRORS).open("wb") as errors:
+                process = subprocess.Popen(command, stdin=DEVNULL, stdout=DEVNULL, stderr=errors)
+        except OSError as error:
+            raise OutputError(f"the run cannot be saved: {error.strerror or error}") from error
         self._jobs.append(_Job(target, process, temporary))
         return f"saving the run: {target}/"
 
@@ -146,7 +150,8 @@ class RunSaver:
 
     def _end(self, job: _Job) -> None:
         self._jobs.remove(job)
-        with job.temporary as folder:
+        lines: list[str] = []
+        with suppress(OSError), job.temporary as folder:  # whoever cleans up may have removed it
             lines = Path(folder, _ERRORS).read_text("utf-8", "replace").strip().splitlines()
         if job.process.returncode == 0:
             self._said.append((f"run saved: {job.target}/ (record, cost, pictures)", False))

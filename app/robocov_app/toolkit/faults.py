@@ -1,0 +1,104 @@
+"""Unexpected exceptions in a window: logged with their traceback, and reported in one sentence.
+
+The log is the file `LOG_FILE` in the folder for drafts, or standard error if no drafts are kept.
+"""
+
+import logging
+import os
+import sys
+import traceback
+from collections import Counter
+from logging.handlers import RotatingFileHandler
+from pathlib import Path
+
+from robocov.text import remove_controls
+
+LOG_FILE = "errors.log"
+_MAX_LOG_BYTES = 1_000_000  # of the file; one older file of this size is kept beside it
+_MAX_MESSAGE_CHARS = 120
+_MAX_LEVELS = 30  # entries of a traceback: one of endless recursion has thousands
+
+
+class FaultLog:
+    """Logs unexpected exceptions of a window.
+
+    The same exception may come with every frame. It is logged the first, the tenth, the hundredth time, ...
+
+    Parameters
+    ----------
+    folder : Path, optional
+        Folder for the log file. By default faults are written to standard error.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self.file = None if folder is None else folder / LOG_FILE
+        self.count = 0
+        self._counts = Counter[tuple[str, str, int]]()
+
+    def record(self, error: BaseException, action: str) -> str:
+        """Log an exception.
+
+        Parameters
+        ----------
+        error : BaseException
+            What was raised.
+        action : str
+            What the window was doing, as in "drawing".
+
+        Returns
+        -------
+        str
+            The exception in one sentence, with the place of the log.
+        """
+        self.count += 1
+        place = _find_place(error)
+        self._counts[place] += 1
+        count = self._counts[place]
+        if str(count).strip("0") == "1":
+            self._write(error, action, count)
+        message = remove_controls(" ".join(str(error).split()), single_line=True)[:_MAX_MESSAGE_CHARS]
+        name = type(error).__name__
+        where = "the terminal" if self.file is None else str(self.file)
+        return f"Internal error while {action} ({name}{': ' if message else ''}{message}). Details: {where}."
+
+    def _write(self, error: BaseException, action: str, count: int) -> None:
+        repeated = f" (number {count})" if count > 1 else ""
+        lines = traceback.format_exception(type(error), error, error.__traceback__, limit=-_MAX_LEVELS)
+        text = f"robocov: internal error while {action}{repeated}\n{''.join(lines)}"
+        handler = self._open_handler()
+        handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
+        try:
+            # a handler reports its own trouble, such as a full disk, on standard error, and raises nothing
+            handler.handle(logging.LogRecord("robocov", logging.ERROR, "", 0, text, None, None))
+        finally:
+            handler.close()
+
+    def _open_handler(self) -> logging.Handler:
+        if self.file is not None:
+            try:
+                self.file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+                return RotatingFileHandler(
+                    self.file,
+                    maxBytes=_MAX_LOG_BYTES,
+                    backupCount=1,
+                    encoding="utf-8",
+                    errors="backslashreplace",
+                )
+            except OSError:
+                self.file = None
+        return logging.StreamHandler(sys.stderr)
+
+
+def describe_os_error(error: OSError) -> str:
+    """Return what the system refused, and of which file, on one line."""
+    reason = error.strerror or str(error) or type(error).__name__
+    text = reason if error.filename is None else f"{os.fsdecode(error.filename)}: {reason}"
+    return remove_controls(text, single_line=True)
+
+
+def _find_place(error: BaseException) -> tuple[str, str, int]:
+    """Return the kind of an exception, and the file and line that raised it."""
+    frames = traceback.extract_tb(error.__traceback__, limit=-1)
+    if not frames:
+        return type(error).__name__, "", 0
+    return type(error).__name__, frames[0].filename, frames[0].lineno or 0

@@ -1,0 +1,128 @@
+"""The end of a window by SIGTERM or SIGHUP: drafts are written, and the process ends in time.
+
+A window whose loop runs ends as if it had been closed, without questions; its draft stays. A window that is
+busy with something else, such as compiling, cannot do that. A thread of its own, which the signal wakes, then
+writes the drafts and ends the process.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
+
+from robocov_app.toolkit.autosave import flush_all
+
+_LOOP_GRACE_S = 0.7  # for the loop to notice that the process is to end
+_CLOSING_GRACE_S = 3.0  # in all, once it has, for closing films and saving settings
+_CLOSED_GRACE_S = 0.1  # once everything is closed, for Python's own end
+_FLUSH_S = 0.2
+_POLL_S = 0.02
+
+_active: _Watcher | None = None
+
+
+def is_ending() -> bool:
+    """Return whether the process is to end by a signal; a loop that asks stops, and closes what it has."""
+    if _active is None or not _active.number:
+        return False
+    _active.is_closing = True
+    return True
+
+
+@contextmanager
+def ending_on_signals() -> Iterator[None]:
+    """End the process in time at SIGTERM and SIGHUP; signals that are ignored, as under nohup, stay so.
+
+    Without effect outside the main thread, and within another such context.
+    """
+    global _active
+    if _active is not None or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    _active = watcher = _Watcher()
+    try:
+        watcher.start()
+        yield
+    except BaseException:
+        watcher.note_closed(failed=True)
+        raise
+    else:
+        watcher.note_closed(failed=False)
+    finally:
+        if not watcher.number:  # else it sees to the end of the process
+            watcher.stop()
+            _active = None
+
+
+class _Watcher:
+    """A thread that waits for signals, and ends the process if it does not end by itself."""
+
+    def __init__(self) -> None:
+        self.number = 0  # of the signal that has come
+        self.is_closing = False
+        self._closed_at: float | None = None
+        self._status: int | None = None  # of the process, once everything is closed
+        self._receiver, self._sender = socket.socketpair()
+        self._sender.setblocking(False)
+        self._former_fd = -1
+        self._former: dict[signal.Signals, signal._HANDLER] = {}
+        self._thread = threading.Thread(target=self._watch, name="termination", daemon=True)
+
+    def start(self) -> None:
+        wanted = (getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP"))
+        for number in filter(None, wanted):
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                self._former[number] = signal.signal(number, self._note)
+        # Python's handler runs only when the main thread is back in Python; this wakes the thread at once
+        self._former_fd = signal.set_wakeup_fd(self._sender.fileno(), warn_on_full_buffer=False)
+        self._thread.start()
+
+    def note_closed(self, *, failed: bool) -> None:
+        """Take note that there is nothing left to save: all that is missing is Python's own end."""
+        if self.number:
+            with suppress(OSError, ValueError):
+                sys.stdout.flush()
+            self._status = 128 + self.number if failed else 0
+            self._closed_at = time.monotonic()
+
+    def stop(self) -> None:
+        signal.set_wakeup_fd(self._former_fd)
+        for number, handler in self._former.items():
+            if signal.getsignal(number) == self._note:
+                signal.signal(number, handler)
+        self._sender.close()
+        self._thread.join()
+        self._receiver.close()
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        self.number = number
+
+    def _watch(self) -> None:
+        with suppress(OSError):
+            while data := self._receiver.recv(64):
+                found = [number for number in data if number in self._former]
+                if found:
+                    self.number = found[0]
+                    self._end()
+
+    def _end(self) -> None:
+        began = time.monotonic()
+        flush_all(_FLUSH_S)
+        while time.monotonic() < self._compute_deadline(began):
+            time.sleep(_POLL_S)
+        if self._status is None:
+            flush_all(_FLUSH_S)
+            self._status = 128 + self.number
+        os._exit(self._status)
+
+    def _compute_deadline(self, began: float) -> float:
+        if self._closed_at is not None:
+            return self._closed_at + _CLOSED_GRACE_S
+        return began + (_CLOSING_GRACE_S if self.is_closing else _LOOP_GRACE_S)

@@ -1,0 +1,291 @@
+"""One message, one event or one fault does not end a window, and text comes in without control characters."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pygame
+import pytest
+from driven_editor import opened_editor
+from driven_window import opened
+from touched_run import begun
+
+from robocov.environment import CircleObstacle
+from robocov_app.editor.edits.create import circle_drawn
+from robocov_app.toolkit import clipboard, faults
+from robocov_app.toolkit.faults import LOG_FILE, FaultLog
+from robocov_app.toolkit.input import clean_event
+from robocov_app.toolkit.text_edit import MAX_CHARS, TextEdit
+from robocov_app.toolkit.window import BaseWindow, display, set_title
+from robocov_app.viewer.session.session import Session
+from robocov_app.web.events import MESSAGES, Hands
+
+CONTROLS = "".join(map(chr, [*range(32), *range(127, 160)])) + "\u202e\u2066\udcff"
+
+
+class Fragile(BaseWindow):
+    """Raises where it is told to."""
+
+    def __init__(self) -> None:
+        super().__init__((900, 600))
+        self.raises: dict[str, Exception] = {}
+        self.calls: list[str] = []
+        self.value = 0
+        self.reports: list[str] = []
+
+    def call(self, name: str) -> None:
+        self.calls.append(name)
+        if name in self.raises:
+            raise self.raises[name]
+
+    def take(self, event: pygame.event.Event) -> None:
+        if event.type == pygame.KEYDOWN:
+            self.value += 1
+            self.call("take")
+        elif event.type == pygame.QUIT:
+            self.call("quit")
+
+    def update(self, seconds: float) -> None:
+        self.call("update")
+
+    def draw(self) -> None:
+        self.call("draw")
+
+    def look(self) -> object:
+        self.call("look")
+        return None
+
+    def save_point(self) -> Callable[[], None]:
+        value = self.value
+        return lambda: setattr(self, "value", value)
+
+    def report_fault(self, message: str, *, in_drawing: bool) -> None:
+        self.reports.append(message)
+
+
+@pytest.fixture
+def window(tmp_path: Path) -> Iterator[Fragile]:
+    with display(headless=True):
+        pygame.event.clear()
+        fragile = Fragile()
+        fragile.faults = FaultLog(tmp_path)
+        yield fragile
+
+
+def post_key() -> None:
+    pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_a, mod=0, unicode="a", scancode=0))
+
+
+def test_an_event_that_raises_is_logged_reported_and_taken_back(window: Fragile, tmp_path: Path) -> None:
+    window.raises["take"] = ValueError("embedded\nnull byte")
+    post_key()
+    window.frame(0.02)
+    assert window.value == 0 and not window.closed
+    (report,) = window.reports
+    assert report.startswith("Internal error while handling KeyDown (ValueError: embedded null byte).")
+    assert str(tmp_path / LOG_FILE) in report and "\n" not in report
+    log = (tmp_path / LOG_FILE).read_text()
+    assert "Traceback" in log and "ValueError: embedded" in log
+    window.raises.clear()
+    post_key()
+    window.frame(0.02)
+    assert window.value == 1
+
+
+@pytest.mark.parametrize("part", ["update", "draw", "look"])
+def test_a_part_that_always_fails_floods_nothing_and_recovers(
+    window: Fragile, part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window.raises[part] = RuntimeError("always")
+    for _ in range(500):
+        window.frame(0.02)
+    assert window.calls.count(part) < 20, "it is tried now and then"
+    assert (tmp_path / LOG_FILE).read_text().count("Traceback") == 1
+    window.raises.clear()
+    window._retry_at.clear()
+    window.calls.clear()
+    window.frame(0.02)
+    assert part in window.calls
+
+
+def test_a_window_whose_closing_fails_closes(window: Fragile) -> None:
+    window.raises["quit"] = RuntimeError("cannot ask")
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    window.frame(0.02)
+    assert window.closed
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, MemoryError])
+def test_what_is_meant_to_end_a_program_ends_it(window: Fragile, error: type[Exception]) -> None:
+    window.raises["take"] = error()
+    post_key()
+    with pytest.raises(error):
+        window.frame(0.02)
+
+
+def test_a_lost_display_ends_the_window(window: Fragile) -> None:
+    window.raises["draw"] = pygame.error("display Surface quit")
+    pygame.display.quit()
+    with pytest.raises(pygame.error):
+        window.frame(0.02)
+
+
+def test_a_log_file_stays_small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(faults, "_MAX_LOG_BYTES", 5_000)
+    log = FaultLog(tmp_path)
+    for k in range(300):
+        error = type(f"Error{k}", (Exception,), {})("x" * 500)
+        log.record(error, "testing")
+    files = list(tmp_path.iterdir())
+    assert len(files) == 2 and sum(file.stat().st_size for file in files) < 12_000
+    assert log.count == 300
+
+
+def test_where_no_log_file_can_be_written_it_is_standard_error(tmp_path: Path, capsys) -> None:
+    (tmp_path / "file").write_text("")
+    sentence = FaultLog(tmp_path / "file").record(ValueError("boom\x1b[31m"), "testing")
+    assert sentence == "Internal error while testing (ValueError: boom[31m). Details: the terminal."
+    assert "ValueError: boom" in capsys.readouterr().err
+
+
+def test_no_control_character_comes_in(tmp_path: Path) -> None:
+    with display(headless=True):
+        for text in ("a\x00b", f"a{CONTROLS}b"):
+            clipboard.put(text)
+            assert clipboard.get().replace("\n", "").replace("\t", "") == "ab"
+            for kind in (pygame.TEXTINPUT, pygame.TEXTEDITING):
+                event = clean_event(pygame.event.Event(kind, text=text, start=0, length=0))
+                assert event is not None and event.text == "ab"
+        assert clean_event(pygame.event.Event(pygame.TEXTINPUT, text="\x00")) is None
+        dropped = clean_event(pygame.event.Event(pygame.DROPFILE, file="a\x00 b\n.json"))
+        assert dropped is not None and dropped.file == "a b\n.json"
+        pygame.display.set_mode((100, 100))
+        set_title(f"a{CONTROLS}b")
+        assert pygame.display.get_caption()[0] == "ab"
+        message = MESSAGES.validate_json(json.dumps({"kind": "paste", "text": "a\x00b"}))
+        assert list(Hands().events(message))
+        assert clipboard.get() == "ab"
+
+
+def test_a_field_takes_text_of_a_largest_length() -> None:
+    edit = TextEdit.of("ab")
+    edit.place(1)
+    edit.type("x\x00y\tz" * MAX_CHARS)
+    assert len(edit.text) == MAX_CHARS and edit.text.startswith("axyzxyz") and edit.text.endswith("b")
+    edit.type("more")
+    assert len(edit.text) == MAX_CHARS
+
+
+def test_an_edit_of_the_map_that_raises_is_taken_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with opened_editor(tmp_path, drafts=tmp_path / "drafts") as hands:
+        window, editor = hands.window, hands.editor
+        window.contains_faults = True
+        editor.change(circle_drawn(editor.sketch, (2.0, 2.0), 0.5))
+        before = editor.sketch
+
+        def half_way() -> None:
+            editor.document.history.do(circle_drawn(editor.sketch, (5.0, 5.0), 0.5))
+            raise ZeroDivisionError("half-way")
+
+        monkeypatch.setattr(window, "try_it", half_way)
+        monkeypatch.setattr(window, "do", lambda name: half_way())
+        hands.key("f5")
+        assert editor.sketch == before and "Internal error" in editor.message and editor.trouble
+        monkeypatch.undo()
+        hands.key("ctrl+z")
+        assert editor.sketch.obstacles == ()
+        hands.key("ctrl+y")
+        assert editor.sketch == before
+
+
+def test_a_dialog_that_cannot_be_drawn_is_dropped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with opened_editor(tmp_path) as hands:
+        hands.window.contains_faults = True
+        hands.key("ctrl+k")
+        asked = hands.editor.dialogs.asked
+        assert asked is not None
+
+        def fail(ui: object) -> None:
+            raise IndexError("page")
+
+        monkeypatch.setattr(asked, "page", fail)
+        hands.window.frame(0.1)
+        hands.window.frame(0.1)
+        assert hands.editor.dialogs.asked is None and "IndexError" in hands.editor.message
+
+
+def test_an_edit_of_a_session_that_raises_is_taken_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with opened(tmp_path) as driver:
+        window, session = driver.window, driver.session
+        window.contains_faults = True
+        for _ in range(20):
+            session.step()
+        session.fail_robot(2)
+        nodes, positions = len(session.document.nodes), session.panes[0].simulation.positions.copy()
+        amend = session.history.amend
+
+        def fail(moment: object) -> None:
+            raise ZeroDivisionError("half-way")
+
+        monkeypatch.setattr(session.history, "amend", fail)
+        driver.viewer.hand.selected = 1
+        driver.key("delete")
+        assert "ZeroDivisionError" in driver.viewer.message
+        monkeypatch.setattr(session.history, "amend", amend)
+        assert session.numbers == (1, 3) and len(session.document.nodes) == nodes
+        assert (session.panes[0].simulation.positions == positions).all()
+        again = _same_without_a_fault()
+        for _ in range(30):
+            session.step()
+            again.step()
+        assert (session.panes[0].simulation.positions == again.panes[0].simulation.positions).all()
+
+
+def _same_without_a_fault() -> Session:
+    session = begun()
+    for _ in range(20):
+        session.step()
+    session.fail_robot(2)
+    return session
+
+
+def test_a_step_that_raises_half_way_is_taken_back_and_the_team_waits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with opened(tmp_path) as driver:
+        window, session = driver.window, driver.session
+        window.contains_faults = True
+        for _ in range(20):
+            session.step()
+        pane = session.panes[0]
+        positions = pane.simulation.positions.copy()
+        step = pane.step
+
+        def fail(pull: object) -> None:
+            step(pull)
+            raise ZeroDivisionError("half-way")
+
+        monkeypatch.setattr(pane, "step", fail)
+        session.playing = True
+        driver.frames(3, 0.1)
+        assert not session.playing and "ZeroDivisionError" in driver.viewer.message
+        assert session.panes[0].time == pytest.approx(session.end)
+        assert (session.panes[0].simulation.positions == positions).all()
+        session.playing = True
+        driver.frames(3, 0.1)
+        assert session.end > 20 * session.scenario.dt
+
+
+def test_a_map_with_controls_in_its_texts_is_drawn(tmp_path: Path) -> None:
+    with opened_editor(tmp_path) as hands:
+        hands.editor.change(circle_drawn(hands.sketch, (5.0, 5.0), 1.0))
+        (item,) = hands.sketch.obstacles
+        assert isinstance(item.shape, CircleObstacle)
+        hands.editor.say("a\x00b\udcff", trouble=True)
+        hands.window.frame(0.1)
