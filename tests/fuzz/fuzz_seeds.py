@@ -80,6 +80,26 @@ SVG = """\
 </svg>
 """
 
+COLOURED = """<svg xmlns="http://www.w3.org/2000/svg" width="20000mm" height="12000mm" viewBox="0 0 20 12">
+  <defs>
+    <linearGradient id="shade">
+      <stop offset="0" stop-color="#eee"/><stop offset="1" stop-color="#111"/>
+    </linearGradient>
+    <linearGradient id="again" href="#shade"/>
+    <pattern id="hatch" width="1" height="1"><path d="M0 0L1 1" stroke="#000"/></pattern>
+  </defs>
+  <rect width="20" height="12" fill="#fff"/>
+  <g id="rooms" opacity=".9">
+    <rect x="1" y="1" width="8" height="10" fill="#e0e0ff" stroke="#000" stroke-width=".2"/>
+    <rect x="9" y="1" width="10" height="10" fill="url(#again)" stroke="currentColor" color="#222"/>
+  </g>
+  <rect x="8.8" y="4" width=".4" height="1.5" fill="white"/>
+  <circle cx="4" cy="5" r="1" fill="rgb(40 40 40 / 80%)" stroke="#888" stroke-width=".05"/>
+  <rect x="12" y="3" width="3" height="2" fill="url(#hatch) grey"/>
+  <path d="M10 8h4v2h-4z" fill="none" stroke="#777" stroke-width=".03" transform="skewX(10)"/>
+</svg>
+"""
+
 # fmt: off
 _DXF = [
     *(0, "SECTION", 2, "HEADER", 9, "$ACADVER", 1, "AC1015", 9, "$INSUNITS", 70, 6, 0, "ENDSEC"),
@@ -381,7 +401,7 @@ SEEDS: dict[str, list[Case]] = {
     ),
     "wkt": _one("plan.wkt", *WKT),
     "geojson": _one("plan.geojson", json.dumps(GEOJSON, indent=1), json.dumps(DEGREES)),
-    "svg": _one("plan.svg", SVG),
+    "svg": _one("plan.svg", SVG, COLOURED),
     "osm": _one("plan.osm", OSM),
     "dxf": _one("plan.dxf", "\n".join(map(str, _DXF)) + "\n"),
     "stage": [

@@ -208,8 +208,31 @@ _ATTRIBUTES = st.dictionaries(
     _LENGTH | _NUMBER.map(str),
     max_size=6,
 )
+_PAINT = st.sampled_from(
+    [
+        "black",
+        "white",
+        "#c8c8c8",
+        "#eef",
+        "none",
+        "url(#a)",
+        "url(#b) red",
+        "rgba(0,0,0,.5)",
+        "hsl(9,9%,9%)",
+        "x",
+    ]
+)
+_BOXES = st.tuples(_WHOLE, _WHOLE, st.integers(1, 8), st.integers(1, 8), _PAINT, _PAINT).map(
+    lambda box: (
+        f"<rect x='{box[0]}' y='{box[1]}' width='{box[2]}' height='{box[3]}' "
+        f"fill='{box[4]}' stroke='{box[5]}'/>"
+    )
+)
+"""Rooms, floors and furniture on a small grid, above each other."""
+
 _ELEMENT = st.recursive(
     st.one_of(
+        _BOXES,
         st.tuples(
             st.sampled_from(["rect", "circle", "ellipse", "line", "use", "image", "text"]), _ATTRIBUTES
         ).map(

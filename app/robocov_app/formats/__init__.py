@@ -47,6 +47,7 @@ __all__ = [
 ]  # fmt: skip
 # options of drawings
 _DRAWN = ("thickness", "pillar", "outlines", "boundary", "around", "snap", "only", "skip")
+_COLOURS = ("free_colour", "solid_colour", "ignore_colour", "colour_tolerance")
 # the first whose `sniff` says yes has a file: the surest come first
 IMPORTERS: dict[str, Importer] = {each.name: each for each in (
     # a .yaml is this by its content only
@@ -67,13 +68,14 @@ IMPORTERS: dict[str, Importer] = {each.name: each for each in (
     Importer("picture", "picture: PNG, JPEG, BMP, TIFF, PGM, PPM, dark is an obstacle",
              (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pbm", ".pgm", ".ppm"),
              lambda path, head: picture.is_picture(head), picture.read,
-             frozenset({"cell", "unknown", "threshold", "invert"})),
+             frozenset({"cell", "unknown", "threshold", "invert", "min_stroke", *_COLOURS})),
     Importer("osm", "OpenStreetMap (.osm, JSON of Overpass): buildings, water, barriers; rooms of a level",
              (".osm",), osm.sniff, osm.read,
              frozenset({"water", "level", *_DRAWN})),
     Importer("svg", "SVG drawings: filled shapes, strokes as walls", (".svg", ".svgz"),
              lambda path, head: svg.ROOT.search(head) is not None or path.suffix.lower() == ".svgz", svg.read,
-             frozenset({"scale", "thickness", "outlines", "boundary", "around", "snap", "only", "skip"})),
+             frozenset({"scale", "thickness", "min_stroke", "outlines", "boundary", "around", "snap", "only",
+                        "skip", *_COLOURS})),
     Importer("dxf", "DXF drawings (with ezdxf): closed outlines, lines as walls, blocks", (".dxf",),
              lambda path, head: head.startswith(dxf.BINARY) or dxf.TEXT.match(head) is not None, dxf.read,
              frozenset({"scale", *_DRAWN, "hatches"})),

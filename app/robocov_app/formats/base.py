@@ -2,20 +2,50 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args, get_origin, get_type_hints
 
+import numpy as np
+from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import CircleObstacle, Environment, WallObstacle
 from robocov.errors import ParameterError, checked, counted, shown
+from robocov_app.formats.colours import ROLES, Colour, ColourKey
 
 Primitive: TypeAlias = CircleObstacle | WallObstacle
 _LENGTH = (1e-6, 1e4, "m")
+_STROKE = re.compile(r"(\d{1,6}(?:\.\d{0,9})?|\.\d{1,9})\s*(px|m)?", re.ASCII)
 _KEYS = {name: f"{name}_m" for name in ("size", "tolerance", "moved")} | {"others": "other_parts_m"}
 _KEYS |= {name: f"{name}_m2" for name in ("area", "area_read", "area_kept", "area_written", "moved_area")}
+
+
+@dataclass(frozen=True, eq=False)
+class Painted:
+    """A shape of a drawing in its colour, mixed with white where it is translucent; `area` in m."""
+
+    area: BaseGeometry
+    colour: Colour
+
+
+@dataclass(frozen=True, eq=False)
+class Thumbnail:
+    """A picture in its colours, made smaller.
+
+    Attributes
+    ----------
+    pixels : (rows, columns, 3) array of uint8
+        The top row first.
+    bounds : tuple of 4 float, m
+        Lower left and upper right corner.
+    """
+
+    pixels: NDArray[np.uint8]
+    bounds: tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +77,9 @@ class ForeignMap:
     repaired: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    page: Polygon | None = None
+    painted: tuple[Painted, ...] = ()
+    thumbnail: Thumbnail | None = None
 
 
 def square_metres(area: float, digits: int = 4) -> str:
@@ -155,8 +188,9 @@ class ReadOptions(Options):
     """Width in metres of walls that are drawn as lines."""
     pillar: float | None = None
     """Radius in metres of a pillar for each point; without it points are left out."""
-    outlines: Literal["free", "solid"] | None = None
-    """What closed outlines of a drawing are, but for the boundary."""
+    outlines: Literal["free", "solid", "nested"] | None = None
+    """What closed outlines of a drawing are, but for the boundary. Nested are free and solid by turns, from
+    the outside in, so that the larger area is free."""
     boundary: str | None = None
     """Name, id, class or layer of the shape that is the outer boundary."""
     around: float | None = None
@@ -166,16 +200,72 @@ class ReadOptions(Options):
     it apart; 0 keeps all. By default 0.01, or a thousandth of the drawing if that is less."""
     only: tuple[str, ...] | None = None
     """Names, ids, classes or layers that are read; all else is left out."""
-    skip: tuple[str, ...] | None = None
+    skip: tuple[str, ...] | None = field(default=None, metadata={"aliases": ["--ignore-layer"]})
     """Names, ids, classes or layers that are left out."""
     level: str | None = None
     """Floor of a building that is read, by its number or name. By default the ground floor, 0."""
+    free_colour: tuple[str, ...] | None = None
+    """Colours that are free space, by name or as #rrggbb."""
+    solid_colour: tuple[str, ...] | None = None
+    """Colours that are obstacles."""
+    ignore_colour: tuple[str, ...] | None = None
+    """Colours that are left out: what is around or below them counts."""
+    colour_tolerance: float | None = None
+    """By how much a colour may differ in each of red, green and blue, of 255. By default 24 in a picture,
+    and 0 in a drawing."""
+    min_stroke: str | None = None
+    """Thinner strokes (door arcs, furniture, text) are dropped: a width in metres, or in pixels as in 3px."""
     hatches: bool = False
     """Hatches are areas, as outlines are."""
 
     def __post_init__(self) -> None:
         lengths = dict.fromkeys(("cell", "scale", "thickness", "pillar", "around"), _LENGTH)
-        self.require(threshold=(0.0, 1.0, ""), snap=(0.0, 10.0, "m"), **lengths)
+        self.require(
+            threshold=(0.0, 1.0, ""),
+            snap=(0.0, 10.0, "m"),
+            colour_tolerance=(0.0, 255.0, ""),
+            **lengths,
+        )
+        self.stroke_width(1.0)
+        self.colour_key()
+
+    def colour_key(self, tolerance: float = 0.0) -> ColourKey:
+        """Return the colours that are given, with this tolerance where none is.
+
+        Raises
+        ------
+        ParameterError
+            If a colour is unknown, or given twice.
+        """
+        return ColourKey.from_names(
+            {role: getattr(self, f"{role}_colour") or () for role in ROLES},
+            tolerance if self.colour_tolerance is None else self.colour_tolerance,
+        )
+
+    def stroke_width(self, pixel: float) -> float:
+        """Return the width in metres below which strokes are dropped, 0 for none.
+
+        Parameters
+        ----------
+        pixel : float, m
+            Side of a pixel, or of a unit of a drawing.
+
+        Raises
+        ------
+        ParameterError
+            If the option is no width.
+        """
+        if self.min_stroke is None:
+            return 0.0
+        match = _STROKE.fullmatch(self.min_stroke.strip())
+        if match is None:
+            wanted = "a width in metres, as in 0.1, or in pixels, as in 3px"
+            raise ParameterError(f"min_stroke: expected {wanted}, got {shown(self.min_stroke)}")
+        width = float(match[1])
+        if match[2] == "px":
+            return width * pixel
+        checked("min_stroke", width, 0.0, _LENGTH[1], "m")
+        return width
 
 
 @dataclass(frozen=True)

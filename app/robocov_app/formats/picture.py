@@ -7,26 +7,39 @@ a text chunk what a pixel is in metres and where its lower left corner is, and s
 
 import io
 import json
+import math
 import re
 import warnings
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from PIL.Image import Image
+from scipy import ndimage
 
+from robocov.arrays import BoolArray
 from robocov.environment import Environment
-from robocov.errors import MapError, one_line, shown
+from robocov.errors import MapError, counted, one_line, shown
 from robocov.files.atomic import written
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
+from robocov_app.formats.base import (
+    ExportReport,
+    ForeignMap,
+    ReadOptions,
+    Thumbnail,
+    WriteOptions,
+    square_metres,
+)
+from robocov_app.formats.colours import NO_ROLE, PICTURE_TOLERANCE, ROLES, ColourKey
 from robocov_app.formats.geometry.rasterize import free_cells, grid_over, grid_report
-from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, UNKNOWN, foreign_map
+from robocov_app.formats.geometry.strokes import MAX_STROKE_PIXELS, remove_thin_strokes
+from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, UNKNOWN, Cells, foreign_map
 
 _PIECE = 1 << 20  # bytes that are unpacked at a time
 _STRIP = 512  # rows that are converted at a time, which bounds the memory
@@ -44,6 +57,9 @@ _MOST_OF_JPEG = 512  # pixels a byte: 8 x 8 take a bit at least; what is not the
 CHUNK = "robocov"  # key of the text chunk that says where it belongs: JSON with ``cell_m`` and ``origin_m``
 TITLE = "Title"  # key of the text chunk with the name of what is shown
 _NOISE = 1.5  # single cells beside dark ones come of how a JPEG is saved
+_THUMBNAIL = 640  # pixels of the longer side of a thumbnail, at most, but for pictures beyond all measure
+_FEW_LIGHT = 0.02  # light pixels for each dark one, at most, of a drawing without paper: soft edges
+_NO_KEY = ColourKey()
 _OPAQUE = 128  # less opaque pixels count as transparent, of 255
 
 
@@ -53,6 +69,7 @@ class Brightness:
 
     `level`, (rows, columns): from 0, black, to `full`, white: the sum of red, green and blue. `alpha`: to
     255, opaque. `texts`: what a PNG says of itself. `lossy`: whether saving may change pixels, as in a JPEG.
+    `roles`: of colours that were asked for, as of `ColourKey.classify`. `thumbnail`, (h, w, 3): its colours.
     """
 
     level: NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.uint32]
@@ -60,25 +77,30 @@ class Brightness:
     alpha: NDArray[np.uint8] | None = None
     texts: Mapping[str, str] = field(default_factory=dict)
     lossy: bool = False
+    roles: NDArray[np.uint8] | None = None
+    thumbnail: NDArray[np.uint8] | None = None
 
 
 def is_picture(head: bytes) -> bool:
     return any(begin.match(head) for begin in (_NETPBM, *_PILLOW.values()))
 
 
-def read_picture(path: Path, where: str) -> Brightness:
-    """Return the picture at `path`, which messages call `where`; MapError where it is broken or too large."""
+def read_picture(path: Path, where: str, key: ColourKey = _NO_KEY) -> Brightness:
+    """Return the picture at `path`, which messages call `where`; MapError where it is broken or too large.
+
+    `key`: colours whose roles are wanted.
+    """
     data = files.content(path)
     if data[:2] in (b"P2", b"P3", b"P5", b"P6"):
-        return _netpbm(data, where)
+        return _netpbm(data, where, key)
     for name, begin in _PILLOW.items():
         if begin.match(data):
-            return _decoded(data, name, where)
+            return _decoded(data, name, where, key)
     wanted = "a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM"
     raise MapError(f"{where}: begins with {shown(data[:8])}, but {wanted} was wanted")
 
 
-def _netpbm(data: bytes, where: str) -> Brightness:
+def _netpbm(data: bytes, where: str, key: ColourKey) -> Brightness:
     """Return a PGM or PPM; see https://netpbm.sourceforge.net/doc/pgm.html."""
     numbers, at = [], 2
     for name in ("width", "height", "largest value"):
@@ -108,9 +130,34 @@ def _netpbm(data: bytes, where: str) -> Brightness:
     highest = int(level.max())
     if highest > most:
         raise MapError(f"{where}: a pixel of {highest}, but at most {most}, the largest value, was wanted")
+    pixels = level.reshape(height, width, colours)
+    roles = np.zeros((height, width), np.uint8) if key else None
+    pieces = []
+    step = _thumbnail_step(width, height)
+    for top in range(0, height, _STRIP):
+        strip = pixels[top : top + _STRIP]
+        if roles is not None:
+            roles[top : top + _STRIP] = key.classify(_in_colour(strip, most))
+        pieces.append(_in_colour(strip[::step, ::step], most))
+    thumbnail = np.concatenate(pieces)
     if colours == 1:
-        return Brightness(level.reshape(height, width), most)
-    return Brightness(level.reshape(height, width, 3).sum(axis=2, dtype=np.uint32), 3 * most)
+        return Brightness(pixels[:, :, 0], most, roles=roles, thumbnail=thumbnail)
+    total = pixels.sum(axis=2, dtype=np.uint32)
+    return Brightness(total, 3 * most, roles=roles, thumbnail=thumbnail)
+
+
+def _in_colour(pixels: Any, most: int) -> NDArray[np.uint8]:
+    """Return pixels, (rows, columns, 1 or 3), with levels to `most`, as red, green and blue to 255."""
+    levels = pixels if most == 255 else pixels.astype(np.uint32) * 255 // most
+    return np.broadcast_to(levels.astype(np.uint8), (*pixels.shape[:2], 3))
+
+
+def _thumbnail_step(width: int, height: int) -> int:
+    """Return how many pixels become one of the thumbnail: a power of 2, so that it fits into strips."""
+    step = 1
+    while max(width, height) > step * _THUMBNAIL and step < _STRIP:
+        step *= 2
+    return step
 
 
 def _plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
@@ -140,7 +187,7 @@ def _plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
     return values
 
 
-def _decoded(data: bytes, name: str, where: str) -> Brightness:
+def _decoded(data: bytes, name: str, where: str, key: ColourKey) -> Brightness:
     import PIL.Image
 
     try:
@@ -150,7 +197,7 @@ def _decoded(data: bytes, name: str, where: str) -> Brightness:
                 files.require_cells(*image.size, where)
                 if name == "JPEG" and image.width * image.height > _MOST_OF_JPEG * len(data):
                     raise ValueError("cut off")
-                return _converted(image)
+                return _converted(image, key)
     except MapError:
         raise
     except PIL.Image.DecompressionBombError:
@@ -161,7 +208,7 @@ def _decoded(data: bytes, name: str, where: str) -> Brightness:
         raise MapError(f"{where}: broken, but a whole {name} was wanted: {reason}") from None
 
 
-def _converted(image: Image) -> Brightness:
+def _converted(image: Image, key: ColourKey) -> Brightness:
     """Return a picture without its colours, turned as it says; only a strip of it is copied at a time."""
     import PIL.ImageOps
     from PIL.ExifTags import Base
@@ -178,7 +225,11 @@ def _converted(image: Image) -> Brightness:
         full = (1 << tags[Base.BitsPerSample][0]) - 1 if tags else 65535
         deep = np.asarray(image).astype(np.uint16)
         dark = tags.get(Base.PhotometricInterpretation) == 0
-        return Brightness(full - deep if dark else deep, full, None, texts)
+        deep = full - deep if dark else deep
+        shades = _in_colour(deep[:, :, None], full)
+        step = _thumbnail_step(image.width, image.height)
+        roles = key.classify(shades) if key else None
+        return Brightness(deep, full, roles=roles, thumbnail=shades[::step, ::step].copy())
     has_alpha = transparent or image.mode in ("LA", "PA", "RGBA", "La", "RGBa")
     grey = image.mode in ("1", "L", "LA") and not transparent
     mode = ("LA" if has_alpha else "L") if grey else ("RGBA" if has_alpha else "RGB")
@@ -186,43 +237,178 @@ def _converted(image: Image) -> Brightness:
     shape = (image.height, image.width)
     level: Any = np.empty(shape, np.uint8 if grey else np.uint16)
     alpha = np.empty(shape, np.uint8) if has_alpha else None
+    roles = np.empty(shape, np.uint8) if key else None
+    step = _thumbnail_step(image.width, image.height)
+    pieces = []
     for top in range(0, image.height, _STRIP):
         rows = slice(top, min(top + _STRIP, image.height))
-        strip = np.asarray(image.crop((0, rows.start, image.width, rows.stop)).convert(mode))
+        part = image.crop((0, rows.start, image.width, rows.stop)).convert(mode)
+        strip = np.asarray(part)
         strip = strip.reshape(strip.shape[0], strip.shape[1], -1)
         level[rows] = strip[:, :, :colours].sum(axis=2, dtype=level.dtype)
         if alpha is not None:
             alpha[rows] = strip[:, :, colours]
-    return Brightness(level, 255 * colours, alpha, texts, lossy)
+        if roles is not None:
+            roles[rows] = key.classify(_in_colour(strip[:, :, :colours], 255))
+        pieces.append(_shrink(part, step))
+    return Brightness(level, 255 * colours, alpha, texts, lossy, roles, np.concatenate(pieces))
+
+
+def _shrink(part: Image, step: int) -> NDArray[np.uint8]:
+    """Return a part of a picture in its colours on white, `step` times smaller, (rows, columns, 3)."""
+    import PIL.Image
+
+    small = part.reduce(step) if step > 1 else part
+    if small.mode in ("LA", "RGBA"):
+        small = small.convert("RGBA")
+        white = PIL.Image.new("RGBA", small.size, "white")
+        small = PIL.Image.alpha_composite(white, small)
+    return np.asarray(small.convert("RGB"))
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = one_line(path)
-    picture = read_picture(path, where)
+    key = options.colour_key(PICTURE_TOLERANCE)
+    picture = read_picture(path, where, key)
     cell, origin = _place(picture)
     cell = options.cell if options.cell is not None else cell
     if cell is None:
         beside = path.with_suffix(".yaml")
         hint = f" (or import {one_line(beside.name)} beside it)" if beside.is_file() else ""
         raise MapError(f"{where}: a picture has no scale, but --cell, the metres a pixel, was wanted{hint}")
-    threshold = 0.5 if options.threshold is None else options.threshold
-    shade = np.arange(picture.full + 1) / picture.full
-    light = shade > 1.0 - threshold if options.invert else shade >= threshold
-    table = np.where(light ^ bool(options.invert), FREE, BLOCKED).astype(np.uint8)
-    cells = table[picture.level]
-    if picture.alpha is not None:
-        cells[picture.alpha < _OPAQUE] = UNKNOWN
-    return foreign_map(
+    cells, notes = _classify(picture, options)
+    unknown = options.unknown or "obstacle"
+    if options.unknown is None and _is_drawn_on_nothing(cells):
+        unknown = "free"
+        notes.append("nothing but dark paint on a transparent ground, so what is transparent is free")
+    dropped = _drop_strokes(cells, options, cell, where) if options.min_stroke is not None else ()
+    _require_both(cells, unknown, picture, options, where, notes)
+    foreign = foreign_map(
         cells,
         where,
         picture.texts.get(TITLE, "").strip() or path.stem,
         f"A picture of {cell:g} m a pixel, imported.",
         cell,
         origin=origin,
-        unknown=options.unknown or "obstacle",
+        unknown=unknown,
         called="transparent",
         noise=_NOISE if picture.lossy else 0.0,
+        notes=tuple(notes),
     )
+    rows, columns = cells.shape
+    bounds = (origin[0], origin[1], origin[0] + columns * cell, origin[1] + rows * cell)
+    thumbnail = None if picture.thumbnail is None else Thumbnail(picture.thumbnail, bounds)
+    return replace(
+        foreign,
+        dropped=(*dropped, *foreign.dropped),
+        page=shapely.box(*bounds),
+        thumbnail=thumbnail,
+    )
+
+
+def _classify(picture: Brightness, options: ReadOptions) -> tuple[Cells, list[str]]:
+    """Return the pixels as cells, and notes on colours that were asked for."""
+    threshold = 0.5 if options.threshold is None else options.threshold
+    shade = np.arange(picture.full + 1) / picture.full
+    light = shade > 1.0 - threshold if options.invert else shade >= threshold
+    table = np.where(light ^ bool(options.invert), FREE, BLOCKED).astype(np.uint8)
+    cells = table[picture.level]
+    transparent = None
+    if picture.alpha is not None:
+        transparent = picture.alpha < _OPAQUE
+    notes: list[str] = []
+    if picture.roles is not None:
+        if transparent is not None:
+            # what cannot be seen has no colour
+            picture.roles[transparent] = NO_ROLE
+        for code, role in enumerate(ROLES, 1):
+            names = getattr(options, f"{role}_colour")
+            if names:
+                share = np.count_nonzero(picture.roles == code) / cells.size
+                what = {"free": "free", "solid": "obstacles", "ignore": "left out"}[role]
+                notes.append(f"{100 * share:.3g} % of the pixels are {', '.join(names)}, taken as {what}")
+        cells[picture.roles == ROLES.index("free") + 1] = FREE
+        cells[picture.roles == ROLES.index("solid") + 1] = BLOCKED
+    if transparent is not None:
+        cells[transparent] = UNKNOWN
+    if picture.roles is not None and options.ignore_colour:
+        ignored = picture.roles == ROLES.index("ignore") + 1
+        _fill_from_around(cells, ignored)
+    return cells, notes
+
+
+def _fill_from_around(cells: Cells, ignored: BoolArray) -> None:
+    """Give ignored cells the value of the nearest other one, and make them free where there is none near."""
+    halo = _STRIP // 4
+    given = cells.copy()
+    for top in range(0, len(cells), _STRIP):
+        low, high = max(top - halo, 0), min(top + _STRIP + halo, len(cells))
+        strip = ignored[low:high]
+        own = ignored[top : top + _STRIP]
+        if not own.any():
+            continue
+        if strip.all():
+            cells[top : top + _STRIP] = FREE
+            continue
+        found = ndimage.distance_transform_edt(strip, return_distances=False, return_indices=True)
+        row, column = found[:, top - low : top - low + len(own)][:, own]
+        cells[top : top + _STRIP][own] = given[low:high][row, column]
+
+
+def _is_drawn_on_nothing(cells: Cells) -> bool:
+    """Return whether a picture has transparent pixels, dark ones, and no others: a drawing without paper."""
+    counts = np.bincount(cells.ravel(), minlength=3)
+    return bool(counts[FREE] < _FEW_LIGHT * counts[BLOCKED] and counts[UNKNOWN] > counts[BLOCKED] > 0)
+
+
+def _drop_strokes(cells: Cells, options: ReadOptions, cell: float, where: str) -> tuple[str, ...]:
+    """Make thin strokes free in `cells`, and return what was dropped."""
+    width = options.stroke_width(cell)
+    pixels = math.ceil(width / cell - 1e-9)
+    if pixels > MAX_STROKE_PIXELS:
+        few = f"expected at most {MAX_STROKE_PIXELS} pixels, got {pixels}"
+        raise MapError(f"{where}: min_stroke: {few}")
+    solid = cells == BLOCKED
+    thin = solid & ~remove_thin_strokes(solid, pixels)
+    count = int(np.count_nonzero(thin))
+    if not count:
+        return ()
+    cells[thin] = FREE
+    pieces = ndimage.label(thin, structure=np.ones((3, 3)))[1]
+    area = square_metres(count * cell * cell, 3)
+    what = f"strokes thinner than {pixels * cell:.3g} m ({pixels} px)"
+    return (f"{what} in {counted(pieces, 'piece')}, {area} (--min-stroke)",)
+
+
+def _require_both(
+    cells: Cells,
+    unknown: str,
+    picture: Brightness,
+    options: ReadOptions,
+    where: str,
+    notes: list[str],
+) -> None:
+    """Name the cause where all of a picture is solid, in a MapError, or free, in a note."""
+    counts = np.bincount(cells.ravel(), minlength=3)
+    share = 100 * counts[UNKNOWN] / cells.size
+    if not counts[FREE] and not (unknown == "free" and counts[UNKNOWN]):
+        if counts[UNKNOWN]:
+            cause = f"{share:.3g} % of the pixels are transparent, which counts as solid"
+            raise MapError(
+                f"{where}: no cell is free: {cause} (--unknown free takes transparent cells as free)"
+            )
+        levels = picture.level.min() / picture.full, picture.level.max() / picture.full
+        cause = f"its brightness is from {levels[0]:.2g} to {levels[1]:.2g}"
+        ways = "--threshold, --invert or --free-colour choose otherwise"
+        raise MapError(f"{where}: no cell is free, but some were wanted: {cause} ({ways})")
+    if not counts[BLOCKED] and unknown == "free" and counts[UNKNOWN]:
+        notes.append(
+            f"nothing is solid: {share:.3g} % of the pixels are transparent (less than half opaque), "
+            "which --unknown free takes as free"
+        )
+    elif not counts[BLOCKED] and not counts[UNKNOWN]:
+        least = picture.level.min() / picture.full
+        notes.append(f"nothing is solid: the darkest pixel has a brightness of {least:.2g} (--threshold)")
 
 
 def _place(picture: Brightness) -> tuple[float | None, tuple[float, float]]:

@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
-from typing import Annotated, Any, TypeVar, get_type_hints
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import tyro
 
@@ -35,6 +35,7 @@ _WORDING: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
 )
 _FIRST = ("map", "controller", "controllers", "out", "robots", "gains", "duration", "seed", "start", "video")
 _LAST = ("json", "overwrite")  # the help ends with these, as it begins with those
+_NEGATIVE = re.compile(r"-\.?\d.*")  # a value, not an option
 _WORD = r"[A-Za-z][A-Za-z0-9_-]*"
 _JSON_WORDS = frozenset(("null", "true", "false", "NaN", "Infinity"))  # no words of an option
 
@@ -47,6 +48,7 @@ def _choices(text: str) -> str:
 def parsed(kind: type[T], command: str, words: list[str]) -> T:
     """Return the options that `words` give; raises InputError, or SystemExit after help."""
     complaint = io.StringIO()
+    words = merge_repeated(kind, words)
     try:
         with contextlib.redirect_stderr(complaint):
             config = tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone
@@ -57,6 +59,61 @@ def parsed(kind: type[T], command: str, words: list[str]) -> T:
         raise InputError(f"{one_line(complaint.getvalue())} (robocov {command} -h explains)") from None
 
 
+def merge_repeated(kind: Any, words: list[str]) -> list[str]:
+    """Return words in which options that take any number of values stand once, with all their values.
+
+    ``--skip a --skip b`` means ``--skip a b``: without this the last would silently replace the others.
+    """
+    several = _options_of_several_values(kind)
+    given: dict[str, list[str]] = {}
+    kept: list[str] = []
+    values = kept
+    for k, word in enumerate(words):
+        if word == "--":
+            kept += words[k:]
+            break
+        name, equals, value = word.partition("=")
+        name = name.replace("_", "-")
+        if not name.startswith("-") or _NEGATIVE.fullmatch(word):
+            values.append(word)
+            continue
+        values = kept
+        if name not in several:
+            kept.append(word)
+            continue
+        name = several[name]
+        if name in given:
+            values = given[name]
+        else:
+            values = given[name] = []
+            kept.append(name)
+        if equals:
+            values.append(value)
+            values = kept
+    merged = []
+    for word in kept:
+        merged.append(word)
+        merged += given.get(word, ())
+    return merged
+
+
+def _options_of_several_values(kind: Any) -> dict[str, str]:
+    """Return the options of a tuple of any length: each name or alias, and the name that it stands for."""
+    several: dict[str, str] = {}
+    for owner in (kind, *groups_of(kind)):
+        plain = get_type_hints(owner)
+        marked = get_type_hints(owner, include_extras=True)
+        for each in fields(owner):
+            kinds = (plain[each.name], *get_args(plain[each.name]))
+            if any(get_origin(hint) is tuple and ... in get_args(hint) for hint in kinds):
+                # an option may have another name than its field
+                names = [getattr(mark, "name", None) for mark in get_args(marked[each.name])[1:]]
+                chosen = next(filter(None, names), each.name)
+                name = f"--{chosen.replace('_', '-')}"
+                several |= dict.fromkeys((name, *each.metadata.get("aliases", ())), name)
+    return several
+
+
 def _for_readers(kind: type[T]) -> type[T]:
     """Return options with the most used ones first in the help, and without defaults that say nothing."""
     hint = tyro.conf.arg(help_behavior_hint=_default_hint)
@@ -64,6 +121,10 @@ def _for_readers(kind: type[T]) -> type[T]:
         own: Any = each
         hints, known = get_type_hints(own, include_extras=True), own.__dataclass_fields__
         own.__annotations__ = {name: Annotated[hints[name], hint] for name in hints}
+        for name, each in known.items():
+            if aliases := each.metadata.get("aliases"):
+                marked = tyro.conf.arg(help_behavior_hint=_default_hint, aliases=aliases)
+                own.__annotations__[name] = Annotated[hints[name], marked]
         order = [*_FIRST, *(name for name in known if name not in _LAST), *_LAST]
         own.__dataclass_fields__ = {name: known[name] for name in order if name in known}
     return kind

@@ -54,7 +54,9 @@ def test_the_options_are_those_of_the_format(name: str, tmp_path: Path) -> None:
     asked = ImportDialog(tmp_path / "x", IMPORTERS[name], DirectWorker(Importing()), None)
     assert asked.settings() == (ReadOptions(), Shaping())
     given = {"number": "1", "place": "1 2", "words": "a, b", "text": "walls"}
+    given |= {"colours": "red, #00ff00", "width": "3px"}
     meant = {"number": 1.0, "place": (1.0, 2.0), "words": ("a", "b"), "text": "walls"}
+    meant |= {"colours": ("red", "#00ff00"), "width": "3px"}
     for option in options:
         asked.given = {option.name: option.choices[-1] if option.choices else given[option.kind]}
         value = (

@@ -1,7 +1,8 @@
-from dataclasses import dataclass, make_dataclass
-from typing import Literal
+from dataclasses import dataclass, field, make_dataclass
+from typing import Annotated, Literal
 
 import pytest
+from tyro.conf import Positional, arg
 
 from robocov.errors import InputError
 from robocov_app.terminal.arguments import _default_hint, by_option, one_line, parsed, parsed_gains
@@ -67,3 +68,39 @@ def test_a_message_names_the_option() -> None:
 def test_gains_are_json_or_words() -> None:
     gains = parsed_gains(("k_rep=0.3", "attraction_limit=null", "target=median"))
     assert gains == {"k_rep": 0.3, "attraction_limit": None, "target": "median"}
+
+
+@dataclass
+class Several:
+    """Options of several values."""
+
+    file: Positional[str]
+    """A file."""
+    skip: tuple[str, ...] | None = field(default=None, metadata={"aliases": ["--ignore-layer"]})
+    """What is left out."""
+    place: tuple[float, float] | None = None
+    """Two numbers."""
+    gains: Annotated[tuple[str, ...], arg(name="set")] = ()
+    """Under another name."""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["f", "--skip", "a", "b"],
+        ["f", "--skip", "a", "--skip", "b"],
+        ["f", "--ignore-layer", "a", "--ignore-layer", "b"],
+        ["--skip", "a", "--place", "-1", "2", "--ignore-layer", "b", "--set", "c=1", "--", "f"],
+        ["f", "--skip=a", "--skip", "b"],
+    ],
+)
+def test_an_option_of_several_values_may_be_repeated(words: list[str]) -> None:
+    assert parsed(Several, "try", words).skip == ("a", "b")
+
+
+def test_repeated_options_keep_their_own_values() -> None:
+    words = ["f", "--set", "k=-1", "--skip", "a", "--place", "-1", ".5", "--set", "l=2", "--skip"]
+    assert parsed(Several, "try", words) == Several("f", ("a",), (-1.0, 0.5), ("k=-1", "l=2"))
+    # what is given once and takes one value is not merged
+    with pytest.raises(InputError):
+        parsed(Several, "try", ["f", "--place", "1", "--place", "2"])

@@ -13,7 +13,7 @@ from robocov_app.formats import ForeignMap, Importer, ImportReport, ReadOptions,
 from robocov_app.formats.geometry.conversion import Comparison, compare
 from robocov_app.toolkit.worker import Line
 
-Kind = Literal["number", "place", "words", "text", "choice"]
+Kind = Literal["number", "place", "words", "colours", "width", "text", "choice"]
 ON = "yes"  # a switch that is on
 Wanted: TypeAlias = tuple[Path, str, ReadOptions, Shaping]  # a file, its format, and how to import it
 
@@ -23,7 +23,7 @@ class Option:
     """An option of an import."""
 
     name: str  # as of the field of `ReadOptions` or `Shaping`
-    kind: Kind  # a number, two for a place, words between commas, any text; or one of the choices
+    kind: Kind  # numbers; words or colours between commas; a width in m or px; any text; or a choice
     choices: tuple[str, ...]  # the first is the default
     default: str  # what stands where nothing was given
     help: str
@@ -31,9 +31,9 @@ class Option:
     def value(self, text: str) -> Any:
         if self.kind == "choice":
             return True if text == ON else text
-        if self.kind == "words":
+        if self.kind in ("words", "colours"):
             return tuple(word.strip() for word in text.split(",") if word.strip())
-        if self.kind == "text":
+        if self.kind in ("text", "width"):
             return text.strip()
         try:
             numbers = tuple(float(word) for word in text.split())
@@ -66,7 +66,12 @@ def _options(settings: type[ReadOptions] | type[Shaping]) -> Iterator[Option]:
             choices = sorted(get_args(hint), key=lambda each: bool(default) and each != default)
             yield Option(name, "choice", tuple(choices), default, words)
         elif get_origin(hint) is tuple:
-            yield Option(name, "words" if ... in get_args(hint) else "place", (), default, words)
+            kind: Kind = "place"
+            if ... in get_args(hint):
+                kind = "colours" if name.endswith("_colour") else "words"
+            yield Option(name, kind, (), default, words)
+        elif name == "min_stroke":
+            yield Option(name, "width", (), default, words)
         else:
             yield Option(name, "number" if hint is float else "text", (), default, words)
 

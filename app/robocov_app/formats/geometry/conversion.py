@@ -7,6 +7,7 @@ from typing import Literal, TypeVar
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
@@ -28,6 +29,12 @@ _TINY, _MANY = 0.01, 10  # obstacles smaller than this, in m², are perhaps nois
 # where less of the free area stays than the first, or a part of more than the second does not, it is said how
 # to choose: so many of the largest parts that are left out are named, with a place in each
 _LITTLE, _CONSIDERABLE, _OFFERED = 0.5, 0.1, 3
+# the largest part of the free space is paper around a plan where it runs along so much of the page's edge,
+# and encloses something so large beside it: less is the inside of an obstacle drawn as an outline
+_PAGE_EDGE, _PLAN_SHARE = 0.2, 0.05
+_HOLLOW_SHARE = (
+    0.1  # of the page: the box around an obstacle that may be the walls of a plan with an open door
+)
 # of maps with more vertices it takes too long to say where robots do not pass, and the narrowest passage
 _SOON, _MOST_VERTICES = 10_000, 20_000
 MAX_OBSTACLES, MAX_KEPT = 8_000, 50_000  # obstacles, vertices of a map: to make as many takes seconds
@@ -90,6 +97,7 @@ class _Shaper:
         self.foreign, self.shaping, self.where, self.radius = foreign, shaping, where, shaping.radius
         self.repaired, self.dropped, self.notes = [*foreign.repaired], [*foreign.dropped], [*foreign.notes]
         self.changed: list[str] = []
+        self.is_enclosed = False  # whether an enclosed part stays in place of the largest
         self.others: list[tuple[float, float]] = []
         self.specks = foreign.specks if shaping.specks is None else shaping.specks
         # how far from walls a robot starts, m: the rules of maps want room for the usual one
@@ -104,6 +112,7 @@ class _Shaper:
         parts = self._without_specks(self._kept(read))
         before = MultiPolygon(parts)
         chosen = shaping.inside is not None or (foreign.robots and shaping.keep == "largest")
+        chosen = chosen or self.is_enclosed
         if chosen and outer is not None and outer.contains_properly(parts[0]):
             outer = None  # what is around the other parts is not around this one
         self._require_few(sum(len(part.interiors) for part in parts), "obstacles", MAX_OBSTACLES)
@@ -217,6 +226,8 @@ class _Shaper:
                     f"wanted; {x:.10g} {y:.10g} is one in the nearest part, {distance[nearest]:.3g} m away"
                 )
             stays = np.arange(len(parts)) == nearest
+        elif (enclosed := self._enclosed_part(parts)) is not None:
+            stays = np.arange(len(parts)) == enclosed
         else:
             shapely.prepare(parts)
             places = shapely.points(np.array(robots[:_MOST_ROBOTS]).reshape(-1, 2))
@@ -244,6 +255,33 @@ class _Shaper:
         if len(kept) > 1:
             note(f"the free space is of {len(kept)} separate parts: robots cannot pass between them")
         return kept
+
+    def _enclosed_part(self, parts: NDArray[np.object_]) -> int | None:
+        """Return the index of the largest enclosed part, where the largest is the paper around a plan."""
+        page = self.foreign.page
+        if page is None or self.foreign.robots:
+            return None
+        touches = [_length_along(part, page) for part in parts]
+        share = touches[0] / page.length
+        if share < _PAGE_EDGE:
+            return None
+        x, y = _place_in(parts[0])
+        edge = f"{100 * share:.0f} % of the edge of the picture"
+        paper = f"{square_metres(parts[0].area, 3)}, runs along {edge}"
+        enclosed = [k for k, length in enumerate(touches) if length == 0.0]
+        if enclosed and parts[enclosed[0]].area >= _PLAN_SHARE * parts[0].area:
+            self.notes.append(
+                f"the largest part of the free space, {paper}: taken as the paper around a plan, of which "
+                f"the largest enclosed part stays (--inside {x:.10g} {y:.10g}: the part along the edge)"
+            )
+            self.is_enclosed = True
+            return enclosed[0]
+        if _has_hollow_obstacle(parts[0], _HOLLOW_SHARE * page.area):
+            self.notes.append(
+                f"the largest part of the free space, {paper}: if that is the paper around a plan, an outer "
+                "door may be open"
+            )
+        return None
 
     def _without_specks(self, parts: list[Polygon]) -> list[Polygon]:
         cell, least = self.foreign.cell, self.specks
@@ -389,6 +427,27 @@ def _reason(geometry: BaseGeometry) -> str:
     what, _, place = shapely.is_valid_reason(geometry).partition("[")
     x, _, y = place.rstrip("]").partition(" ")
     return f"{what.lower()} at [{float(x):.6g}, {float(y):.6g}]" if y else what.lower()
+
+
+def _has_hollow_obstacle(part: Polygon, area: float) -> bool:
+    """Return whether a hole of `part` fills little of its bounding box, of at least that area in m²."""
+    holes = shapely.polygons(shapely.get_rings(part)[1:])
+    low_x, low_y, high_x, high_y = shapely.bounds(holes).reshape(-1, 4).T
+    boxes = (high_x - low_x) * (high_y - low_y)
+    return bool(((boxes >= area) & (shapely.area(holes) < _LITTLE * boxes)).any())
+
+
+def _length_along(part: Polygon, page: Polygon) -> float:
+    """Return how much of the outline of a part runs along the edge of a page, an upright rectangle, m."""
+    sides = sides_of(part)
+    low_x, low_y, high_x, high_y = page.bounds
+    slack = 1e-6 * max(high_x - low_x, high_y - low_y)
+    length = np.hypot(*(sides[:, 1] - sides[:, 0]).T)
+    total = 0.0
+    for axis, edge in ((0, low_x), (0, high_x), (1, low_y), (1, high_y)):
+        on_edge = (np.abs(sides[:, :, axis] - edge) <= slack).all(axis=1)
+        total += float(length[on_edge].sum())
+    return total
 
 
 def _place_in(part: Polygon) -> tuple[float, float]:

@@ -14,6 +14,8 @@ from robocov.arrays import Array
 from robocov.environment import CircleObstacle, WallObstacle
 from robocov.errors import one_line
 from robocov.mapfile.models import LONGEST_LABEL
+from robocov_app.formats.colours import Colour, Role
+from robocov_app.formats.geometry.painting import Coat
 from robocov_app.formats.geometry.polygons import Rule
 
 Kind: TypeAlias = Literal["polygon", "line", "point"]
@@ -62,12 +64,28 @@ class Outline:
         The disc that it is, if any.
     whole : str
         As of `Figure`.
+    colour : tuple of 3 int, or None
+        Of its fill, as it is seen on white, if known.
+    role : str or None
+        Of that colour, if one was declared.
+    order : int
+        Outlines and lines of a higher one are painted later.
+    edges : tuple of Line
+        Its stroke, which is a wall only if the outline is free.
     """
 
     area: MultiPolygon
     labels: tuple[str, ...] = ()
     circle: CircleObstacle | None = None
     whole: str = ""
+    colour: Colour | None = None
+    role: Role | None = None
+    order: int = 0
+    edges: tuple["Line", ...] = ()
+
+    @property
+    def coat(self) -> Coat:
+        return Coat(self.area, self.order, self.colour)
 
     @property
     def filled_area(self) -> float:
@@ -90,6 +108,8 @@ class Line:
         As of walls in `robocov.environment`.
     stretched : tuple or None
         Of a pen that is no circle: (k, 2) points, a width, and the (3, 3) matrix that makes them metres.
+    colour, role, order
+        As of `Outline`.
     """
 
     points: Array
@@ -99,6 +119,9 @@ class Line:
     join: Literal["mitre", "bevel", "round"] = "mitre"
     mitre_limit: float = 4.0
     stretched: tuple[Array, float, Array] | None = None
+    colour: Colour | None = None
+    role: Role | None = None
+    order: int = 0
 
     @cached_property
     def solid(self) -> BaseGeometry:
@@ -110,6 +133,10 @@ class Line:
         if matrix is None:
             return solid
         return shapely.transform(solid, lambda places: places @ matrix[:2, :2].T + matrix[:2, 2])
+
+    @property
+    def coat(self) -> Coat:
+        return Coat(self.solid, self.order, self.colour)
 
     @property
     def wall(self) -> WallObstacle | None:

@@ -11,6 +11,11 @@ Lines and pillars are obstacles in both cases. The boundary is, in this order,
 3. the outer edge of the walls, if they close and what they enclose is mostly open;
 4. a rectangle around everything, at the distance of the option ``around``.
 
+If the colours of a drawing are known, what is painted later covers what was painted before, and what was
+declared free is so. Pale fills with something dark painted on them are floors; so are all pale fills on a
+dark boundary, which is solid itself. With the option ``outlines`` as "nested", outlines are free and solid
+by turns, from the outside in.
+
 In drawings whose outlines are free by default, 2 is: all outlines that do not lie in a larger one, if any
 does; then those that do are obstacles.
 
@@ -30,8 +35,17 @@ from robocov.arrays import Array
 from robocov.environment import GRID, CircleObstacle
 from robocov.errors import MapError, counted, shown
 from robocov.mapfile.models import LARGEST
-from robocov_app.formats.base import Primitive, ReadOptions
+from robocov_app.formats.base import Primitive, ReadOptions, square_metres
+from robocov_app.formats.colours import count_colours
 from robocov_app.formats.geometry.figures import BOUNDARY, Line, Outline
+from robocov_app.formats.geometry.painting import (
+    Coat,
+    alternate,
+    find_floor_colours,
+    is_dark,
+    is_pale,
+    uncover,
+)
 from robocov_app.formats.geometry.polygons import Crossings, polygons_of, united
 from robocov_app.formats.geometry.snapping import (
     are_edge_to_edge,
@@ -44,6 +58,7 @@ from robocov_app.formats.geometry.snapping import (
 DEFAULT_AROUND_M = 1.0  # distance from the shapes to the rectangle around them
 MOST = 0.5  # a boundary holds more of the other shapes; walls that are one leave so much of it open
 _SAME = 0.999  # of two outlines one of which lies in the other: ratio of areas from which on they are one
+_BACKGROUND_SHARE = 0.98  # of the page, which its background covers at least
 _MAX_APART_M = 10.0 * LARGEST  # shapes farther from each other are of no map: unions take seconds
 
 
@@ -63,6 +78,8 @@ class Boundary:
         Whether the file or the user calls it the boundary.
     gaps : str
         What was closed between its outlines, for the report.
+    is_guess : bool
+        Whether nothing in the drawing marks it.
     """
 
     area: MultiPolygon
@@ -71,6 +88,7 @@ class Boundary:
     lines: frozenset[Line] = frozenset()
     is_named: bool = False
     gaps: str = ""
+    is_guess: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +104,8 @@ class Drawing:
     world : MultiPolygon or None, m
         What is free before the shapes stand in it, if the format says so.
     options : ReadOptions
+    page : Polygon or None, m
+        The sheet that was drawn on, a rectangle, if the format says so.
     """
 
     where: str
@@ -94,6 +114,7 @@ class Drawing:
     pillars: Sequence[CircleObstacle]
     options: ReadOptions
     world: MultiPolygon | None = None
+    page: Polygon | None = None
 
     @property
     def areas(self) -> list[BaseGeometry]:
@@ -124,6 +145,8 @@ class Interpretation:
     primitives : tuple of obstacles
     outside : int
         Number of shapes outside of the boundary.
+    page : Polygon or None, m
+        As of `ForeignMap`.
     repaired, notes : list of str
         Lines for the report.
     """
@@ -133,6 +156,7 @@ class Interpretation:
     has_named_boundary: bool
     primitives: tuple[Primitive, ...]
     outside: int
+    page: Polygon | None = None
     repaired: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
@@ -159,15 +183,27 @@ def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation
     report = _Report()
     boundary = find_boundary(drawing, solid=solid, overlap=overlap)
     are_solid = _are_solid(drawing, boundary, solid=solid)
+    nested = None
+    if drawing.options.outlines == "nested":
+        nested = _find_nested_areas(drawing, boundary, report)
+    if nested is not None:
+        boundary = nested.boundary
+    floors = _find_floors(drawing, boundary, report, are_solid=are_solid)
     if are_solid and boundary is None:
-        boundary = find_surrounding(drawing)
+        boundary = find_surrounding(drawing, floors.outlines)
     region = _find_region(drawing, boundary, report, are_solid=are_solid)
     if region.is_empty:
         found = "no closed outline, but one that encloses free space was wanted"
         raise MapError(f"{drawing.where}: {found}")
     require_size(region.geoms[0].bounds, drawing.where)
-    obstacles = _find_obstacles(drawing, boundary, region, are_solid=are_solid)
-    free = _subtract(region, obstacles.solids)
+    if nested is not None:
+        obstacles = _find_obstacles(drawing, boundary, region, floors, are_solid=False)
+        ground: Coat | None = nested.solid
+    else:
+        obstacles = _find_obstacles(drawing, boundary, region, floors, are_solid=are_solid)
+        ground = _find_ground(boundary, region, floors)
+    coats = obstacles.coats if ground is None else [*obstacles.coats, ground]
+    free = _subtract(region, uncover(coats, floors.coats))
     report.describe(drawing, boundary, obstacles, are_solid=are_solid)
     return Interpretation(
         free=free,
@@ -175,6 +211,7 @@ def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation
         has_named_boundary=boundary is not None and boundary.is_named,
         primitives=obstacles.primitives,
         outside=obstacles.outside,
+        page=drawing.page if _is_background(drawing, boundary) else None,
         repaired=report.repaired,
         notes=report.notes,
     )
@@ -208,7 +245,7 @@ def find_boundary(drawing: Drawing, *, solid: bool, overlap: bool) -> Boundary |
         return Boundary(drawing.world)
     named = _find_named(drawing)
     asked = drawing.options.outlines
-    if named is not None or asked == "free" or not drawing.outlines:
+    if named is not None or asked in ("free", "nested") or not drawing.outlines:
         return named
     if asked == "solid" or solid:
         return _find_largest(drawing, with_walls=True)
@@ -333,10 +370,13 @@ def _join_outlines(drawing: Drawing, largest: Outline, members: set[Outline]) ->
     return Boundary(joined.area, source, frozenset(members), gaps=gaps)
 
 
-def find_surrounding(drawing: Drawing) -> Boundary:
-    """Return what the shapes enclose as walls, else a rectangle around them."""
-    solids = [*drawing.areas, *(line.solid for line in drawing.lines)]
-    solid = _unite(solids)
+def find_surrounding(drawing: Drawing, floors: frozenset[Outline] = frozenset()) -> Boundary:
+    """Return what the shapes except for floors enclose as walls, else a rectangle around everything."""
+    everything = [*drawing.areas, *(line.solid for line in drawing.lines)]
+    edges = [edge for outline in drawing.outlines if outline in floors for edge in outline.edges]
+    lines = [line for line in (*drawing.lines, *edges) if line.role != "free"]
+    areas = [outline.area for outline in drawing.outlines if outline not in floors]
+    solid = _unite([*areas, *(line.solid for line in lines)])
     fills = [Polygon(part.exterior) for part in solid.geoms]
     if fills:  # else what there is is thinner than the grid
         k = int(np.argmax([fill.area for fill in fills]))
@@ -345,10 +385,10 @@ def find_surrounding(drawing: Drawing) -> Boundary:
         if is_open and _holds(fill, list(solid.geoms)):
             return Boundary(MultiPolygon([fill]), f"the outer edge of the walls, around {fill.area:.4g} m²")
     around = DEFAULT_AROUND_M if drawing.options.around is None else drawing.options.around
-    x, y, right, top = shapely.total_bounds(solids)
+    x, y, right, top = shapely.total_bounds(everything)
     box = shapely.box(x - around, y - around, right + around, top + around)
     source = f"a rectangle {around:g} m around everything (--around): no shape holds the others"
-    return Boundary(MultiPolygon([box]), source)
+    return Boundary(MultiPolygon([box]), source, is_guess=True)
 
 
 def _holds(outer: BaseGeometry, inner: Sequence[BaseGeometry]) -> bool:
@@ -371,7 +411,7 @@ def _unite(areas: Sequence[BaseGeometry]) -> MultiPolygon:
 def _are_solid(drawing: Drawing, boundary: Boundary | None, *, solid: bool) -> bool:
     """Return whether closed outlines are solid, except for the boundary."""
     if drawing.options.outlines is not None:
-        return drawing.options.outlines == "solid"
+        return drawing.options.outlines != "free"
     if solid or not drawing.outlines:
         return True
     return boundary is not None and len(drawing.outlines) > len(boundary.outlines)
@@ -385,15 +425,127 @@ def _find_region(
         assert boundary is not None
         return boundary.area
     used = frozenset() if boundary is None else boundary.outlines
-    areas = [outline.area for outline in drawing.outlines if outline not in used]
+    outlines = [outline for outline in drawing.outlines if outline.role != "solid"]
+    areas = [outline.area for outline in outlines if outline not in used]
     if not areas:
         return MultiPolygon() if boundary is None else boundary.area
     return report.count_gaps(areas, drawing.snap)
 
 
 @dataclass(frozen=True, eq=False)
+class _Floors:
+    """Outlines that are free among solid ones, and the paint that uncovers what is below it.
+
+    `is_slab`: whether the boundary is solid itself, except for the floors on it.
+    """
+
+    outlines: frozenset[Outline]
+    coats: Sequence[Coat]
+    is_slab: bool = False
+
+
+def _find_floors(
+    drawing: Drawing, boundary: Boundary | None, report: "_Report", *, are_solid: bool
+) -> _Floors:
+    """Return the floors of a drawing: what was declared free, and where nothing was, what is pale."""
+    used = frozenset() if boundary is None else boundary.outlines
+    others = [outline for outline in drawing.outlines if outline not in used]
+    chosen = {outline for outline in others if outline.role == "free"}
+    is_slab = are_solid and boundary is not None and _is_slab(drawing, boundary)
+    if are_solid and drawing.options.outlines is None:
+        chosen |= _find_pale_floors(drawing, others, report, is_slab=is_slab)
+    coats = [outline.coat for outline in others if outline in chosen]
+    coats += [line.coat for line in drawing.lines if line.role == "free"]
+    return _Floors(frozenset(chosen), coats, is_slab)
+
+
+def _is_slab(drawing: Drawing, boundary: Boundary) -> bool:
+    """Return whether a boundary is a dark area that pale floors are painted on, or declared solid."""
+    if boundary.is_named or len(boundary.outlines) != 1:
+        return False
+    (outline,) = boundary.outlines
+    if outline.role is not None:
+        return outline.role == "solid"
+    later = [each for each in drawing.outlines if each.order > outline.order and each.role != "solid"]
+    return is_dark(outline.colour) and any(is_pale(each.colour) for each in later)
+
+
+def _find_pale_floors(
+    drawing: Drawing, outlines: Sequence[Outline], report: "_Report", *, is_slab: bool
+) -> set[Outline]:
+    """Return the outlines that are floors by their colour, and report all that is pale."""
+    undecided = [outline for outline in outlines if outline.role is None and outline.colour is not None]
+    if is_slab:
+        colours = {outline.colour for outline in undecided if is_pale(outline.colour)}
+    else:
+        marks = [outline.coat for outline in outlines]
+        lines = [*drawing.lines, *(edge for outline in outlines for edge in outline.edges)]
+        marks += [Coat(LineString(line.points), line.order, line.colour) for line in lines]
+        colours = set(find_floor_colours([outline.coat for outline in undecided], marks))
+    chosen = [outline for outline in undecided if outline.colour in colours]
+    pale = [each.colour for each in undecided if is_pale(each.colour) and each.colour not in colours]
+    pale += [line.colour for line in drawing.lines if line.role is None and is_pale(line.colour)]
+    if chosen:
+        why = "on a dark ground" if is_slab else "with dark paint on them"
+        counts = count_colours(outline.colour for outline in chosen)
+        report.notes.append(f"pale fills taken as floor: {counts} {why} (--solid-colour: as obstacles)")
+    if pale:
+        counts = count_colours(pale)
+        report.notes.append(f"pale paint taken as solid: {counts} (--free-colour: as free space)")
+    return set(chosen)
+
+
+def _find_ground(boundary: Boundary | None, region: MultiPolygon, floors: _Floors) -> Coat | None:
+    """Return the region as paint where only what is painted as a floor is free."""
+    if boundary is None:
+        return None
+    has_declared = any(outline.role == "free" for outline in floors.outlines)
+    if floors.is_slab or (boundary.is_guess and has_declared):
+        order = min((outline.order for outline in boundary.outlines), default=-1)
+        return Coat(region, order)
+    return None
+
+
+def _is_background(drawing: Drawing, boundary: Boundary | None) -> bool:
+    """Return whether the boundary is a filled rectangle without a stroke, as large as the page."""
+    if drawing.page is None or boundary is None or boundary.is_named or len(boundary.outlines) != 1:
+        return False
+    (outline,) = boundary.outlines
+    is_plain = not outline.edges and outline.role is None and not is_dark(outline.colour)
+    covered = shapely.intersection(outline.area, drawing.page).area
+    return is_plain and covered > _BACKGROUND_SHARE * drawing.page.area
+
+
+@dataclass(frozen=True, eq=False)
+class _Nested:
+    """A boundary in which outlines are free and solid by turns, and what is solid in it."""
+
+    boundary: Boundary
+    solid: Coat
+
+
+def _find_nested_areas(drawing: Drawing, boundary: Boundary | None, report: "_Report") -> _Nested | None:
+    """Return what outlines are by turns; None where there are none."""
+    used = frozenset() if boundary is None else boundary.outlines
+    areas = [each.area for each in drawing.outlines if each not in used and each.role is None]
+    if not areas:
+        return None
+    odd, even = alternate(areas)
+    if boundary is not None:
+        report.notes.append("what lies in an odd number of outlines within the boundary is solid")
+        return _Nested(boundary, Coat(odd, -1))
+    is_odd_free = odd.area >= even.area
+    free, solid = (odd, even) if is_odd_free else (even, odd)
+    whole = polygons_of(united([Polygon(part.exterior) for part in (*odd.geoms, *even.geoms)]))
+    number = "an odd number" if is_odd_free else "an even number"
+    size = square_metres(free.area, 3)
+    report.notes.append(f"what lies in {number} of outlines is free, {size}, as the larger area")
+    return _Nested(Boundary(whole, "the outermost outlines"), Coat(solid, -1))
+
+
+@dataclass(frozen=True, eq=False)
 class _Obstacles:
-    """What stands in a region: outlines, lines and pillars, and the areas of all of them.
+    """What stands in a region: outlines, lines and pillars, and the paint of all of them.
 
     `outside`: number of shapes that do not meet the region, and of outlines around all of it.
     """
@@ -401,7 +553,7 @@ class _Obstacles:
     outlines: Sequence[Outline]
     walls: Sequence[Line]
     pillars: Sequence[CircleObstacle]
-    solids: Sequence[BaseGeometry]
+    coats: Sequence[Coat]
     count: int
     outside: int
 
@@ -414,23 +566,25 @@ class _Obstacles:
 
 
 def _find_obstacles(
-    drawing: Drawing, boundary: Boundary | None, region: MultiPolygon, *, are_solid: bool
+    drawing: Drawing, boundary: Boundary | None, region: MultiPolygon, floors: _Floors, *, are_solid: bool
 ) -> _Obstacles:
     """Return what stands in a region, m, that has the given boundary."""
     used = Boundary(region) if boundary is None else boundary
-    outlines = [each for each in drawing.outlines if are_solid and each not in used.outlines]
-    walls = [line for line in drawing.lines if line not in used.lines]
+    others = [each for each in drawing.outlines if each not in used.outlines and each not in floors.outlines]
+    outlines = [each for each in others if are_solid or each.role == "solid"]
+    edges = [edge for outline in drawing.outlines if outline in floors.outlines for edge in outline.edges]
+    lines = [line for line in drawing.lines if line not in used.lines]
+    walls = [line for line in (*lines, *edges) if line.role != "free"]
     blocks = np.array([outline.area for outline in outlines], dtype=object)
     shapely.prepare(region)
     is_frame = shapely.covered_by(region, blocks)
-    solids = [
-        *blocks[~is_frame],
-        *(line.solid for line in walls),
-        *(pillar.polygon for pillar in drawing.pillars),
-    ]
-    outside = int((~shapely.intersects(region, solids)).sum() + is_frame.sum())
+    coats = [outline.coat for outline, frames in zip(outlines, is_frame, strict=True) if not frames]
+    coats += [line.coat for line in walls]
+    # pillars are drawn by no paint that could be covered
+    coats += [Coat(pillar.polygon, np.inf) for pillar in drawing.pillars]
+    outside = int((~shapely.intersects(region, [coat.area for coat in coats])).sum() + is_frame.sum())
     count = int((~is_frame).sum())
-    return _Obstacles(outlines, walls, drawing.pillars, solids, count, outside)
+    return _Obstacles(outlines, walls, drawing.pillars, coats, count, outside)
 
 
 def _subtract(region: MultiPolygon, solids: Sequence[BaseGeometry]) -> MultiPolygon:

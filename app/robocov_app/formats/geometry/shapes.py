@@ -14,13 +14,15 @@ from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, counted, unknown_name
 from robocov.mapfile.models import FARTHEST, SMALLEST
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, ReadOptions
+from robocov_app.formats.base import ForeignMap, Painted, ReadOptions
+from robocov_app.formats.colours import UNPAINTED, ColourKey, Paint, count_colours, name_colour
 from robocov_app.formats.geometry.figures import BOUNDARY, Figure, Line, Outline, name_of
 from robocov_app.formats.geometry.interpretation import Boundary, Drawing, find_surrounding, interpret
 from robocov_app.formats.geometry.polygons import Crossings, Rule, enclosed
 
 __all__ = ["BOUNDARY", "Figure", "Line", "Outline", "Shapes"]
 THICKNESS = 0.1  # width of walls that are drawn as lines without one, in metres
+_EVEN = 1e-6  # relative width by which a shape may be thinner by rounding
 _SHOWN = 20  # names that are listed where one is wrong
 _DIGITS = 9
 
@@ -47,6 +49,7 @@ class Shapes:
         self.robots: list[tuple[float, float]] = []
         self.notes: list[str] = []
         self.cell: float | None = None
+        self.page: Polygon | None = None
         self.thickness = THICKNESS if options.thickness is None else options.thickness
         self._heights: list[Array] = []
         self._met: list[str] = []
@@ -85,7 +88,7 @@ class Shapes:
 
     def add_outline(
         self, rings: Sequence[Array], labels: Sequence[str] = (), *,
-        rule: Rule = "holes", at: str = "", thing: str = "outline", whole: str = "",
+        rule: Rule = "holes", at: str = "", thing: str = "outline", whole: str = "", paint: Paint = UNPAINTED,
     ) -> bool:  # fmt: skip
         """Add the area of rings, (k, 2) m; without one the `thing`, if it has a name, is counted."""
         rings = self._checked(rings, at)
@@ -95,10 +98,45 @@ class Shapes:
         if reason is not None:
             self._met.append(f"{at}: {reason}" if at else reason)
         if not area.is_empty:
-            self.outlines.append(Outline(area, tuple(labels), whole=whole))
+            self._keep_outline(Outline(area, tuple(labels), whole=whole), paint)
         elif thing:
             self.leave_out(thing, "without an area")
         return not area.is_empty
+
+    def _keep_outline(self, outline: Outline, paint: Paint) -> None:
+        order = len(self.outlines) + len(self.lines)
+        self.outlines.append(replace(outline, colour=paint.colour, role=paint.role, order=order))
+
+    def add_edges(self, lines: Sequence[Line]) -> None:
+        """Keep the stroke of the outline that was added last; it counts only if the outline is free."""
+        last = self.outlines[-1]
+        self.outlines[-1] = replace(last, edges=tuple(replace(line, order=last.order) for line in lines))
+
+    def drop_thin_outlines(self, width: float) -> None:
+        """Drop outlines that are nowhere as wide as a width in metres, and count them."""
+        if not width > 0.0 or not self.outlines:
+            return
+        areas = [outline.area for outline in self.outlines]
+        is_thin = shapely.is_empty(shapely.buffer(areas, -width / 2 * (1.0 - _EVEN), quad_segs=4))
+        if is_thin.any():
+            self.leave_out("shape", f"thinner than {width:.3g} m (--min-stroke)", int(is_thin.sum()))
+            self.outlines = [each for each, goes in zip(self.outlines, is_thin, strict=True) if not goes]
+
+    def note_colours(self, key: ColourKey) -> None:
+        """Note how often colours with a declared role occur, and which ones there are where none does."""
+        painted: list[Outline | Line] = [*self.outlines, *self.lines]
+        painted += [edge for outline in self.outlines for edge in outline.edges]
+        for role in ("free", "solid"):
+            declared = [colour for colour, its in key.entries if its == role]
+            found = [each for each in painted if each.role == role]
+            if found:
+                counts = count_colours(each.colour for each in found)
+                self.notes.append(f"painted as {role}: {counts} (--{role}-colour)")
+            elif declared:
+                known = count_colours(each.colour for each in painted)
+                there = f"; there are {known}" if known else ""
+                names = ", ".join(map(name_colour, declared))
+                self.notes.append(f"nothing is painted {names} (--{role}-colour){there}")
 
     def add_line(self, line: Line, *, at: str = "") -> None:
         (points,) = self._checked([line.points], at)
@@ -110,7 +148,8 @@ class Shapes:
         if not (points[1:] != points[:-1]).any():
             self.leave_out("line", "without a length")
         else:
-            self.lines.append(replace(line, points=points, width=width))
+            order = len(self.outlines) + len(self.lines)
+            self.lines.append(replace(line, points=points, width=width, order=order))
 
     def join_lines(self) -> None:
         """Join lines of the same width and labels whose ends meet, so that their corners are whole."""
@@ -123,11 +162,19 @@ class Shapes:
             for joined in shapely.get_parts(shapely.line_merge(shapely.MultiLineString(lines)))
         ]
 
-    def add_circle(self, centre: Array, radius: float, labels: Sequence[str] = (), *, at: str = "") -> None:
+    def add_circle(
+        self,
+        centre: Array,
+        radius: float,
+        labels: Sequence[str] = (),
+        *,
+        at: str = "",
+        paint: Paint = UNPAINTED,
+    ) -> None:
         self._checked([centre + np.array([[-radius, -radius], [radius, radius]])], at)
         circle = CircleObstacle((float(centre[0]), float(centre[1])), radius, name_of(labels))
         (ring,) = self._checked([np.asarray(circle.polygon.exterior.coords)[:-1]], at)
-        self.outlines.append(Outline(MultiPolygon([Polygon(ring)]), tuple(labels), circle))
+        self._keep_outline(Outline(MultiPolygon([Polygon(ring)]), tuple(labels), circle), paint)
 
     def add_point(self, point: Array, labels: Sequence[str] = (), *, at: str = "") -> None:
         ((x, y),) = self._checked([point[None]], at)[0].tolist()
@@ -255,7 +302,18 @@ class Shapes:
             repaired=(*self.repaired, *found.repaired),
             dropped=self.dropped,
             notes=(*self.notes, *found.notes),
+            page=found.page,
+            painted=self._list_painted(),
         )
+
+    def _list_painted(self) -> tuple[Painted, ...]:
+        """Return what has a colour, the lowest first."""
+        coats = [outline.coat for outline in self.outlines if outline.colour is not None]
+        lines = [*self.lines, *(edge for outline in self.outlines for edge in outline.edges)]
+        coats += [line.coat for line in lines if line.colour is not None]
+        # of one order are a fill and its own stroke, which is above
+        coats.sort(key=lambda coat: coat.order)
+        return tuple(Painted(coat.area, coat.colour) for coat in coats if coat.colour is not None)
 
     def find_surrounding(self) -> Boundary:
         """Return what the shapes enclose as walls, else a rectangle around them."""
@@ -269,6 +327,7 @@ class Shapes:
             pillars=self.pillars,
             options=self.options,
             world=world,
+            page=self.page,
         )
 
 

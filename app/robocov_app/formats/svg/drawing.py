@@ -27,7 +27,9 @@ from robocov.arrays import Array
 from robocov.environment import CircleObstacle, Environment, Obstacle, Ring, WallObstacle
 from robocov.errors import MapError, one_line
 from robocov.files.atomic import written
+from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
+from robocov_app.formats.colours import Paint, read_colour
 from robocov_app.formats.files import MAX_VERTICES, name_of_map, require_shapes
 from robocov_app.formats.geometry.conversion import with_numbers
 from robocov_app.formats.geometry.curves import TOLERANCE, arc
@@ -49,6 +51,7 @@ _SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
 _PICTURES = ("text", "image", "foreignObject", "video", "iframe", "canvas")
 _CAPS: dict[str, Literal["square", "round"]] = {"square": "square", "round": "round"}
 _JOINS: dict[str, Literal["bevel", "round"]] = {"bevel": "bevel", "round": "round"}
+_MAX_REFERENCES = 5  # from one gradient to the next
 _EVEN = 1.0 + 1e-6  # ratio of the growth of lengths in two directions up to which a stroke has one width
 
 
@@ -60,7 +63,13 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         matrix, width, height = _page(root.attributes, options.scale)
     except ValueError as error:
         root.refuse(str(error))
+    left, top, *_ = _view_box(root.attributes) or (0.0, 0.0, width, height)
+    corners = np.array([[left, top], [left + width, top + height]])
+    (x0, y0), (x1, y1) = moved(matrix, corners).tolist()
+    shapes.page = shapely.box(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
+    drawing.pixel = paths.PIXEL if options.scale is None else options.scale
     drawing.draw(matrix, width, height)
+    shapes.drop_thin_outlines(options.stroke_width(drawing.pixel))
     everything = shapes.geometries
     if options.scale is None and everything:
         x, y, right, top = shapely.total_bounds(everything)
@@ -70,6 +79,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
             raise MapError(f"{shapes.where}: {found}, but at least {_SMALLEST:g} m was wanted: {hint}")
     own = "at its own scale" if options.scale is None else f"a unit is {options.scale:g} m"
     shapes.notes = [own, *drawing.notes()]
+    shapes.note_colours(drawing.key)
     texts = {each.tag: one_line(" ".join(each.text.split())) for each in root.children if each.text.strip()}
     name = texts.get("title", "")[:80] or name_of_map(path)
     return shapes.foreign_map(name, texts.get("desc", "")[:1000] or "Imported from SVG.", solid=True)
@@ -115,7 +125,10 @@ def _labels(element: Element, *, outer: tuple[str, ...] = (), inner: tuple[str, 
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Matrix from an element's units to metres, (3, 3); style; labels, the innermost first; viewport."""
+    """Matrix from an element's units to metres, (3, 3); style; labels, the innermost first; viewport.
+
+    `opacity`: of the groups around an element and of its own.
+    """
 
     matrix: Array
     style: paths.Style
@@ -123,6 +136,7 @@ class _Place:
     width: float
     height: float
     depth: int = 0
+    opacity: float = 1.0
 
     @property
     def diagonal(self) -> float:
@@ -150,7 +164,10 @@ class _Drawing:
         self.sheet = paths.StyleSheet(root.where)
         self.named: dict[str, Element] = {}
         self.draws = paths.MOST_DRAWS
+        self.pixel = paths.PIXEL  # metres a unit of the root
+        self.key = shapes.options.colour_key()
         self.dashed = self.clipped = 0
+        self._last: tuple[Element, _Place, list[tuple[Array, bool]]] | None = None
         for element in root.everything():
             if name := element.attributes.get("id"):
                 self.named.setdefault(name, element)
@@ -222,6 +239,7 @@ class _Drawing:
                 style=paths.inherited(outer.style, own),
                 labels=_labels(element, outer=outer.labels),
                 depth=outer.depth + 1,
+                opacity=outer.opacity * paths.opacity_of(own.get("opacity", "1")),
             )
             if element.tag in _SHAPES:
                 self._shape(element, place)
@@ -267,33 +285,92 @@ class _Drawing:
         if not (visible and (filled or stroked)):
             self.shapes.leave_out("hidden element")
             return
-        least, most = stretch(place.matrix)
-        if filled and element.tag == "circle" and most - least <= 1e-9 * most:
-            (centre,) = moved(place.matrix, np.array([place.lengths(element, "cx", "cy")]))
-            radius = place.radius(element) * most
-            if radius > 0.0:
-                self.shapes.add_circle(centre, radius, place.labels, at=at)
-                return
-        parts = self._points(element, place)
-        rings = [moved(place.matrix, points) for points, _ in parts]
-        rule: Rule = "evenodd" if style["fill-rule"].lower() == "evenodd" else "nonzero"
-        if filled and rings and self.shapes.add_outline(rings, place.labels, rule=rule, at=at, thing=""):
+        fill, stroke = self._paint(place, "fill"), self._paint(place, "stroke")
+        if filled and fill.role == "ignore":
+            self.shapes.leave_out("fill", "of a colour that is left out (--ignore-colour)")
+            filled = False
+        if stroked and stroke.role == "ignore":
+            self.shapes.leave_out("stroke", "of a colour that is left out (--ignore-colour)")
+            stroked = False
+        if not (filled or stroked):
+            return
+        if filled and self._fill(element, place, fill, at):
+            if stroked:
+                self._add_edges(element, place, stroke)
             return
         if stroked:
-            self._strokes(parts, place, at)
+            self._strokes(self._points(element, place), place, stroke, at)
         else:
             self.shapes.leave_out("shape", "without an area")
 
-    def _strokes(self, parts: list[tuple[Array, bool]], place: _Place, at: str) -> None:
+    def _paint(self, place: _Place, what: str) -> Paint:
+        """Return the colour of a fill or a stroke; the first of a gradient's colours for all of it."""
+        seen = paths.seen_colour(place.style, what, place.opacity, self._gradient_colour)
+        written = read_colour(place.style[what])
+        return Paint(seen, self.key.find_role(written) or self.key.find_role(seen))
+
+    def _gradient_colour(self, name: str) -> str | None:
+        """Return the first colour of the gradient of that name, or of the one that it refers to."""
+        for _ in range(_MAX_REFERENCES):
+            gradient = self.named.get(name)
+            if gradient is None:
+                return None
+            for stop in gradient.children:
+                if stop.tag == "stop":
+                    own = self.sheet.of(stop)
+                    return own.get("stop-color") or stop.attributes.get("stop-color", "black")
+            name = gradient.attributes.get("href", "").strip().removeprefix("#")
+        return None
+
+    def _fill(self, element: Element, place: _Place, paint: Paint, at: str) -> bool:
+        """Add the area of a filled shape; return whether it has one that counts."""
+        least, most = stretch(place.matrix)
+        if element.tag == "circle" and most - least <= 1e-9 * most:
+            (centre,) = moved(place.matrix, np.array([place.lengths(element, "cx", "cy")]))
+            radius = place.radius(element) * most
+            if radius > 0.0:
+                self.shapes.add_circle(centre, radius, place.labels, at=at, paint=paint)
+                return True
+        rings = [moved(place.matrix, points) for points, _ in self._points(element, place)]
+        rule: Rule = "evenodd" if place.style["fill-rule"].lower() == "evenodd" else "nonzero"
+        if not rings:
+            return False
+        return self.shapes.add_outline(rings, place.labels, rule=rule, at=at, thing="", paint=paint)
+
+    def _add_edges(self, element: Element, place: _Place, paint: Paint) -> None:
+        """Keep the stroke of a filled shape, which only counts where its fill turns out to be floor."""
+        try:
+            lines = self._lines(self._points(element, place), place, paint)
+        except ValueError:  # of a width that no program writes, of a stroke that may never matter
+            return
+        thinnest = self.shapes.options.stroke_width(self.pixel)
+        wide = (line for line in lines if thinnest <= line.measure_widths()[1] <= LARGEST)
+        self.shapes.add_edges([replace(line, width=max(line.width, SMALLEST)) for line in wide])
+
+    def _strokes(self, parts: list[tuple[Array, bool]], place: _Place, paint: Paint, at: str) -> None:
+        lines = self._lines(parts, place, paint)
+        if not lines:
+            self.shapes.leave_out("stroke", "without a width")
+            return
+        thinnest = self.shapes.options.stroke_width(self.pixel)
+        if max(line.measure_widths()[1] for line in lines) < thinnest:
+            self.shapes.leave_out("stroke", f"thinner than {thinnest:.3g} m (--min-stroke)")
+            return
+        self.dashed += place.style["stroke-dasharray"].lower() != "none"
+        for line in lines:
+            self.shapes.add_line(line, at=at)
+
+    def _lines(self, parts: list[tuple[Array, bool]], place: _Place, paint: Paint) -> list[Line]:
+        """Return the lines of a stroke, none where it has no width."""
         style, given = place.style, self.shapes.options.thickness
         least, most = stretch(place.matrix)
         own = length(style["stroke-width"], place.diagonal)
         width = own * math.sqrt(least * most) if given is None else given
         if not width > 0.0:
-            self.shapes.leave_out("stroke", "without a width")
-            return
-        self.dashed += style["stroke-dasharray"].lower() != "none"
+            return []
         limit = numbers(style["stroke-miterlimit"])
+        is_stretched = given is None and most > _EVEN * least
+        lines = []
         for points, closed in parts:
             path = np.concatenate([points, points[:1]]) if closed else points
             line = Line(
@@ -303,12 +380,22 @@ class _Drawing:
                 cap=_CAPS.get(style["stroke-linecap"].lower(), "flat"),
                 join=_JOINS.get(style["stroke-linejoin"].lower(), "mitre"),
                 mitre_limit=limit[0] if limit and limit[0] >= 1.0 else 4.0,
-                stretched=(path, own, place.matrix) if given is None and most > _EVEN * least else None,
+                stretched=(path, own, place.matrix) if is_stretched else None,
+                colour=paint.colour,
+                role=paint.role,
             )
-            self.shapes.add_line(line, at=at)
+            lines.append(line)
+        return lines
 
     def _points(self, element: Element, place: _Place) -> list[tuple[Array, bool]]:
         """Return the points of the subpaths of a shape, (k, 2), and whether they are closed."""
+        last = self._last
+        if last is None or last[0] is not element or last[1] is not place:
+            last = element, place, self._compute_points(element, place)
+            self._last = last
+        return last[2]
+
+    def _compute_points(self, element: Element, place: _Place) -> list[tuple[Array, bool]]:
         most = stretch(place.matrix)[1]
         tolerance = TOLERANCE / most if most > 0.0 else np.inf
         given = element.attributes

@@ -11,6 +11,7 @@ import numpy as np
 
 from robocov.arrays import Array, ranges
 from robocov.errors import MapError
+from robocov_app.formats.colours import Colour, mix_with_white, read_paint
 from robocov_app.formats.geometry.curves import arcs, beziers
 from robocov_app.formats.geometry.frames import frame
 from robocov_app.formats.xml_tree import Element
@@ -26,6 +27,7 @@ _PIXELS = {  # user units in a unit of length (CSS Values 4, section 6.2)
 }  # fmt: skip
 PIXEL = 0.0254 / 96  # a user unit in metres, where nothing says otherwise
 MOST_DRAWS = 150_000  # commands of all paths, with or without their letter; vertices of polylines are none
+_REFERENCE = re.compile(r"""\s*url\(\s*["']?#([^"')]*)["']?\s*\)""")
 _COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])", re.ASCII)
 _FLAG = re.compile(r"[\s,]*([01])")
 _ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
@@ -292,7 +294,7 @@ class _Pen:
 
 Style: TypeAlias = Mapping[str, str]  # properties by name, as they are written
 INHERITED = {  # by elements from groups, with their defaults (SVG 2, section 13)
-    "fill": "black", "fill-opacity": "1", "fill-rule": "nonzero",
+    "color": "black", "fill": "black", "fill-opacity": "1", "fill-rule": "nonzero",
     "stroke": "none", "stroke-opacity": "1", "stroke-width": "1", "stroke-dasharray": "none",
     "stroke-linecap": "butt", "stroke-linejoin": "miter", "stroke-miterlimit": "4",
     "visibility": "visible",
@@ -406,7 +408,53 @@ def inherited(parent: Style, own: Style) -> dict[str, str]:
 
 
 def is_painted(style: Style, what: str) -> bool:
-    return style[what].lower() not in ("none", "transparent") and not _is_zero(style[f"{what}-opacity"])
+    """Return whether a fill or a stroke is seen at all."""
+    if style[what].lower() in ("none", "transparent") or _is_zero(style[f"{what}-opacity"]):
+        return False
+    paint = read_paint(style[what])
+    return paint is None or paint[1] > 0.0
+
+
+def seen_colour(
+    style: Style, what: str, opacity: float, gradient_colour: Callable[[str], str | None]
+) -> Colour | None:
+    """Return the colour of a fill or a stroke, mixed with white where it is translucent.
+
+    Parameters
+    ----------
+    style : Style
+    what : str
+        ``fill`` or ``stroke``.
+    opacity : float
+        Of the element and of the groups around it.
+    gradient_colour : callable
+        Gives the colour of the gradient with a name, as it is written, or None.
+
+    Returns
+    -------
+    colour : Colour or None
+        None where it is not known, as of a pattern.
+    """
+    written = style[what]
+    if match := _REFERENCE.match(written):
+        written = gradient_colour(match[1]) or written[match.end() :].strip()
+    if written.casefold() == "currentcolor":
+        written = style["color"]
+    paint = read_paint(written)
+    if paint is None:
+        return None
+    colour, alpha = paint
+    return mix_with_white(colour, alpha * opacity * opacity_of(style[f"{what}-opacity"]))
+
+
+def opacity_of(text: str) -> float:
+    """Return an opacity from 0 to 1; what is no number is 1."""
+    text = text.strip()
+    try:
+        value = float(text.rstrip("%")) / (100.0 if text.endswith("%") else 1.0)
+    except ValueError:
+        return 1.0
+    return min(max(value, 0.0), 1.0) if value == value else 1.0
 
 
 def is_hidden(own: Style) -> bool:
