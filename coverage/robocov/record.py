@@ -10,13 +10,13 @@ from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cache, cached_property
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from pydantic import Field, create_model
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.conditions import LIMITS, Conditions
+from robocov.conditions import LIMITS, Conditions, Joined
 from robocov.controllers import Controller, gain_values, short_name
 from robocov.controllers.gains import Value
 from robocov.drawing import Drawable
@@ -91,6 +91,23 @@ class _Touch(Document):
     robots: list[Number]
 
 
+class _Placement(Document):
+    """Which robots were put to another place by hand, and when they were there."""
+
+    time_s: Time
+    robots: list[Number]
+
+
+class _Event(Document):
+    """A robot that joined, where it did and where it was to."""
+
+    kind: Literal["join"]
+    robot: Number
+    time_s: Time
+    place_m: Point
+    requested_m: Point
+
+
 class _Session(Document):
     """See `robocov_app.viewer.session.kept`."""
 
@@ -99,6 +116,7 @@ class _Session(Document):
     robots: list[Number] = Field([])
     failed: dict[Key, Point] = Field({})
     touched: list[_Touch] = Field([])
+    placed: list[_Placement] = Field([])
     control_dt_s: Seconds = 1.0
     repeatable: bool = True
 
@@ -116,6 +134,7 @@ class RunDocument(Document):
     duration_s: Time = 0.0
     lattice: Annotated[int | None, Field(ge=2, le=2048), wanted("a whole number from 2 to 2048")] = None
     conditions: _Conditions | None = None
+    events: list[_Event] = Field([])
     session: _Session = _Session()
     versions: dict[str, str] = Field({})
     summary: dict[str, Any] = Field({})
@@ -143,6 +162,8 @@ class Record(Drawable):
         Heading, from +x, and turning rate of unicycles; None in a team of points.
     session : dict
         Where a run comes from that is a part of a session in the window.
+    joined : tuple of Joined
+        The robots that joined during the run, and where.
     """
 
     _drawn_as = "record"
@@ -164,6 +185,7 @@ class Record(Drawable):
     session: Mapping[str, Any] = field(default_factory=dict)
     conditions: Conditions | None = None  # ideal ones
     steering: Array | None = None
+    joined: tuple[Joined, ...] = ()
 
     @cached_property
     def working(self) -> BoolArray:
@@ -174,6 +196,24 @@ class Record(Drawable):
     def present(self) -> BoolArray:
         """Mask of robots present, failed ones included, (T, n) bool; read-only."""
         return self._of_robots(Conditions.present)
+
+    @cached_property
+    def travelled(self) -> BoolArray:
+        """Mask of the displacements that are travel, (T - 1, n) bool; read-only.
+
+        Between two moments a robot that is not there yet, or that was put elsewhere by hand, does not travel.
+        """
+        mask = self.present[:-1].copy()
+        numbers = self.session.get("robots") or range(1, len(self.team) + 1)
+        row_of = {number: row for row, number in enumerate(numbers)}
+        for placed in self.session.get("placed", ()):
+            # half a microsecond forgives the rounding of sums of steps
+            after = int(np.searchsorted(self.time, placed["time_s"] - 5e-7))
+            rows = [row_of[number] for number in placed["robots"] if number in row_of]
+            if 0 < after < len(self.time):
+                mask[after - 1, rows] = False
+        mask.setflags(write=False)
+        return mask
 
     @property
     def arrays(self) -> tuple[str, ...]:
@@ -287,6 +327,7 @@ class Record(Drawable):
             "duration_s": float(self.time[-1]),
             "lattice": lattice,
             **({"conditions": self.conditions.to_dict()} if self.conditions else {}),
+            **({"events": [_event_json(each) for each in self.joined]} if self.joined else {}),
             **({"session": dict(self.session)} if self.session else {}),
             "versions": dict(versions()),
             "summary": dict(summary or {}),
@@ -328,11 +369,31 @@ class Record(Drawable):
                 conditions.check_team(len(team))
         except ParameterError as error:
             raise InputError(f"{path}: {error}") from error
-        law = run.controller.name, short_name(run.controller.name), run.controller.gains
-        origin = run.start, run.seed, run.dt_s
-        session = run.session.model_dump(exclude_unset=True)
-        arrays = _arrays_of(folder / "record.npz", team)
-        return cls(environment, team, *law, *origin, **arrays, session=session, conditions=conditions)
+        known: dict[str, Any] = {
+            "environment": environment,
+            "team": team,
+            "controller": run.controller.name,
+            "label": short_name(run.controller.name),
+            "gains": run.controller.gains,
+            "start": run.start,
+            "seed": run.seed,
+            "dt": run.dt_s,
+            "session": run.session.model_dump(exclude_unset=True),
+            "conditions": conditions,
+            "joined": tuple(_joined_from(event) for event in run.events),
+        }
+        return cls(**known, **_arrays_of(folder / "record.npz", team))
+
+
+def _event_json(joined: Joined) -> dict[str, Any]:
+    place, requested = list(joined.place), list(joined.requested)
+    times = {"kind": "join", "robot": joined.robot, "time_s": joined.time}
+    return {**times, "place_m": place, "requested_m": requested}
+
+
+def _joined_from(event: _Event) -> Joined:
+    place, requested = (event.place_m[0], event.place_m[1]), (event.requested_m[0], event.requested_m[1])
+    return Joined(event.robot, event.time_s, place, requested)
 
 
 @dataclass(eq=False)
@@ -370,14 +431,15 @@ class Recorder:
         arrays += [] if snapshot.steering is None else [snapshot.steering]
         self._moments.append((seen.time, *(array.copy() for array in arrays)))
 
-    def record(self) -> Record:
-        """Return what was collected so far."""
+    def record(self, joined: tuple[Joined, ...] = ()) -> Record:
+        """Return what was collected so far; `joined` are the robots that joined in the simulation."""
         names = (*ARRAYS, TURNING) if self.team.turns.any() else ARRAYS
         columns = zip(*self._moments, strict=True) if self._moments else [()] * len(names)
         arrays: dict[str, Any] = {name: np.array(rows) for name, rows in zip(names, columns, strict=True)}
         law = str(self.name), one_line(self.controller.label), self._gains
         origin = self.start, self.seed, self.dt
-        return Record(self.environment, self.team, *law, *origin, conditions=self.conditions, **arrays)
+        arrays |= {"conditions": self.conditions, "joined": joined}
+        return Record(self.environment, self.team, *law, *origin, **arrays)
 
 
 def nearest_moments(time: Array, rate: float) -> IntArray:

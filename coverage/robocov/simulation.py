@@ -10,9 +10,10 @@ from time import process_time
 from typing import Any
 
 import numpy as np
+import shapely
 
 from robocov.arrays import Array, BoolArray
-from robocov.conditions import Conditions
+from robocov.conditions import SOON, Conditions, Joined
 from robocov.conditions.perception import Inbox, Perception, of_working
 from robocov.controllers import CONTROLLERS, informed, remembers
 from robocov.controllers.base import Controller, IndividualController, for_team
@@ -80,7 +81,7 @@ class Simulation:
         on. Robots of different runs know nothing of each other. See `simulate_many`.
 
     `memory` is what the controller remembers, `inbox` the messages that the robots have, None where they know
-    the others as they are.
+    the others as they are. `joined` lists the robots that have joined since the simulation was made.
 
     Raises StartError when a robot would start in a wall or in another robot, ParameterError when dt is out of
     range, or team and starts differ in size.
@@ -144,6 +145,9 @@ class Simulation:
             required("conditions", conditions, Conditions, "Conditions")
             conditions.check_team(len(positions))
             conditions = None if conditions.ideal else conditions
+            if not resumed:
+                check_joins(environment, conditions)
+        self.joined: tuple[Joined, ...] = ()
         self.environment, self.controller, self.dt = environment, controller, dt
         self.deciding = 0.0  # seconds of processor time that the controller has taken to decide so far
         self._began, self._steps = time, steps
@@ -301,10 +305,27 @@ class Simulation:
         else:
             forces = given_forces(forces, count, "forces")
         inbox = None if self._perception is None else self._observed()[1]
+        before = self.positions
         self._world.step(forces, self.dt, external_forces, time=self.time)
         self.memory, self.inbox = memory, inbox
         self._steps += 1
+        if self.conditions is not None and self.conditions.joins:
+            self.joined += self._find_joined(before)
         self._begin_step()
+
+    def _find_joined(self, before: Array) -> tuple[Joined, ...]:
+        """Return the robots that joined in the last step; positions `before` it are where they were to."""
+        assert self.conditions is not None
+        earlier, now = self.conditions.present(np.array([self.time - self.dt, self.time]), len(self.team))
+        return tuple(
+            Joined(
+                robot=robot + 1,
+                time=self.time,
+                place=(float(self.positions[robot, 0]), float(self.positions[robot, 1])),
+                requested=(float(before[robot, 0]), float(before[robot, 1])),
+            )
+            for robot in np.flatnonzero(now & ~earlier & self.working).tolist()
+        )
 
     def restart(self, run: int, positions: Array) -> None:
         """Put the robots of a run to other places, at rest; raises StartError where they do not fit."""
@@ -331,7 +352,7 @@ class Simulation:
         recorder = Recorder(*given, start=start, seed=seed, conditions=self.conditions)
         for snapshot in self.snapshots(duration):
             recorder.add(snapshot)
-        return recorder.record()
+        return recorder.record(self.joined)
 
     def show(self, *, height: int = 620) -> Any:
         """Show it as the interactive window, live in a notebook's cell of `height` px: see `robocov.show`.
@@ -395,6 +416,7 @@ class Simulation:
             steps=self._steps,
             conditions=self.conditions if conditions is None else conditions,
         )
+        twin.joined = self.joined
         if len(twin.team) == len(self.team):
             twin.inbox = self.inbox if conditions is None else twin.inbox
             twin.memory = deepcopy(self.memory) if controller is None else twin.memory
@@ -446,6 +468,37 @@ def simulate_many(
                 own = {name: getattr(record, name)[:, rows].copy() for name in ARRAYS[1:]}
                 records[run] = replace(record, team=one, seed=own_seeds[run], **own)
     return [records[run] for run in range(len(starts))]
+
+
+def check_joins(environment: Environment, conditions: Conditions | None) -> None:
+    """Check where robots are to join.
+
+    Parameters
+    ----------
+    environment : Environment
+        Its boundary has to enclose the places.
+    conditions : Conditions or None
+        None: no robot joins.
+
+    Raises
+    ------
+    ParameterError
+        If a robot is to join outside of the boundary, or at a place of its own but from the beginning.
+    """
+    for k, join in enumerate(() if conditions is None else conditions.joins):
+        if join.place is None:
+            continue
+        x, y = join.place
+        where = f"conditions.joins[{k}]"
+        if join.time <= SOON:
+            expected = "expected a time above 0 s for a robot that joins at a place of its own"
+            raise ParameterError(f"{where}: {expected}, got robot {join.robot} at {join.time:g} s")
+        if not environment.boundary_polygon.covers(shapely.Point(x, y)):
+            left, bottom, right, top = environment.boundary_polygon.bounds
+            inside = f"inside the boundary of map {environment.name!r}"
+            extent = f"x from {left:g} to {right:g} m, y from {bottom:g} to {top:g} m"
+            got = f"got [{x:g}, {y:g}] for robot {join.robot}"
+            raise ParameterError(f"{where}: expected a place {inside} ({extent}), {got}")
 
 
 def check_dt(dt: float) -> None:

@@ -69,7 +69,9 @@ def command(options: Arguments) -> int:
         cells.append([text.format(**row, settled=settled) for text in columns.values()])
     if not options.json:
         print_table([(title, RIGHT if title else BOLD) for title in columns], cells)
+    notes = [f"note: {row['label']}: {note}" for row in rows for note in row.get("notes", ())]
     done = "stopped; what was done is in" if stopped else "saved in"
     answer = {"out": str(out), "interrupted": stopped, "runs": rows}
-    tell(options, answer, *density_lines(environment), f"{done} {out}/: {listed(out)}{options.record_words}")
+    saved = f"{done} {out}/: {listed(out)}{options.record_words}"
+    tell(options, answer, *density_lines(environment), *notes, saved)
     return INTERRUPTED if stopped else 0

@@ -65,6 +65,7 @@ def command(options: Arguments) -> int:
     path = sum(summary["path_length_m"]) / len(summary["path_length_m"])
     end = f"stopped at {record.time[-1]:.1f} s; what was done is in" if stopped else "saved in"
     lines += [f"  path length     {path:.2f} m per robot"]
+    lines += [f"note: {note}" for note in summary.get("notes", ())]
     lines += [f"{end} {out}/: {listed(out)}{options.record_words}"]
     tell(options, {"out": str(out), "interrupted": stopped, **summary}, *lines)
     return INTERRUPTED if stopped else 0

@@ -254,7 +254,7 @@ class Episode:
         recorder = self._spec.recorder(self.simulation.controller)
         for moment in (*self._moments, self.simulation.snapshot):
             recorder.add(moment)
-        return recorder.record()
+        return recorder.record(self.simulation.joined)
 
 
 def held(task: CoverageTask, simulation: Simulation, actions: Array, moments: list[Snapshot] | None) -> Array:

@@ -90,6 +90,7 @@ def rows_of(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
             **{figure: run.summary[figure] for figure in _FIGURES if figure in run.summary},
             "mean_path_length_m": sum(run.summary["path_length_m"]) / len(run.record.team),
             "above_best": run.summary["mean_distance_m"] / best - 1.0,
+            **({"notes": run.summary["notes"]} if "notes" in run.summary else {}),
         }
         for name, run in runs.items()
     ]
@@ -104,7 +105,7 @@ def save_comparison(runs: Mapping[str, Run], cost: CoverageCost, folder: Path, o
     rows = rows_of(runs)
     content = {**_HEAD, "lattice": options.lattice, "folders": list(runs), "runs": rows}
     write_json(folder / "comparison.json", finite(content))
-    columns = [name for name in rows[0] if name not in ("label", "gains")]
+    columns = [name for name in rows[0] if name not in ("label", "gains", "notes")]
     write_csv(folder / "comparison.csv", ",".join(columns), ([row[name] for name in columns] for row in rows))
     save_pictures(list(runs.values()), cost, folder, options, comparison=True)
 

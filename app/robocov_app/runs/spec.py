@@ -13,7 +13,7 @@ from robocov.controllers.user_modules import Source, provided
 from robocov.environment import Environment
 from robocov.record import Record, Recorder
 from robocov.robots import Team
-from robocov.simulation import DEFAULT_DT, Simulation
+from robocov.simulation import DEFAULT_DT, Simulation, check_joins
 
 MOST_ROWS = 2e7  # largest record, in moments times robots: about 2 GB
 COST_RATE = 10.0  # samples of the coverage cost per simulated second
@@ -61,6 +61,7 @@ class RunSpec:
         """Raise what would be raised at the beginning: ParameterError, StartError."""
         self.made_controller()
         _ = self.starts
+        check_joins(self.environment, self.conditions)
 
     def simulation(
         self, controller: Controller | None = None, *, steps: int = 0, resumed: bool = False
@@ -95,4 +96,4 @@ class RunSpec:
                     recorder.add(snapshot)
                 if last:
                     break
-            return recorder.record()
+            return recorder.record(simulation.joined)

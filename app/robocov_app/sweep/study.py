@@ -26,7 +26,7 @@ from robocov.errors import InputError, ParameterError, checked, place, required,
 from robocov.mapfile import to_json
 from robocov.robots import DEFAULT_RADIUS, KINEMATICS, TURNING_RATE, Team, team_of_groups
 from robocov.robots import UNITS as TEAM_UNITS
-from robocov.simulation import DEFAULT_DT, check_dt
+from robocov.simulation import DEFAULT_DT, check_dt, check_joins
 from robocov_app.runs.spec import MOST_ROWS
 
 T = TypeVar("T")
@@ -368,7 +368,9 @@ class Study:
         axes |= condition_axes(self.conditions)
         teams = tuple(dict(zip(axes, row, strict=True)) for row in product(*axes.values()))
         for team, robots in product(teams, self.robots):
-            conditions_of(team, 0, robots)
+            conditions = conditions_of(team, 0, robots)
+            for each in self.maps:
+                check_joins(each.environment, conditions)
         object.__setattr__(self, "teams", teams)
         for name, value in zip(("sources", "gains"), self._controllers(), strict=True):
             object.__setattr__(self, name, value)

@@ -58,6 +58,8 @@ class Part:
     scenes: list[Scene]  # of its beginning, and of the story's end, one for each pane: what a legend explains
     # between which steps which robot was moved by hand
     touched: list[list[int]] = field(default_factory=list)
+    # at which steps which robot was put to another place
+    placed: list[tuple[int, int]] = field(default_factory=list)
     ends: int = 0
 
 
@@ -76,7 +78,9 @@ def parts_of(document: Document, node: Node, end: int) -> list[Part]:
         for pane in run.panes:
             part.recorders[pane.number].add(pane.simulation.snapshot)
         held = {run.hand[0]} if run.hand is not None else set()
-        held |= {each.robot for each in here.changes if each.step == run.step and isinstance(each, Place)}
+        moved = {each.robot for each in here.changes if each.step == run.step and isinstance(each, Place)}
+        part.placed += [(run.step, robot) for robot in sorted(moved)]
+        held |= moved
         for robot in held:
             last = next((each for each in part.touched if each[2] == robot and each[1] >= run.step - 1), None)
             if last is None:
@@ -121,6 +125,8 @@ def _session_of(part: Part, setup: PaneSetup, record: Record, dt: float) -> dict
     for begin, end, robot in part.touched:
         times = {"from_s": (begin - part.begin) * dt, "to_s": (end - part.begin) * dt}
         said.setdefault("touched", []).append({**times, "robots": [robot]})
+    for step, robot in part.placed:
+        said.setdefault("placed", []).append({"time_s": (step - part.begin) * dt, "robots": [robot]})
     known = part.begin == 0 or not remembers(setup.law.made())
     turned = record.steering is not None and bool(record.steering[0].any())
     repeatable = known and not part.touched and not turned

@@ -63,6 +63,20 @@ class Join(NamedTuple):
         return f"{self.robot}@{self.time:g}{place}"
 
 
+class Joined(NamedTuple):
+    """A robot, numbered from 1, that has joined: when, s, where, and where it was to join, (x, y) m."""
+
+    robot: int
+    time: float
+    place: tuple[float, float]
+    requested: tuple[float, float]
+
+    @property
+    def offset(self) -> float:
+        """Distance from the requested place, m: above 0 where a wall or another robot was too near."""
+        return math.dist(self.place, self.requested)
+
+
 @dataclass(frozen=True)
 class Conditions:
     """All that varies during a run, seeded.

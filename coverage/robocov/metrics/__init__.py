@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import inlined_kernel, kernel
 from robocov.cost import CoverageCost, MomentaryCost
 from robocov.drawing import Drawable
 from robocov.errors import counted, required
+from robocov.metrics.advice import advise
 from robocov.record import Record, nearest_moments
 from robocov.sensor import RangeSensor
 from robocov.world.solid import movers, solid_pieces
@@ -109,10 +110,23 @@ def settled_at(
     return float(time[first]) if first < len(far) else None
 
 
-def path_lengths(positions: Array) -> Array:
-    """Return how far each robot travelled, (n,) m, from its positions, (T, n, 2) m."""
-    moved = np.diff(positions, axis=0)
-    return np.asarray(np.sqrt((moved**2).sum(axis=-1)).sum(axis=0))
+def path_lengths(positions: Array, travelled: BoolArray | None = None) -> Array:
+    """Compute how far each robot travelled.
+
+    Parameters
+    ----------
+    positions : (T, n, 2) array, m
+    travelled : (T - 1, n) bool array, optional
+        Mask of the displacements that count, as `Record.travelled`; by default all do.
+
+    Returns
+    -------
+    (n,) array, m
+    """
+    moved = np.sqrt((np.diff(positions, axis=0) ** 2).sum(axis=-1))
+    if travelled is not None:
+        moved = np.where(travelled, moved, 0.0)
+    return np.asarray(moved.sum(axis=0))
 
 
 def mean_over_run(time: Array, values: Array) -> float:
@@ -237,6 +251,7 @@ def example() -> None:
 def summarise(record: Record, history: CostHistory) -> dict[str, Any]:
     """Return the summary that ``run.json`` holds; units are in the key names."""
     clearance = clearances(record)
+    notes = [*_describe_moved_joins(record), *advise(record, clearance)]
     return {
         "mean_distance_m": float(history.mean_distance[-1]),
         "mean_distance_over_run_m": mean_over_run(history.time, history.mean_distance),
@@ -246,6 +261,18 @@ def summarise(record: Record, history: CostHistory) -> dict[str, Any]:
         "settled_at_s": settled_at(record.time, record.positions),
         "contacts": contacts(record, clearance),
         "min_clearance_m": float(clearance.min()),
-        "path_length_m": [float(x) for x in path_lengths(record.positions)],
+        "path_length_m": [float(x) for x in path_lengths(record.positions, record.travelled)],
         "stuck_robots": stuck_robots(record.time, record.positions, record.goals),
+        **({"notes": notes} if notes else {}),
     }
+
+
+def _describe_moved_joins(record: Record) -> list[str]:
+    """Return a sentence for each robot that joined elsewhere than it was to."""
+    notes = []
+    for joined in record.joined:
+        if joined.offset >= 5e-4:
+            place, requested = (f"[{x:.4g}, {y:.4g}]" for x, y in (joined.place, joined.requested))
+            moved = f"{joined.offset:.2g} m from {requested}, which is too near to a wall or another robot"
+            notes.append(f"Robot {joined.robot} joined at {joined.time:.4g} s at {place}, {moved}.")
+    return notes

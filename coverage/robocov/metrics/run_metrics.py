@@ -168,7 +168,8 @@ def _integrals(record: Record) -> Array:
     power = np.abs((forces * record.velocities).sum(axis=-1)).sum(axis=1)
     square = (forces**2).sum(axis=(1, 2))
     step = np.diff(record.time)
-    moved = np.sqrt((np.diff(record.positions, axis=0) ** 2).sum(axis=-1)).mean(axis=1)
+    distances = np.sqrt((np.diff(record.positions, axis=0) ** 2).sum(axis=-1))
+    moved = np.where(record.travelled, distances, 0.0).mean(axis=1)
     # the force holds until the next moment; what it does meanwhile, by the trapezoidal rule
     parts = 0.5 * (power[1:] + power[:-1]) * step, square[:-1] * step, moved
     return np.array([np.concatenate([[0.0], np.cumsum(part)]) for part in parts])

@@ -9,6 +9,7 @@ from robocov.controllers import Rapf
 from robocov.errors import ParameterError
 from robocov.record import Record
 from robocov.simulation import Simulation
+from robocov_app.cli import main
 from robocov_app.runs.options import ConditionOptions
 
 
@@ -68,3 +69,26 @@ def test_distances_are_shown_of_a_map_that_moves(tmp_path: Path, capsys: pytest.
     said = answer(capsys, *words.split(), "--film-speed", "1", "--show", "distances", "--out", str(out))
     assert said["mean_distance_m"] > 0.0
     assert len(list((out / "frames").iterdir())) > 2
+
+
+def test_a_robot_that_joins_outside_of_the_map_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    said = complaint(capsys, "run", "rooms", "--join", "6@30:100,100", "--out", str(out))
+    assert said.startswith("--join: expected a place inside the boundary of map 'Rooms' (x from 0 to 12 m, ")
+    assert said.endswith("got [100, 100] for robot 6")
+    assert not out.exists()
+
+
+def test_a_robot_that_joins_elsewhere_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    words = ["run", "rooms", "--join", "6@0.5:1,8", "--duration", "1", "--lattice", "16", "--no-pictures"]
+    assert main([*words, "--out", str(out)]) == 0
+    note = "Robot 6 joined at 0.5 s at [1, 7.499], 0.5 m from [1, 8], which is too near to a wall"
+    assert f"note: {note}" in capsys.readouterr().out
+    run = json.loads((out / "run.json").read_text())
+    assert run["summary"]["notes"][0].startswith(note)
+    (event,) = run["events"]
+    assert event["kind"] == "join" and event["robot"] == 6 and event["requested_m"] == [1.0, 8.0]
+    assert run["summary"]["path_length_m"][5] < 0.5

@@ -12,10 +12,12 @@ from kept_run import record_of, same_arrays
 from touched_run import HALL, LLOYD, RAPF, begun, stepped, with_curves
 
 from robocov.environment import CircleObstacle
+from robocov.metrics import path_lengths
 from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.runs.options import FilmOptions
 from robocov_app.viewer.headless import parts_of, story_frames
+from robocov_app.viewer.session.changes import Place
 from robocov_app.viewer.session.file import load_session, save_session
 from robocov_app.viewer.session.map_edits import with_obstacle
 from robocov_app.viewer.session.session import Session
@@ -180,3 +182,16 @@ def test_a_run_is_saved_by_another_process_and_nothing_else_stays(
     assert words.startswith("run saved: ") and not trouble
     assert (tmp_path / "hall-comparison-1" / "session.robocov").is_file()
     assert not list(aside.iterdir())
+
+
+def test_a_robot_that_is_put_elsewhere_does_not_travel_there() -> None:
+    session = stepped(begun(RAPF), 12)
+    session.do(Place(2, (5.0, 3.0)), "hand", "robot 2 placed")
+    stepped(session, 12)
+    record = record_of(session)
+    assert len(record) == 25
+    (placed,) = record.session["placed"]
+    assert placed["robots"] == [2] and placed["time_s"] == pytest.approx(0.2)
+    jump = np.hypot(*np.diff(record.positions[:, 1], axis=0).T)
+    assert jump.max() > 1.0
+    assert path_lengths(record.positions, record.travelled)[1] < 0.5

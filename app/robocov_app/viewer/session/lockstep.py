@@ -10,6 +10,7 @@ from robocov.arrays import Array
 from robocov.conditions import SOON
 from robocov.environment import Point
 from robocov.errors import ParameterError
+from robocov.simulation import check_joins
 from robocov_app.viewer.session import changes
 from robocov_app.viewer.session.changes import Drag, Fail, Join, Place, Release, Touch
 from robocov_app.viewer.session.moments import Moment, PaneSetup
@@ -29,6 +30,7 @@ class Lockstep:
         working = np.ones(len(positions), dtype=bool)
         if conditions is not None:
             conditions.check_team(len(positions))
+            check_joins(scenario.environment, conditions)
             working = conditions.working(0.0, len(positions))
             conditions = conditions.of_robots_that_stay()
         numbers = tuple((np.flatnonzero(working) + 1).tolist())
@@ -104,6 +106,15 @@ class Lockstep:
         pulls[row] = pull * (simulation.team.mass[row] * min(1.0, STRONGEST / max(size, 1e-12)))
         return pulls
 
+    def _describe_offset(self, number: int, requested: Point) -> str:
+        """Return how far from the requested place a robot joined, in words; empty if it joined there."""
+        pane = self.panes[0]
+        row = pane.row(number)
+        offset = 0.0 if row is None else float(np.hypot(*(pane.simulation.positions[row] - requested)))
+        if offset < 5e-4:
+            return ""
+        return f" {offset:.2f} m from [{requested[0]:g}, {requested[1]:g}]"
+
     def _come_and_go(self) -> Iterator[Happening]:
         conditions = self.scenario.conditions
         if conditions is None or not conditions.team_changes:
@@ -115,7 +126,7 @@ class Lockstep:
                 place = next(join.place for join in conditions.joins if join.robot == number)
                 x, y = self.scenario.positions()[number - 1].tolist() if place is None else place
                 self.apply(Join(number, (x, y)))
-                yield self.step, "robot", f"robot {number} joined"
+                yield self.step, "robot", f"robot {number} joined{self._describe_offset(number, (x, y))}"
         for number in (np.flatnonzero((ends > before) & (ends <= now)) + 1).tolist():
             if number in self.panes[0].numbers and len(self.panes[0].numbers) > 1:
                 self.apply(Fail(number))

@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robocov.controllers import Lloyd, Rapf
+from robocov.environment import Environment, PolygonObstacle
+from robocov.metrics import clearances
+from robocov.metrics.advice import advise, count_zigzags, find_trembling
+from robocov.record import Record
+from robocov.robots import Team
+from robocov.simulation import Simulation
+
+HALL = Environment("hall", ((0, 0), (6, 0), (6, 4), (0, 4)))
+CORRIDORS = Environment(
+    "corridors",
+    ((0, 0), (6.2, 0), (6.2, 6.2), (0, 6.2)),
+    (PolygonObstacle(((0.6, 0.6), (5.6, 0.6), (5.6, 5.6), (0.6, 5.6))),),
+)
+
+
+def run_in(
+    environment: Environment, controller: object, dt: float, seconds: float, **limits: float
+) -> Record:
+    team = Team.homogeneous(3, **limits)
+    starts = environment.start("uniform").sample(3, seed=0)
+    return Simulation(environment, controller, starts, team, dt).run(seconds)
+
+
+def notes_on(record: Record) -> list[str]:
+    return advise(record, clearances(record))
+
+
+def test_a_control_period_that_is_too_long_is_told() -> None:
+    stiff = Rapf(k_rep=2.0, attraction_limit=None)
+    (note,) = notes_on(run_in(HALL, stiff, 0.25, 20.0))
+    assert "The team trembles: " in note and "cm a step" in note
+    assert "the control period of 0.25 s is too long" in note and "--dt" in note
+    assert notes_on(run_in(HALL, stiff, 1 / 60, 20.0)) == []
+
+
+def test_zigzag_in_a_corridor_is_told_and_ends_with_more_acceleration() -> None:
+    record = run_in(CORRIDORS, Rapf(), 1 / 60, 20.0)
+    (note,) = notes_on(record)
+    assert note.startswith("Zigzag in a narrow passage: ") and "than 2 m/s²" in note
+    assert notes_on(run_in(CORRIDORS, Rapf(), 1 / 60, 20.0, max_acceleration=5.0)) == []
+
+
+@pytest.mark.parametrize("controller", [Rapf(), Lloyd()])
+def test_ordinary_runs_get_no_advice(controller: object) -> None:
+    assert notes_on(run_in(HALL, controller, 1 / 60, 12.0)) == []
+    assert notes_on(run_in(CORRIDORS, Lloyd(), 1 / 60, 12.0)) == []
+
+
+def test_a_robot_that_patrols_in_circles_does_not_tremble() -> None:
+    record = run_in(HALL, Lloyd(), 0.1, 12.0)
+    angle = 0.1 * np.arange(len(record))
+    circle = np.stack([3.0 + np.cos(angle), 2.0 + np.sin(angle)], axis=1)
+    positions = record.positions.copy()
+    positions[:, 0] = circle
+    assert len(find_trembling(replace(record, positions=positions))) == 0
+    # the same with a period of four steps is no way to drive
+    angle = 0.5 * np.pi * np.arange(len(record))
+    positions[:, 0] = np.stack([3.0 + 0.1 * np.cos(angle), 2.0 + 0.1 * np.sin(angle)], axis=1)
+    assert find_trembling(replace(record, positions=positions)).tolist() == [0]
+
+
+def test_short_and_thinned_records_are_not_judged() -> None:
+    stiff = Rapf(k_rep=2.0, attraction_limit=None)
+    record = run_in(HALL, stiff, 0.25, 20.0)
+    assert len(find_trembling(record)) > 0
+    assert len(find_trembling(record.until(3.0))) == 0
+    assert len(find_trembling(record.thinned(1.0))) == 0
+
+
+def test_contacts_with_one_wall_are_no_zigzag() -> None:
+    record = run_in(HALL, Lloyd(), 0.1, 12.0)
+    positions, points = record.positions.copy(), record.obstacle_points.copy()
+    clearance = np.ones(positions.shape[:2])
+    positions[:, 0] = [3.0, 0.1]
+    points[:, 0] = [3.0, 0.0]
+    clearance[::4, 0] = 0.0
+    bouncing = replace(record, positions=positions, obstacle_points=points)
+    assert count_zigzags(bouncing, clearance).tolist() == [0, 0, 0]
+    points[4::8, 0] = [3.0, 0.2]
+    zigzag = replace(record, positions=positions, obstacle_points=points)
+    assert count_zigzags(zigzag, clearance)[0] == len(record) // 4
