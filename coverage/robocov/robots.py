@@ -128,6 +128,10 @@ class Team:
                 raise ParameterError(f"team.{name}: {found}, but {wanted} was wanted")
             object.__setattr__(self, name, values)
 
+    def __reduce__(self) -> tuple[type[Team], tuple[Array, ...]]:
+        """Return how to rebuild the team: pickles do not say that its arrays are read-only."""
+        return Team, tuple(getattr(self, name) for name in LIMITS)
+
     @classmethod
     def homogeneous(
         cls,

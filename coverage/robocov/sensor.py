@@ -8,6 +8,7 @@ from __future__ import annotations
 import platform
 import sys
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pymunk
@@ -43,6 +44,10 @@ class RangeSensor:
     def copy(self) -> RangeSensor:
         """Return one of the same obstacles, at time zero."""
         return RangeSensor(self._pieces, self._movers)
+
+    def __reduce__(self) -> tuple[type[RangeSensor], tuple[Any, ...]]:
+        """Return how to rebuild one of the same obstacles, at time zero."""
+        return RangeSensor, (self._pieces, self._movers)
 
     def show(self, time: float, failed_robots: Array | None = None) -> None:
         """Move to a time, s, at which some robots have failed, and are obstacles: x, y, radius, (w, 3) m."""

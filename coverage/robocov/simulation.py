@@ -371,6 +371,15 @@ class Simulation:
         twin._begin_step()  # a snapshot holds the memory that the step after it will hand on
         return twin
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state to pickle: all but what is recomputed from it, as in `copy`."""
+        return {**vars(self), "_observation": None, "_snapshot": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Resume a pickled or deep-copied simulation; it goes on identically, bit for bit."""
+        vars(self).update(state)
+        self._begin_step()
+
     def with_density(self, environment: Environment) -> Simulation:
         """Return a simulation that goes on from here in the same place by another density."""
         twin = self.copy()

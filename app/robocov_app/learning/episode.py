@@ -335,6 +335,10 @@ class EpisodeEnv:
         self._window: Any = None
         self._clock: Any = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state to pickle or to copy: without the window, and what is drawn on, if any."""
+        return {**vars(self), "_painter": None, "_window": None, "_clock": None}
+
     def _present(self) -> Episode:
         if self.episode is None:
             raise RobocovError("environment: reset() was wanted before anything else")

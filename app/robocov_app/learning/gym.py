@@ -1,7 +1,8 @@
 """One learner for the whole team: an environment of gymnasium, registered as ``robocov/Coverage-v0``.
 
 Importing this module registers it; ``gymnasium.make("robocov_app.learning.gym:robocov/Coverage-v0")`` does
-both. (gymnasium knows no entry points of packages any more.)
+both. (gymnasium knows no entry points of packages any more.) ``gymnasium.make_vec`` makes a
+`CoverageVectorEnv` with ``vectorization_mode="vector_entry_point"``.
 """
 
 from functools import partial
@@ -82,7 +83,8 @@ class CoverageVectorEnv(SyncVectorEnv):
 
     Each environment is what it is alone, bit for bit: with ``reset(seed=s)`` that of the seed s + k.
     Those on one map without conditions and moving obstacles are moved on together, others one by one.
-    `autoreset_mode` says when an episode that is over is followed by the next one; `changes` are of the task.
+    `autoreset_mode` says when an episode that is over is followed by the next one, `render_mode` is that of
+    each environment, and `changes` are of the task.
 
     Raises InputError when the task makes no sense or a map cannot be read.
     """
@@ -93,11 +95,12 @@ class CoverageVectorEnv(SyncVectorEnv):
         task: CoverageTask | None = None,
         *,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
         **changes: Any,
     ) -> None:
         self.task = changed_task(task, changes)
         scenarios = Scenarios(self.task.maps, self.task.lattice)
-        make = partial(CoverageEnv, self.task, scenarios=scenarios)
+        make = partial(CoverageEnv, self.task, scenarios=scenarios, render_mode=render_mode)
         super().__init__([make] * num_envs, autoreset_mode=autoreset_mode)
         self._teams = cast("list[CoverageEnv]", self.envs)
         ideal = self.task.conditions is None or self.task.conditions.ideal
@@ -122,4 +125,8 @@ class CoverageVectorEnv(SyncVectorEnv):
         return super().step(values)
 
 
-gymnasium.register(ID, f"{__name__}:{CoverageEnv.__name__}")
+gymnasium.register(
+    ID,
+    entry_point=f"{__name__}:{CoverageEnv.__name__}",
+    vector_entry_point=f"{__name__}:{CoverageVectorEnv.__name__}",
+)

@@ -20,7 +20,7 @@ import math
 from collections.abc import Iterable
 from copy import copy
 from functools import cached_property
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import pymunk
@@ -115,11 +115,19 @@ class World:
 
     def copy(self) -> World:
         """Return an independent world in the same state, which goes on identically."""
-        twin = copy(self)
-        # the engine and the solver, made anew when they are needed, are all that is changed in place
-        vars(twin).pop("_engine", None)
-        twin._contacts = None
-        return twin
+        return copy(self)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # the engine and the solver, rebuilt when they are needed, are all that is changed in place
+        state = {**vars(self), "_contacts": None}
+        state.pop("_engine", None)
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        for array in (self.positions, self.velocities, self.steering):
+            if array is not None:
+                array.setflags(write=False)  # pickles do not say so
 
     def step(
         self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
@@ -285,6 +293,10 @@ class ChangingWorld:
         twin = copy(self)
         twin._world = None if self._world is None else self._world.copy()
         return twin
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._protect()  # pickles do not say that arrays are read-only
 
     def step(
         self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0

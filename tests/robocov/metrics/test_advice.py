@@ -7,6 +7,7 @@ import pytest
 
 from robocov.controllers import Lloyd, Rapf
 from robocov.environment import Environment, PolygonObstacle
+from robocov.mapfile import load_map
 from robocov.metrics import clearances
 from robocov.metrics.advice import advise, count_zigzags, find_trembling
 from robocov.record import Record
@@ -29,16 +30,20 @@ def run_in(
     return Simulation(environment, controller, starts, team, dt).run(seconds)
 
 
+def rooms_at(dt: float) -> Record:
+    rooms = load_map("rooms")
+    return Simulation(rooms, Rapf(), rooms.start().sample(6, seed=0), dt=dt).run(40.0)
+
+
 def notes_on(record: Record) -> list[str]:
     return advise(record, clearances(record))
 
 
 def test_a_control_period_that_is_too_long_is_told() -> None:
-    stiff = Rapf(k_rep=2.0, attraction_limit=None)
-    (note,) = notes_on(run_in(HALL, stiff, 0.25, 20.0))
+    (note,) = notes_on(rooms_at(0.25))
     assert "The team trembles: " in note and "cm a step" in note
     assert "the control period of 0.25 s is too long" in note and "--dt" in note
-    assert notes_on(run_in(HALL, stiff, 1 / 60, 20.0)) == []
+    assert notes_on(rooms_at(0.05)) == []
 
 
 def test_zigzag_in_a_corridor_is_told_and_ends_with_more_acceleration() -> None:
@@ -68,8 +73,7 @@ def test_a_robot_that_patrols_in_circles_does_not_tremble() -> None:
 
 
 def test_short_and_thinned_records_are_not_judged() -> None:
-    stiff = Rapf(k_rep=2.0, attraction_limit=None)
-    record = run_in(HALL, stiff, 0.25, 20.0)
+    record = rooms_at(0.25)
     assert len(find_trembling(record)) > 0
     assert len(find_trembling(record.until(3.0))) == 0
     assert len(find_trembling(record.thinned(1.0))) == 0
