@@ -268,7 +268,10 @@ def conditions_of(parameters: Mapping[str, TeamValue], seed: int, robots: int) -
     return None if conditions.ideal else conditions
 
 
-MOST_RUNS = 1_000_000
+DEFAULT_MAX_RUNS = 100_000
+"""Runs of a study that does not allow more: on ten cores they take some days."""
+MAX_MAX_RUNS = 10_000_000
+"""Runs that a study may allow at most: they are listed in memory."""
 ALL = "*"  # stands for all starts of a map
 TEAM = ("radius", "max_speed", "max_acceleration", "viscosity", "sensing_range", "communication_range")
 """Parameters of a team that a study may sweep."""
@@ -321,11 +324,14 @@ class Study:
     record_hz: float = 5.0  # how many moments are kept of each run; 0: the first and the last
     metrics: bool = False  # whether the table holds `robocov.metrics.run_metrics` of the end as well
     sampling: Sampling | None = None
+    max_runs: int = DEFAULT_MAX_RUNS  # a study of more is refused before its combinations are made
     folder: Path = Path()  # where relative paths of controllers begin
     sources: Mapping[str, Source] = field(init=False)  # of the users' controllers, as they are now
     teams: tuple[Mapping[str, TeamValue], ...] = field(init=False)  # combinations of team and conditions
 
     def __post_init__(self) -> None:
+        checked("max_runs", self.max_runs, 1, MAX_MAX_RUNS, whole=True)
+        require_few_runs(self._count_values(), self.controllers, self.gains, self.sampling, self.max_runs)
         for name in ("maps", "controllers", "robots", "starts", "seeds"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         if self.group:
@@ -366,20 +372,28 @@ class Study:
         if self.group:
             axes[GROUPS] = [json.dumps([dict(each) for each in self.group])]
         axes |= condition_axes(self.conditions)
+        for row in product(*(axes[name] for name in self.conditions)):
+            for robots in self.robots:
+                conditions = conditions_of(dict(zip(self.conditions, row, strict=True)), 0, robots)
+                for each in self.maps:
+                    check_joins(each.environment, conditions)
         teams = tuple(dict(zip(axes, row, strict=True)) for row in product(*axes.values()))
-        for team, robots in product(teams, self.robots):
-            conditions = conditions_of(team, 0, robots)
-            for each in self.maps:
-                check_joins(each.environment, conditions)
         object.__setattr__(self, "teams", teams)
         for name, value in zip(("sources", "gains"), self._controllers(), strict=True):
             object.__setattr__(self, name, value)
-        if len(self) > MOST_RUNS:
-            raise ParameterError(f"runs: {len(self):.3g}, but at most {MOST_RUNS:.0e} were wanted")
         rows = self.duration / self.dt * max(self.robots)
         if rows > MOST_ROWS:
             rows_of = f"{self.duration:g} s of {max(self.robots)} robots at {self.dt:g} s are {rows:.3g} rows"
             raise ParameterError(f"duration: {rows_of} of a record, but at most {MOST_ROWS:.0e} were wanted")
+
+    def _count_values(self) -> dict[str, int]:
+        """Return how many values are given of what is varied, apart from gains, before they are checked."""
+        given = {name: getattr(self, name) for name in ("maps", "robots", "seeds", *TEAM, *UNICYCLES)}
+        counts = {name: _count(value) for name, value in (given | dict(self.conditions)).items()}
+        counts["starts"] = _count(self.starts)
+        if tuple(self.starts) == (ALL,):
+            counts["starts"] = max((len(each.environment.starts) for each in self.maps), default=1)
+        return counts
 
     def __len__(self) -> int:
         starts = sum(len(self.starts_on(each)) for each in self.maps)
@@ -449,6 +463,66 @@ class Study:
         if self.sampling is not None and not any(each.ranges for each in gains.values()):
             raise ParameterError("sampling: no gain has a range {low, high}, but at least one was wanted")
         return sources, gains
+
+
+def require_few_runs(
+    counts: Mapping[str, int],
+    controllers: Sequence[str],
+    gains: Mapping[str, Any],
+    sampling: Sampling | None,
+    max_runs: int,
+) -> None:
+    """Raise ParameterError when a study would have more than `max_runs` runs.
+
+    Nothing is combined for it, as a file of some kB can stand for more runs than any memory holds.
+
+    Parameters
+    ----------
+    counts : dict of str to int
+        Number of values of each thing that is varied, apart from gains.
+    controllers, gains, sampling
+        As in `Study`.
+    max_runs : int
+    """
+    combined = sum(_count_gains(gains.get(name, {}), sampling) for name in controllers)
+    runs = math.prod(max(count, 1) for count in counts.values()) * combined
+    if runs <= max_runs:
+        return
+    several = sorted((name for name, count in counts.items() if count > 1), key=lambda name: -counts[name])
+    factors = [f"{_round_count(counts[name])} {name}" for name in several[:5]] + [
+        f"{_round_count(combined)} sets of gains"
+    ] * (combined > 1)
+    product_of = f" ({' x '.join(factors)})" if factors else ""
+    way_out = f"max_runs in the study allows more, up to {MAX_MAX_RUNS}"
+    raise ParameterError(
+        f"runs: expected at most {max_runs}, got {_round_count(runs)}{product_of}. {way_out}."
+    )
+
+
+def _count(values: object) -> int:
+    """Return the length of a list of values, 1 for a single one."""
+    if isinstance(values, range):  # one may be too long for `len`
+        return max(-(-(values.stop - values.start) // values.step), 0)
+    is_list = isinstance(values, Sequence) and not isinstance(values, str)
+    return len(cast("Sequence[object]", values)) if is_list else 1
+
+
+def _count_gains(given: Any, sampling: Sampling | None) -> int:
+    """Return how many sets of gains are tried of a controller."""
+    if isinstance(given, Gains):
+        return len(given.choices)
+    if not isinstance(given, Mapping):
+        return _count(given)
+    lists = math.prod(max(_count(values), 1) for values in given.values() if not isinstance(values, Range))
+    has_range = any(isinstance(values, Range) for values in given.values())
+    return lists * (sampling.samples if has_range and sampling is not None else 1)
+
+
+def _round_count(count: int) -> str:
+    """Return a number as it is read most easily, also one that is too large for a float."""
+    if count < 10**9:
+        return str(count)
+    return f"{count:.3g}" if count < 10**300 else "more than 1e300"
 
 
 def source_json(source: Source | None) -> dict[str, Any]:

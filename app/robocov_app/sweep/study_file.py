@@ -78,6 +78,7 @@ _STUDY = _Table(
         **dict.fromkeys(("duration", "dt", "cost_hz", "record_hz"), _NUMBER),
         "lattice": _WHOLE,
         "metrics": _Value("true or false", _of(bool)),
+        "max_runs": _WHOLE,
         "team": _Table("a table [team]", _OF_TEAM),
         "conditions": _Table("a table [conditions]", dict.fromkeys(study.CONDITIONS, _CONDITION)),
         "gains": _Table("tables [gains.NAME]", {"*": _Table("a table of gains", {"*": _GAIN})}),
@@ -126,9 +127,8 @@ def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
     try:
         if isinstance(given.get("seeds"), int):
             count = given["seeds"]
-            if not 1 <= count <= study.MOST_RUNS:
-                wanted = f"a whole number from 1 to {study.MOST_RUNS}"
-                raise InputError(f"seeds: {shown(count)}, but {wanted} was wanted")
+            if count < 1:
+                raise InputError(f"seeds: expected a whole number from 1, got {shown(count)}")
             given["seeds"] = range(count)
         for name in ("maps", "controllers", "robots", "starts"):
             if name in given and not isinstance(given[name], list):

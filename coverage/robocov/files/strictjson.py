@@ -27,6 +27,11 @@ from robocov.errors import InputError, JsonPath, MapError, Mistake, one_line, pl
 MAX_BYTES = 50_000_000
 MAX_DEPTH = 32
 """Deepest nesting of lists and objects; a map's own needs 6."""
+MAX_TOML_BYTES = 4_000_000
+"""Largest TOML file: a second is needed to parse one of this size."""
+_TOML_PART = re.compile(rb"[=,\n]")
+_MAX_DOTS = 1000
+"""Dots in a key, or in a text without commas."""
 _TOO_DEEP = f"nested too deeply, but at most {MAX_DEPTH} levels were wanted"
 _MAX_DIGITS = 400
 """Whole numbers with more digits exceed every float."""
@@ -96,16 +101,51 @@ def parse(text: str | bytes, where: str) -> Any:
 
 
 def parse_toml(content: bytes, where: str) -> dict[str, Any]:
-    """Return what a TOML file holds; raise `InputError`, in which the file is called `where`."""
+    """Return what a TOML file holds.
+
+    Parameters
+    ----------
+    content : bytes
+        At most `MAX_TOML_BYTES` of UTF-8.
+    where : str
+        What messages call the file.
+
+    Raises
+    ------
+    InputError
+        When the content is no TOML, too large, or has tables nested deeper than `MAX_DEPTH`.
+    """
+    if len(content) > MAX_TOML_BYTES:
+        raise InputError(f"{where}: expected at most {MAX_TOML_BYTES // 1_000_000} MB of TOML, got more")
+    # the parser takes seconds for a key of very many parts
+    if max(part.count(b".") for part in _TOML_PART.split(content)) > _MAX_DOTS:
+        raise InputError(f"{where}: nested too deeply, expected at most {MAX_DEPTH} levels")
     try:
-        return tomllib.loads(content.decode("utf-8-sig"))
+        document = tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise InputError(f"{where}: byte at offset {error.start}: not UTF-8, but TOML was wanted") from None
     except ValueError as error:  # of TOML, or of a whole number with thousands of digits
         text = one_line(error)
         raise InputError(f"{where}: not TOML: {text[:1].lower()}{text[1:]}") from None
     except RecursionError:
-        raise InputError(f"{where}: nested too deeply") from None
+        raise InputError(f"{where}: nested too deeply, expected at most {MAX_DEPTH} levels") from None
+    if _is_deeper_than(MAX_DEPTH, document):
+        raise InputError(f"{where}: nested too deeply, expected at most {MAX_DEPTH} levels")
+    return document
+
+
+def _is_deeper_than(limit: int, value: object) -> bool:
+    """Return whether lists and tables are nested deeper than a limit, however deep they are."""
+    level: list[object] = [value]
+    for _ in range(limit + 1):
+        inner: list[object] = []
+        for item in level:
+            if isinstance(item, dict):
+                inner += item.values()
+            elif isinstance(item, list):
+                inner += item
+        level = inner
+    return bool(level)
 
 
 def located(error: MapError, text: str | bytes, where: str) -> MapError:

@@ -119,7 +119,10 @@ WRONG = [
     ({"gains": {"rapff": {}}}, "gains.rapff: unknown controller of the study 'rapff': did you mean 'rapf'?"),
     ({"gains": {"rapf": {"k_rep": -1}}}, "gains.rapf.k_rep: -1, but a number from "),
     ({"sampling": Sampling()}, "sampling: no gain has a range {low, high}, but at least one was wanted"),
-    ({"seeds": range(1000), "robots": range(1, 1001)}, "runs: 2e+06, but at most 1e+06 were wanted"),
+    (
+        {"seeds": range(1000), "robots": range(1, 1001)},
+        "runs: expected at most 100000, got 2000000 (1000 robots x 1000 seeds x 2 sets of gains)",
+    ),
 ]
 
 

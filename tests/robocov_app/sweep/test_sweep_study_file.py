@@ -102,7 +102,7 @@ def test_all_bundled_maps(folder: Path) -> None:
 
 
 KNOWN = (
-    "conditions, controllers, cost_hz, dt, duration, gains, lattice, maps, metrics, "
+    "conditions, controllers, cost_hz, dt, duration, gains, lattice, maps, max_runs, metrics, "
     "record_hz, robots, sampling, seeds, starts, team"
 )
 WRONG = [
@@ -139,7 +139,7 @@ WRONG = [
     ),
     ('starts = "*"', "starts = 3", "starts: 3, but a text, or a list of texts, was wanted"),
     ("seeds = 4", "seeds = [1, 2, 1]", "seeds[2]: 1 is given already at seeds[0]; each once was wanted"),
-    ("seeds = 4", "seeds = 0", "seeds: 0, but a whole number from 1 to 1000000 was wanted"),
+    ("seeds = 4", "seeds = 0", "seeds: expected a whole number from 1, got 0"),
     ("seeds = 4", "seeds = [-1]", "seeds[0]: -1, but a whole number from 0 to "),
     ("seeds = 4", "seeds = 1e3", "seeds: 1000.0, but how many seeds, or a list of seeds, was wanted"),
     ("duration = 5.0", "duration = nan", "duration: nan, but a number from 0 to 1e+06 was wanted"),
@@ -350,4 +350,84 @@ def test_groups_that_are_none(folder: Path, before: str, after: str, message: st
 def test_a_group_that_is_no_table(folder: Path) -> None:
     path = written(folder, 'maps = ["rooms"]\ncontrollers = ["rapf"]\n[team]\ngroup = 3\n')
     with pytest.raises(InputError, match=r"team.group: 3, but tables \[\[team.group\]\] was wanted"):
+        read_study(path)
+
+
+# Files that stand for more runs than anybody can do, or than a parser can take
+
+
+def axes(names: list[str], values: int) -> str:
+    listed = ", ".join(f"{1 + k / 1000:.3f}" for k in range(values))
+    return "".join(f"{name} = [{listed}]\n" for name in names)
+
+
+HEAD = 'maps = ["square"]\ncontrollers = ["rapf"]\n'
+TEAM_AXES = ["radius", "max_speed", "max_acceleration", "viscosity", "sensing_range", "communication_range"]
+
+
+@pytest.mark.parametrize(
+    ("text", "runs"),
+    [
+        (f"{HEAD}[team]\n{axes(TEAM_AXES, 100)}", "1e+12 (100 radius x 100 max_speed x "),
+        (f"{HEAD}[gains.rapf]\n{axes(['k_rep', 'k_att'], 1000)}", "1000000 (1000000 sets of gains)"),
+        (
+            f"{HEAD}[conditions]\n{axes(['delay', 'forget_after'], 700)}",
+            "490000 (700 delay x 700 forget_after)",
+        ),
+        (
+            f"{HEAD}[gains.rapf]\n{axes(['k_rep'], 50)}k_att = {{low = 1, high = 2}}\n"
+            "[sampling]\nmethod = 'sobol'\nsamples = 100000\n",
+            "5000000 (5000000 sets of gains)",
+        ),
+        (f"{HEAD}seeds = 1{'0' * 30}\n", "1e+30 (1e+30 seeds)"),
+        (f"{HEAD}seeds = 1{'0' * 4000}\n", "more than 1e300 (more than 1e300 seeds)"),
+    ],
+    ids=["team", "gains", "conditions", "samples", "seeds", "digits"],
+)
+def test_studies_without_end_are_refused_before_they_are_made(tmp_path: Path, text: str, runs: str) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_study(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: runs: expected at most 100000, got {runs}")
+    assert message.endswith(" max_runs in the study allows more, up to 10000000.") and message.isprintable()
+    assert len(message) < len(str(path)) + 400
+
+
+def test_max_runs_says_how_many_runs_may_be(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(f"{HEAD}seeds = 11\nmax_runs = 10\n")
+    with pytest.raises(InputError, match=r"runs: expected at most 10, got 11 \(11 seeds\)"):
+        read_study(path)
+    path.write_text(f"{HEAD}seeds = 100001\nmax_runs = 200000\n")
+    assert len(read_study(path)) == 100_001
+    path.write_text(f"{HEAD}max_runs = 10000001\n")
+    with pytest.raises(InputError, match="max_runs: 10000001"):
+        read_study(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"maps.{'a.' * 3000}b = 1\n",
+        f"{HEAD}[[team.group]]\ncount.{'a.' * 3000}b = 1\n",
+        f"{HEAD}[{'a.' * 20_000}b]\n",
+        f"maps = {'[' * 60}{']' * 60}\n",
+        f"maps = {'[' * 9000}{']' * 9000}\n",
+        f"{HEAD}[team]\nradius = {'{a=' * 60}1{'}' * 60}\n",
+    ],
+    ids=["keys", "group", "table", "lists", "many", "inline"],
+)
+def test_what_is_nested_too_deeply_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match="nested too deeply, expected at most 32 levels"):
+        read_study(path)
+
+
+def test_a_file_that_is_too_large_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text("#" * 4_000_001)
+    with pytest.raises(InputError, match="expected at most 4 MB of TOML, got more"):
         read_study(path)
