@@ -29,7 +29,7 @@ from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
 from robocov_app.formats.geometry.shapes import Line, Shapes
 from robocov_app.formats.geometry.vectorize import free_area, vertices_of
-from robocov_app.formats.picture import read_picture
+from robocov_app.formats.picture import describe_transparency, read_picture
 
 MOST_OBJECTS = 4_000  # robots and obstacles of a world
 _WORLD = re.compile(rb"^(?:world|obstacle)[ \t]*:", re.MULTILINE)
@@ -106,6 +106,10 @@ def _picture(world: _Node, path: Path, shapes: Shapes) -> BoolArray:
         step.refuse("a number from 1")
     # IR-SIM counts rows from the bottom
     light = 2 * picture.level.astype(np.uint32) >= picture.full
+    if transparency := describe_transparency(picture):
+        notes.append(f"{source.at.rpartition(': ')[2]}: {transparency}")
+        if not light.any():
+            raise MapError(f"{one_line(file)}: no cell is free: {transparency}")
     return light[::-1][::every, ::every][::-1]
 
 

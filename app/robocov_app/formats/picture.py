@@ -200,12 +200,71 @@ def _decoded(data: bytes, name: str, where: str, key: ColourKey) -> Brightness:
                 return _converted(image, key)
     except MapError:
         raise
+    except _UnclearSamplesError as error:
+        way_out = "Save it with 8 bits, as gdal_translate -ot Byte -scale does"
+        raise MapError(f"{where}: a TIFF whose brightness is unclear: {error}. {way_out}.") from None
     except PIL.Image.DecompressionBombError:
         most = files.MAX_CELLS // 1_000_000
         raise MapError(f"{where}: too many pixels, but at most {most} million were wanted") from None
     except Exception as error:  # of Pillow, which raises what it likes on nonsense in any chunk
         reason = one_line(error).partition(" <")[0][:100]
         raise MapError(f"{where}: broken, but a whole {name} was wanted: {reason}") from None
+
+
+class _UnclearSamplesError(ValueError):
+    """Samples of a TIFF do not say what is black and what is white."""
+
+
+def _from_floats(image: Image, key: ColourKey) -> Brightness:
+    """Return a TIFF of floating-point samples from 0, black, to 1, white; what is no number is transparent.
+
+    Raises
+    ------
+    _UnclearSamplesError
+        When there are other samples: heights, or whatever else such files hold.
+    """
+    from PIL.ExifTags import Base
+
+    full = 65535
+    is_white_zero = getattr(image, "tag_v2", {}).get(Base.PhotometricInterpretation) == 0
+    level = np.empty((image.height, image.width), np.uint16)
+    alpha = np.empty((image.height, image.width), np.uint8)
+    low, high = np.inf, -np.inf
+    for top in range(0, image.height, _STRIP):
+        rows = slice(top, min(top + _STRIP, image.height))
+        samples = np.asarray(image.crop((0, rows.start, image.width, rows.stop)))
+        known = np.isfinite(samples)
+        alpha[rows] = np.where(known, 255, 0)
+        low = min(low, float(samples.min(initial=np.inf, where=known)))
+        high = max(high, float(samples.max(initial=-np.inf, where=known)))
+        shade = np.clip(np.where(known, samples, 0.0), 0.0, 1.0)
+        level[rows] = np.rint(full * (1.0 - shade if is_white_zero else shade))
+    if not low <= high:
+        raise _UnclearSamplesError("expected samples from 0 (black) to 1 (white), got none that is a number")
+    if low < 0.0 or high > 1.0:
+        found = f"{low:.6g} to {high:.6g}"
+        raise _UnclearSamplesError(
+            f"expected floating-point samples from 0 (black) to 1 (white), got {found}"
+        )
+    shades = _in_colour(level[:, :, None], full)
+    step = _thumbnail_step(image.width, image.height)
+    return Brightness(
+        level,
+        full,
+        alpha=None if (alpha == 255).all() else alpha,
+        roles=key.classify(shades) if key else None,
+        thumbnail=shades[::step, ::step].copy(),
+    )
+
+
+def describe_transparency(picture: Brightness) -> str:
+    """Return what is transparent in a picture, in words, for formats that do not look at it; or nothing."""
+    if picture.alpha is None:
+        return ""
+    share = 100 * np.count_nonzero(picture.alpha < _OPAQUE) / picture.alpha.size
+    if share == 0.0:
+        return ""
+    return f"{share:.3g} % of the pixels are transparent, and count by the colour that is hidden in them"
 
 
 def _converted(image: Image, key: ColourKey) -> Brightness:
@@ -219,8 +278,10 @@ def _converted(image: Image, key: ColourKey) -> Brightness:
         PIL.ImageOps.exif_transpose(image, in_place=True)
     texts = {str(key): value for key, value in image.info.items() if isinstance(value, str)}
     transparent = "transparency" in image.info
-    if image.mode == "F" or (image.mode == "I" and tags):
-        raise ValueError("samples of 32 bits or with a sign, but up to 16 bits without were wanted")
+    if image.mode == "F":
+        return _from_floats(image, key)
+    if image.mode == "I" and tags:
+        raise _UnclearSamplesError("expected samples of up to 16 bits without a sign, got others")
     if image.mode.startswith("I") and not transparent:
         full = (1 << tags[Base.BitsPerSample][0]) - 1 if tags else 65535
         deep = np.asarray(image).astype(np.uint16)

@@ -33,7 +33,7 @@ from robocov_app.formats import files
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.geometry.rasterize import free_cells, grid_over, grid_report
 from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, UNKNOWN, Cells, foreign_map
-from robocov_app.formats.picture import Brightness, read_picture
+from robocov_app.formats.picture import Brightness, describe_transparency, read_picture
 
 _OCCUPIED, _FREE = 0.65, 0.196
 _THRESHOLDS = {"occupied_thresh": _OCCUPIED, "free_thresh": _FREE}  # as map_server writes them
@@ -77,6 +77,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     name, at = _text(given, "image", where), f"{where}: image"
     image = files.named_file(path, name, "picture", at, repaired, options.anywhere)
     picture = read_picture(image, one_line(image))
+    transparency = _describe_transparency(picture, mode)
     threshold = 0.5 if options.threshold is None else options.threshold
     notes = [f"{one_line(key)}: no key of map_server, not looked at" for key in given if key not in _KNOWN]
     if mode != "raw":
@@ -91,6 +92,12 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         cells = _scale(picture, negate, free, occupied, threshold)
     else:
         cells = _raw(picture, threshold)
+    if transparency:
+        notes.append(transparency)
+        if not (cells == FREE).any() and options.unknown != "free":
+            raise MapError(f"{where}: no cell is free: {transparency}")
+    turn = math.remainder(yaw, 2 * math.pi)
+    notes += _describe_yaw(yaw, turn)
     return foreign_map(
         cells,
         where,
@@ -98,7 +105,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         f"A ROS map of {cell:g} m a cell, imported.",
         cell,
         origin=(x, y),
-        yaw=math.remainder(yaw, 2 * math.pi),
+        yaw=turn,
         unknown=options.unknown or "obstacle",
         noise=_NOISE,
         repaired=tuple(repaired),
@@ -110,8 +117,8 @@ def _trinary(picture: Brightness, negate: bool, free: float, occupied: float) ->
     level, full = picture.level, picture.full
     if picture.alpha is not None:
         # of a grey picture every colour is the level
-        colours = np.uint16(3) if full == 255 else np.uint16(1)
-        level, full = level * colours + picture.alpha.astype(np.uint16), 1020
+        colours = np.rint(np.arange(full + 1) * (765 / full)).astype(np.uint16)[level]
+        level, full = colours + picture.alpha.astype(np.uint16), 1020
     dark = _darkness(full, negate)
     table = np.full(full + 1, UNKNOWN, np.uint8)
     table[dark < free] = FREE
@@ -144,6 +151,28 @@ def _darkness(full: int, negate: bool) -> Array:
 
 def _blocked(occupancy: Array, threshold: float) -> Cells:
     return np.where(occupancy >= max(100.0 * threshold, 1.0), BLOCKED, FREE).astype(np.uint8)
+
+
+def _describe_transparency(picture: Brightness, mode: str) -> str:
+    """Return how transparent pixels count, in words, where they do not count as unknown; or nothing."""
+    found = describe_transparency(picture)
+    if not found or mode == "scale":
+        return ""
+    if mode == "raw":
+        return found
+    share, _, _ = found.partition(",")
+    return f"{share}, which map_server averages in as if it were a dark colour"
+
+
+def _describe_yaw(yaw: float, turn: float) -> list[str]:
+    """Return a note on the third number of the origin, where it turns the map."""
+    if turn == 0.0:
+        return []
+    notes = [f"origin: turned by {math.degrees(turn):.4g} degrees about the lower left corner"]
+    if abs(yaw) > 2 * math.pi:
+        radians = math.radians(yaw)
+        notes[0] += f", as its yaw is {yaw:g} rad; if it was meant in degrees, write {radians:.6g}"
+    return notes
 
 
 def _doubted(picture: Brightness, negate: bool, free: float) -> list[str]:

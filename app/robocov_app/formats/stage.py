@@ -34,7 +34,7 @@ from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
 from robocov_app.formats.geometry.polygons import polygons_of
 from robocov_app.formats.geometry.shapes import Outline, Shapes
 from robocov_app.formats.geometry.vectorize import free_area, vertices_of
-from robocov_app.formats.picture import read_picture
+from robocov_app.formats.picture import describe_transparency, read_picture
 
 MAX_BYTES = 5_000_000  # largest file of a world, and of all that it includes together, in bytes
 MOST_TOKENS, MOST_ENTITIES = 200_000, 10_000  # words and numbers; models and blocks that macros make of them
@@ -294,8 +294,13 @@ class _World:
                 what = f"with those before it more than {files.MAX_CELLS // 1_000_000} million pixels"
                 raise MapError(f"{where}: {what}, but fewer were wanted")
             dark = picture.level <= _DARK * picture.full
-            if not dark.any():
-                raise MapError(f"{where}: all is light, but a picture with dark walls was wanted")
+            transparency = describe_transparency(picture)
+            if transparency:
+                self.shapes.notes.append(f"{one_line(file.name)}: {transparency}")
+            if not dark.any() or (transparency and dark.all()):
+                what = "dark" if dark.any() else "light"
+                cause = f": {transparency}" if transparency else ""
+                raise MapError(f"{where}: all is {what}, but a picture with dark walls was wanted{cause}")
             row, column = np.flatnonzero(dark.any(axis=1)), np.flatnonzero(dark.any(axis=0))
             light = ~dark[row[0] : row[-1] + 1, column[0] : column[-1] + 1]
             rows, columns = light.shape

@@ -1,6 +1,7 @@
 """Pictures of every kind give the same brightness; what is broken or too large is refused."""
 
 import io
+import math
 import struct
 from pathlib import Path
 
@@ -197,10 +198,37 @@ def test_tiff_of_16_bits(tmp_path: Path, kind: str, white_is_zero: bool) -> None
     np.testing.assert_allclose(shade(read(tmp_path, data)), 1 - wanted if white_is_zero else wanted)
 
 
-def test_samples_of_32_bits_are_refused(tmp_path: Path) -> None:
-    for image in (Image.new("F", (3, 3)), Image.new("I", (3, 3))):
-        with pytest.raises(MapError, match=r"whole TIFF was wanted: samples of 32 bits or with a sign"):
-            read(tmp_path, saved(image, "TIFF"))
+def floats(values: list[list[float]]) -> bytes:
+    return saved(Image.fromarray(np.array(values, dtype=np.float32)), "TIFF")
+
+
+def test_a_tiff_of_floats_from_0_to_1_is_read(tmp_path: Path) -> None:
+    picture = read(tmp_path, floats([[0.0, 0.25, 1.0], [0.5, math.nan, -0.0]]))
+    np.testing.assert_allclose(shade(picture), [[0, 0.25, 1], [0.5, 0, 0]], atol=1e-4)
+    assert picture.alpha is not None
+    assert (picture.alpha == [[255, 255, 255], [255, 0, 255]]).all()
+    assert read(tmp_path, floats([[0.0, 1.0]])).alpha is None
+
+
+@pytest.mark.parametrize(
+    ("image", "found"),
+    [
+        (
+            floats([[0.0, 812.5], [-3.0, 1.0]]),
+            "floating-point samples from 0 (black) to 1 (white), got -3 to 812.5",
+        ),
+        (floats([[0.0, 255.0]]), "floating-point samples from 0 (black) to 1 (white), got 0 to 255"),
+        (floats([[math.nan, math.inf]]), "samples from 0 (black) to 1 (white), got none that is a number"),
+        (saved(Image.new("I", (3, 3)), "TIFF"), "samples of up to 16 bits without a sign, got others"),
+    ],
+    ids=["heights", "bytes", "nan", "whole"],
+)
+def test_a_tiff_of_other_samples_is_named(tmp_path: Path, image: bytes, found: str) -> None:
+    with pytest.raises(MapError) as caught:
+        read(tmp_path, image)
+    message = str(caught.value)
+    assert f"a TIFF whose brightness is unclear: expected {found}. Save it with 8 bits" in message
+    assert "broken" not in message
 
 
 @pytest.mark.parametrize("kind", ["JPEG", "TIFF", "PNG"])

@@ -58,6 +58,52 @@ def test_yaw_turns_the_map_about_its_lower_left_corner(tmp_path: Path) -> None:
     assert (0.0, 0.0) in environment.boundary
 
 
+@pytest.mark.parametrize(
+    ("yaw", "notes"),
+    [
+        ("0", []),
+        ("-0.0", []),
+        ("1.5707963267948966", ["origin: turned by 90 degrees about the lower left corner"]),
+        ("-0.5", ["origin: turned by -28.65 degrees about the lower left corner"]),
+        (
+            "90",
+            [
+                "origin: turned by 116.6 degrees about the lower left corner, as its yaw is 90 rad; "
+                "if it was meant in degrees, write 1.5708"
+            ],
+        ),
+    ],
+)
+def test_a_map_that_is_turned_is_said_to_be(tmp_path: Path, yaw: str, notes: list[str]) -> None:
+    path = ros_map(tmp_path, np.full((3, 3), FREE, np.uint8), origin=f"[0, 0, {yaw}]")
+    foreign = IMPORTER.read(path, ReadOptions())
+    assert [note for note in foreign.notes if note.startswith("origin")] == notes
+
+
+@pytest.mark.parametrize(
+    ("mode", "cause"),
+    [
+        (
+            "trinary",
+            "100 % of the pixels are transparent, which map_server averages in as if it were a dark colour",
+        ),
+        ("raw", "100 % of the pixels are transparent, and count by the colour that is hidden in them"),
+    ],
+)
+def test_transparency_is_named_as_the_cause(tmp_path: Path, mode: str, cause: str) -> None:
+    Image.new("LA", (4, 4), (200, 0)).save(tmp_path / "plan.png")
+    path = ros_map(tmp_path, b"", image="plan.png", mode=mode)
+    with pytest.raises(MapError, match=f"no cell is free: {cause}"):
+        IMPORTER.read(path, ReadOptions())
+
+
+def test_a_map_of_floats_is_read_in_every_mode(tmp_path: Path) -> None:
+    values = np.array([[1.0, 1.0, 0.0], [1.0, np.nan, 0.5]], dtype=np.float32)
+    Image.fromarray(values).save(tmp_path / "plan.tif")
+    path = ros_map(tmp_path, b"", image="plan.tif", resolution=1.0)
+    assert read(path).area == 3
+
+
 def test_unknown_cells(tmp_path: Path) -> None:
     path = ros_map(tmp_path, drawn(PLAN), resolution=1.0)
     assert read(path).area == 68
