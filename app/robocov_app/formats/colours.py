@@ -16,6 +16,7 @@ from robocov.errors import ParameterError, counted, shown
 Colour: TypeAlias = tuple[int, int, int]
 Role: TypeAlias = Literal["free", "solid", "ignore"]
 ROLES: tuple[Role, ...] = ("free", "solid", "ignore")
+WHITE: Colour = (255, 255, 255)
 NO_ROLE = 0  # in arrays of roles, where a role is its index in `ROLES` plus one
 PICTURE_TOLERANCE = 24.0  # levels per channel: what saving as JPEG and soft edges change
 DARK, PALE = 0.5, 0.75  # luminance below which paint is dark, and from which it is pale
@@ -70,6 +71,13 @@ class ColourKey:
             return None
         code = int(self.classify(np.array([[colour]], dtype=np.uint8))[0, 0])
         return None if code == NO_ROLE else ROLES[code - 1]
+
+    def find_nearest(self, colour: Colour) -> Colour | None:
+        """Return the nearest colour of the key within the tolerance, whatever its role."""
+        distances = [max(abs(a - b) for a, b in zip(colour, its, strict=True)) for its, _ in self.entries]
+        if not distances or min(distances) > self.tolerance:
+            return None
+        return self.entries[distances.index(min(distances))][0]
 
     def classify(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return the roles of pixels.

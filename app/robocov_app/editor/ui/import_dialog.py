@@ -11,9 +11,11 @@ import shapely
 from pygame import Rect, Surface
 
 from robocov.errors import RobocovError
+from robocov_app.editor.ui.import_sheet import declared_colours, find_role, give_role, next_role
 from robocov_app.editor.ui.importing import Imported, options_of
 from robocov_app.formats import Importer, ReadOptions, Shaping
 from robocov_app.formats.base import square_metres
+from robocov_app.formats.colours import Colour, name_colour
 from robocov_app.render import layout, surface_cache
 from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, shortened, text_width
@@ -27,7 +29,12 @@ from robocov_app.toolkit.worker import Worker
 # pixels at scale 1: of the options, of their names, beside them, of a line of the report, above each map
 _COLUMN, _NAME, _GAP, _LINE, _ABOVE = 300, 126, 32, 17, 40
 _FEWEST_LINES = 7  # of the report; more below maps that are wide
-_HINT = "click into the map: keep that part · Tab option · Enter imports · Esc leaves"
+_HINTS = {
+    "part": "click into the map: keep that part · Tab option · Enter imports · Esc leaves",
+    "colour": "click into the left map, or Space on a colour: free, solid, ignored · Enter imports",
+}
+_CHIP, _SWATCH = 78, 12  # pixels at scale 1: of a colour with its role, and of its square
+_ROLE_NAMES = {None: "default", "free": "free", "solid": "solid", "ignore": "ignore"}
 _DEFAULT = "default"
 
 
@@ -45,6 +52,7 @@ class ImportDialog(Dialog):
         self.imported: Imported | None = None  # of the newest settings that could be imported
         self.accepted = False  # whether it is wanted as it is set, as soon as it is there
         self.cameras: list[Camera] = []
+        self.clicks = "part"  # what a click into the map chooses: a part to keep, or the role of a colour
         self._seen: Ui | None = None
         self._worker = worker
         self._picture: surface_cache.Latest[Surface] = surface_cache.Latest()
@@ -61,6 +69,17 @@ class ImportDialog(Dialog):
     def keep_inside(self, place: tuple[float, float]) -> None:
         self.given.pop("keep", None)
         self.set("inside", f"{place[0]:.10g} {place[1]:.10g}")
+
+    @property
+    def has_colours(self) -> bool:
+        """Whether the colours of the file can be given a role."""
+        takes = "free_colour" in self.importer.options
+        return takes and self.imported is not None and self.imported.sheet is not None
+
+    def cycle_colour(self, colour: Colour) -> None:
+        """Give a colour the next role: free, solid, ignored, and none."""
+        give_role(self.given, colour, next_role(find_role(self.given, colour)))
+        self._ask()
 
     def settings(self) -> tuple[ReadOptions, Shaping]:
         named = {each.name: each for each in self.options}
@@ -109,18 +128,22 @@ class ImportDialog(Dialog):
         ui.wide = _COLUMN
         self._options(ui, top + high)
         ui.x, ui.y, ui.wide = left + _COLUMN + _GAP, top, wide - _COLUMN - _GAP
-        ui.row(height=high - (_LINE * (_FEWEST_LINES + 1) + 14), below=0)
+        room = high - (_LINE * (_FEWEST_LINES + 1) + 14)
+        if self.has_colours:
+            before = ui.y
+            self._colours(ui)
+            room -= ui.y - before
+        maps_top = ui.y
+        ui.row(height=room, below=0)
         rect, clicked = ui.area("maps")
         if self.imported is not None:
             maps = self._place(rect, self.imported, ui.scale)
             if ui.surface is not None:
                 self._draw_maps(ui.surface, self.imported, ui.scale, ui.theme)
-            for camera in self.cameras:
-                if clicked and Rect(camera.view).collidepoint(ui.at):
-                    x, y = camera.to_world(np.array(ui.at, dtype=float)).tolist()
-                    digits = max(0, math.ceil(math.log10(camera.zoom)))  # no finer than a pixel
-                    self.keep_inside((round(x, digits), round(y, digits)))
-            ui.y = top + maps / ui.scale + 14
+            if clicked:
+                self._click(ui.at)
+            ui.end_row()
+            ui.y = maps_top + maps / ui.scale + 14
         else:
             ui.space(14)
             if ui.surface is not None:
@@ -128,6 +151,61 @@ class ImportDialog(Dialog):
                 ui.surface.blit(words, words.get_rect(center=rect.center))
         self._report(ui, top + high)
         ui.x, ui.y, ui.wide = left, top + high, wide
+
+    def _click(self, at: tuple[int, int]) -> None:
+        """Take a click into one of the maps."""
+        for k, camera in enumerate(self.cameras):
+            if not Rect(camera.view).collidepoint(at):
+                continue
+            x, y = camera.to_world(np.array(at, dtype=float)).tolist()
+            if self._shows_colours and k == 0:
+                assert self.imported is not None and self.imported.sheet is not None
+                colour = self.imported.sheet.find_colour(x, y)
+                if colour is not None:
+                    self.cycle_colour(colour)
+            else:
+                digits = max(0, math.ceil(math.log10(camera.zoom)))  # no finer than a pixel
+                self.keep_inside((round(x, digits), round(y, digits)))
+
+    @property
+    def _shows_colours(self) -> bool:
+        return self.has_colours and self.clicks == "colour"
+
+    def _colours(self, ui: Ui) -> None:
+        """Show what a click chooses and, for colours, each with its role."""
+        ui.row(56, 84, 84, 0, height=24, below=6)
+        ui.label("A click", style="unit")
+        for name, text, tip in (
+            ("part", "keeps a part", "A click into a map keeps that part of the free space"),
+            ("colour", "sets a colour", "A click into the left map makes its colour free, solid or ignored"),
+        ):
+            if ui.button(text, key=f"clicks:{name}", chosen=self.clicks == name, small=True, tip=tip):
+                self.clicks = name
+        ui.end_row()
+        if self._shows_colours:
+            self._chips(ui)
+
+    def _chips(self, ui: Ui) -> None:
+        assert self.imported is not None and self.imported.sheet is not None
+        colours = list(dict.fromkeys([*declared_colours(self.given), *self.imported.sheet.colours]))
+        colours = colours[: max(int((ui.wide + 6) // (_CHIP + 6)), 1)]
+        ui.row(*[_CHIP] * len(colours), 0, height=24, below=8)
+        for colour in colours:
+            role = find_role(self.given, colour)
+            name = name_colour(colour)
+            key = f"colour:{name}"
+            text = f"     {_ROLE_NAMES[role]}"
+            if ui.button(
+                text, key=key, chosen=role is not None, small=True, tip=f"{name}: a click changes it"
+            ):
+                self.cycle_colour(colour)
+            shown = ui.find("button", key)
+            if ui.surface is not None and shown is not None:
+                side = ui.px(_SWATCH)
+                square = Rect(shown.rect.left + ui.px(7), shown.rect.centery - side // 2, side, side)
+                pygame.draw.rect(ui.surface, colour, square)
+                pygame.draw.rect(ui.surface, ui.theme.faint, square, 1)
+        ui.end_row()
 
     def _options(self, ui: Ui, foot: float) -> None:
         ui.words(f"Import {self.path.name}", size=16, bold=True)
@@ -174,7 +252,8 @@ class ImportDialog(Dialog):
                 ui.surface.blit(label(line, ui.px(SMALL), colour), ui.cell())
         ui.end_row()
         ui.y = foot - _LINE
-        ui.label("importing…" if self.busy and self.imported is not None else _HINT, style="unit")
+        hint = _HINTS["colour" if self._shows_colours else "part"]
+        ui.label("importing…" if self.busy and self.imported is not None else hint, style="unit")
         ui.end_row()
 
     def _place(self, box: Rect, imported: Imported, scale: float) -> float:
@@ -192,8 +271,16 @@ class ImportDialog(Dialog):
         return corners[1][1] + above + high - box.top
 
     def _draw_maps(self, screen: Surface, imported: Imported, scale: float, theme: Theme) -> None:
-        look = (*(camera.view for camera in self.cameras), scale, theme)
-        maps = self._picture.of(imported, look, lambda: _maps(screen, imported, self.cameras, scale, theme))
+        shows_colours = self._shows_colours
+        look = (*(camera.view for camera in self.cameras), scale, theme, shows_colours)
+
+        def draw() -> Surface:
+            picture = _maps(screen, imported, self.cameras, scale, theme)
+            if shows_colours and imported.sheet is not None:
+                imported.sheet.draw(picture, self.cameras[0])
+            return picture
+
+        maps = self._picture.of(imported, look, draw)
         screen.blit(maps, (0, 0))
         self._draw_captions(screen, imported, scale, theme)
         inside = next(option for option in self.options if option.name == "inside")
@@ -219,7 +306,10 @@ class ImportDialog(Dialog):
             ("as read", report.vertices_read, compared.before.area, "", lost, theme.trajectory),
             ("as imported", report.vertices_kept, compared.after.area, passage, opened, theme.start),
         )
-        for camera, (name, vertices, area, more, mark, colour) in zip(self.cameras, rows, strict=True):
+        for k, (camera, row) in enumerate(zip(self.cameras, rows, strict=True)):
+            name, vertices, area, more, mark, colour = row
+            if k == 0 and self._shows_colours:
+                name, mark = "in its colours", ""
             x, y = round(camera.view[0]), round(camera.view[1] - _ABOVE * scale)
             screen.blit(label(name, size, theme.ink, True), (x, y))
             left = x + text_width(name, size, True) + round(10 * scale)

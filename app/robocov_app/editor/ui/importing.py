@@ -3,12 +3,13 @@
 import inspect
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args, get_origin, get_type_hints
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError, one_line, shown
+from robocov_app.editor.ui.import_sheet import Sheet, make_sheet
 from robocov_app.formats import ForeignMap, Importer, ImportReport, ReadOptions, Shaping, read_map, shaped
 from robocov_app.formats.geometry.conversion import Comparison, compare
 from robocov_app.toolkit.worker import Line
@@ -78,11 +79,12 @@ def _options(settings: type[ReadOptions] | type[Shaping]) -> Iterator[Option]:
 
 @dataclass(frozen=True, eq=False)
 class Imported:
-    """Answer: the imported map, with its report and what walls changed sides."""
+    """Answer: the imported map, with its report, what walls changed sides, and the file in its colours."""
 
     environment: Environment
     report: ImportReport
     comparison: Comparison
+    sheet: Sheet | None = None
 
 
 class Importing:
@@ -92,6 +94,7 @@ class Importing:
 
     def __init__(self) -> None:
         self._read: tuple[tuple[Path, str, ReadOptions], ForeignMap] | None = None
+        self._sheet: tuple[tuple[Path, str, ReadOptions], Sheet | None] | None = None
 
     def __call__(self, questions: list[Wanted], line: Line) -> Imported:
         path, name, options, shaping = questions[-1]
@@ -100,5 +103,22 @@ class Importing:
             self._read = None
             self._read = key, read_map(path, format=name, options=options)
         foreign = self._read[1]
+        sheet = self._make_sheet(path, name, options, foreign)
         environment, report = shaped(foreign, shaping, one_line(path.name))
-        return Imported(environment, report, compare(foreign, environment, report))
+        return Imported(environment, report, compare(foreign, environment, report), sheet)
+
+    def _make_sheet(self, path: Path, name: str, options: ReadOptions, foreign: ForeignMap) -> Sheet | None:
+        """Return the file in its own colours, those included that its options leave out."""
+        plain = replace(
+            options,
+            free_colour=None,
+            solid_colour=None,
+            ignore_colour=None,
+            colour_tolerance=None,
+            min_stroke=None,
+        )
+        key = path, name, plain
+        if self._sheet is None or self._sheet[0] != key:
+            source = foreign if plain == options else read_map(path, format=name, options=plain)
+            self._sheet = key, make_sheet(source)
+        return self._sheet[1]

@@ -12,9 +12,10 @@ Lines and pillars are obstacles in both cases. The boundary is, in this order,
 4. a rectangle around everything, at the distance of the option ``around``.
 
 If the colours of a drawing are known, what is painted later covers what was painted before, and what was
-declared free is so. Pale fills with something dark painted on them are floors; so are all pale fills on a
-dark boundary, which is solid itself. With the option ``outlines`` as "nested", outlines are free and solid
-by turns, from the outside in.
+declared free is so. Pale fills with something darker painted on them are floors, and so are others of their
+colour or of the size of a room; pale fills in the colour of the ground, without a stroke; and all pale fills
+on a dark boundary, which is solid itself. With the option ``outlines`` as "nested", outlines are free and
+solid by turns, from the outside in.
 
 In drawings whose outlines are free by default, 2 is: all outlines that do not lie in a larger one, if any
 does; then those that do are obstacles.
@@ -36,12 +37,12 @@ from robocov.environment import GRID, CircleObstacle
 from robocov.errors import MapError, counted, shown
 from robocov.mapfile.models import LARGEST
 from robocov_app.formats.base import Primitive, ReadOptions, square_metres
-from robocov_app.formats.colours import count_colours
+from robocov_app.formats.colours import WHITE, count_colours
 from robocov_app.formats.geometry.figures import BOUNDARY, Line, Outline
 from robocov_app.formats.geometry.painting import (
     Coat,
     alternate,
-    find_floor_colours,
+    find_evident_floors,
     is_dark,
     is_pale,
     uncover,
@@ -453,7 +454,7 @@ def _find_floors(
     chosen = {outline for outline in others if outline.role == "free"}
     is_slab = are_solid and boundary is not None and _is_slab(drawing, boundary)
     if are_solid and drawing.options.outlines is None:
-        chosen |= _find_pale_floors(drawing, others, report, is_slab=is_slab)
+        chosen |= _find_pale_floors(drawing, boundary, others, report, is_slab=is_slab)
     coats = [outline.coat for outline in others if outline in chosen]
     coats += [line.coat for line in drawing.lines if line.role == "free"]
     return _Floors(frozenset(chosen), coats, is_slab)
@@ -471,28 +472,42 @@ def _is_slab(drawing: Drawing, boundary: Boundary) -> bool:
 
 
 def _find_pale_floors(
-    drawing: Drawing, outlines: Sequence[Outline], report: "_Report", *, is_slab: bool
+    drawing: Drawing,
+    boundary: Boundary | None,
+    outlines: Sequence[Outline],
+    report: "_Report",
+    *,
+    is_slab: bool,
 ) -> set[Outline]:
     """Return the outlines that are floors by their colour, and report all that is pale."""
     undecided = [outline for outline in outlines if outline.role is None and outline.colour is not None]
-    if is_slab:
-        colours = {outline.colour for outline in undecided if is_pale(outline.colour)}
-    else:
+    chosen = [outline for outline in undecided if is_slab and is_pale(outline.colour)]
+    if not is_slab:
         marks = [outline.coat for outline in outlines]
         lines = [*drawing.lines, *(edge for outline in outlines for edge in outline.edges)]
         marks += [Coat(LineString(line.points), line.order, line.colour) for line in lines]
-        colours = set(find_floor_colours([outline.coat for outline in undecided], marks))
-    chosen = [outline for outline in undecided if outline.colour in colours]
-    pale = [each.colour for each in undecided if is_pale(each.colour) and each.colour not in colours]
+        evident = find_evident_floors([outline.coat for outline in undecided], marks)
+        chosen = [outline for outline, is_floor in zip(undecided, evident, strict=True) if is_floor]
+        chosen += [each for each in undecided if each not in chosen and _is_unseen(each, boundary)]
+    left = [outline for outline in undecided if outline not in chosen]
+    pale = [outline.colour for outline in left if is_pale(outline.colour)]
     pale += [line.colour for line in drawing.lines if line.role is None and is_pale(line.colour)]
     if chosen:
-        why = "on a dark ground" if is_slab else "with dark paint on them"
+        why = "on a dark ground" if is_slab else "as darker paint lies on such"
+        if not is_slab and not any(evident):
+            why = "in the colour of the ground"
         counts = count_colours(outline.colour for outline in chosen)
         report.notes.append(f"pale fills taken as floor: {counts} {why} (--solid-colour: as obstacles)")
     if pale:
         counts = count_colours(pale)
         report.notes.append(f"pale paint taken as solid: {counts} (--free-colour: as free space)")
     return set(chosen)
+
+
+def _is_unseen(outline: Outline, boundary: Boundary | None) -> bool:
+    """Return whether an outline has the pale colour of the ground and no stroke: it only covers others."""
+    ground = [] if boundary is None else [each.colour for each in boundary.outlines]
+    return is_pale(outline.colour) and not outline.edges and outline.colour in (ground or [WHITE])
 
 
 def _find_ground(boundary: Boundary | None, region: MultiPolygon, floors: _Floors) -> Coat | None:

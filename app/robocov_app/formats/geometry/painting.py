@@ -5,12 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import GRID
 from robocov_app.formats.colours import DARK, PALE, Colour, luminance
 from robocov_app.formats.geometry.polygons import enclosed, polygons_of, united
+
+_ROOM_SHARE = 0.5  # of the smallest fill with something on it: the size of a room
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,31 +42,43 @@ def is_pale(colour: Colour | None) -> bool:
     return colour is not None and luminance(colour) >= PALE
 
 
-def find_floor_colours(fills: Sequence[Coat], marks: Sequence[Coat]) -> set[Colour]:
-    """Return the pale colours of filled shapes that are floors.
+def find_evident_floors(fills: Sequence[Coat], marks: Sequence[Coat]) -> list[bool]:
+    """Return which filled shapes are floors by what is painted on them.
 
-    Nobody paints dark things onto a pale obstacle. So where one pale fill has something dark on it, fills of
-    its colour are floors.
+    Nobody paints furniture and walls onto a pale obstacle. So where one pale fill has something darker on it,
+    fills of its colour are floors, and pale ones of the size of a room are, too: rooms often have different
+    colours.
 
     Parameters
     ----------
     fills : sequence of Coat
     marks : sequence of Coat
-        All that is painted; what is dark among it counts.
+        All that is painted; what is not pale among it counts.
     """
-    pale = [fill for fill in fills if is_pale(fill.colour)]
-    dark = [mark for mark in marks if is_dark(mark.colour)]
-    if not pale or not dark:
-        return set()
-    tree = shapely.STRtree([mark.area for mark in dark])
-    mark_order = np.array([mark.order for mark in dark])
-    found: set[Colour] = set()
-    for fill in pale:
-        if fill.colour is None or fill.colour in found:
-            continue
-        on_it = tree.query(fill.area, "covers")
-        if (mark_order[on_it] > fill.order).any():
-            found.add(fill.colour)
+    evident = _find_marked(fills, marks)
+    if not evident.any():
+        return [False] * len(fills)
+    colours = {fills[k].colour for k in np.flatnonzero(evident).tolist()}
+    sizes = shapely.area([fill.area for fill in fills])
+    room = _ROOM_SHARE * sizes[evident].min()
+    return [
+        is_pale(fill.colour) and (fill.colour in colours or size >= room)
+        for fill, size in zip(fills, sizes.tolist(), strict=True)
+    ]
+
+
+def _find_marked(fills: Sequence[Coat], marks: Sequence[Coat]) -> NDArray[np.bool_]:
+    """Return which fills are pale and have something on them that is not."""
+    found = np.zeros(len(fills), dtype=bool)
+    darker = [mark for mark in marks if mark.colour is not None and not is_pale(mark.colour)]
+    if not darker:
+        return found
+    tree = shapely.STRtree([mark.area for mark in darker])
+    order = np.array([mark.order for mark in darker])
+    for k, fill in enumerate(fills):
+        if is_pale(fill.colour):
+            on_it = tree.query(fill.area, "covers")
+            found[k] = (order[on_it] > fill.order).any()
     return found
 
 
