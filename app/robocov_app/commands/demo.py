@@ -77,8 +77,9 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
 
 def command(options: Arguments) -> int:
     from robocov_app.toolkit.termination import ending_on_signals
-    from robocov_app.web import serve_each
+    from robocov_app.web import prepare, serve_each
 
+    prepare(options, options.folder)
     if options.each:
         return serve_each(command, options)
     headless = options.frames is not None or options.video is not None

@@ -75,13 +75,16 @@ class WebOptions:
     port: int = 8765
     """Port to listen at with --serve; 0 for any that is free."""
     each: bool = False
-    """With --serve: everybody who has the link gets a window of their own, a process each."""
-    most: int = 8
-    """So many of them at a time."""
+    """With --serve: every visitor with the link gets a window of their own, a process each."""
+    max_sessions: int = 8
+    """Maximum number of concurrent windows (with --each)."""
+    idle_minutes: float = 10.0
+    """Minutes after which a window that no browser shows is ended; its work is kept as a draft (with --each)."""
 
     def __post_init__(self) -> None:
         checked("--port", self.port, 0, 65535)
-        checked("--most", self.most, 1, 200)
+        checked("--max-sessions", self.max_sessions, 1, 200)
+        checked("--idle-minutes", self.idle_minutes, 0.05, 10_000.0)
         if self.each and not self.serve:
             raise ParameterError("--each: --serve was wanted beside it")
 

@@ -14,6 +14,29 @@ if TYPE_CHECKING:
     from robocov_app.toolkit.window import BaseWindow
 
 
+def prepare(options: Any, folder: Path) -> None:
+    """Check what a served window needs before anything is opened for it.
+
+    Parameters
+    ----------
+    options : WebOptions
+        Options of a command; nothing is checked without ``--serve``.
+    folder : Path
+        Folder for files of the window; it is created.
+
+    Raises
+    ------
+    RobocovError
+        Without the extra, or if files cannot be written to the folder.
+    """
+    if not options.serve:
+        return
+    extra("websockets", "web")
+    from robocov_app.web.files import prepare_folder
+
+    prepare_folder(folder)
+
+
 def show(window: BaseWindow, options: Any, folder: Path) -> None:
     """Run a window until it is closed: on the screen, or in browsers, as the options of a command say.
 
@@ -22,7 +45,6 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
     if not options.serve:
         window.run()
         return
-    extra("websockets", "web")
     from robocov_app.terminal.interruption import interruptible
     from robocov_app.toolkit.termination import ending_on_signals, is_ending
     from robocov_app.web.confined import confined
@@ -49,11 +71,14 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
 
 def serve_each(command: Callable[[Any], int], options: Any) -> int:
     """Serve a command's window to each visitor in a process of their own, until the process is stopped."""
-    extra("websockets", "web")
     import asyncio
 
     from robocov_app.web.each import Sessions
 
-    sessions = Sessions(command, options, options.most)
-    asyncio.run(sessions.serve(lambda words: echo(words, flush=True)))
+    max_idle_s = 60.0 * options.idle_minutes
+    sessions = Sessions(command, options, options.max_sessions, max_idle_s)
+    try:
+        asyncio.run(sessions.serve(lambda line: echo(line, flush=True)))
+    except asyncio.CancelledError:  # by SIGTERM
+        raise KeyboardInterrupt from None
     return 0

@@ -1,177 +1,442 @@
-"""A window of their own for everybody: a process for each visitor, all behind one port."""
+"""A window for each visitor: a process each, all behind one port."""
+
+from __future__ import annotations
 
 import asyncio
 import multiprocessing
 import os
 import secrets
+import signal
 from _thread import interrupt_main
 from collections.abc import Callable
 from contextlib import redirect_stdout, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from http import HTTPStatus
 from io import TextIOBase
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
+from pathlib import Path
 from threading import Thread
-from time import monotonic
-from typing import Any
-from urllib.parse import urlsplit
+from time import monotonic, time
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote, unquote, urlencode, urlsplit
 
-from robocov.errors import InputError, RobocovError
+from robocov.errors import InputError, OutputError, RobocovError, reason
 from robocov_app.terminal.interruption import interruptible
-from robocov_app.web.access import cookies_of, link_to, listening_failed, same, token_in
+from robocov_app.web.access import cookies_of, link_to, query_of, same, token_in
+from robocov_app.web.connections import (
+    FAULT,
+    NOT_UNDERSTOOD,
+    TRY_AGAIN_LATER,
+    WINDOW_CLOSED,
+    WINDOW_ENDED,
+    WRITE_LIMIT_BYTES,
+    Listener,
+    is_from_own_page,
+    report,
+    respond,
+    respond_with,
+    respond_with_page,
+)
+from robocov_app.web.files import TransferError, list_saved, read_saved
+from robocov_app.web.visitors import VisitorFolders, create_id, is_signed, read_id, sign
 
-LONGEST_HEAD = 1 << 14  # bytes of a request's head
-PATIENCE = 20.0  # seconds that a request's head may take
-_START = 120.0  # seconds that a window may take to open
+if TYPE_CHECKING:
+    from websockets.asyncio.connection import Connection as Socket
+    from websockets.asyncio.server import ServerConnection
+    from websockets.http11 import Request, Response
+
+OPENING_TIMEOUT_S = 120.0
+ENDING_TIMEOUT_S = 5.0  # to write a draft; then the process is killed
+MAX_OPENING = 4  # windows that open at the same time
+MIN_IDLE_S = 60.0  # without a page, before a window may be ended because another visitor waits
+LOOKING_INTERVAL_S = 1.0  # between two looks for windows that have ended, or that nobody looks at
+MAX_QUEUED_FRAMES = 4
+MAX_FRAME_BYTES = 1 << 27
+MAX_REASON_BYTES = 120  # of a close frame's reason, which has at most 123 of them
 
 
-@dataclass
-class _Session:
-    process: SpawnProcess
-    port: int
-    token: str
+class _Output(TextIOBase):
+    """Standard output of a window's process to the server, which reads until the window is open."""
 
-
-class _Lines(TextIOBase):
-    """Standard output to another process."""
-
-    def __init__(self, to: Connection) -> None:
-        self._to = to
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe = pipe
 
     def write(self, text: str, /) -> int:
         with suppress(OSError):
-            self._to.send(text)
+            self._pipe.send(text)
         return len(text)
 
 
-def _session(command: Callable[[Any], int], options: Any, to: Connection) -> None:
+def _run_window(command: Callable[[Any], int], options: Any, pipe: Connection) -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None
 
-    def end_with_it() -> None:
+    def end_with_parent() -> None:
         parent.join()
         interrupt_main()
 
-    Thread(target=end_with_it, daemon=True).start()
-    with suppress(KeyboardInterrupt), redirect_stdout(_Lines(to)):
+    Thread(target=end_with_parent, daemon=True).start()
+    with suppress(KeyboardInterrupt), redirect_stdout(_Output(pipe)):
         try:
             command(options)
         except RobocovError as error:
-            to.send(str(error))
+            pipe.send(str(error))
+
+
+@dataclass(eq=False)
+class Window:
+    """A window that is open in a process of its own."""
+
+    process: SpawnProcess
+    folder: Path
+    port: int
+    token: str
+    opened_at: float = field(default_factory=time)
+
+
+@dataclass(eq=False)
+class Session:
+    """A visitor with a window, or with one that is being opened."""
+
+    opening: asyncio.Task[Window]
+    n_pages: int = 0
+    unwatched_since: float = field(default_factory=monotonic)
+    ending: asyncio.Task[None] | None = None
+
+    @property
+    def window(self) -> Window | None:
+        """The window, once it is open."""
+        if self.opening.done() and not self.opening.cancelled() and self.opening.exception() is None:
+            return self.opening.result()
+        return None
+
+    @property
+    def idle_s(self) -> float:
+        """For how long nobody has looked at the window, in seconds."""
+        return 0.0 if self.n_pages else monotonic() - self.unwatched_since
 
 
 class Sessions:
-    """Starts a command for each visitor who has the link, and carries bytes to and fro.
+    """Opens a window for each visitor who follows the link, and carries messages to and fro.
 
-    A visitor is known by the token of their own window, which their browser keeps as a cookie: whoever comes
-    back comes back to that window. `most`: windows at a time. Each has a folder of its own.
+    A visitor gets a cookie with the page, and a window when that page opens a socket, which link previews
+    and programs that fetch a page do not. Whoever comes back finds their window; if it was ended meanwhile,
+    a new one with their folder, which offers their draft.
+
+    Parameters
+    ----------
+    command : callable
+        Command that shows the window.
+    options : WindowOptions
+        Its options.
+    max_sessions : int
+        Maximum number of concurrent windows.
+    max_idle_s : float
+        A window that no page has shown for that long is ended.
     """
 
-    def __init__(self, command: Callable[[Any], int], options: Any, most: int) -> None:
-        self.token, self._most = secrets.token_urlsafe(18), most
-        self._command, self._options = command, options
-        self._sessions: list[_Session] = []
-        self._processes: list[SpawnProcess] = []  # also those whose window is not open yet
-        self._count = 0
-        self._spare: _Session | None = None  # one that is there for the first visitor
+    def __init__(
+        self, command: Callable[[Any], int], options: Any, max_sessions: int, max_idle_s: float
+    ) -> None:
+        self.token = secrets.token_urlsafe(18)
+        self._command = command
+        self._options = options
+        self._max_sessions = max_sessions
+        self._max_idle_s = max_idle_s
+        self._folders = VisitorFolders(options.folder)
+        self._sessions: dict[str, Session] = {}  # by the identity of the visitor
+        self._spare: Window | None = None  # for the first new visitor
+        self._processes: list[SpawnProcess] = []
+        self._admission = asyncio.Lock()
+        self._openings = asyncio.Semaphore(MAX_OPENING)
 
     async def serve(self, tell: Callable[[str], object]) -> None:
-        host, port = self._options.host, self._options.port
+        """Serve until the task is cancelled; `tell` is called with the line that names the link."""
+        listener = Listener(self._answer, self._talk)
+        host = self._options.host
+        port = await listener.listen(host, self._options.port)
+        loop = asyncio.get_running_loop()
+        task = asyncio.current_task()
+        assert task is not None
+        with suppress(NotImplementedError, ValueError):  # not on Windows, and only in the main thread
+            loop.add_signal_handler(signal.SIGTERM, task.cancel)
         try:
-            server = await asyncio.start_server(self._carry, host, port, limit=LONGEST_HEAD)
-        except OSError as error:
-            raise listening_failed(host, port, error) from None
-        try:
-            self._spare = await self._opened()  # also tells at once what is wrong with the options
-            tell(f"open {link_to(host, server.sockets[0].getsockname()[1], self.token)}")
-            await asyncio.Event().wait()
+            self._spare = await self._open(self._folders.create())  # reports at once what is wrong
+            tell(f"open {link_to(host, port, self.token)}")
+            while True:
+                await asyncio.sleep(LOOKING_INTERVAL_S)
+                self._look_after()
         finally:
-            server.close()
-            for process in self._processes:
-                process.terminate()
-            end = monotonic() + 5.0
-            for process in self._processes:
-                process.join(max(end - monotonic(), 0.0))
-                process.kill()
+            await self._end_all(listener)
 
-    async def _carry(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        cut = OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, asyncio.CancelledError
-        with suppress(*cut, TimeoutError):
-            head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), PATIENCE)
-            found = await self._session_of(head)
-            if isinstance(found, str):
-                writer.write(found.encode())
-            else:
-                there, back = await asyncio.open_connection("127.0.0.1", found.port)
-                back.write(head)
-                await asyncio.gather(_copied(reader, back), _copied(there, writer))
-        writer.close()
+    async def _end_all(self, listener: Listener) -> None:
+        for process in self._processes:
+            process.terminate()
+        await listener.close()
+        deadline = monotonic() + ENDING_TIMEOUT_S
+        for process in self._processes:
+            process.join(max(deadline - monotonic(), 0.0))
+            process.kill()
+        if self._spare is not None:
+            with suppress(OSError):
+                self._spare.folder.rmdir()  # nobody had it
 
-    async def _session_of(self, head: bytes) -> _Session | str:
-        first, *lines = head.decode("latin-1").split("\r\n")
-        given = token_in(first.partition(" ")[2].partition(" ")[0])
-        cookies = cookies_of(line[7:].strip() for line in lines if line[:7].lower() == "cookie:")
-        self._processes = [each for each in self._processes if each.is_alive()]
-        self._sessions = [each for each in self._sessions if each.process in self._processes]
-        for token in (given, *cookies.values()):
-            for each in self._sessions:
-                if same(token, each.token):
-                    # with the link of all in the address: to the own window
-                    return _answer("303 See Other", each.token) if same(given, self.token) else each
-        if not same(given, self.token):
-            return _answer("403 Forbidden")
-        session, self._spare = self._spare, None
-        if session is None or not session.process.is_alive():
-            if len(self._processes) >= self._most:
-                return _answer("503 Service Unavailable")
-            try:
-                session = await self._opened()
-            except InputError:
-                return _answer("500 Internal Server Error")
-        self._sessions.append(session)
-        return _answer("303 See Other", session.token)
+    # Requests.
 
-    async def _opened(self) -> _Session:
-        """Open a window in a process of its own; InputError with what it says if it does not open."""
-        self._count += 1
-        folder = self._options.folder / f"session-{self._count}"
-        folder.mkdir(parents=True, exist_ok=True)
-        own = replace(self._options, each=False, host="127.0.0.1", port=0, folder=folder)
-        context = multiprocessing.get_context("spawn")
-        said, says = context.Pipe(duplex=False)
-        process = context.Process(target=_session, args=(self._command, own, says), daemon=False)
-        if os.name == "posix":
-            resource_tracker.ensure_running()  # which would unblock what is blocked here
-        interruptible(False)
-        process.start()
-        interruptible(True)
-        self._processes.append(process)
-        says.close()
-        words = "the window did not open"
-        with suppress(EOFError):
-            if await asyncio.to_thread(said.poll, _START):
-                kind, _, link = (words := str(said.recv())).strip().partition(" ")
-                if kind == "open":
-                    return _Session(process, urlsplit(link).port or 0, token_in(link))
+    async def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Answer a request for the page or a file; None lets a socket be opened."""
+        path = request.path.partition("?")[0]
+        given = token_in(request.path)
+        kept = self._kept_token(request)
+        if same(given, self.token) and path.endswith("/"):
+            return self._admit(connection, kept)
+        token = self._visitor_token(request)
+        if not token:
+            return respond(
+                connection, HTTPStatus.FORBIDDEN, "This needs the whole link that robocov printed.\n"
+            )
+        if path.endswith("/socket"):
+            if is_from_own_page(request):
+                return None
+            return respond(connection, HTTPStatus.FORBIDDEN, "Another page may not drive this window.\n")
+        folder, _, name = path.rpartition("/")
+        if folder.endswith("/saved"):
+            return await self._download(connection, read_id(token), unquote(name))
+        if not path.endswith("/"):
+            return respond(connection, HTTPStatus.NOT_FOUND, "Nothing is there.\n")
+        is_given = token == given
+        cookie = f"{self._folders.cookie}={token}" if is_given and token != kept else ""
+        return respond_with_page(connection, may_be_framed=is_given, cookie=cookie)
+
+    def _admit(self, connection: ServerConnection, kept: str) -> Response:
+        """Send whoever has the link to an address of their own; nothing is started for them yet."""
+        visitor = read_id(kept)
+        if not (is_signed(kept, self.token) or self._folders.find(visitor)):
+            visitor = create_id()
+        response = respond(connection, HTTPStatus.SEE_OTHER, "")
+        response.headers["Location"] = f"./?{urlencode({'token': sign(visitor, self.token)})}"
+        return response
+
+    def _kept_token(self, request: Request) -> str:
+        return cookies_of(request.headers.get_all("Cookie")).get(self._folders.cookie, "")
+
+    def _visitor_token(self, request: Request) -> str:
+        """Return the token of the visitor who sends a request; empty if this server let in nobody such."""
+        for token in (token_in(request.path), self._kept_token(request)):
+            if is_signed(token, self.token):
+                return token
+        return ""
+
+    async def _download(self, connection: ServerConnection, visitor: str, name: str) -> Response:
+        session = self._sessions.get(visitor)
+        window = None if session is None else session.window
+        if window is None or name not in list_saved(window.folder, window.opened_at):
+            return respond(connection, HTTPStatus.NOT_FOUND, "Nothing is there.\n")
+        path = window.folder / name
+        if not path.resolve().is_relative_to(window.folder.resolve()):
+            return respond(connection, HTTPStatus.NOT_FOUND, "Nothing is there.\n")
+        try:
+            name, body = await asyncio.to_thread(read_saved, path)
+        except TransferError as error:
+            return respond(connection, HTTPStatus.NOT_FOUND, f"{error}\n")
+        headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(name)}"}
+        return respond_with(connection, HTTPStatus.OK, body, "application/octet-stream", headers)
+
+    # Sockets.
+
+    async def _talk(self, connection: ServerConnection) -> None:
+        """Carry messages between a page and its visitor's window, which is opened if there is none."""
+        request = connection.request
+        assert request is not None
+        visitor = read_id(self._visitor_token(request))
+        session = await self._find_or_start(visitor)
+        if session is None:
+            text = f"All {self._max_sessions} windows are in use. Trying again …"
+            await connection.close(TRY_AGAIN_LATER, text)
+            return
+        session.n_pages += 1
+        try:
+            window = await asyncio.shield(session.opening)
+            await self._carry(connection, window, query_of(request.path).get("page", ""))
+        except RobocovError as error:
+            if self._sessions.get(visitor) is session:
+                del self._sessions[visitor]
+                report(f"a visitor's window did not open: {error}")
+            await connection.close(FAULT, _cut_reason(f"The window did not open: {error}"))
+        finally:
+            session.n_pages -= 1
+            session.unwatched_since = monotonic()
+
+    async def _find_or_start(self, visitor: str) -> Session | None:
+        """Return a visitor's session, which is started if there is none; None if all places are taken."""
+        async with self._admission:
+            session = self._sessions.get(visitor)
+            if session is not None and self._has_ended(session):
+                await self._end(visitor, session)
+                session = None
+            if session is None:
+                session = await self._start(visitor)
+            return session
+
+    async def _start(self, visitor: str) -> Session | None:
+        folder = self._folders.find(visitor)
+        spare = self._spare
+        if folder is None and spare is not None and spare.process.is_alive():
+            self._spare = None
+            session = Session(asyncio.create_task(self._give(spare, visitor)))
+        elif await self._make_room():
+            session = Session(asyncio.create_task(self._open_for(visitor, folder)))
+        else:
+            return None
+        self._sessions[visitor] = session
+        return session
+
+    def _has_ended(self, session: Session) -> bool:
+        window = session.window
+        return session.ending is not None or (window is not None and not window.process.is_alive())
+
+    async def _give(self, window: Window, visitor: str) -> Window:
+        """Give the window that is open already to a visitor."""
+        with suppress(OSError, OutputError):  # they are not known again after the end of the server
+            self._folders.assign(visitor, window.folder)
+        window.opened_at = time()
+        return window
+
+    async def _open_for(self, visitor: str, folder: Path | None) -> Window:
+        """Open a window for a visitor, in the folder that they had before."""
+        try:
+            if folder is None:
+                folder = self._folders.create()
+                self._folders.assign(visitor, folder)
+        except OSError as error:
+            text = f"{self._options.folder}: cannot be written to: {reason(error)}"
+            raise OutputError(text) from error
+        return await self._open(folder)
+
+    async def _make_room(self) -> bool:
+        """End the window that nobody has looked at for longest if all places are taken."""
+        if len(self._sessions) + (self._spare is not None) < self._max_sessions:
+            return True
+        if self._spare is not None:
+            spare = self._spare
+            self._spare = None
+            await self._stop(spare.process)
+            with suppress(OSError):
+                spare.folder.rmdir()
+            return True
+        idle = [(visitor, each) for visitor, each in self._sessions.items() if each.idle_s >= MIN_IDLE_S]
+        if not idle:
+            return False
+        visitor, session = max(idle, key=lambda item: item[1].idle_s)
+        await self._end(visitor, session)
+        return True
+
+    async def _carry(self, connection: ServerConnection, window: Window, page_id: str) -> None:
+        from websockets.asyncio.client import connect
+        from websockets.exceptions import WebSocketException
+
+        query = urlencode({"token": window.token, "page": page_id})
+        try:
+            socket = await connect(
+                f"ws://127.0.0.1:{window.port}/socket?{query}",
+                max_size=MAX_FRAME_BYTES,
+                max_queue=MAX_QUEUED_FRAMES,
+                write_limit=WRITE_LIMIT_BYTES,
+                compression=None,
+                ping_interval=None,  # the process ends with its socket
+                proxy=None,
+            )
+        except (OSError, WebSocketException):
+            await connection.close(WINDOW_ENDED, "The window has ended.")
+            return
+        async with socket:
+            copying = {
+                asyncio.create_task(_copy_messages(connection, socket)),
+                asyncio.create_task(_copy_messages(socket, connection)),
+            }
+            _, pending = await asyncio.wait(copying, return_when=asyncio.FIRST_COMPLETED)
+            for task in pending:
+                task.cancel()
+            await asyncio.wait(copying)
+        code = socket.close_code
+        if code is None or (code < NOT_UNDERSTOOD and code != WINDOW_CLOSED):
+            code = WINDOW_ENDED
+        await connection.close(code, socket.close_reason or "")
+
+    # Processes.
+
+    def _look_after(self) -> None:
+        """Forget windows that have ended, and end those that nobody has looked at for long."""
+        self._processes = [process for process in self._processes if process.is_alive()]
+        for visitor, session in list(self._sessions.items()):
+            if session.ending is not None or not session.opening.done():
+                continue
+            window = session.window
+            if window is None or not window.process.is_alive():
+                del self._sessions[visitor]
+            elif session.idle_s >= self._max_idle_s:
+                session.ending = asyncio.create_task(self._end(visitor, session))
+
+    async def _end(self, visitor: str, session: Session) -> None:
+        """End a visitor's window, which writes a draft, and give its place back."""
+        if session.ending is not None and session.ending is not asyncio.current_task():
+            await asyncio.shield(session.ending)
+        window = session.window
+        if window is not None:
+            await self._stop(window.process)
+        if self._sessions.get(visitor) is session:
+            del self._sessions[visitor]
+
+    async def _stop(self, process: SpawnProcess) -> None:
         process.terminate()
-        raise InputError(words)
+        deadline = monotonic() + ENDING_TIMEOUT_S
+        while process.is_alive() and monotonic() < deadline:
+            await asyncio.sleep(0.02)
+        process.kill()
+
+    async def _open(self, folder: Path) -> Window:
+        """Open a window in a process of its own; raises `InputError` with its message if it does not open."""
+        async with self._openings:
+            options = replace(self._options, each=False, host="127.0.0.1", port=0, folder=folder)
+            context = multiprocessing.get_context("spawn")
+            receiver, sender = context.Pipe(duplex=False)
+            process = context.Process(target=_run_window, args=(self._command, options, sender), daemon=False)
+            if os.name == "posix":
+                resource_tracker.ensure_running()  # which would unblock what is blocked here
+            interruptible(False)
+            process.start()
+            interruptible(True)
+            self._processes.append(process)
+            sender.close()
+            with receiver:
+                text = await asyncio.to_thread(_receive_line, receiver)
+            word, _, link = text.strip().partition(" ")
+            if word == "open":
+                return Window(process, folder, urlsplit(link).port or 0, token_in(link))
+            process.terminate()
+            with suppress(OSError):
+                folder.rmdir()  # only if it is empty
+            raise InputError(text)
 
 
-def _answer(status: str, token: str = "") -> str:
-    words = {"303": "", "403": "This needs the whole link that robocov printed."}
-    words |= {"500": "The window did not open.", "503": "All windows are taken."}
-    body = words[status[:3]] + "\n"
-    place = f"Location: ./?token={token}\r\n" if token else ""
-    head = f"HTTP/1.1 {status}\r\n{place}Content-Type: text/plain\r\nContent-Length: {len(body)}\r\n"
-    return f"{head}Cache-Control: no-store\r\nConnection: close\r\n\r\n{body}"
+def _receive_line(receiver: Connection) -> str:
+    """Return what a window's process prints first."""
+    with suppress(EOFError, OSError):
+        if receiver.poll(OPENING_TIMEOUT_S):
+            return str(receiver.recv())
+    return "the window did not open"
 
 
-async def _copied(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Carry bytes one way until they end; a slow line holds up who sends."""
-    with suppress(OSError):
-        while data := await reader.read(1 << 16):
-            writer.write(data)
-            await writer.drain()
-    with suppress(OSError):
-        writer.close()
+async def _copy_messages(source: Socket, target: Socket) -> None:
+    """Carry messages one way until either end is closed; a slow target holds up who sends."""
+    from websockets.exceptions import ConnectionClosed
+
+    with suppress(ConnectionClosed):
+        async for message in source:
+            await target.send(message)
+
+
+def _cut_reason(text: str) -> str:
+    return text.encode()[:MAX_REASON_BYTES].decode(errors="ignore")

@@ -1,16 +1,51 @@
 """Messages of a page, checked; and pygame's events made of them."""
 
+import unicodedata
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 import pygame
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter
 from pygame.event import Event
 
 from robocov_app.toolkit import clipboard
 
 SMALLEST, LARGEST, MOST_PIXELS = 200, 7680, 4096 * 2304  # a page's sides, and its area, in pixels
 
+MAX_UPLOAD_BYTES = 1 << 24
+_STRIPPED_CATEGORIES = ("Cc", "Cs")
+MAX_FILE_NAME_CHARACTERS = 300  # longer than what any file system takes, so that it is refused with a message
+
+
+def strip_controls(text: str, keep: str = "") -> str:
+    """Remove control characters such as NUL, escape and delete from a text.
+
+    Parameters
+    ----------
+    text : str
+        Text that came in from a page.
+    keep : str
+        Control characters that stay, such as line breaks in a text that is pasted.
+
+    Returns
+    -------
+    str
+        The text without characters of Unicode's categories Cc (control) and Cs (surrogate).
+    """
+    return "".join(
+        character
+        for character in text
+        if character in keep or unicodedata.category(character) not in _STRIPPED_CATEGORIES
+    )
+
+
+def _strip_lines(text: str) -> str:
+    """Remove control characters except line breaks, which become line feeds, and tabs."""
+    return strip_controls(text.replace("\r\n", "\n").replace("\r", "\n"), keep="\n\t")
+
+
+_Line = AfterValidator(strip_controls)
+_Lines = AfterValidator(_strip_lines)
 _Pixel = Annotated[float, Field(ge=-1e5, le=1e5)]
 _Turn = Annotated[float, Field(ge=-100.0, le=100.0)]
 
@@ -52,10 +87,10 @@ class WheelTurned(_OfPointer):
 
 
 class KeyChanged(_OfHands):
-    """A key is pressed or let go; `key` is its name as browsers call it."""
+    """A key is pressed or let go; `key` is its name in browsers, empty if it was a control character."""
 
     kind: Literal["key"]
-    key: str = Field(min_length=1, max_length=20)
+    key: Annotated[str, Field(min_length=1, max_length=20), _Line]
     down: bool
 
 
@@ -63,14 +98,14 @@ class TextTyped(_Message):
     """A text is typed without keys: on a phone, or put together from several."""
 
     kind: Literal["text"]
-    text: str = Field(max_length=1000)
+    text: Annotated[str, Field(max_length=1000), _Lines]
 
 
 class TextPasted(_Message):
     """A text is pasted from the clipboard of who controls."""
 
     kind: Literal["paste"]
-    text: str = Field(max_length=100_000)
+    text: Annotated[str, Field(max_length=100_000), _Lines]
 
 
 class Left(_Message):
@@ -108,7 +143,15 @@ class Named(_Message):
     """The name of who looks at a page."""
 
     kind: Literal["name"]
-    name: str = Field(max_length=40)
+    name: Annotated[str, Field(max_length=40), _Line]
+
+
+class UploadStarted(_Message):
+    """A file follows in binary messages: its name, and its size in bytes."""
+
+    kind: Literal["upload"]
+    name: Annotated[str, Field(max_length=MAX_FILE_NAME_CHARACTERS), _Line]
+    size: int = Field(ge=0, le=MAX_UPLOAD_BYTES)
 
 
 class Uploaded(_Message):
@@ -120,7 +163,7 @@ class Uploaded(_Message):
 
 OfHands = PointerMoved | ButtonChanged | WheelTurned | KeyChanged | TextTyped | TextPasted | Left
 """Messages of hands to a window."""
-Message = OfHands | PageChanged | PictureShown | Control | Named
+Message = OfHands | PageChanged | PictureShown | Control | Named | UploadStarted
 MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="kind")])
 _NAMED_ALIKE = [
     *("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"),
@@ -158,9 +201,11 @@ class Hands:
             case KeyChanged():
                 yield from _key(message)
             case TextTyped():
-                for letter in message.text:
-                    yield from _key(KeyChanged(kind="key", key=letter, down=True))
-                    yield from _key(KeyChanged(kind="key", key=letter, down=False))
+                for character in message.text:
+                    # a telephone's keyboard writes a line break where another presses Enter
+                    key = {"\n": "Enter", "\t": "Tab"}.get(character, character)
+                    yield from _key(KeyChanged(kind="key", key=key, down=True))
+                    yield from _key(KeyChanged(kind="key", key=key, down=False))
             case TextPasted():
                 clipboard.put(message.text)
                 for down in (True, False):
@@ -186,6 +231,8 @@ def modifiers(held: int) -> int:
 
 def _key(message: KeyChanged) -> Iterator[Event]:
     name, held = message.key, message.held
+    if not name:
+        return
     writes = name if len(name) == 1 and not held & 0b1010 else ""
     code = _KEYS.get(name)
     if code is None:

@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import weakref
 from collections.abc import Sequence
 from html import escape
@@ -24,19 +25,27 @@ class LiveWindow:
     def __init__(self, arguments: Sequence[str], height: int = 620) -> None:
         extra("websockets", "web")
         call = [sys.executable, "-m", "robocov_app", *arguments, "--serve", "--port", "0"]
-        pipe, none = subprocess.PIPE, subprocess.DEVNULL
         environment = {**os.environ, DRAFTS: ""}  # the cell makes the window again, there is nothing to offer
-        self._process = subprocess.Popen(
-            call, stdin=none, stdout=pipe, stderr=pipe, text=True, env=environment
-        )
-        self.close = weakref.finalize(self, _ended, self._process)
-        assert self._process.stdout is not None
-        self.height = height
-        found = re.match(r"open (\S+)", self._process.stdout.readline())
-        if found is None:
-            _, words = self._process.communicate()
-            raise RobocovError(words.strip().removeprefix("robocov: error: ") or "the window did not open")
-        self.link = found[1]
+        # a file: nobody reads on once the window is open, and a pipe that is full would stop the process
+        with tempfile.TemporaryFile() as errors:
+            self._process = subprocess.Popen(
+                call,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                text=True,
+                env=environment,
+            )
+            self.close = weakref.finalize(self, _ended, self._process)
+            assert self._process.stdout is not None
+            self.height = height
+            found = re.match(r"open (\S+)", self._process.stdout.readline())
+            if found is None:
+                self._process.wait()
+                errors.seek(0)
+                text = errors.read().decode(errors="replace").strip().removeprefix("robocov: error: ")
+                raise RobocovError(text or "the window did not open")
+            self.link = found[1]
 
     def _repr_html_(self) -> str:
         link = self.link

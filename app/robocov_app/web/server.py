@@ -1,4 +1,4 @@
-"""The server of a window: one page, its pictures and what hands do there, behind a token.
+"""The server of a window: one page, its frames and what hands do there, behind a token.
 
 The window's loop stays in the main thread and knows a `Remote` and nothing of browsers; the server has a
 thread of its own. (rendercanvas' ``http`` backend has none of tokens, origins, control, text and clipboard.)
@@ -9,36 +9,41 @@ from __future__ import annotations
 import asyncio
 import json
 import secrets
-import struct
 import threading
-import zlib
 from collections import deque
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
 from http import HTTPStatus
-from importlib.resources import files
-from io import BytesIO
-from itertools import count, islice
+from itertools import count
 from pathlib import Path
 from time import monotonic, time
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, unquote
-from weakref import WeakSet
-from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import pygame
-from numpy.typing import NDArray
 
-from robocov.files.atomic import written
-from robocov.files.result_folder import MANIFEST
-from robocov_app.terminal.output import free_name
+from robocov.errors import InputError
 from robocov_app.toolkit import clipboard
-from robocov_app.toolkit.dialogs import MOST_LISTED
 from robocov_app.toolkit.input import shown_cursor
 from robocov_app.web import events
-from robocov_app.web.access import cookies_of, link_to, listening_failed, query_of, same, token_in
+from robocov_app.web.access import cookies_of, link_to, query_of, same, token_in
+from robocov_app.web.connections import (
+    NOT_UNDERSTOOD,
+    REPLACED,
+    SEND_TIMEOUT_S,
+    TRY_AGAIN_LATER,
+    Listener,
+    is_from_own_page,
+    report,
+    respond,
+    respond_with,
+    respond_with_page,
+)
+from robocov_app.web.files import TransferError, Upload, check_name, list_saved, read_saved
+from robocov_app.web.frames import BaseFrames, Frame, encode_frame
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -46,18 +51,20 @@ if TYPE_CHECKING:
 
     from robocov_app.toolkit.window import BaseWindow
 
-LONGEST = 1 << 17  # letters of a message that comes in
-LARGEST_UPLOAD = 1 << 24  # bytes of a file
-_PICTURES = "png jpg jpeg bmp gif webp tif tiff pgm"
-_MAPS = "json geojson wkt svg dxf yaml yml tmx osm map scen world argos xml"
-UPLOADS = frozenset(f".{suffix}" for suffix in f"robocov {_PICTURES} {_MAPS}".split())
-_OFFERED = UPLOADS | {".mp4", ".csv", ".html", ".pdf", ".zip"}  # what is saved is offered for download
-_MOST_COPIED = 100_000
-MOST_EVENTS = 400.0  # messages a second that are taken from one page; what is more waits in the line
-MOST_WAITING = 5000  # messages that wait for the window
-MOST_PAGES = 100
-NARROW = 700  # width of a page, in pixels of CSS, below which the panel is hidden
-IN_FLIGHT = 2  # pictures that are on their way to a page, at most
+MAX_WATCHERS = 100
+MAX_CONTROLLERS = 16  # pages with the controlling link; the oldest one has to go for one more
+MAX_EVENTS_PER_S = 400.0  # that are taken from one page; what is more waits in its connection
+EVENTS_PER_UPLOAD = 200.0  # an upload counts as that many events
+EVENTS_PER_PIECE = 8.0  # and each piece of it
+MAX_WAITING_EVENTS = 5000  # for the window
+MAX_NOTICES = 8  # that wait for a page
+MAX_COPIED_CHARACTERS = 100_000
+MAX_DOWNLOADS_BYTES = 1 << 29  # on their way at a time
+NARROW_PX = 700  # width of a page, in pixels of CSS, below which the panel is hidden
+MAX_IN_FLIGHT = 2  # frames that are on their way to a page
+FEW_WATCHERS = 3
+WATCHERS_INTERVAL_S = 1 / 15  # between two frames for watchers, if there are more than a few
+SAVED_INTERVAL_S = 1.0  # between two looks for new files
 _CURSORS = {
     pygame.SYSTEM_CURSOR_HAND: "pointer",
     pygame.SYSTEM_CURSOR_CROSSHAIR: "crosshair",
@@ -70,101 +77,103 @@ _CURSORS = {
     pygame.SYSTEM_CURSOR_WAIT: "wait",
     pygame.SYSTEM_CURSOR_NO: "not-allowed",
 }
-HEADER = struct.Struct("<I6H")
-"""Number of the picture; its width and height; left, top, width and height of what is different."""
-
-
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """Pixels of the window at one moment; `number` grows from picture to picture."""
-
-    number: int
-    pixels: NDArray[np.uint32]  # (height, width), 0xRRGGBB
-
-    @classmethod
-    def of(cls, surface: pygame.Surface, number: int) -> Picture:
-        high, wide = surface.get_height(), surface.get_pitch() // 4
-        buffer: Any = surface.get_buffer()
-        view = np.frombuffer(buffer, np.uint32).reshape(high, wide)
-        return cls(number, view[:, : surface.get_width()] & np.uint32(0xFFFFFF))
-
-
-def encoded(picture: Picture, before: Picture | None) -> bytes:
-    """Return what a browser that shows `before` needs to show a picture: a header and deflated pixels.
-
-    The pixels are those of the smallest box around all that is different, xor those that were there: what
-    stays is 0, which deflate makes nothing of. Text stays as sharp as it is in the window, and all this is
-    several times quicker than PNG. A picture of another size begins from black.
-    """
-    pixels = picture.pixels
-    high, wide = pixels.shape
-    change = pixels if before is None or before.pixels.shape != pixels.shape else pixels ^ before.pixels
-    rows, columns = np.flatnonzero(change.any(axis=1)), np.flatnonzero(change.any(axis=0))
-    left, top, right, bottom = 0, 0, 0, 0
-    if len(rows):
-        left, top, right, bottom = columns[0], rows[0], columns[-1] + 1, rows[-1] + 1
-    box: Any = np.ascontiguousarray(change[top:bottom, left:right])
-    head = HEADER.pack(picture.number % 2**32, wide, high, left, top, right - left, bottom - top)
-    return head + zlib.compress(box, 1)
 
 
 @dataclass(eq=False)
 class Page:
     """A browser that shows the window."""
 
-    line: ServerConnection
+    connection: ServerConnection
     number: int
-    teacher: bool  # may take control at any time
+    is_teacher: bool  # may take control at any time
     name: str
-    own: str  # by which it is known again after its line broke
+    page_id: str  # by which it is known again when its connection broke
     asks: bool = False  # for control
-    shown: Picture | None = None  # the picture that it has, or will have
-    sent: deque[int] = field(default_factory=deque)  # numbers of pictures on their way
-    told: dict[str, Any] = field(default_factory=dict)
     size: events.PageChanged | None = None
+    upload: Upload | None = None
+    base: int = 0  # number of the frame that it has, or will have; 0 for none
+    in_flight: deque[int] = field(default_factory=deque)  # numbers of frames on their way
+    outbox: deque[bytes] = field(default_factory=deque)  # frames to be sent
+    notices: deque[str] = field(default_factory=lambda: deque(maxlen=MAX_NOTICES))
+    state: dict[str, Any] = field(default_factory=dict)  # that it was sent last
     changed: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def is_ready_for(self, frame: Frame | None) -> bool:
+        """Return whether a frame is newer than what the page has, and can be sent."""
+        return frame is not None and self.base < frame.number and len(self.in_flight) < MAX_IN_FLIGHT
+
+    def notify(self, notice: str) -> None:
+        """Show a message in the page."""
+        self.notices.append(notice)
+        self.changed.set()
 
 
 class WebDisplay:
-    """A window's pictures to browsers, and their events to the window: a `Remote`.
+    """A window's frames to browsers, and their events to the window: a `Remote`.
 
-    `host`, `port`: where it listens, 0 for any port that is free. `folder`: of what is saved and uploaded.
-    Who has the `link` may take control of the window; who has `watch_link` sees it, and controls it once
+    Whoever has `link` may take control of the window. Whoever has `watch_link` sees it, and controls it once
     control is handed over. One page controls at a time: the first that may, until it hands over or is gone.
+
+    Parameters
+    ----------
+    host : str
+        Address to listen at.
+    port : int
+        Port to listen at; 0 for any port that is free.
+    folder : Path
+        Folder for files that are saved and uploaded.
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int = 0, folder: Path = Path()) -> None:
-        self.host, self.port, self.folder = host, port, folder
-        self.token, self.watch_token = secrets.token_urlsafe(18), secrets.token_urlsafe(18)
-        self._numbers = count(1)
-        self._control: Page | None = None
-        self._saved: tuple[str, ...] = ()
-        self._looked, self._since = 0.0, time()
+        self.host = host
+        self.port = port
+        self.folder = folder
+        self.token = secrets.token_urlsafe(18)
+        self.watch_token = secrets.token_urlsafe(18)
         # browsers share cookies among all ports of a machine
         self._cookie = f"robocov-{sha256(self.token.encode()).hexdigest()[:12]}"
-        self._waiting: deque[events.OfHands | events.Uploaded] = deque()
+        # the window's side
         self._wanted: events.PageChanged | None = None
         self._given: events.PageChanged | None = None
         self._hands = events.Hands()
-        self._held, self._narrow = 0, False
-        self._picture: Picture | None = None
-        # also a page that is there before the first picture is told all of it
-        self._told: dict[str, Any] = {"cursor": "default", "title": "robocov", "saved": ()}
+        self._held = 0
+        self._narrow = False
+        self._saved: tuple[str, ...] = ()
+        self._saved_looked_at = 0.0
+        self._started_at = time()
+        # what both sides use
+        self._waiting: deque[events.OfHands | events.Uploaded] = deque()
+        self._frame: Frame | None = None
+        # also a page that is there before the first frame gets all of it
+        self._state: dict[str, Any] = {"cursor": "default", "title": "robocov", "saved": ()}
+        self._called = threading.Event()
+        # the browsers' side
+        self._numbers = count(1)
         self._pages: list[Page] = []
-        self._encoded: dict[tuple[int, int], bytes] = {}
+        self._people: list[dict[str, Any]] = []
+        self._control: Page | None = None
+        self._bases = BaseFrames()
+        self._watchers_frame: Frame | None = None
+        self._watchers_due = 0.0
+        self._control_was_served = False
+        self._downloads_bytes = 0
+        self._background: set[asyncio.Task[None]] = set()
         self._loop: asyncio.AbstractEventLoop
+        self._stirred = asyncio.Event()
         self._ended = asyncio.Event()
-        self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="web", daemon=True)
-        self._begun, self._called = threading.Event(), threading.Event()
-        self._trouble: OSError | None = None
+        self._encoder = ThreadPoolExecutor(1, thread_name_prefix="web-encoder")
+        self._file_thread = ThreadPoolExecutor(1, thread_name_prefix="web-files")
+        self._thread = threading.Thread(target=self._run, name="web", daemon=True)
+        self._started = threading.Event()
+        self._trouble: InputError | None = None
 
-    # the window's side
+    # The window's side.
 
     def __enter__(self) -> WebDisplay:
         self._thread.start()
-        self._begun.wait()
+        self._started.wait()
         if self._trouble is not None:
-            raise listening_failed(self.host, self.port, self._trouble)
+            raise self._trouble
         self.link = link_to(self.host, self.port, self.token)
         self.watch_link = link_to(self.host, self.port, self.watch_token)
         return self
@@ -181,13 +190,8 @@ class WebDisplay:
         """Give the window the size and look of the page, and post what hands did there."""
         wanted = self._wanted
         if wanted is not None and wanted is not self._given:
-            self._given, size = wanted, (wanted.width, wanted.height)
-            if window.screen.get_size() != size:
-                pygame.display.set_mode(size, pygame.RESIZABLE)
-                pygame.event.post(pygame.event.Event(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1]))
-            narrow, before = wanted.width < NARROW * wanted.ratio, self._narrow
-            self._narrow, theme = narrow, "dark" if wanted.dark else "light"
-            window.suit(wanted.ratio, theme, panel=None if narrow == before else not narrow)
+            self._given = wanted
+            self._fit(window, wanted)
         posted = False
         while self._waiting:
             held = getattr(self._waiting[0], "held", self._held)
@@ -201,212 +205,308 @@ class WebDisplay:
                 pygame.event.post(event)
                 posted = True
 
+    def _fit(self, window: BaseWindow, wanted: events.PageChanged) -> None:
+        size = (wanted.width, wanted.height)
+        if window.screen.get_size() != size:
+            pygame.display.set_mode(size, pygame.RESIZABLE)
+            pygame.event.post(pygame.event.Event(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1]))
+        was_narrow = self._narrow
+        self._narrow = wanted.width < NARROW_PX * wanted.ratio
+        panel = None if self._narrow == was_narrow else not self._narrow
+        window.suit(wanted.ratio, "dark" if wanted.dark else "light", panel=panel)
+
     def send(self, surface: pygame.Surface) -> None:
-        before = self._picture
-        picture = Picture.of(surface, 1 if before is None else before.number + 1)
-        title = next(iter(pygame.display.get_caption()), "robocov")
-        if monotonic() - self._looked >= 1.0:
-            self._looked, self._saved = monotonic(), saved_since(self.folder, self._since)
-        told = {"cursor": _CURSORS.get(shown_cursor(), "default"), "title": title, "saved": self._saved}
-        told["copied"] = clipboard.get()[:_MOST_COPIED]
-        changed = before is None or not np.array_equal(before.pixels, picture.pixels)
-        if changed or told != self._told:
-            self._told, self._picture = told, picture if changed else before
-            self._loop.call_soon_threadsafe(self._wake)
+        """Show what is in the window now."""
+        before = self._frame
+        frame = Frame.from_surface(surface, 1 if before is None else before.number + 1)
+        if before is None or not np.array_equal(before.pixels, frame.pixels):
+            self._frame = frame
+            self._loop.call_soon_threadsafe(self._stirred.set)
+        if monotonic() - self._saved_looked_at >= SAVED_INTERVAL_S:
+            self._saved_looked_at = monotonic()
+            self._saved = list_saved(self.folder, self._started_at)
+        state = {
+            "cursor": _CURSORS.get(shown_cursor(), "default"),
+            "title": next(iter(pygame.display.get_caption()), "robocov"),
+            "saved": self._saved,
+            "copied": clipboard.get()[:MAX_COPIED_CHARACTERS],
+        }
+        if state != self._state:
+            self._state = state
+            self._loop.call_soon_threadsafe(self._wake_pages)
 
-    # the browsers' side, in the server's thread
+    # The browsers' side, in the server's thread.
 
-    def _wake(self) -> None:
-        for page in self._pages:
-            page.changed.set()
+    def _run(self) -> None:
+        try:
+            asyncio.run(self._serve())
+        finally:
+            self._started.set()
+            self._encoder.shutdown(wait=False, cancel_futures=True)
+            self._file_thread.shutdown(wait=False, cancel_futures=True)
 
     async def _serve(self) -> None:
-        from websockets.asyncio.server import ServerConnection, serve
-
-        lines = WeakSet[ServerConnection]()
-
-        class Line(ServerConnection):
-            def connection_made(self, transport: asyncio.BaseTransport) -> None:
-                lines.add(self)
-                super().connection_made(transport)
-
         self._loop = asyncio.get_running_loop()
-        how: dict[str, Any] = {"process_request": self._answer, "compression": None, "server_header": None}
-        how["create_connection"] = Line
-        how |= {"max_size": LARGEST_UPLOAD, "max_queue": 16, "write_limit": 1 << 16}
+        listener = Listener(self._answer, self._talk)
         try:
-            server = await serve(self._talk, self.host, self.port, **how)
-            self.port = server.sockets[0].getsockname()[1]
-            self._begun.set()
-            await self._ended.wait()
-            server.close()
-            closed = asyncio.ensure_future(server.wait_closed())
-            pages = {page.line for page in self._pages}
-            for line in {*lines} - pages:  # browsers open lines ahead of need, on which nothing comes
-                line.transport.abort()
-            await asyncio.wait([closed], timeout=1.0)
-            for line in lines:
-                line.transport.abort()
-            await closed
-        except OSError as error:
+            self.port = await listener.listen(self.host, self.port)
+        except InputError as error:
             self._trouble = error
-        finally:
-            self._begun.set()
+            return
+        distributing = asyncio.create_task(self._distribute_frames())
+        self._started.set()
+        await self._ended.wait()
+        await listener.close()
+        distributing.cancel()
 
-    async def _answer(self, line: ServerConnection, request: Request) -> Response | None:
-        """Answer a request for the page; None lets a socket be opened."""
-        place = request.path.partition("?")[0]
-        if not self._known(self._secret(request)):
-            words = "This needs the whole link that robocov printed, with its token.\n"
-            return line.respond(HTTPStatus.FORBIDDEN, words)
-        if place.endswith("/socket"):
-            # our own page opens it; what is no browser names no origin
-            origins, headers = request.headers.get_all("Origin"), request.headers
-            hosts = headers.get_all("Host") + headers.get_all("X-Forwarded-Host")
-            if len(origins) > 1 or any(origin.partition("://")[2] not in hosts for origin in origins):
-                return line.respond(HTTPStatus.FORBIDDEN, "Another page may not drive this window.\n")
-            if len(self._pages) >= MOST_PAGES:
-                return line.respond(HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages show this window.\n")
-            return None
-        folder, _, name = place.rpartition("/")
-        if folder.endswith("/saved") and unquote(name) in self._saved:
-            return await asyncio.to_thread(self._download, line, unquote(name))
-        if not place.endswith("/"):
-            return line.respond(HTTPStatus.NOT_FOUND, "Nothing is there.\n")
+    async def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Answer a request for the page or a file; None lets a socket be opened."""
+        path = request.path.partition("?")[0]
+        if not self._is_known(self._token_of(request)):
+            text = "This needs the whole link that robocov printed, with its token.\n"
+            return respond(connection, HTTPStatus.FORBIDDEN, text)
+        if path.endswith("/socket"):
+            if is_from_own_page(request):
+                return None
+            return respond(connection, HTTPStatus.FORBIDDEN, "Another page may not drive this window.\n")
+        folder, _, name = path.rpartition("/")
+        name = unquote(name)
+        if folder.endswith("/saved") and name in self._saved:
+            return await self._download(connection, name)
+        if not path.endswith("/"):
+            return respond(connection, HTTPStatus.NOT_FOUND, "Nothing is there.\n")
+        given = token_in(request.path)
         kept = cookies_of(request.headers.get_all("Cookie")).get(self._cookie, "")
-        return self._page(line, token_in(request.path), kept)
+        is_given = self._is_known(given)
+        # who controls may look at what others see
+        replaces = is_given and not same(kept, self.token)
+        cookie = f"{self._cookie}={given}" if replaces else ""
+        return respond_with_page(connection, may_be_framed=is_given, cookie=cookie)
 
-    def _page(self, line: ServerConnection, given: str, kept: str) -> Response:
-        nonce = secrets.token_urlsafe(12)
-        page = files("robocov_app.web").joinpath("page.html").read_text("utf-8").replace("{nonce}", nonce)
-        framed = "*" if self._known(given) else "'none'"  # notebooks frame it: who does knows the token
-        headers = {"Referrer-Policy": "no-referrer", "Cache-Control": "no-store"}
-        headers["Content-Security-Policy"] = (
-            f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; img-src data:; "
-            f"connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {framed}"
-        )
-        # of no path: it is that of the page, also behind a proxy; who controls may look at what others see
-        if self._known(given) and not same(kept, self.token):
-            headers["Set-Cookie"] = f"{self._cookie}={given}; HttpOnly; SameSite=Strict"
-        return _answer(line, page.encode(), "text/html; charset=utf-8", headers)
-
-    def _download(self, line: ServerConnection, name: str) -> Response:
-        path = self.folder / name
+    async def _download(self, connection: ServerConnection, name: str) -> Response:
+        if self._downloads_bytes > MAX_DOWNLOADS_BYTES:
+            text = "Too many files are being downloaded; try again in a minute.\n"
+            return respond(connection, HTTPStatus.SERVICE_UNAVAILABLE, text)
         try:
-            body = zipped(path) if path.is_dir() else path.read_bytes()
-        except OSError:
-            return line.respond(HTTPStatus.NOT_FOUND, "It is not there any more.\n")
-        name += ".zip" * path.is_dir()
+            name, body = await self._loop.run_in_executor(self._file_thread, read_saved, self.folder / name)
+        except TransferError as error:
+            return respond(connection, HTTPStatus.NOT_FOUND, f"{error}\n")
+        self._start_in_background(self._count_download(connection, len(body)))
         headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(name)}"}
-        return _answer(line, body, "application/octet-stream", headers)
+        return respond_with(connection, HTTPStatus.OK, body, "application/octet-stream", headers)
 
-    def _secret(self, request: Request) -> str:
-        return token_in(request.path) or cookies_of(request.headers.get_all("Cookie")).get(self._cookie, "")
+    async def _count_download(self, connection: ServerConnection, n_bytes: int) -> None:
+        self._downloads_bytes += n_bytes
+        try:
+            await connection.wait_closed()
+        finally:
+            self._downloads_bytes -= n_bytes
 
-    def _known(self, token: str) -> bool:
+    def _start_in_background(self, work: Any) -> None:
+        task = asyncio.create_task(work)
+        self._background.add(task)
+        task.add_done_callback(self._background.discard)
+
+    def _token_of(self, request: Request) -> str:
+        cookies = cookies_of(request.headers.get_all("Cookie"))
+        return token_in(request.path) or cookies.get(self._cookie, "")
+
+    def _is_known(self, token: str) -> bool:
         return same(token, self.token) or same(token, self.watch_token)
 
-    async def _talk(self, line: ServerConnection) -> None:
-        assert line.request is not None
-        number, teacher = next(self._numbers), same(self._secret(line.request), self.token)
-        own = query_of(line.request.path).get("page", "")
-        page = Page(line, number, teacher, f"{'Teacher' if teacher else 'Viewer'} {number}", own)
+    # Pages come, take control, and go.
+
+    async def _talk(self, connection: ServerConnection) -> None:
+        """Exchange messages with a page as long as its connection lasts."""
+        assert connection.request is not None
+        is_teacher = same(self._token_of(connection.request), self.token)
+        page_id = query_of(connection.request.path).get("page", "")
+        earlier = self._find_page(page_id, is_teacher)
+        if earlier is None and not is_teacher:
+            watchers = [page for page in self._pages if not page.is_teacher]
+            if len(watchers) >= MAX_WATCHERS:
+                text = f"All {MAX_WATCHERS} places for watchers are taken. Trying again …"
+                await connection.close(TRY_AGAIN_LATER, text)
+                return
+        number = next(self._numbers)
+        name = f"{'Teacher' if is_teacher else 'Viewer'} {number}"
+        page = Page(connection, number, is_teacher, name, page_id)
         self._pages.append(page)
-        for one in self._pages[:-1]:
-            if (
-                own and one.own == own and one.teacher == teacher
-            ):  # its line broke, which nobody has noticed yet
-                page.number, page.name, page.asks = one.number, one.name, one.asks
-                self._control = page if one is self._control else self._control
-                one.line.transport.abort()
+        if earlier is not None:  # its connection broke, which nobody has noticed yet
+            self._take_over(page, earlier)
+        elif is_teacher:
+            self._make_room_for_teacher()
         self._give_control(self._control)
-        sender = asyncio.ensure_future(self._send_all(page))
+        sender = asyncio.create_task(self._send_all(page))
         try:
             await self._take_all(page)
         finally:
             sender.cancel()
+            self._remove_page(page)
+
+    def _find_page(self, page_id: str, is_teacher: bool) -> Page | None:
+        for page in self._pages:
+            if page_id and page.page_id == page_id and page.is_teacher == is_teacher:
+                return page
+        return None
+
+    def _take_over(self, page: Page, earlier: Page) -> None:
+        page.number = earlier.number
+        page.name = earlier.name
+        page.asks = earlier.asks
+        had_control = earlier is self._control
+        self._pages.remove(earlier)
+        if had_control:
+            self._give_control(page)
+        earlier.connection.transport.abort()
+
+    def _make_room_for_teacher(self) -> None:
+        """End the oldest page with the controlling link that does not control, if there are too many."""
+        teachers = [page for page in self._pages if page.is_teacher]
+        if len(teachers) <= MAX_CONTROLLERS:
+            return
+        oldest = next(page for page in teachers if page is not self._control)
+        self._pages.remove(oldest)
+        text = "This window was opened in too many other pages."
+        self._start_in_background(oldest.connection.close(REPLACED, text))
+
+    def _remove_page(self, page: Page) -> None:
+        if page in self._pages:
             self._pages.remove(page)
-            self._give_control(self._control)
+        self._give_control(self._control)
+        self._stirred.set()  # the frame that it had need not be kept
 
     def _give_control(self, page: Page | None) -> None:
-        """Let a page control the window; the first that may where that one is gone."""
+        """Let a page control the window; the first that may if that one is gone."""
         if page not in self._pages:
-            page = next((each for each in self._pages if each.teacher), None)
+            page = next((each for each in self._pages if each.is_teacher), None)
         if page is not self._control:
-            before, self._control = self._control, page
+            before = self._control
+            self._control = page
             if page is not None:
                 page.asks = False
                 self._wanted = page.size or self._wanted
                 self._called.set()
             if before is not None:
-                self._waiting.append(
-                    events.Left(kind="blur")
-                )  # keys and buttons that the one before has held
-        self._wake()
+                # keys and buttons that the one before has held are let go
+                self._waiting.append(events.Left(kind="blur"))
+        self._update_people()
+
+    def _update_people(self) -> None:
+        self._people = [
+            {
+                "number": page.number,
+                "name": page.name,
+                "asks": page.asks,
+                "controls": page is self._control,
+            }
+            for page in self._pages
+        ]
+        self._wake_pages()
+
+    def _wake_pages(self) -> None:
+        for page in self._pages:
+            page.changed.set()
+
+    # What comes in.
 
     async def _take_all(self, page: Page) -> None:
         from websockets.exceptions import ConnectionClosed
 
-        allowed, before = MOST_EVENTS, monotonic()
+        allowed = MAX_EVENTS_PER_S
+        before = monotonic()
         with suppress(ConnectionClosed):
-            async for text in page.line:
+            async for message in page.connection:
                 now = monotonic()
-                allowed, before = min(allowed + (now - before) * MOST_EVENTS, MOST_EVENTS) - 1.0, now
-                while allowed < 0.0 or len(self._waiting) > MOST_WAITING:
-                    await asyncio.sleep(0.05)  # what is more waits in the line; nothing is lost
-                    allowed += 0.05 * MOST_EVENTS
+                allowed = min(allowed + (now - before) * MAX_EVENTS_PER_S, MAX_EVENTS_PER_S)
+                before = now
                 try:
-                    if isinstance(text, bytes):
-                        allowed -= MOST_EVENTS  # a file a second
-                        await asyncio.to_thread(self._upload, page, text)
-                    elif len(text) > LONGEST:
-                        raise ValueError
-                    else:
-                        self._take(page, events.MESSAGES.validate_json(text))
+                    allowed -= await self._take_any(page, message)
                 except ValueError:
-                    await page.line.close(1008, "not understood")
+                    await page.connection.close(NOT_UNDERSTOOD, "not understood")
+                while allowed < 0.0 or len(self._waiting) > MAX_WAITING_EVENTS:
+                    await asyncio.sleep(0.05)  # what is more waits in the connection; nothing is lost
+                    allowed += 0.05 * MAX_EVENTS_PER_S
+
+    async def _take_any(self, page: Page, message: str | bytes) -> float:
+        """Take a message, and return as how many events it counts; raises `ValueError`."""
+        if isinstance(message, bytes):
+            await self._take_piece(page, message)
+            return EVENTS_PER_PIECE
+        checked = events.MESSAGES.validate_json(message)
+        if isinstance(checked, events.UploadStarted):
+            await self._start_upload(page, checked)
+            return EVENTS_PER_UPLOAD
+        self._take(page, checked)
+        return 1.0
 
     def _take(self, page: Page, message: events.Message) -> None:
         if isinstance(message, events.PictureShown):
-            while page.sent and page.sent.popleft() != message.number:
+            while page.in_flight and page.in_flight.popleft() != message.number:
                 pass
-            page.changed.set()
+            self._stirred.set()
         elif isinstance(message, events.Control):
-            if message.to == 0:
-                page.asks = not page.asks and page is not self._control
-                self._wake()
-            elif page is self._control or page.teacher:
-                named = (each for each in self._pages if each.number == message.to)
-                self._give_control(next(named, self._control))
+            self._take_control(page, message.to)
         elif isinstance(message, events.Named):
             page.name = "".join(filter(str.isprintable, message.name)).strip() or page.name
-            self._wake()
+            self._update_people()
         elif isinstance(message, events.PageChanged):
             if message.width * message.height > events.MOST_PIXELS:
-                raise ValueError
+                raise ValueError("page too large")
             page.size = message
             if page is self._control:
                 self._wanted = message
                 self._called.set()
-        elif page is self._control:  # the others only watch
-            self._waiting.append(message)
+        elif page is self._control and not isinstance(message, events.UploadStarted):
+            self._waiting.append(message)  # the others only watch
             self._called.set()
 
-    def _upload(self, page: Page, data: bytes) -> None:
-        """Put a file into the folder, under a name that is free, and let the window open it."""
-        name, _, content = data.partition(b"\n")
-        path = Path(name.decode("utf-8"))
-        if page is not self._control or path.suffix.lower() not in UPLOADS or path.name != str(path):
-            raise ValueError
-        if len(path.name) > 100 or not path.name.isprintable() or path.name.startswith("."):
-            raise ValueError
-        target = self.folder / path
-        if target.exists():
-            target = free_name(self.folder, path.stem, path.suffix)
-        with written(target) as part:
-            part.write_bytes(content)
-        self._waiting.append(events.Uploaded(path=str(target)))
+    def _take_control(self, page: Page, to: int) -> None:
+        if to == 0:
+            page.asks = not page.asks and page is not self._control
+            self._update_people()
+        elif page is self._control or page.is_teacher:
+            named = (each for each in self._pages if each.number == to)
+            self._give_control(next(named, self._control))
+
+    async def _start_upload(self, page: Page, message: events.UploadStarted) -> None:
+        problem = "" if page is self._control else "Only the page that controls the window can open files."
+        try:
+            check_name(message.name)
+        except TransferError as error:
+            problem = problem or str(error)
+        if problem:
+            page.notify(problem)
+        page.upload = Upload(message.name, message.size, is_refused=bool(problem))
+        await self._finish_upload(page)
+
+    async def _take_piece(self, page: Page, piece: bytes) -> None:
+        if page.upload is None:
+            raise ValueError("a piece of no file")
+        page.upload.add(piece)
+        await self._finish_upload(page)
+
+    async def _finish_upload(self, page: Page) -> None:
+        """Save a file once it has come in, and let the window open it."""
+        upload = page.upload
+        if upload is None or not upload.is_complete:
+            return
+        page.upload = None
+        if upload.is_refused:
+            return
+        if page is not self._control:
+            page.notify(f"{upload.name}: not opened, another page controls the window now.")
+            return
+        try:
+            path = await self._loop.run_in_executor(self._file_thread, upload.save, self.folder)
+        except TransferError as error:
+            page.notify(str(error))
+            report(str(error))
+            return
+        self._waiting.append(events.Uploaded(path=str(path)))
         self._called.set()
+
+    # What goes out.
 
     async def _send_all(self, page: Page) -> None:
         from websockets.exceptions import ConnectionClosed
@@ -415,64 +515,85 @@ class WebDisplay:
             while True:
                 await page.changed.wait()
                 page.changed.clear()
-                picture = self._picture  # before what is told, which is never older then
-                first = self._control
-                people = [
-                    {"number": one.number, "name": one.name, "asks": one.asks, "controls": one is first}
-                    for one in self._pages
-                ]
-                told = self._told | {"people": people, "you": page.number, "teacher": page.teacher}
-                if page is not first:
-                    told.pop("copied", None)  # the clipboard is of the one who controls alone
-                if told != page.told:
-                    page.told = told
-                    await page.line.send(json.dumps(told))
-                if picture is not None and picture is not page.shown and len(page.sent) < IN_FLIGHT:
-                    before, page.shown = page.shown, picture
-                    page.sent.append(picture.number)
-                    await page.line.send(await self._bytes(picture, before))
+                frames = list(page.outbox)  # before the state, which is never older then
+                page.outbox.clear()
+                await self._send_state(page)
+                while page.notices:
+                    notice = {"kind": "notice", "text": page.notices.popleft()}
+                    await self._send(page, json.dumps(notice))
+                for frame in frames:
+                    await self._send(page, frame)
 
-    async def _bytes(self, picture: Picture, before: Picture | None) -> bytes:
-        """Return a picture as a page needs it that shows another; those who watch in step share it."""
-        key = picture.number, 0 if before is None else before.number
-        if key not in self._encoded:
-            self._encoded[key] = await asyncio.to_thread(encoded, picture, before)
-            for old in list(self._encoded)[:-8]:
-                del self._encoded[old]
-        return self._encoded[key]
+    async def _send_state(self, page: Page) -> None:
+        state = {
+            **self._state,
+            "kind": "state",
+            "people": self._people,
+            "you": page.number,
+            "teacher": page.is_teacher,
+        }
+        if page is not self._control:
+            state.pop("copied", None)  # only the page that controls sees the clipboard
+        if state != page.state:
+            page.state = state
+            await self._send(page, json.dumps(state))
 
+    async def _send(self, page: Page, message: str | bytes) -> None:
+        try:
+            async with asyncio.timeout(SEND_TIMEOUT_S):
+                await page.connection.send(message)
+        except TimeoutError:  # it does not read
+            page.connection.transport.abort()
 
-def _answer(line: ServerConnection, body: bytes, kind: str, headers: dict[str, str]) -> Response:
-    answer = line.respond(HTTPStatus.OK, "")
-    answer.body = body
-    for name in ("Content-Type", "Content-Length"):
-        del answer.headers[name]
-    answer.headers.update({"Content-Type": kind, "Content-Length": str(len(body)), **headers})
-    answer.headers["X-Content-Type-Options"] = "nosniff"
-    return answer
+    async def _distribute_frames(self) -> None:
+        """Encode frames for pages that are ready for them, for all that have the same one at once."""
+        while True:
+            self._stirred.clear()
+            page, frame = self._choose_delivery()
+            if page is None or frame is None:
+                await self._wait_for_work()
+            else:
+                await self._deliver(page, frame)
+            self._bases.keep_only({page.base for page in self._pages})
 
+    async def _deliver(self, page: Page, frame: Frame) -> None:
+        number = page.base
+        base = self._bases.get(number)
+        message = await self._loop.run_in_executor(self._encoder, encode_frame, frame, base)
+        self._bases.add(frame)
+        self._control_was_served = page is self._control
+        for each in self._pages:
+            is_due = each is page or each is not self._control
+            if each.base == number and is_due and each.is_ready_for(frame):
+                each.base = frame.number
+                each.in_flight.append(frame.number % 2**32)
+                each.outbox.append(message)
+                each.changed.set()
 
-def saved_since(folder: Path, since: float) -> tuple[str, ...]:
-    """Return the names of what windows save that was written to a folder since a time, the newest first."""
-    try:
-        seen = [each for each in islice(folder.iterdir(), MOST_LISTED) if _is_saved(each)]
-        found = [(changed, each.name) for each in seen if (changed := each.stat().st_mtime) >= since]
-    except OSError:
-        return ()
-    return tuple(name for _, name in sorted(found, reverse=True)[:20])
+    def _choose_delivery(self) -> tuple[Page | None, Frame | None]:
+        """Return a page, and the frame that it gets next: the page that controls by turns with the others."""
+        newest = self._frame
+        control = self._control
+        control_is_ready = control is not None and control.is_ready_for(newest)
+        if control_is_ready and not self._control_was_served:
+            return control, newest
+        watchers = [page for page in self._pages if page is not control]
+        if len(watchers) <= FEW_WATCHERS or monotonic() >= self._watchers_due:
+            # if there are many, they get the same frames, and what is encoded for one serves others, too
+            if newest is not self._watchers_frame:
+                self._watchers_due = monotonic() + WATCHERS_INTERVAL_S
+            self._watchers_frame = newest
+        ready = [page for page in watchers if page.is_ready_for(self._watchers_frame)]
+        if ready:
+            return min(ready, key=lambda page: page.base), self._watchers_frame
+        if control_is_ready:
+            return control, newest
+        return None, None
 
-
-def _is_saved(path: Path) -> bool:
-    if path.name.startswith("."):
-        return False
-    return (path / MANIFEST).exists() if path.is_dir() else path.suffix.lower() in _OFFERED
-
-
-def zipped(folder: Path) -> bytes:
-    """Return a folder as a zip; links in it are left out."""
-    archive = BytesIO()
-    with ZipFile(archive, "w", ZIP_DEFLATED) as into:
-        for path in sorted(folder.rglob("*")):
-            if path.is_file() and not path.is_symlink():
-                into.write(path, path.relative_to(folder.parent))
-    return archive.getvalue()
+    async def _wait_for_work(self) -> None:
+        timeout = None
+        if self._watchers_frame is not self._frame and len(self._pages) > 1:
+            timeout = max(self._watchers_due - monotonic(), 0.001)
+        with suppress(TimeoutError):
+            async with asyncio.timeout(timeout):
+                await self._stirred.wait()

@@ -1,12 +1,14 @@
 """A window in a browser: pictures arrive as they were, hands do what they did there, strangers do nothing."""
 
+import errno
 import json
 import socket
 import time
+import unicodedata
 import urllib.error
 import urllib.request
 import zlib
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from http.cookies import SimpleCookie
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,26 +20,40 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.compiled import kernel
-from robocov.errors import RobocovError
+from robocov.errors import InputError, RobocovError
 from robocov.files.atomic import locked
 from robocov.mapfile import load_map
+from robocov_app.cli import main
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.input import key_of
 from robocov_app.web.confined import OutsideError, confined
-from robocov_app.web.events import MESSAGES, Hands, PageChanged, PictureShown, PointerMoved
+from robocov_app.web.events import (
+    MAX_UPLOAD_BYTES,
+    MESSAGES,
+    Control,
+    Hands,
+    Named,
+    PageChanged,
+    PictureShown,
+    PointerMoved,
+    Uploaded,
+    UploadStarted,
+)
+from robocov_app.web.files import prepare_folder
 
 pytest.importorskip("websockets")
 
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from robocov_app.web.server import HEADER, Picture, WebDisplay, encoded
+from robocov_app.web.frames import HEADER, BaseFrames, Frame, encode_frame
+from robocov_app.web.server import WebDisplay
 
 
 def decoded(data: bytes, before: np.ndarray | None) -> np.ndarray:
     """Return the picture of a page that showed another: what its script does."""
-    _, wide, high, left, top, width, height = HEADER.unpack_from(data)
-    same = before is not None and before.shape == (high, wide)
+    _, wide, high, left, top, width, height, from_black = HEADER.unpack_from(data)
+    same = before is not None and before.shape == (high, wide) and not from_black
     picture = before.copy() if before is not None and same else np.zeros((high, wide), np.uint32)
     box = np.frombuffer(zlib.decompress(data[HEADER.size :]), np.uint32).reshape(height, width)
     picture[top : top + height, left : left + width] ^= box
@@ -51,15 +67,15 @@ def test_pictures_arrive_as_they_were(sizes):
     before, shown = None, None
     for number, (wide, high, seed) in enumerate(sizes):
         pixels = np.random.default_rng(seed).integers(0, 3, (high, wide)).astype(np.uint32) * 0x10FF
-        picture = Picture(number, pixels)
-        shown = decoded(encoded(picture, before), shown)
+        picture = Frame(number, pixels)
+        shown = decoded(encode_frame(picture, before), shown)
         assert np.array_equal(shown, pixels)
         before = picture
 
 
 def test_a_picture_without_a_change_is_empty():
-    picture = Picture(1, np.ones((4, 5), np.uint32))
-    assert HEADER.unpack_from(encoded(picture, picture))[3:] == (0, 0, 0, 0)
+    picture = Frame(1, np.ones((4, 5), np.uint32))
+    assert HEADER.unpack_from(encode_frame(picture, picture))[3:] == (0, 0, 0, 0, 0)
 
 
 @pytest.mark.parametrize(
@@ -81,8 +97,12 @@ SCRAPS = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
     max_leaves=5,
 )
-FIELDS = st.sampled_from("x y held button down key text right up width height ratio dark number".split())
-KINDS = st.sampled_from("move button wheel key text leave blur page shown what".split())
+FIELDS = st.sampled_from(
+    "x y held button down key text right up width height ratio dark number to name size".split()
+)
+KINDS = st.sampled_from(
+    "move button wheel key text paste leave blur page shown control name upload what".split()
+)
 
 
 @given(st.builds(lambda kind, more: {**more, "kind": kind}, KINDS, st.dictionaries(FIELDS, SCRAPS)))
@@ -91,7 +111,7 @@ def test_whatever_a_page_tells_is_understood_or_refused(told):
         message = MESSAGES.validate_json(json.dumps(told))
     except ValueError:
         return
-    if not isinstance(message, PageChanged | PictureShown):
+    if not isinstance(message, PageChanged | PictureShown | Control | Named | UploadStarted):
         for event in Hands().events(message):
             assert event.type
 
@@ -120,7 +140,7 @@ def cookie_of(display):
         morsels = SimpleCookie(answer.headers["Set-Cookie"])
     name, morsel = next(iter(morsels.items()))
     assert morsel["httponly"]
-    assert morsel["samesite"] == "Strict"
+    assert morsel["samesite"] == "Lax"
     return f"{name}={morsel.value}"
 
 
@@ -163,15 +183,21 @@ def test_who_tells_nonsense_is_cut_off(display, message):
         assert cut_off(line) == 1008
 
 
-TOO_LARGE = (("x" * 200_000, 1008), (b"a.json\n" + bytes(1 << 24), 1009))
-
-
-@pytest.mark.parametrize(("message", "code"), TOO_LARGE, ids=("text", "file"))
-def test_a_message_has_a_largest_size(display, message, code):
+@pytest.mark.parametrize("message", ["x" * (2 << 20), bytes(2 << 20)], ids=("text", "file"))
+def test_a_message_has_a_largest_size(display, message):
     with socket_of(display, Cookie=cookie_of(display)) as line:
         with suppress(ConnectionClosed):
             line.send(message)
-        assert cut_off(line) == code
+        assert cut_off(line) == 1009
+
+
+def test_the_longest_text_that_a_page_pastes_is_taken(display):
+    text = "\N{SNOWMAN}\n" * 50_000
+    with socket_of(display, Cookie=cookie_of(display)) as line:
+        line.send(json.dumps({"kind": "paste", "text": text}))
+        while not display._waiting:
+            time.sleep(0.01)
+        assert display._waiting.popleft().text == text
 
 
 def test_a_slow_line_misses_pictures_and_nothing_is_sent_twice(display):
@@ -182,7 +208,7 @@ def test_a_slow_line_misses_pictures_and_nothing_is_sent_twice(display):
             surface.fill((shade, shade, 255), (shade // 2, 10, 40, 40))
             display.send(surface)
         display.send(surface)  # as it was
-        while shown is None or not np.array_equal(shown, Picture.of(surface, 0).pixels):
+        while shown is None or not np.array_equal(shown, Frame.from_surface(surface, 0).pixels):
             data = line.recv(5)
             if isinstance(data, bytes):
                 shown, pictures = decoded(data, shown), pictures + 1
@@ -294,10 +320,8 @@ def test_files_come_in_and_go_out_by_the_folder_alone(tmp_path):
     with WebDisplay(folder=tmp_path) as display:
         cookie = cookie_of(display)
         with socket_of(display, Cookie=cookie) as line:
-            line.send(b"hall.json\n{}")
-            while not display._waiting:
-                time.sleep(0.01)
-            assert display._waiting.popleft().path == str(tmp_path / "hall.json")
+            upload(line, "hall.json", b"{}")
+            assert uploaded(display) == tmp_path / "hall.json"
             assert (tmp_path / "hall.json").read_bytes() == b"{}"
             (tmp_path / "run").mkdir()
             (tmp_path / "run/record.json").write_text("1")
@@ -319,14 +343,286 @@ def test_files_come_in_and_go_out_by_the_folder_alone(tmp_path):
             missing.value.close()
 
 
-@pytest.mark.parametrize(
-    "name", ["../out.json", "/etc/x.json", "mine.py", ".hidden.json", "a\0.json", "", "x" * 200 + ".json"]
-)
-def test_no_other_names_are_taken(tmp_path, name):
+def upload(line, name, content, piece=1 << 17):
+    line.send(json.dumps({"kind": "upload", "name": name, "size": len(content)}))
+    for at in range(0, len(content), piece):
+        line.send(content[at : at + piece])
+
+
+def uploaded(display):
+    """Return the path of the file that the window is to open."""
+    end = time.monotonic() + 5.0
+    while time.monotonic() < end:
+        while display._waiting:
+            event = display._waiting.popleft()
+            if isinstance(event, Uploaded):
+                return Path(event.path)
+        time.sleep(0.01)
+    raise AssertionError("nothing was uploaded")
+
+
+def notice_to(line):
+    """Return the next message that a page shows."""
+    while (told := told_to(line))["kind"] != "notice":
+        pass
+    return told["text"]
+
+
+REFUSED_NAMES = [
+    "../out.json",
+    "/etc/x.json",
+    "a\\b.json",
+    "mine.py",
+    ".hidden.json",
+    "",
+    "x" * 250 + ".json",
+]
+
+
+@pytest.mark.parametrize("name", REFUSED_NAMES, ids=range(len(REFUSED_NAMES)))
+def test_files_of_other_names_are_refused_with_a_message(tmp_path, name):
     with WebDisplay(folder=tmp_path) as display, socket_of(display, Cookie=cookie_of(display)) as line:
-        line.send(name.encode() + b"\n{}")
+        upload(line, name, bytes(300_000))
+        assert notice_to(line)
+        assert not list(tmp_path.iterdir())
+        upload(line, "hall.json", b"{}")  # the connection stays
+        assert uploaded(display).read_bytes() == b"{}"
+
+
+def test_control_characters_are_no_part_of_a_file_name(tmp_path):
+    with WebDisplay(folder=tmp_path) as display, socket_of(display, Cookie=cookie_of(display)) as line:
+        upload(line, "a\0b\x1b\n.json", b"{}")
+        assert uploaded(display).name == "ab.json"
+
+
+def test_a_large_file_comes_in_pieces_and_an_empty_one_too(tmp_path):
+    content = np.random.default_rng(1).bytes(3_000_000)
+    with WebDisplay(folder=tmp_path) as display, socket_of(display, Cookie=cookie_of(display)) as line:
+        upload(line, "large.png", content)
+        assert uploaded(display).read_bytes() == content
+        upload(line, "large.png", b"")
+        assert uploaded(display).name == "large-1.png"
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        {"kind": "upload", "name": "a.json", "size": MAX_UPLOAD_BYTES + 1},
+        {"kind": "upload", "name": "a.json", "size": -1},
+        {"kind": "upload", "name": "a" * 301, "size": 1},
+        b"a piece of no file",
+    ],
+)
+def test_an_upload_that_no_page_would_send_ends_the_connection(tmp_path, broken):
+    with WebDisplay(folder=tmp_path) as display, socket_of(display, Cookie=cookie_of(display)) as line:
+        line.send(json.dumps(broken) if isinstance(broken, dict) else broken)
         assert cut_off(line) == 1008
         assert not list(tmp_path.iterdir())
+
+
+def test_more_than_was_announced_ends_the_connection(tmp_path):
+    with WebDisplay(folder=tmp_path) as display, socket_of(display, Cookie=cookie_of(display)) as line:
+        line.send(json.dumps({"kind": "upload", "name": "a.json", "size": 2}))
+        line.send(b"{} ")
+        assert cut_off(line) == 1008
+        assert not list(tmp_path.iterdir())
+
+
+def test_only_who_controls_uploads(tmp_path):
+    with WebDisplay(folder=tmp_path) as display, socket_of(display, Cookie=cookie_of(display)) as teacher:
+        told_to(teacher)
+        with watcher_of(display) as pupil:
+            upload(pupil, "mine.json", b"{}")
+            assert "controls" in notice_to(pupil)
+        assert not list(tmp_path.iterdir())
+
+
+def fill_disk(monkeypatch, tmp_path):
+    def fail(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", fail)
+
+
+def remove_folder(monkeypatch, tmp_path):
+    tmp_path.rmdir()
+
+
+def put_a_file_there(monkeypatch, tmp_path):
+    tmp_path.rmdir()
+    tmp_path.write_text("")
+
+
+@pytest.mark.parametrize(
+    ("break_folder", "reason"),
+    [
+        (fill_disk, "no space left on device"),
+        (remove_folder, "no such file or directory"),
+        (put_a_file_there, "not a directory"),
+    ],
+)
+def test_an_upload_that_cannot_be_written_is_a_message_and_the_connection_stays(
+    tmp_path, monkeypatch, capfd, break_folder, reason
+):
+    folder = tmp_path / "files"
+    folder.mkdir()
+    with WebDisplay(folder=folder) as display, socket_of(display, Cookie=cookie_of(display)) as line:
+        break_folder(monkeypatch, folder)
+        upload(line, "hall.json", b"{}")
+        assert notice_to(line).lower() == f"hall.json: cannot be saved on the server: {reason}"
+        line.send(json.dumps({"kind": "move", "x": 1, "y": 1}))
+        while not moved(display):
+            time.sleep(0.01)
+    printed = capfd.readouterr().err
+    assert printed.lower() == f"robocov: hall.json: cannot be saved on the server: {reason}\n"
+
+
+def test_the_folder_is_created_or_refused(tmp_path):
+    prepare_folder(tmp_path / "a/b")
+    assert list((tmp_path / "a/b").iterdir()) == []
+    (tmp_path / "file").write_text("")
+    for wrong in (tmp_path / "file", tmp_path / "file/inside"):
+        with pytest.raises(InputError, match=r"^--folder: .*file.*: not a folder; choose another --folder$"):
+            prepare_folder(wrong)
+    with pytest.raises(InputError, match=r"^--folder: /proc/robocov.*cannot be written to: "):
+        prepare_folder(Path("/proc/robocov"))
+
+
+@pytest.mark.parametrize("command", ["demo", "edit"])
+@pytest.mark.parametrize("each", [[], ["--each"]])
+def test_a_folder_that_cannot_be_used_is_one_line_at_the_start(tmp_path, capsys, command, each):
+    (tmp_path / "file").write_text("")
+    assert main([command, "--serve", *each, "--folder", str(tmp_path / "file")]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("robocov: error: --folder: ")
+    assert printed.err.count("\n") == 1
+
+
+CONTROLS = "a\0b\x1b[31m\x7f\x85\r\nc\td"
+
+
+@pytest.mark.parametrize(
+    ("message", "key", "text"),
+    [
+        ({"kind": "paste", "text": CONTROLS}, "text", "ab[31m\nc\td"),
+        ({"kind": "text", "text": CONTROLS}, "text", "ab[31m\nc\td"),
+        ({"kind": "name", "name": CONTROLS}, "name", "ab[31mcd"),
+        ({"kind": "key", "key": "\0", "down": True}, "key", ""),
+        ({"kind": "key", "key": "a\0", "down": True}, "key", "a"),
+        ({"kind": "upload", "name": "\0a.json", "size": 1}, "name", "a.json"),
+    ],
+)
+def test_control_characters_do_not_come_in(message, key, text):
+    assert getattr(MESSAGES.validate_json(json.dumps(message)), key) == text
+
+
+CONTROL_CHARACTERS = st.text(
+    st.characters(categories=["Cc", "Zl", "Zp", "Cf", "Ll"]), min_size=1, max_size=20
+)
+
+
+@given(CONTROL_CHARACTERS, st.sampled_from(["paste", "text", "key"]))
+def test_events_of_a_window_have_no_control_characters(text, kind):
+    told = {"kind": kind, "key": text, "down": True} if kind == "key" else {"kind": kind, "text": text}
+    message = MESSAGES.validate_json(json.dumps(told))
+    for event in Hands().events(message):
+        written = getattr(event, "unicode", "") + getattr(event, "text", "")
+        assert all(unicodedata.category(each) != "Cc" for each in written)
+    if kind == "paste":
+        assert all(unicodedata.category(each) != "Cc" or each in "\n\t" for each in clipboard.get())
+
+
+def test_a_telephones_line_break_is_enter():
+    message = MESSAGES.validate_json(json.dumps({"kind": "text", "text": "7\n"}))
+    keys = [event.key for event in Hands().events(message) if event.type == pygame.KEYDOWN]
+    assert keys == [pygame.K_7, pygame.K_RETURN]
+
+
+def close_reason(line):
+    with pytest.raises(ConnectionClosed) as closed:
+        while True:
+            line.recv(5)
+    return closed.value.rcvd.code, closed.value.rcvd.reason
+
+
+def test_watchers_never_lock_the_teacher_out(display, monkeypatch):
+    monkeypatch.setattr("robocov_app.web.server.MAX_WATCHERS", 3)
+    cookie = cookie_of(display)
+    with ExitStack() as stack:
+        watchers = [stack.enter_context(watcher_of(display)) for _ in range(3)]
+        with watcher_of(display) as refused:
+            code, reason = close_reason(refused)
+        assert code == 1013
+        assert reason.startswith("All 3 places for watchers are taken")
+        for _ in range(5):  # reloads
+            with socket_of(display, Cookie=cookie) as teacher:
+                told = told_to(teacher)
+                assert controller(told) == told["you"]
+        watchers[0].close()
+        with watcher_of(display) as other:
+            assert told_to(other)["people"]
+
+
+def test_a_watcher_whose_connection_broke_comes_back_to_a_full_house(display, monkeypatch):
+    monkeypatch.setattr("robocov_app.web.server.MAX_WATCHERS", 1)
+    address = f"ws://127.0.0.1:{display.port}/socket?token={display.watch_token}&page=a"
+    with connect(address, proxy=None) as before:
+        told_to(before)
+        with connect(address, proxy=None) as again:
+            assert told_to(again)["you"] == 1
+
+
+def test_the_newest_of_too_many_pages_with_the_controlling_link_stays(display, monkeypatch):
+    monkeypatch.setattr("robocov_app.web.server.MAX_CONTROLLERS", 2)
+    cookie = cookie_of(display)
+    with ExitStack() as stack:
+        first, second = (stack.enter_context(socket_of(display, Cookie=cookie)) for _ in range(2))
+        told_to(first)
+        third = stack.enter_context(socket_of(display, Cookie=cookie))
+        assert close_reason(second)[0] == 4001  # the first one controls
+        told = told_to(third)
+        while len(told["people"]) != 2:
+            told = told_to(third)
+        first.ping().wait(5)
+
+
+def test_frames_that_pages_have_are_bounded():
+    bases = BaseFrames(max_bytes=3 * 400)
+    for number in range(1, 9):
+        bases.add(Frame(number, np.zeros((10, 10), np.uint32)))
+    assert bases.n_bytes <= 1200
+    assert [bases.get(number) is None for number in (5, 6, 7, 8)] == [True, False, False, False]
+    bases.keep_only({7})
+    assert len(bases) == 1
+
+
+def test_a_page_whose_frame_was_given_up_gets_the_next_one_from_black(display, monkeypatch):
+    monkeypatch.setattr(display, "_bases", BaseFrames(max_bytes=1))
+    surface = pygame.Surface((40, 30), 0, 32)
+    with socket_of(display, Cookie=cookie_of(display)) as ahead, watcher_of(display) as behind:
+        told_to(ahead), told_to(behind)
+        shown = {ahead: None, behind: None}
+        for shade in (10, 20, 30):
+            surface.fill((shade, 0, 0), (shade, 0, 5, 5))
+            display.send(surface)
+            for line in (ahead, behind) if shade != 20 else (ahead,):
+                while not isinstance(data := line.recv(5), bytes):
+                    pass
+                shown[line] = decoded(data, shown[line])
+                line.send(json.dumps({"kind": "shown", "number": HEADER.unpack_from(data)[0]}))
+        assert np.array_equal(shown[ahead], Frame.from_surface(surface, 0).pixels)
+
+
+def test_a_program_that_asks_for_heads_alone_gets_them(display):
+    for method, status in (("HEAD", 200), ("POST", 405), ("DELETE", 405)):
+        request = urllib.request.Request(display.link, method=method)
+        try:
+            with urllib.request.urlopen(request) as answer:
+                assert (answer.status, answer.read()) == (status, b"")
+        except urllib.error.HTTPError as error:
+            with error:
+                assert error.code == status
 
 
 def test_a_served_window_uses_the_caches_of_kernels_and_arrays(tmp_path, monkeypatch):

@@ -23,7 +23,7 @@ pytest.importorskip("websockets")
 
 from websockets.sync.client import ClientConnection, connect
 
-from robocov_app.web.server import saved_since
+from robocov_app.web.files import list_saved
 
 PATIENCE_S = 30.0
 
@@ -52,7 +52,7 @@ def test_a_served_editor_offers_its_draft_at_the_next_start(tmp_path: Path) -> N
         assert editor.dialogs.asked is None
         editor.attempt(lambda: editor.change(circle_drawn(editor.sketch, (5.0, 5.0), 1.0)))
         window.frame(0.1)
-    assert saved_since(tmp_path, 0.0) == (), "the page does not list drafts"
+    assert list_saved(tmp_path, 0.0) == (), "the page does not list drafts"
     with editor_window(None, tmp_path, served=True) as window:
         assert window.editor.dialogs.asked.title == "Recover unsaved work?"
         window.editor.dialogs.asked.answers[0].call()
@@ -66,7 +66,7 @@ def test_a_served_viewer_offers_its_draft_at_the_next_start(tmp_path: Path) -> N
         session.fail_robot(2)
         window.frame(0.1)
         window.close()
-    assert saved_since(tmp_path, 0.0) == (), "the page does not list drafts"
+    assert list_saved(tmp_path, 0.0) == (), "the page does not list drafts"
     with Launcher(begun(), "hall", tmp_path, lattice=4, size=(900, 600), served=True).window() as window:
         assert window.dialogs.asked.title == "Recover unsaved work?"
         window.dialogs.asked.answers[0].call()

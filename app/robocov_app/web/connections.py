@@ -1,0 +1,229 @@
+"""Connections of browsers: requests are answered, sockets handed over, and what strangers hold is bounded."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+import traceback
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from http import HTTPStatus
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+from robocov_app.terminal.output import echo
+from robocov_app.web.access import listening_failed
+
+if TYPE_CHECKING:
+    from websockets.asyncio.server import Server, ServerConnection
+    from websockets.http11 import Request, Response
+
+MAX_MESSAGE_BYTES = 1 << 20  # the longest text that is pasted, escaped; files come in pieces
+MAX_QUEUED_MESSAGES = 4  # from one page, before reading from it pauses
+WRITE_LIMIT_BYTES = 1 << 16
+MAX_UNANSWERED = 64  # connections without an open socket; the oldest one is ended when there are more
+REQUEST_TIMEOUT_S = 10.0  # for a request to come in
+RESPONSE_TIMEOUT_S = 600.0  # for a browser to take a file
+SEND_TIMEOUT_S = 30.0  # for a page to take a message
+CLOSE_TIMEOUT_S = 5.0
+END_TIMEOUT_S = 1.0  # for all pages to say goodbye at the end of the server
+
+# close codes of sockets, see page.html
+WINDOW_CLOSED = 1001
+NOT_UNDERSTOOD = 1008
+FAULT = 1011
+WINDOW_ENDED = 1012  # comes back by itself
+TRY_AGAIN_LATER = 1013
+REPLACED = 4001  # the page does not come back by itself
+
+Answer = Callable[["ServerConnection", "Request"], Awaitable["Response | None"]]
+Talk = Callable[["ServerConnection"], Awaitable[None]]
+
+
+def report_fault(what: str) -> None:
+    """Print what went wrong in the server, with the traceback of the current exception, on stderr."""
+    report(f"{what}\n{traceback.format_exc()}")
+
+
+def report(what: str) -> None:
+    """Print a line on stderr."""
+    echo(f"robocov: {what}", to_stderr=True, flush=True)
+
+
+class Listener:
+    """Listens for browsers, answers their requests and hands over the sockets that they open.
+
+    Parameters
+    ----------
+    answer : callable
+        Returns the response to a request; None to let it open a socket.
+    talk : callable
+        Exchanges messages with a page as long as its socket is open.
+    """
+
+    def __init__(self, answer: Answer, talk: Talk) -> None:
+        self._answer = answer
+        self._talk = talk
+        self._connections: set[ServerConnection] = set()
+        self._unanswered: dict[ServerConnection, asyncio.TimerHandle] = {}  # in the order in which they came
+        self._server: Server | None = None
+
+    async def listen(self, host: str, port: int) -> int:
+        """Begin to listen, and return the port; raises `InputError` if that is not possible."""
+        from websockets.asyncio.server import ServerConnection, serve
+
+        listener = self
+
+        class Connection(ServerConnection):
+            def connection_made(self, transport: asyncio.BaseTransport) -> None:
+                super().connection_made(transport)
+                listener._on_connected(self)
+
+            def connection_lost(self, error: Exception | None) -> None:
+                listener._on_lost(self)
+                super().connection_lost(error)
+
+        # what strangers send is not worth a line on the terminal
+        logger = logging.getLogger("robocov.web")
+        logger.propagate = False
+        logger.addHandler(logging.NullHandler())
+        try:
+            self._server = await serve(
+                self._handle_socket,
+                host,
+                port,
+                process_request=self._handle_request,
+                create_connection=Connection,
+                compression=None,
+                server_header=None,
+                max_size=MAX_MESSAGE_BYTES,
+                max_queue=MAX_QUEUED_MESSAGES,
+                write_limit=WRITE_LIMIT_BYTES,
+                open_timeout=None,  # see `_on_connected`: the answer may be a large file
+                close_timeout=CLOSE_TIMEOUT_S,
+                logger=logger,
+            )
+        except OSError as error:
+            raise listening_failed(host, port, error) from None
+        found: int = self._server.sockets[0].getsockname()[1]
+        return found
+
+    async def close(self) -> None:
+        """Say goodbye to all pages, and end all connections."""
+        if self._server is None:
+            return
+        self._server.close(code=WINDOW_CLOSED)
+        closed = asyncio.ensure_future(self._server.wait_closed())
+        for connection in list(self._unanswered):  # browsers open some ahead of need, on which nothing comes
+            connection.transport.abort()
+        await asyncio.wait([closed], timeout=END_TIMEOUT_S)
+        for connection in list(self._connections):
+            connection.transport.abort()
+        await closed
+
+    def _on_connected(self, connection: ServerConnection) -> None:
+        self._connections.add(connection)
+        timer = asyncio.get_running_loop().call_later(REQUEST_TIMEOUT_S, self._abort_silent, connection)
+        self._unanswered[connection] = timer
+        if len(self._unanswered) > MAX_UNANSWERED:
+            next(iter(self._unanswered)).transport.abort()
+
+    def _abort_silent(self, connection: ServerConnection) -> None:
+        if connection.request is None:
+            connection.transport.abort()
+
+    def _on_lost(self, connection: ServerConnection) -> None:
+        self._connections.discard(connection)
+        self._on_answered(connection)
+
+    def _on_answered(self, connection: ServerConnection) -> None:
+        timer = self._unanswered.pop(connection, None)
+        if timer is not None:
+            timer.cancel()
+
+    async def _handle_request(self, connection: ServerConnection, request: Request) -> Response | None:
+        method = getattr(request, "method", "GET")  # websockets before 17 takes no other
+        if method not in ("GET", "HEAD"):
+            return respond(connection, HTTPStatus.METHOD_NOT_ALLOWED, "Expected GET or HEAD.\n")
+        try:
+            response = await self._answer(connection, request)
+        except Exception:
+            report_fault("a request of a browser failed")
+            return respond(connection, HTTPStatus.INTERNAL_SERVER_ERROR, "The request failed.\n")
+        if response is not None:
+            if len(response.body) > WRITE_LIMIT_BYTES:
+                self._on_answered(connection)
+                loop = asyncio.get_running_loop()
+                loop.call_later(RESPONSE_TIMEOUT_S, connection.transport.abort)
+            if method == "HEAD":
+                response.body = b""
+        return response
+
+    async def _handle_socket(self, connection: ServerConnection) -> None:
+        self._on_answered(connection)
+        try:
+            await self._talk(connection)
+        except Exception:
+            report_fault("the connection to a page failed")
+            with suppress(Exception):
+                await connection.close(FAULT, "The server had a fault.")
+
+
+def respond(connection: ServerConnection, status: HTTPStatus, text: str) -> Response:
+    """Return a response of plain text."""
+    return respond_with(connection, status, text.encode(), "text/plain; charset=utf-8", {})
+
+
+def respond_with(
+    connection: ServerConnection,
+    status: HTTPStatus,
+    body: bytes,
+    content_type: str,
+    headers: dict[str, str],
+) -> Response:
+    """Return a response with a body of any type."""
+    response = connection.respond(status, "")
+    response.body = body
+    for name in ("Content-Type", "Content-Length"):
+        del response.headers[name]
+    response.headers.update({"Content-Type": content_type, "Content-Length": str(len(body)), **headers})
+    response.headers["X-Content-Type-Options"] = "nosniff"
+    response.headers["Cache-Control"] = "no-store"
+    return response
+
+
+def respond_with_page(connection: ServerConnection, *, may_be_framed: bool, cookie: str = "") -> Response:
+    """Return the page that shows a window.
+
+    Parameters
+    ----------
+    connection : ServerConnection
+        The connection that asks for it.
+    may_be_framed : bool
+        Whether other sites may frame it, such as notebooks do.
+    cookie : str
+        ``name=value`` to keep in the browser; empty to keep none.
+    """
+    nonce = secrets.token_urlsafe(12)
+    page = files("robocov_app.web").joinpath("page.html").read_text("utf-8").replace("{nonce}", nonce)
+    ancestors = "*" if may_be_framed else "'none'"
+    headers = {"Referrer-Policy": "no-referrer"}
+    headers["Content-Security-Policy"] = (
+        f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; img-src data:; "
+        f"connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {ancestors}"
+    )
+    if cookie:
+        # Without a path it is that of the page, also behind a proxy. Lax: a link in a mail or on a
+        # course page is followed from another site, and must find the cookie of who comes back.
+        headers["Set-Cookie"] = f"{cookie}; HttpOnly; SameSite=Lax"
+    return respond_with(connection, HTTPStatus.OK, page.encode(), "text/html; charset=utf-8", headers)
+
+
+def is_from_own_page(request: Request) -> bool:
+    """Return whether a socket is opened by the server's own page, or by what is no browser."""
+    origins = request.headers.get_all("Origin")
+    if not origins:
+        return True
+    hosts = request.headers.get_all("Host") + request.headers.get_all("X-Forwarded-Host")
+    return len(origins) == 1 and origins[0].partition("://")[2] in hosts

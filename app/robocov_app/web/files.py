@@ -1,0 +1,157 @@
+"""Files that go in and out of a served window, all in the folder that was named for it."""
+
+from __future__ import annotations
+
+import tempfile
+from io import BytesIO
+from itertools import islice
+from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
+
+from robocov.errors import InputError, OutputError, RobocovError, reason
+from robocov.files.atomic import written
+from robocov.files.result_folder import MANIFEST
+from robocov_app.terminal.output import free_name
+from robocov_app.toolkit.dialogs import MOST_LISTED
+
+MAX_DOWNLOAD_BYTES = 1 << 28
+MAX_NAME_BYTES = 200
+_IMAGE_SUFFIXES = "png jpg jpeg bmp gif webp tif tiff pgm"
+_MAP_SUFFIXES = "json geojson wkt svg dxf yaml yml tmx osm map scen world argos xml"
+UPLOAD_SUFFIXES = frozenset(f".{suffix}" for suffix in f"robocov {_IMAGE_SUFFIXES} {_MAP_SUFFIXES}".split())
+_OFFERED_SUFFIXES = UPLOAD_SUFFIXES | {".mp4", ".csv", ".html", ".pdf", ".zip"}
+_MAX_OFFERED = 20
+
+
+class TransferError(RobocovError):
+    """A file cannot be taken from a page, or given to it; the message is for the page."""
+
+
+def prepare_folder(folder: Path) -> None:
+    """Create the folder of a served window, and find out whether files can be written to it.
+
+    Raises
+    ------
+    InputError
+        If it is not a folder, or cannot be created or written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder, prefix=".robocov-"):
+            pass
+    except (FileExistsError, NotADirectoryError):
+        raise InputError(f"--folder: {folder}: not a folder; choose another --folder") from None
+    except OSError as error:
+        raise InputError(
+            f"--folder: {folder}: cannot be written to: {reason(error)}; choose another --folder"
+        ) from None
+
+
+class Upload:
+    """A file that comes in from a page piece by piece.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file.
+    size : int
+        Its size in bytes.
+    is_refused : bool
+        Whether its pieces are thrown away when they come; the page may have sent them already.
+    """
+
+    def __init__(self, name: str, size: int, *, is_refused: bool) -> None:
+        self.name = name
+        self.is_refused = is_refused
+        self._remaining = size
+        self._pieces: list[bytes] = []
+
+    @property
+    def is_complete(self) -> bool:
+        return self._remaining == 0
+
+    def add(self, piece: bytes) -> None:
+        """Take the next piece; raises `ValueError` if more comes than was announced."""
+        if len(piece) > self._remaining:
+            raise ValueError(f"{self.name}: more came than was announced")
+        self._remaining -= len(piece)
+        if not self.is_refused:
+            self._pieces.append(piece)
+
+    def save(self, folder: Path) -> Path:
+        """Write the file under a name that is free, and return its path; raises `TransferError`."""
+        path = folder / self.name
+        try:
+            if path.exists():
+                path = free_name(folder, path.stem, path.suffix)
+            with written(path) as part:
+                part.write_bytes(b"".join(self._pieces))
+        except OSError as error:
+            raise TransferError(f"{self.name}: cannot be saved on the server: {reason(error)}") from error
+        except OutputError as error:
+            why = reason(error.__cause__) if isinstance(error.__cause__, OSError) else str(error)
+            raise TransferError(f"{self.name}: cannot be saved on the server: {why}") from error
+        return path
+
+
+def check_name(name: str) -> None:
+    """Raise `TransferError` if a file of this name is not taken from a page."""
+    path = Path(name)
+    if not name or path.name != name or "\\" in name or name.startswith("."):
+        raise TransferError("expected the name of a file without folders")
+    if not name.isprintable():
+        raise TransferError("expected a file name of printable characters")
+    if len(name.encode()) > MAX_NAME_BYTES:
+        raise TransferError(f"{name[:40]}…: the name is too long; expected at most {MAX_NAME_BYTES} bytes")
+    if path.suffix.lower() not in UPLOAD_SUFFIXES:
+        raise TransferError(f"{name}: expected a map, an image or a session (.robocov)")
+
+
+def list_saved(folder: Path, since: float) -> tuple[str, ...]:
+    """Return the names of what windows saved to a folder since a time, the newest first."""
+    try:
+        offered = [path for path in islice(folder.iterdir(), MOST_LISTED) if _is_offered(path)]
+        changed = [(path.stat().st_mtime, path.name) for path in offered]
+    except OSError:
+        return ()
+    found = sorted((each for each in changed if each[0] >= since), reverse=True)
+    return tuple(name for _, name in found[:_MAX_OFFERED])
+
+
+def _is_offered(path: Path) -> bool:
+    if path.name.startswith("."):
+        return False
+    if path.is_dir():
+        return (path / MANIFEST).exists()
+    return path.suffix.lower() in _OFFERED_SUFFIXES
+
+
+def read_saved(path: Path) -> tuple[str, bytes]:
+    """Return the name and the content of a file, or of a folder as a zip, to give to a page.
+
+    Raises
+    ------
+    TransferError
+        If it cannot be read, or is too large to be given.
+    """
+    try:
+        if path.is_dir():
+            members = [each for each in sorted(path.rglob("*")) if each.is_file() and not each.is_symlink()]
+        else:
+            members = [path]
+        if sum(each.stat().st_size for each in members) > MAX_DOWNLOAD_BYTES:
+            limit = f"{MAX_DOWNLOAD_BYTES >> 20} MB"
+            raise TransferError(f"{path.name}: larger than {limit}; copy it from the folder of the server")
+        if path.is_dir():
+            return f"{path.name}.zip", _zip_files(members, path.parent)
+        return path.name, path.read_bytes()
+    except OSError as error:
+        raise TransferError(f"{path.name}: cannot be read: {reason(error)}") from error
+
+
+def _zip_files(members: list[Path], root: Path) -> bytes:
+    archive = BytesIO()
+    with ZipFile(archive, "w", ZIP_DEFLATED) as target:
+        for path in members:
+            target.write(path, path.relative_to(root))
+    return archive.getvalue()

@@ -1,0 +1,116 @@
+"""Visitors of a server that gives a window to each: how they are known, and which folder is theirs."""
+
+from __future__ import annotations
+
+import hmac
+import json
+import secrets
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, TypeGuard
+
+from robocov.files.atomic import written
+
+FILE_NAME = ".robocov-visitors.json"
+_ID_BYTES = 18
+_ID_CHARACTERS = 24
+
+
+def create_id() -> str:
+    """Create the identity of a visitor: what cannot be guessed."""
+    return secrets.token_urlsafe(_ID_BYTES)
+
+
+def sign(visitor: str, key: str) -> str:
+    """Return the token of a visitor: it proves that the server with this key let them in."""
+    return f"{visitor}.{_signature(visitor, key)}"
+
+
+def read_id(token: str) -> str:
+    """Return the identity in a token, whoever signed it; empty if it is not a token of a visitor."""
+    visitor, dot, _ = token.partition(".")
+    return visitor if dot and len(visitor) == _ID_CHARACTERS else ""
+
+
+def is_signed(token: str, key: str) -> bool:
+    """Return whether a token was signed with this key."""
+    visitor = read_id(token)
+    return bool(visitor) and hmac.compare_digest(token.encode(errors="replace"), sign(visitor, key).encode())
+
+
+def _signature(visitor: str, key: str) -> str:
+    return hmac.new(key.encode(), visitor.encode(errors="replace"), sha256).hexdigest()[:32]
+
+
+class VisitorFolders:
+    """The folders of visitors below one folder, also those of an earlier server.
+
+    A file in that folder lists them by hashes of the visitors' identities, so that reading it lets nobody in.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder that has a folder for each visitor.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        content = self._read()
+        cookie = content.get("cookie")
+        self.cookie = cookie if _is_cookie_name(cookie) else f"robocov-{secrets.token_hex(6)}"
+        """Name of the cookie of visitors; browsers share cookies among all servers of a machine."""
+        self._names = _read_names(content)
+
+    def find(self, visitor: str) -> Path | None:
+        """Return the folder of a visitor who was here before; None for a new one."""
+        name = self._names.get(_hash(visitor))
+        if name is None or not (self._folder / name).is_dir():
+            return None
+        return self._folder / name
+
+    def create(self) -> Path:
+        """Create a folder that is nobody's; raises `OSError`."""
+        number = 1
+        while True:
+            path = self._folder / f"session-{number}"
+            try:
+                path.mkdir()
+                return path
+            except FileExistsError:
+                number += 1
+
+    def assign(self, visitor: str, path: Path) -> None:
+        """Remember that a folder is a visitor's; raises `OSError` or `OutputError`."""
+        # another server may have the same folder
+        self._names = {**_read_names(self._read()), **self._names, _hash(visitor): path.name}
+        content = {"cookie": self.cookie, "visitors": self._names}
+        with written(self._folder / FILE_NAME) as part:
+            part.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+    def _read(self) -> dict[str, Any]:
+        with suppress(OSError, ValueError):
+            content = json.loads((self._folder / FILE_NAME).read_text("utf-8"))
+            if isinstance(content, dict):
+                return content
+        return {}
+
+
+def _hash(visitor: str) -> str:
+    return sha256(visitor.encode(errors="replace")).hexdigest()
+
+
+def _read_names(content: dict[str, Any]) -> dict[str, str]:
+    """Return the names of folders by hashes of identities, without what is none."""
+    names = content.get("visitors")
+    if not isinstance(names, dict):
+        return {}
+    return {str(key): name for key, name in names.items() if _is_session_name(name)}
+
+
+def _is_cookie_name(name: object) -> TypeGuard[str]:
+    return isinstance(name, str) and name.startswith("robocov-") and name[len("robocov-") :].isalnum()
+
+
+def _is_session_name(name: object) -> TypeGuard[str]:
+    return isinstance(name, str) and name.startswith("session-") and name[len("session-") :].isdecimal()
