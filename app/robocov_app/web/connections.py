@@ -22,11 +22,12 @@ if TYPE_CHECKING:
 MAX_MESSAGE_BYTES = 1 << 20  # the longest text that is pasted, escaped; files come in pieces
 MAX_QUEUED_MESSAGES = 4  # from one page, before reading from it pauses
 WRITE_LIMIT_BYTES = 1 << 16
-MAX_UNANSWERED = 64  # connections without an open socket; the oldest one is ended when there are more
+MAX_UNANSWERED = 256  # connections without an open socket; the oldest one is ended when there are more
 REQUEST_TIMEOUT_S = 10.0  # for a request to come in
 RESPONSE_TIMEOUT_S = 600.0  # for a browser to take a file
 SEND_TIMEOUT_S = 30.0  # for a page to take a message
 CLOSE_TIMEOUT_S = 5.0
+MIN_FILES = 2048  # that the process may have open: each connection is one
 END_TIMEOUT_S = 1.0  # for all pages to say goodbye at the end of the server
 
 # close codes of sockets, see page.html
@@ -84,6 +85,7 @@ class Listener:
                 listener._on_lost(self)
                 super().connection_lost(error)
 
+        _raise_file_limit()
         # what strangers send is not worth a line on the terminal
         logger = logging.getLogger("robocov.web")
         logger.propagate = False
@@ -168,6 +170,19 @@ class Listener:
             report_fault("the connection to a page failed")
             with suppress(Exception):
                 await connection.close(FAULT, "The server had a fault.")
+
+
+def _raise_file_limit() -> None:
+    """Let the process have many files open, as far as the system allows; some allow 256 at first."""
+    try:
+        import resource
+    except ImportError:  # Windows has no such limit
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = MIN_FILES if hard == resource.RLIM_INFINITY else min(MIN_FILES, hard)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        with suppress(OSError, ValueError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
 
 
 def respond(connection: ServerConnection, status: HTTPStatus, text: str) -> Response:

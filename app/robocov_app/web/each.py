@@ -149,6 +149,7 @@ class Sessions:
         self._sessions: dict[str, Session] = {}  # by the identity of the visitor
         self._spare: Window | None = None  # for the first new visitor
         self._processes: list[SpawnProcess] = []
+        self._is_ending = False
         self._admission = asyncio.Lock()
         self._openings = asyncio.Semaphore(MAX_OPENING)
 
@@ -172,6 +173,7 @@ class Sessions:
             await self._end_all(listener)
 
     async def _end_all(self, listener: Listener) -> None:
+        self._is_ending = True
         for process in self._processes:
             process.terminate()
         await listener.close()
@@ -261,7 +263,7 @@ class Sessions:
             window = await asyncio.shield(session.opening)
             await self._carry(connection, window, query_of(request.path).get("page", ""))
         except RobocovError as error:
-            if self._sessions.get(visitor) is session:
+            if self._sessions.get(visitor) is session and not self._is_ending:
                 del self._sessions[visitor]
                 report(f"a visitor's window did not open: {error}")
             await connection.close(FAULT, _cut_reason(f"The window did not open: {error}"))
@@ -326,11 +328,15 @@ class Sessions:
             with suppress(OSError):
                 spare.folder.rmdir()
             return True
-        idle = [(visitor, each) for visitor, each in self._sessions.items() if each.idle_s >= MIN_IDLE_S]
-        if not idle:
+        ended = [visitor for visitor, session in self._sessions.items() if self._has_ended(session)]
+        idle = [visitor for visitor, session in self._sessions.items() if session.idle_s >= MIN_IDLE_S]
+        if ended:
+            chosen = ended[0]
+        elif idle:
+            chosen = max(idle, key=lambda visitor: self._sessions[visitor].idle_s)
+        else:
             return False
-        visitor, session = max(idle, key=lambda item: item[1].idle_s)
-        await self._end(visitor, session)
+        await self._end(chosen, self._sessions[chosen])
         return True
 
     async def _carry(self, connection: ServerConnection, window: Window, page_id: str) -> None:
@@ -338,8 +344,10 @@ class Sessions:
         from websockets.exceptions import WebSocketException
 
         query = urlencode({"token": window.token, "page": page_id})
-        try:
-            socket = await connect(
+        code = None
+        text = "The window has ended."
+        with suppress(OSError, WebSocketException):
+            async with connect(
                 f"ws://127.0.0.1:{window.port}/socket?{query}",
                 max_size=MAX_FRAME_BYTES,
                 max_queue=MAX_QUEUED_FRAMES,
@@ -347,23 +355,13 @@ class Sessions:
                 compression=None,
                 ping_interval=None,  # the process ends with its socket
                 proxy=None,
-            )
-        except (OSError, WebSocketException):
-            await connection.close(WINDOW_ENDED, "The window has ended.")
-            return
-        async with socket:
-            copying = {
-                asyncio.create_task(_copy_messages(connection, socket)),
-                asyncio.create_task(_copy_messages(socket, connection)),
-            }
-            _, pending = await asyncio.wait(copying, return_when=asyncio.FIRST_COMPLETED)
-            for task in pending:
-                task.cancel()
-            await asyncio.wait(copying)
-        code = socket.close_code
+            ) as socket:
+                await _copy_both_ways(connection, socket)
+                code = socket.close_code
+                text = socket.close_reason or text
         if code is None or (code < NOT_UNDERSTOOD and code != WINDOW_CLOSED):
             code = WINDOW_ENDED
-        await connection.close(code, socket.close_reason or "")
+        await connection.close(code, text)
 
     # Processes.
 
@@ -427,6 +425,18 @@ def _receive_line(receiver: Connection) -> str:
         if receiver.poll(OPENING_TIMEOUT_S):
             return str(receiver.recv())
     return "the window did not open"
+
+
+async def _copy_both_ways(one: Socket, other: Socket) -> None:
+    """Carry messages both ways until either end is closed."""
+    copying = {
+        asyncio.create_task(_copy_messages(one, other)),
+        asyncio.create_task(_copy_messages(other, one)),
+    }
+    _, pending = await asyncio.wait(copying, return_when=asyncio.FIRST_COMPLETED)
+    for task in pending:
+        task.cancel()
+    await asyncio.wait(copying)
 
 
 async def _copy_messages(source: Socket, target: Socket) -> None:

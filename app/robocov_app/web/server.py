@@ -337,6 +337,7 @@ class WebDisplay:
         elif is_teacher:
             self._make_room_for_teacher()
         self._give_control(self._control)
+        self._stirred.set()  # the page has no frame yet
         sender = asyncio.create_task(self._send_all(page))
         try:
             await self._take_all(page)

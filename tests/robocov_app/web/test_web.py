@@ -614,6 +614,17 @@ def test_a_page_whose_frame_was_given_up_gets_the_next_one_from_black(display, m
         assert np.array_equal(shown[ahead], Frame.from_surface(surface, 0).pixels)
 
 
+def test_who_comes_to_a_window_at_rest_sees_it(display):
+    surface = pygame.Surface((40, 30), 0, 32)
+    surface.fill((1, 2, 3))
+    display.send(surface)
+    for _ in range(5):
+        with watcher_of(display) as line:
+            while not isinstance(data := line.recv(5), bytes):
+                pass
+        assert np.array_equal(decoded(data, None), Frame.from_surface(surface, 0).pixels)
+
+
 def test_a_program_that_asks_for_heads_alone_gets_them(display):
     for method, status in (("HEAD", 200), ("POST", 405), ("DELETE", 405)):
         request = urllib.request.Request(display.link, method=method)

@@ -145,7 +145,7 @@ def test_below_a_path_of_a_proxy_and_after_its_line_broke_the_page_is_the_same(b
         browser.until(lambda: canvas_size(browser) == [900, 600])
         assert urlsplit(browser.driver.current_url).path == PREFIX + "/"
         proxy.cut()
-        browser.until(lambda: "broken" in browser.find("#note").text)
+        browser.until(lambda: "Connection lost" in browser.find("#note").text)
         browser.until(lambda: browser.find("#note").text == "")
         assert browser.js("return controls")
         browser.driver.refresh()

@@ -1,66 +1,90 @@
-"""Everybody gets a window of their own, and comes back to it."""
+"""Every visitor gets a window of their own, and comes back to it."""
 
+import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
 import urllib.error
 import urllib.request
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from http.cookiejar import CookieJar
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import pytest
 from served_window import served
 
+from robocov_app.toolkit.autosave import FOLDER, SERVED_FOLDER
+
 pytest.importorskip("websockets")
+
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("web")]
 
+PATIENCE_S = 40.0
 
-def visitor():
-    """Return hands of a browser with cookies of its own: from an address to status, where it led, page."""
-    browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
 
-    def opened(address):
+class Visitor:
+    """A browser with cookies of its own."""
+
+    def __init__(self):
+        self.cookies = CookieJar()
+        self._opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(self.cookies))
+
+    def get(self, address, method="GET"):
+        """Return the status, where the address led, and the page."""
         try:
-            with browser.open(address) as answer:
+            with self._opener.open(urllib.request.Request(address, method=method)) as answer:
                 return answer.status, answer.url, answer.read()
         except urllib.error.HTTPError as error:
             with error:
                 return error.code, address, error.read()
 
-    return opened
-
-
-def test_each_visitor_has_a_window_of_their_own(tmp_path):
-    from websockets.sync.client import connect
-
-    with served("demo", "rooms", "--paused", "--each", "--most", "2", "--folder", str(tmp_path)) as link:
-        ada, ben, cleo = visitor(), visitor(), visitor()
-        status, own, page = ada(link)
+    @contextmanager
+    def page(self, link):
+        """Open the page of a link, and its socket, as a browser does."""
+        status, address, _ = self.get(link)
         assert status == 200
-        assert b"<canvas" in page
-        assert ben(link)[:2] != (status, own)
-        assert ada(link)[1] == own  # she comes back to it
-        assert ada(link.partition("?")[0])[0] == 200  # by her cookie alone
-        strange = (link, link[:-3], link.partition("?")[0], link.replace("/?", "//[?") + "x")
-        assert [cleo(address)[0] for address in strange] == [503, 403, 403, 403]
-        with connect(own.replace("http", "ws").replace("/?", "/socket?"), proxy=None) as line:
-            line.send('{"kind": "page", "width": 900, "height": 600, "ratio": 1.0, "dark": false}')
-            while not isinstance(line.recv(10), bytes):
-                pass
-        assert sorted(each.name for each in tmp_path.iterdir()) == ["session-1", "session-2"]
+        with connect(address.replace("http", "ws").replace("/?", "/socket?"), proxy=None) as line:
+            yield line
+
+
+def first_frame(line):
+    line.send('{"kind": "page", "width": 1000, "height": 700, "ratio": 1.0, "dark": false}')
+    while not isinstance(frame := line.recv(PATIENCE_S), bytes):
+        pass
+    return frame
+
+
+def press(line, key, held=0):
+    for down in (True, False):
+        line.send(json.dumps({"kind": "key", "key": key, "down": down, "held": held}))
+
+
+def close_of(line):
+    """Return the code and the reason with which a page's socket is closed."""
+    with pytest.raises(ConnectionClosed) as closed:
+        while True:
+            line.recv(PATIENCE_S)
+    return closed.value.rcvd.code, closed.value.rcvd.reason
 
 
 def wait_until(condition):
-    end = time.monotonic() + 10.0
+    end = time.monotonic() + PATIENCE_S
     while not condition():
         assert time.monotonic() < end
-        time.sleep(0.01)
+        time.sleep(0.02)
+
+
+def children(process):
+    """Return the processes of windows."""
+    found = subprocess.run(
+        ["pgrep", "-P", str(process.pid), "-f", "spawn_main"], capture_output=True, text=True
+    )
+    return [int(each) for each in found.stdout.split()]
 
 
 def alive(pid):
@@ -69,24 +93,123 @@ def alive(pid):
     return False
 
 
+def test_each_visitor_has_a_window_of_their_own(tmp_path):
+    options = ("--paused", "--each", "--max-sessions", "2", "--folder", str(tmp_path))
+    with served("demo", "rooms", *options) as link:
+        ada, ben, cleo = Visitor(), Visitor(), Visitor()
+        status, own, page = ada.get(link)
+        assert status == 200
+        assert b"<canvas" in page
+        assert ben.get(link)[:2] != (status, own)
+        assert ada.get(link)[1] == own
+        assert ada.get(link.partition("?")[0])[0] == 200  # by her cookie alone
+        strange = (link[:-3], link.partition("?")[0], link.replace("/?", "//[?") + "x", own[:-1])
+        assert [cleo.get(address)[0] for address in strange] == [403] * 4
+        with ada.page(link) as hers, ben.page(link) as his:
+            first_frame(hers), first_frame(his)
+            with ada.page(link) as second:  # another tab
+                first_frame(second)
+            with cleo.page(link) as refused:
+                assert close_of(refused) == (1013, "All 2 windows are in use. Trying again …")
+            (tmp_path / "session-1/mine.json").write_text("{}")
+            wait_until(lambda: "mine.json" in hers.recv(PATIENCE_S).__str__())
+            saved = link.partition("?")[0] + "saved/mine.json"
+            assert [each.get(saved)[0] for each in (ada, ben, cleo)] == [200, 404, 404]
+        folders = [each.name for each in tmp_path.iterdir() if each.is_dir()]
+        assert sorted(folders) == ["session-1", "session-2"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
+def test_who_only_fetches_the_page_takes_no_window(tmp_path):
+    options = ("--each", "--max-sessions", "2", "--folder", str(tmp_path))
+    with served("demo", "rooms", "--paused", *options) as link:
+        (spare,) = children(link.process)
+        for _ in range(10):
+            status, address, page = Visitor().get(link)
+            assert status == 200
+            assert b"<canvas" in page
+            assert Visitor().get(address, "HEAD") == (200, address, b"")
+        assert children(link.process) == [spare]
+        with Visitor().page(link) as ada, Visitor().page(link) as ben:
+            first_frame(ada), first_frame(ben)
+            assert len(children(link.process)) == 2
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
+def test_a_window_that_nobody_looks_at_is_ended_and_its_work_is_offered(tmp_path, monkeypatch):
+    monkeypatch.delenv(FOLDER, raising=False)
+    options = ("--each", "--max-sessions", "1", "--idle-minutes", "0.05", "--folder", str(tmp_path))
+    ada, ben = Visitor(), Visitor()
+    with served("edit", *options, cwd=tmp_path) as link:
+        with ada.page(link) as line:
+            first_frame(line)
+            press(line, "c")  # the tool for circles
+            line.send(json.dumps({"kind": "button", "button": 1, "down": True, "x": 300, "y": 300}))
+            line.send(json.dumps({"kind": "move", "button": 1, "x": 350, "y": 300}))
+            line.send(json.dumps({"kind": "button", "button": 1, "down": False, "x": 350, "y": 300}))
+            (window,) = children(link.process)
+            time.sleep(5.0)
+            assert alive(window)  # somebody looks
+        wait_until(lambda: not children(link.process))
+        assert len(list((tmp_path / "session-1" / SERVED_FOLDER).rglob("draft.json"))) == 1
+        with ben.page(link) as line:  # the place was given back
+            first_frame(line)
+        wait_until(lambda: not children(link.process))
+        with ada.page(link) as line:
+            first_frame(line)
+            press(line, "Enter")  # Recover
+            press(line, "s", held=2)
+            press(line, "Enter")
+            wait_until(lambda: list((tmp_path / "session-1").glob("*.json")))
+    (saved,) = (tmp_path / "session-1").glob("*.json")
+    assert [each["kind"] for each in json.loads(saved.read_text())["obstacles"]] == ["circle"]
+    # also the next server knows her
+    with served("edit", *options, cwd=tmp_path) as link:
+        assert ada.get(link.partition("?")[0])[0] == 403  # but not without its link
+        with ada.page(link) as line:
+            first_frame(line)
+            (tmp_path / "session-1/new.json").write_text("{}")
+            wait_until(lambda: "new.json" in line.recv(PATIENCE_S).__str__())
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
+def test_a_window_that_dies_is_opened_again_by_its_page(tmp_path):
+    with served("demo", "rooms", "--paused", "--each", "--folder", str(tmp_path)) as link:
+        ada = Visitor()
+        with ada.page(link) as line:
+            first_frame(line)
+            os.kill(children(link.process)[0], signal.SIGKILL)
+            assert close_of(line)[0] == 1012
+        with ada.page(link) as line:
+            first_frame(line)
+            press(line, "q", held=2)
+            press(line, "Enter")
+        assert sorted(each.name for each in tmp_path.iterdir() if each.is_dir()) == ["session-1"]
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 @pytest.mark.parametrize("starting", [False, True])
-def test_ctrl_c_ends_all_windows_without_a_traceback(tmp_path, starting):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_all_windows_without_a_traceback(tmp_path, starting, number):
     how = {"stderr": subprocess.PIPE, "start_new_session": True}
     with served("demo", "rooms", "--paused", "--each", "--folder", str(tmp_path), **how) as link:
-        visitor()(link)
-        if starting:
-            second = socket.create_connection(("127.0.0.1", urlsplit(link).port))
-            second.sendall(f"GET /?{urlsplit(link).query} HTTP/1.1\r\n\r\n".encode())
-            wait_until((tmp_path / "session-2").exists)
-        pids = subprocess.run(["pgrep", "-P", str(link.process.pid)], capture_output=True, text=True).stdout
-        os.killpg(link.process.pid, signal.SIGINT)  # as a terminal does
-        assert link.process.wait(10) == 130
+        with Visitor().page(link) as line:
+            first_frame(line)
+            with Visitor().page(link) as second:
+                if starting:
+                    wait_until((tmp_path / "session-2").exists)
+                else:
+                    first_frame(second)
+                pids = children(link.process)
+                assert pids
+                if number == signal.SIGINT:
+                    os.killpg(link.process.pid, number)  # as a terminal does
+                else:
+                    link.process.send_signal(number)
+                assert link.process.wait(10) == 130
         assert link.process.stderr.read() == "robocov: stopped\n"
         link.process.stderr.close()
-        wait_until(lambda: not any(map(alive, pids.split())))
-        if starting:
-            second.close()
+        wait_until(lambda: not any(map(alive, pids)))
 
 
 def test_what_is_wrong_is_told_before_anybody_comes(tmp_path):
@@ -94,3 +217,4 @@ def test_what_is_wrong_is_told_before_anybody_comes(tmp_path):
     ended = subprocess.run([*call, "--folder", str(tmp_path)], capture_output=True, text=True, timeout=60)
     assert (ended.returncode, ended.stdout) == (2, "")
     assert ended.stderr.startswith("robocov: error: unknown map 'nowhere'")
+    assert not list(tmp_path.iterdir())
