@@ -79,7 +79,7 @@ class WebOptions:
     max_sessions: int = 8
     """Maximum number of concurrent windows (with --each)."""
     idle_minutes: float = 10.0
-    """Minutes after which a window that no browser shows is ended; its work is kept as a draft (with --each)."""
+    """Minutes without a browser after which a window is ended; its work is kept as a draft (with --each)."""
 
     def __post_init__(self) -> None:
         checked("--port", self.port, 0, 65535)
