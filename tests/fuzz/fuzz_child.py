@@ -104,6 +104,11 @@ def _import(path: Path, job: dict[str, Any]) -> str:
     return _require_map(environment)
 
 
+def _folder(path: Path, job: dict[str, Any]) -> str:
+    """Import the folder that a file is in, or an archive."""
+    return _import(path if path.suffix == ".zip" else path.parent, job)
+
+
 def _map(path: Path, job: dict[str, Any]) -> str:
     from robocov.mapfile import load_map
 
@@ -157,7 +162,14 @@ def _misbehaving(path: Path, job: dict[str, Any]) -> str:
     return "fine"
 
 
-_READ = {"import": _import, "map": _map, "study": _study, "check": _check, "misbehaving": _misbehaving}
+_READ = {
+    "import": _import,
+    "folder": _folder,
+    "map": _map,
+    "study": _study,
+    "check": _check,
+    "misbehaving": _misbehaving,
+}
 
 
 def _load() -> None:

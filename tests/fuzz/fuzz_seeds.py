@@ -6,6 +6,7 @@ import base64
 import io
 import json
 import struct
+import zipfile
 import zlib
 from dataclasses import dataclass, field
 from typing import Any
@@ -195,6 +196,18 @@ def _rgba() -> bytes:
     return file.getvalue()
 
 
+def _floats() -> bytes:
+    """Return a TIFF of floating-point samples, one of which is none."""
+    import numpy as np
+    from PIL import Image
+
+    samples = np.array(GREY, dtype=np.float32) / 255
+    samples[0, 0] = np.nan
+    file = io.BytesIO()
+    Image.fromarray(samples).save(file, "TIFF")
+    return file.getvalue()
+
+
 def _saved(kind: str, **options: Any) -> bytes:
     from PIL import Image
 
@@ -219,6 +232,53 @@ OSM = """\
   <tag k="type" v="multipolygon"/><tag k="building" v="yes"/></relation>
 </osm>
 """
+
+
+INDOOR = """\
+<osm version="0.6">
+ <node id="1" lat="48" lon="11"/><node id="2" lat="48" lon="11.0002"/>
+ <node id="3" lat="48.0001" lon="11.0002"/><node id="4" lat="48.0001" lon="11"/>
+ <node id="5" lat="48.0002" lon="11.0002"/><node id="6" lat="48.0002" lon="11"/>
+ <node id="7" lat="48.0001" lon="11.0001"><tag k="door" v="yes"/><tag k="width" v="1.2"/></node>
+ <node id="8" lat="48.00005" lon="11.00005"><tag k="indoor" v="column"/><tag k="level" v="0;1"/></node>
+ <way id="1"><nd ref="1"/><nd ref="2"/><nd ref="3"/><nd ref="7"/><nd ref="4"/><nd ref="1"/>
+  <tag k="indoor" v="corridor"/><tag k="level" v="0"/></way>
+ <way id="2"><nd ref="4"/><nd ref="7"/><nd ref="3"/><nd ref="5"/><nd ref="6"/><nd ref="4"/>
+  <tag k="indoor" v="room"/><tag k="level" v="-1-1"/><tag k="name" v="office"/></way>
+ <way id="3"><nd ref="7"/><nd ref="8"/><tag k="indoor" v="wall"/><tag k="repeat_on" v="0"/></way>
+ <way id="4"><nd ref="1"/><nd ref="8"/><nd ref="2"/><nd ref="1"/><tag k="indoor" v="area"/>
+  <tag k="room" v="stairs"/></way>
+</osm>
+"""
+
+
+def _elements() -> list[dict[str, Any]]:
+    """Return a building, whose way has nodes and places, a wall, and a relation that holds its way."""
+    places = [
+        {"lat": 48.0 + y * 1e-4, "lon": 11.0 + x * 1e-4} for x, y in ((0, 0), (2, 0), (2, 1), (0, 1), (0, 0))
+    ]
+    nodes = [{"type": "node", "id": k, **place} for k, place in enumerate(places[:4], start=1)]
+    wall = {"type": "way", "id": 11, "nodes": [1, 3], "tags": {"barrier": "wall", "width": "0.3"}}
+    house = {
+        "type": "way",
+        "id": 10,
+        "nodes": [1, 2, 3, 4, 1],
+        "geometry": places,
+        "tags": {"building": "yes"},
+    }
+    member = {"type": "way", "ref": 12, "role": "outer", "geometry": [*places[:2], places[2], places[0]]}
+    tags = {"type": "multipolygon", "natural": "water"}
+    pond = {"type": "relation", "id": 13, "members": [member, {"type": "node", "ref": 1}], "tags": tags}
+    return [*nodes, house, wall, pond]
+
+
+OVERPASS: dict[str, Any] = {
+    "version": 0.6,
+    "generator": "Overpass API",
+    "bounds": {"minlat": 47.9999, "minlon": 10.9999, "maxlat": 48.0003, "maxlon": 11.0004},
+    "elements": _elements(),
+    "remark": "runtime error: none",
+}
 
 
 def _feature(kind: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
@@ -361,6 +421,79 @@ MORE = """\
 """
 _TILES = struct.pack("<12I", *(0, 0, 0, 1) * 3)
 
+
+def _indoor_feature(kind: str, geometry: Any, number: str = "1", **properties: Any) -> dict[str, Any]:
+    return {
+        "type": "Feature",
+        "id": number,
+        "feature_type": kind,
+        "geometry": geometry,
+        "properties": properties,
+    }
+
+
+def _indoor_area(*sides: float) -> dict[str, Any]:
+    x, y, right, top = (side * 1e-5 for side in sides)
+    ring = [(x, y), (right, y), (right, top), (x, top), (x, y)]
+    return {"type": "Polygon", "coordinates": [[[8.4 + a, 49.0 + b] for a, b in ring]]}
+
+
+_OPENING = {"type": "LineString", "coordinates": [[8.40001, 49.0001], [8.40003, 49.0001]]}
+IMDF: dict[str, list[dict[str, Any]]] = {
+    "level": [
+        _indoor_feature("level", _indoor_area(0, 0, 20, 30), "a", ordinal=0, short_name={"en": "G"}),
+        _indoor_feature("level", None, "b", ordinal=1, name={"en": "First"}),
+    ],
+    "unit": [
+        _indoor_feature("unit", _indoor_area(0, 0, 20, 10), category="walkway", level_id="a"),
+        _indoor_feature(
+            "unit", _indoor_area(0, 10, 10, 30), category="office", level_id="a", name={"en": "A"}
+        ),
+        _indoor_feature("unit", _indoor_area(10, 10, 20, 30), category="stairs", level_id="a"),
+        _indoor_feature("unit", _indoor_area(0, 0, 9, 9), category="room", level_id="b"),
+    ],
+    "opening": [_indoor_feature("opening", _OPENING, category="pedestrian", level_id="a")],
+    "fixture": [_indoor_feature("fixture", _indoor_area(2, 2, 4, 4), category="desk", level_id="a")],
+    "venue": [_indoor_feature("venue", None, name={"en": "Mill"})],
+}
+
+
+def imdf_files(given: dict[str, Any]) -> dict[str, bytes]:
+    """Return the files of an archive."""
+    return {
+        f"{name}.geojson": json.dumps({"type": "FeatureCollection", "features": features}).encode()
+        for name, features in given.items()
+    }
+
+
+def imdf_zip(given: dict[str, Any]) -> bytes:
+    """Return an archive as a zip, some of it packed."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        for k, (name, content) in enumerate(imdf_files(given).items()):
+            entry = zipfile.ZipInfo(name)
+            entry.compress_type = zipfile.ZIP_DEFLATED if k % 2 else zipfile.ZIP_STORED
+            archive.writestr(entry, content)
+    return file.getvalue()
+
+
+def _sequence(separator: bytes) -> bytes:
+    lines = [json.dumps(feature).encode() for feature in GEOJSON["features"]]
+    return b"".join(separator + line + b"\n" for line in lines)
+
+
+ANCHORS = """\
+world: &world
+  height: 6
+  width: 10
+  robots: &state [1, 1, 0]
+obstacle:
+  - shape: &box {name: 'rectangle', length: 1.0, width: 0.5}
+    state: [3, 3, 0]
+  - {shape: {<<: *box, length: 2}, state: [7, 3, 1.57]}
+robot: [{state: *state}, {<<: [*world], state: [2, 2, 0]}]
+"""
+
 SEEDS: dict[str, list[Case]] = {
     "map": _one("map.json", json.dumps(MAP, indent=2), json.dumps({**MAP, "obstacles": [], "starts": {}})),
     "check": _one("map.json", json.dumps(MAP, indent=1)),
@@ -374,6 +507,7 @@ SEEDS: dict[str, list[Case]] = {
         *_one(
             "plan.tif",
             _saved("TIFF"),
+            _floats(),
             *(_saved("TIFF", compression=f"tiff_{way}") for way in ("lzw", "deflate")),
         ),
     ],
@@ -400,9 +534,13 @@ SEEDS: dict[str, list[Case]] = {
         json.dumps({"vertices": [0, 0, 10, 0, 10, 6, 0, 6, 2, 2, 2, 4, 4, 4], "holes": [4], "dimensions": 2}),
     ),
     "wkt": _one("plan.wkt", *WKT),
-    "geojson": _one("plan.geojson", json.dumps(GEOJSON, indent=1), json.dumps(DEGREES)),
+    "geojson": [
+        *_one("plan.geojson", json.dumps(GEOJSON, indent=1), json.dumps(DEGREES), _sequence(b"\x1e")),
+        *_one("plan.geojsonl", _sequence(b"")),
+    ],
+    "imdf": [Case(imdf_files(IMDF)), Case({"venue.zip": imdf_zip(IMDF)})],
     "svg": _one("plan.svg", SVG, COLOURED),
-    "osm": _one("plan.osm", OSM),
+    "osm": [*_one("plan.osm", OSM, INDOOR), *_one("plan.json", json.dumps(OVERPASS, indent=1))],
     "dxf": _one("plan.dxf", "\n".join(map(str, _DXF)) + "\n"),
     "stage": [
         Case({"hall.world": STAGE.encode(), "things.inc": THINGS.encode(), "map.png": png(GREY)}),
@@ -410,7 +548,7 @@ SEEDS: dict[str, list[Case]] = {
     ],
     "argos": _one("arena.argos", ARGOS),
     "irsim": [
-        *_one("world.yaml", IRSIM),
+        *_one("world.yaml", IRSIM, ANCHORS),
         Case(
             {
                 "world.yaml": IRSIM.replace(
@@ -506,6 +644,18 @@ _XML = ["<", ">", "/>", "</", '"', "<!--", "<!DOCTYPE a>", '<!ENTITY a "b">', "&
     "\n"]
 # fmt: on
 # fmt: off
+TOKENS["imdf"] = [
+    *_JSON,
+    *('"level_id"', '"ordinal"', '"features"', '"geometry"', '"coordinates"', '"Polygon"', '"walkway"'),
+    *('"stairs"', '"office"', '"LineString"', '"properties"', "PK\x03\x04", "PK\x01\x02", "PK\x05\x06"),
+    *("unit.geojson", "level.geojson", "opening.geojson", "1e300", "0.00001", "8.4", "49.0"),
+]
+TOKENS["osm"] += [
+    *('"elements"', '"nodes"', '"geometry"', '"members"', '"type": "way"', '"lat"', '"tags"', '"bounds"'),
+    *("<tag k='indoor' v='room'/>", "<tag k='indoor' v='wall'/>", "<tag k='door' v='yes'/>"),
+    *("<tag k='level' v='0;1'/>", "<tag k='level' v='-200-200'/>", "<tag k='room' v='stairs'/>"),
+]
+TOKENS["geojson"] += ["\x1e", "\n", "}\n{"]
 TOKENS["stage"] = [
     *("(", ")", "[", "]", '"', "#", "\n", "define", "model", "position", "block", "points", "point[0]",
         "size"),

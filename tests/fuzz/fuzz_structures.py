@@ -4,7 +4,7 @@ import copy
 import json
 from typing import Any
 
-from fuzz_seeds import DEGREES, GEOJSON, MAP, Case
+from fuzz_seeds import DEGREES, GEOJSON, IMDF, MAP, OVERPASS, Case, imdf_files
 from hypothesis import strategies as st
 
 _WHOLE = st.integers(-3, 12)
@@ -324,6 +324,76 @@ def _case(name: str, texts: st.SearchStrategy[Any]) -> st.SearchStrategy[Case]:
     )
 
 
+_INDOOR_TAGS: list[dict[str, str]] = [
+    *({"indoor": kind} for kind in ("room", "corridor", "area", "wall", "column", "yes")),
+    *({"indoor": "room", "level": level} for level in ("1", "0;1", "-1-1", "x")),
+    *({"building": "yes"}, {"barrier": "wall"}, {"indoor": "area", "room": "stairs"}, {}),
+]
+_DOORS: list[dict[str, str]] = [{}, {}, {"door": "yes"}, {"door": "yes", "width": "90"}, {"indoor": "column"}]
+
+
+@st.composite
+def _overpass(draw: st.DrawFn) -> dict[str, Any]:
+    """Draw ways through few nodes, some of them doors: rooms overlap, touch, and have no area."""
+    elements: list[Any] = []
+    for number, (x, y) in enumerate(draw(st.lists(_NEAR, min_size=1, max_size=9))):
+        node = {"type": "node", "id": number, "lat": 48 + y * 1e-5, "lon": 11 + x * 1e-5}
+        elements.append({**node, "tags": draw(st.sampled_from(_DOORS))})
+    among = st.integers(0, len(elements))
+    for number in range(draw(st.integers(1, 5))):
+        nodes = draw(st.lists(among, max_size=7))
+        closed = [*nodes, *nodes[:1]] if draw(st.booleans()) else nodes
+        elements.append(
+            {"type": "way", "id": number, "nodes": closed, "tags": draw(st.sampled_from(_INDOOR_TAGS))}
+        )
+    if draw(st.booleans()):
+        members = [{"type": "way", "ref": ref, "role": "outer"} for ref in draw(st.lists(among, max_size=3))]
+        tags = {"type": "multipolygon", **draw(st.sampled_from(_INDOOR_TAGS))}
+        elements.append({"type": "relation", "id": 1, "members": members, "tags": tags})
+    return {"generator": "Overpass API", "elements": elements}
+
+
+@st.composite
+def _venue(draw: st.DrawFn) -> dict[str, Any]:
+    """Draw units on a small grid with openings anywhere."""
+
+    def geometry(kind: str, points: Any) -> dict[str, Any]:
+        return {"type": kind, "coordinates": points}
+
+    def degrees(points: Any) -> Any:
+        return [[8.4 + x * 1e-5, 49.0 + y * 1e-5] for x, y in points]
+
+    def features(kind: str, geometries: list[Any]) -> list[Any]:
+        categories = st.sampled_from(["walkway", "office", "stairs", "column", "room", "lobby"])
+        return [
+            {
+                "type": "Feature",
+                "id": kind,
+                "geometry": each,
+                "properties": {"level_id": "a", "category": draw(categories)},
+            }
+            for each in geometries
+        ]
+
+    rings = [
+        degrees([*ring, *ring[:1]]) for ring in draw(st.lists(_BOX | st.lists(_NEAR, min_size=1), max_size=5))
+    ]
+    lines = [degrees(line) for line in draw(st.lists(st.lists(_NEAR, min_size=2, max_size=3), max_size=3))]
+    level = {"type": "Feature", "id": "a", "geometry": None, "properties": {"ordinal": 0}}
+    return {
+        "level": [level],
+        "unit": features("unit", [geometry("Polygon", [ring]) for ring in rings]),
+        "opening": features("opening", [geometry("LineString", line) for line in lines]),
+        "fixture": features("fixture", [geometry("Polygon", [ring]) for ring in rings[:1]]),
+    }
+
+
+def _archive(given: dict[str, Any]) -> Case:
+    """Return the files that IMDF knows of an altered archive."""
+    known = {name: given[name] for name in IMDF if name in given}
+    return Case(imdf_files(known) or {"unit.geojson": b""})
+
+
 STRUCTURES: dict[str, st.SearchStrategy[Case]] = {
     "map": _case("map.json", _MAP.map(_json)),
     "check": _case("map.json", _MAP.map(_json)),
@@ -340,6 +410,8 @@ STRUCTURES: dict[str, st.SearchStrategy[Case]] = {
             _json
         ),
     ),
+    "osm": _case("plan.json", (_overpass() | _altered(OVERPASS, _JUNK)).map(_json)),
+    "imdf": (_venue() | _altered(IMDF, _JUNK)).map(_archive),
     "svg": _case("plan.svg", _SVG),
     "dxf": _case(
         "plan.dxf", st.tuples(st.lists(_ENTITY, max_size=2), st.lists(_ENTITY, max_size=6)).map(_dxf)

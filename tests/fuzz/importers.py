@@ -55,6 +55,7 @@ _OPTIONS: dict[str, list[Any]] = {
     "only": [["walls"], ["desk", "boundary"]],
     "skip": [["walls"], ["boundary"]],
     "hatches": [True],
+    "level": ["0", "1", "-1", "G", "nan"],
     "free_colour": [["white"], ["#c8c8c8", "black"], ["no colour"], ["#fffffff"]],
     "solid_colour": [["white"], ["#777"], ["rgb(1,2,3)"]],
     "ignore_colour": [["black"], ["red", "rgba(0,0,0,.5)"], []],
@@ -88,6 +89,8 @@ def usual_job(target: str) -> Job:
     """Return how the seeds of a target are read."""
     if target in ("map", "study", "check"):
         return Job(target)
+    if target == "imdf":
+        return Job("folder", target)
     return Job("import", target, {_MOSTLY[target]: 0.5} if target in _MOSTLY else {})
 
 
@@ -105,7 +108,12 @@ def drawn_job(target: str, random: Random) -> Job:
         if name in _OPTIONS and random.random() < (0.9 if _MOSTLY.get(target) == name else 0.15)
     }
     shaping = {name: random.choice(values) for name, values in _SHAPING.items() if random.random() < 0.08}
-    return Job("import", target if random.random() < 0.9 else None, options, shaping)
+    return Job(
+        "folder" if target == "imdf" else "import",
+        target if random.random() < 0.9 else None,
+        options,
+        shaping,
+    )
 
 
 @dataclass

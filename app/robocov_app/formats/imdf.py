@@ -22,6 +22,7 @@ from robocov_app.formats.georeference import DEGREES, in_metres
 from robocov_app.formats.indoor import IndoorFigure, Role, build_floor, choose_floor, list_floors
 
 MAX_ENTRIES = 1000  # files in an archive
+MAX_OBJECTS = 200_000  # of JSON in the files together; a feature is about four
 _REQUIRED = ("level", "unit")
 _READ = (*_REQUIRED, "opening", "fixture", "kiosk", "venue")
 _ZIP = b"PK\x03\x04"
@@ -54,6 +55,8 @@ class _Archive:
         for name in _REQUIRED:
             if name not in texts:
                 raise MapError(f"{self.where}: expected {name}.geojson in it, as IMDF has, got none")
+        if sum(text.count(b"{") for text in texts.values()) > MAX_OBJECTS:
+            raise MapError(f"{self.where}: expected at most {MAX_OBJECTS} objects in its files, got more")
         self.files = {name: JsonFile(path / f"{name}.geojson", text) for name, text in texts.items()}
 
     def features(self, name: str) -> list[dict[str, Any]]:
