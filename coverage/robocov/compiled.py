@@ -1,333 +1,229 @@
-"""Kernels: plain loops over arrays, compiled by numba when they are first called.
+"""Kernels: plain loops over arrays, which numba compiles when they are first called.
 
-Numba is imported only then. What it compiles is kept in the user's cache folder (``NUMBA_CACHE_DIR`` names
-another one, else ``ROBOCOV_CACHE`` one for all that is kept, or none), by the code of a kernel and of all
-kernels that it calls; an entry that is damaged, or of another numba or processor, counts as missing. No two
-processes compile the same kernel at the same time: the second one waits, and loads it.
-With ``NUMBA_DISABLE_JIT=1`` kernels run as Python.
+Numba is imported only then. Machine code is kept in the user's cache folder by numba's own cache, in a folder
+named after the sources of robocov, so that no code of another version is ever used. The environment variable
+``NUMBA_CACHE_DIR`` names another folder, ``ROBOCOV_CACHE`` one for all of robocov's caches; if the latter is
+empty, nothing is kept. With ``NUMBA_DISABLE_JIT=1`` kernels run as Python.
 """
 
 from __future__ import annotations
 
-import ctypes
-import gc
+import functools
+import hashlib
+import importlib
 import importlib.util
 import os
-import pickle
-import subprocess
+import shutil
 import sys
+import threading
 import time
-from contextlib import ExitStack, suppress
-from functools import cached_property, update_wrapper
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from types import FunctionType, ModuleType
-from typing import TYPE_CHECKING, Any, TypeVar
+from types import ModuleType
+from typing import Any, TypeVar
 
 import numpy as np
-import platformdirs
+from filelock import FileLock
 
-from robocov.errors import OutputError
-from robocov.files.array_files import ArrayCache
-from robocov.files.atomic import locked
+from robocov.files.cache_folders import find_cache_root, open_private_folder
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 
-_Function = TypeVar("_Function", bound="Callable[..., Any]")
-
-_FORMAT = 1
-"""Version of the entries in the cache."""
-
-_COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
-
-_LIMIT = 1 << 28
-"""Bytes of all that is kept; what was not used for the longest time goes first."""
-
-_PATIENCE = 60.0
-"""Seconds for which another process is waited for."""
-
-_EXAMPLES = ["robocov.cost", "robocov.simulation", "robocov.metrics"]
-"""Modules whose function `example` calls the kernels of the coverage cost, a step, and a summary."""
-
-_ahead: list[str] = []
-
-_helpers: list[subprocess.Popen[bytes]] = []
+IS_COMPILER_ENABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
+_MAX_UNUSED_DAYS = 30.0
+"""Machine code of other versions is removed once it has not been used for so long."""
+_READY_FILE = "ready"
+"""Name of the file that marks a folder with the machine code of all common kernels."""
+_EXAMPLE_MODULES = ("robocov.cost", "robocov.simulation", "robocov.metrics")
+"""Modules whose function `example` calls the kernels of the coverage cost, of a step, and of a summary."""
 
 on_compile: list[Callable[[str], None]] = []
-"""Called with the name of each kernel that the cache does not hold, before it is compiled."""
+"""Functions that are called with the name of each kernel right before it is compiled."""
+
+_lock = threading.RLock()
+_is_interpreting = False
 
 
 def kernel(function: _Function) -> _Function:
-    """Return a function of numbers, arrays and named tuples of these as a compiled one.
+    """Compile a function of numbers, arrays and named tuples of these when it is first called.
 
-    It may call other kernels, whatever module they come from, and read global numbers. Arithmetic is that of
+    A kernel may call other kernels, from whatever module, and read global numbers. Arithmetic is that of
     Python, without fused or reordered operations, so that all processors give the same bits.
 
+    Parameters
+    ----------
+    function : callable
+        Plain Python that numba can compile without objects.
+
+    Returns
+    -------
+    callable
+        A `Kernel`, or the function itself if the compiler is disabled.
+
+    Examples
+    --------
     >>> @kernel
-    ... def doubled(x):
+    ... def double(x):
     ...     return 2.0 * x
-    >>> doubled(0.5)
+    >>> double(0.5)
     1.0
+    >>> double(x=4.0)
+    8.0
     """
-    return _as_kernel(function)
-
-
-def inner_kernel(function: _Function) -> _Function:
-    """Return the same of a function that makes no array, for loops: references are not counted."""
-    return _as_kernel(function, _nrt=False)
-
-
-def inlined_kernel(function: _Function) -> _Function:
-    """Return the same of a short one, which becomes part of the loops that call it."""
-    return _as_kernel(function, _nrt=False, forceinline=True)
-
-
-def _as_kernel(function: _Function, **options: bool) -> _Function:
-    if not _COMPILED:
+    if not IS_COMPILER_ENABLED:
         return function
-    return Kernel(function, options)  # type: ignore[return-value]
+    return Kernel(function)  # type: ignore[return-value]
 
 
 class Kernel:
-    """A function that is compiled when it is first called."""
+    """A function that is compiled when it is first called.
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, bool]) -> None:
-        assert isinstance(function, FunctionType)
-        update_wrapper(self, function)
-        self._function, self._options = function, options
+    Attributes
+    ----------
+    py_func : callable
+        The function in Python.
+    """
 
-    def __call__(self, *args: Any) -> Any:
-        """Return what the function returns."""
+    def __init__(self, function: Callable[..., Any]) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func = function
+        self._dispatcher: Any = None
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Call the compiled function, or the Python one while `interpret_until_ready` says so."""
+        if _is_interpreting:
+            with np.errstate(all="ignore"):
+                return self.py_func(*args, **kwargs)
+        dispatcher = self._dispatcher or self.get_dispatcher()
         try:
-            return self._dispatcher(*args)
+            return dispatcher(*args, **kwargs)
         except SystemError as error:
-            # Ctrl-C while numba looks at the arguments
+            # numba turns a Ctrl-C that comes while it looks at the arguments into a SystemError.
             if isinstance(error.__cause__, KeyboardInterrupt):
                 raise KeyboardInterrupt from None
             raise
 
-    @cached_property
-    def _callees(self) -> dict[str, Kernel]:
-        found = {name: self._function.__globals__.get(name) for name in self._function.__code__.co_names}
-        return {name: value for name, value in found.items() if isinstance(value, Kernel)}
-
-    @cached_property
-    def _linked(self) -> FunctionType:
-        # numba knows its own dispatchers only, in the place of the kernels that this one calls
-        known = {name: callee._inner for name, callee in self._callees.items()}
-        function = self._function
-        linked = FunctionType(function.__code__, function.__globals__ | known, function.__name__)
-        linked.__module__, linked.__qualname__ = function.__module__, function.__qualname__
-        return linked
-
-    @cached_property
-    def _inner(self) -> Any:
-        """For other kernels: what Python needs to call it takes long to compile."""
-        numba = _numba()
-        options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **self._options}
-        inner = numba.njit(self._linked, error_model="numpy", **options)
-        template = inner.get_call_template
-
-        def without_literals(args: Any, kws: Any) -> Any:
-            # else each constant that a caller passes would be compiled anew
-            return template(tuple(map(numba.types.unliteral, args)), kws)
-
-        inner.get_call_template = without_literals
-        return inner
-
-    @cached_property
-    def _dispatcher(self) -> Any:
-        dispatcher = _numba().njit(self._linked, error_model="numpy", no_cfunc_wrapper=True, **self._options)
-        cache = dispatcher._cache = _KernelCache(self._function.__name__, self._identity)
-        compiling = dispatcher.compile
-
-        def released(types: Any) -> Any:
-            with cache.held:  # until it is saved, or has failed
-                return compiling(types)
-
-        dispatcher.compile = released
-        array, typeof = _numba().types.Array, dispatcher.typeof_pyval
-
-        def without_flags(value: Any) -> Any:
-            # else each combination of arrays that may be written and that may not would be compiled anew
-            kind = typeof(value)
-            return kind.copy(readonly=False) if isinstance(kind, array) and not kind.mutable else kind
-
-        dispatcher.typeof_pyval = without_flags
-        return dispatcher
-
-    @cached_property
-    def _identity(self) -> str:
-        """Name what the machine code comes from: the kernel, those that it calls, the numbers it reads."""
-        code, scope = self._function.__code__, self._function.__globals__
-        parts: list[str] = [self.__module__, self.__qualname__, code.co_code.hex()]  # type: ignore[attr-defined]
-        parts += map(repr, (code.co_consts, code.co_names, code.co_varnames, self._options))
-        for name in code.co_names:
-            value = scope.get(name)
-            if isinstance(value, (int, float)):
-                parts.append(f"{name}={value!r}")
-            elif isinstance(value, type):
-                parts.append(f"{name}={getattr(value, '_fields', None)}")
-        parts += [self._callees[name]._identity for name in sorted(self._callees)]
-        return ArrayCache.key(*parts)
+    def get_dispatcher(self) -> Any:
+        """Return numba's dispatcher for the function; import numba if this is the first kernel of all."""
+        with _lock:
+            if self._dispatcher is None:
+                self._dispatcher = _build_dispatcher(self.py_func)
+            return self._dispatcher
 
 
-class _ForeignCall(Kernel):
-    """`call_c` as numba's own instruction."""
-
-    # of this instruction; what Python does instead is nowhere in machine code
-    _identity = "call_c 1"
-
-    @cached_property
-    def _inner(self) -> Any:
-        numba = _numba()
-        from llvmlite import ir
-
-        def typed(_: Any, address: Any, arguments: Any) -> Any:
-            kinds = numba.types.Tuple([numba.types.unliteral(kind) for kind in arguments])
-
-            def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-                passed = [builder.extract_value(values[1], k) for k in range(len(kinds))]
-                function = ir.FunctionType(ir.IntType(64), [value.type for value in passed])
-                return builder.call(builder.inttoptr(values[0], function.as_pointer()), passed)
-
-            return numba.types.intp(numba.types.intp, kinds), generate
-
-        return numba.extending.intrinsic(typed)
+def _build_dispatcher(function: Callable[..., Any]) -> Any:
+    numba = import_numba()
+    folder = cache_folder()
+    # A cache finds its folder when the dispatcher is built; the setting is numba's own again afterwards.
+    previous = numba.config.CACHE_DIR
+    try:
+        if folder is not None:
+            numba.config.CACHE_DIR = str(folder)
+        return numba.njit(function, cache=folder is not None, error_model="numpy")
+    finally:
+        numba.config.CACHE_DIR = previous
 
 
-def call_c(address: int, arguments: tuple[float, ...]) -> int:
-    """Call a C function by its address, also from kernels, and return the word that it returns.
+@functools.cache
+def import_numba() -> ModuleType:
+    """Import numba, in spite of a folder `coverage` on the path, and let its kernels call ours.
 
-    Arguments are floats, and whole numbers of 64 bits, which stand for pointers as well.
+    Numba takes any module `coverage` for coverage.py, also our source root of that name.
     """
-    passed = [each if isinstance(each, float) else int(each) for each in arguments]
-    kinds = [ctypes.c_double if isinstance(each, float) else ctypes.c_ssize_t for each in passed]
-    return int(ctypes.CFUNCTYPE(ctypes.c_ssize_t, *kinds)(int(address))(*passed))
-
-
-if _COMPILED:
-    call_c = _ForeignCall(call_c, {})  # type: ignore[assignment]
-
-
-class _KernelCache:
-    """The machine code of one kernel in the user's cache, where numba looks: an entry for each signature."""
-
-    def __init__(self, name: str, identity: str) -> None:
-        self._name, self._identity = name, identity
-        folder, self.held = cache_folder(), ExitStack()
-        self._cache = None if folder is None else ArrayCache(folder, _LIMIT)
-
-    def _key(self, sig: Any, codegen: Any) -> str:
-        parts = _numba().__version__, np.__version__, sys.version, repr(codegen.magic_tuple())
-        return ArrayCache.key("kernel", _FORMAT, self._identity, *parts, *map(_described, sig))
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the machine code for the types of the arguments, None where it is to be compiled."""
-        target_context.refresh()
-        key = self._key(sig, target_context.codegen())
-        found = self._loaded(key, target_context)
-        if found is None:
-            for tell in tuple(on_compile):
-                tell(self._name)
-            found = self._awaited(key, target_context)
-        if found is None and gc.isenabled():
-            # a tenth of the time, for next to no garbage
-            gc.disable()
-            self.held.callback(gc.enable)
-        return found
-
-    def _awaited(self, key: str, target_context: Any) -> Any:
-        """Return what another process that has begun to compile this is going to save, None if none has."""
-        if self._cache is None:
-            return None
-        with suppress(OSError):
-            self._cache.folder.mkdir(parents=True, exist_ok=True)
-        if not (self._cache.folder.is_dir() and os.access(self._cache.folder, os.W_OK)):
-            return None
-        _start_helper()
-        until = time.monotonic() + _PATIENCE
-        while time.monotonic() < until:
-            try:
-                self.held.enter_context(locked(self._cache.folder, f".{key}.lock", remove=True))
-            except OutputError as error:
-                if error.__cause__ is not None:  # nobody can lock there
-                    return None
-                time.sleep(0.02)
-                continue
-            # it may have been saved just before
-            return self._loaded(key, target_context)
-        return None
-
-    def _loaded(self, key: str, target_context: Any) -> Any:
-        from numba.core import compiler
-
-        entry = None if self._cache is None else self._cache.load(key)
-        if entry is not None:
-            # a cache is never in the way, whatever there may be in it
-            with suppress(Exception):
-                rebuild: Any = compiler.CompileResult._rebuild
-                return rebuild(target_context, *pickle.loads(entry["code"].tobytes()))
-        return None
-
-    def save_overload(self, sig: Any, result: Any) -> None:
-        if self._cache is not None:
-            code = np.frombuffer(pickle.dumps(result._reduce()), dtype=np.uint8)
-            self._cache.save(self._key(sig, result.codegen), {"code": code})
-
-
-def cache_folder() -> Path | None:
-    """Return where kernels are kept between processes, None where they are not."""
-    # the variable of numba's own caches
-    named, ours = os.environ.get("NUMBA_CACHE_DIR"), os.environ.get("ROBOCOV_CACHE")
-    if named:
-        return Path(named)
-    if ours == "":
-        return None
-    return (Path(ours) if ours else platformdirs.user_cache_path("robocov", appauthor=False)) / "kernels"
-
-
-def compile_kernels() -> None:
-    """Have the kernels of a run and its summary in the cache, and ready to be called here.
-
-    As soon as one is missing, another process compiles all but those of the cost, if there is a core for it.
-    """
-    _ahead[:] = _EXAMPLES[1:]
-    for module in _EXAMPLES:
-        importlib.import_module(module).example()
-
-
-def _start_helper() -> None:
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    path, no = os.pathsep.join(filter(None, sys.path)), subprocess.DEVNULL
-    if _ahead and not _helpers and cores > 1:
-        script = "; ".join(f"import {module}; {module}.example()" for module in _ahead)
-        # -P: what lies in the working folder is not meant
-        command = [sys.executable, "-P", "-c", script]
-        with suppress(OSError):
-            env = {**os.environ, "PYTHONPATH": path}
-            _helpers.append(subprocess.Popen(command, env=env, stdin=no, stdout=no, stderr=no))
-
-
-def _described(kind: Any) -> str:
-    """Return a type of numba's in words."""
-    if hasattr(kind, "fields"):
-        return f"{kind.fields}({', '.join(map(_described, kind.types))})"
-    return repr(kind)
-
-
-def _numba() -> ModuleType:
-    """Return numba, imported in spite of a folder `coverage` on the path."""
-    if "numba" in sys.modules:
-        return sys.modules["numba"]
-    # numba takes any `coverage` for coverage.py, also our source root on the path: an empty entry hides it
-    found = None if "coverage" in sys.modules else importlib.util.find_spec("coverage")
-    ours = found is not None and found.origin is None
-    if ours:
+    is_source_root = False
+    if "numba" not in sys.modules and "coverage" not in sys.modules:
+        found = importlib.util.find_spec("coverage")
+        is_source_root = found is not None and found.origin is None
+    if is_source_root:
         sys.modules["coverage"] = None  # type: ignore[assignment]
     try:
         import numba
+        from numba.core import event  # documented as numba's event API
+        from numba.extending import typeof_impl
     finally:
-        if ours:
+        if is_source_root:
             del sys.modules["coverage"]
+
+    typeof: Callable[[Any], Any] = numba.typeof
+    register: Callable[[str, event.Listener], None] = event.register
+
+    @typeof_impl.register(Kernel)
+    def type_kernel(called: Kernel, context: Any) -> Any:
+        """Let numba see the dispatcher of a kernel that another kernel calls."""
+        return typeof(called.get_dispatcher())
+
+    class CompilationListener(event.Listener):
+        """Passes the names of kernels on to `on_compile`."""
+
+        def on_start(self, started: Any) -> None:
+            for report in tuple(on_compile):
+                report(started.data["dispatcher"].__name__)
+
+        def on_end(self, ended: Any) -> None:
+            pass
+
+    register("numba:compile", CompilationListener())
     return numba
+
+
+@functools.cache
+def cache_folder() -> Path | None:
+    """Return the folder that keeps the machine code of this version, or None if nothing is kept.
+
+    A folder that belongs to somebody else, or that others may write to, is ignored: whoever can write there
+    could run code as this user. So is one that cannot be written to.
+    """
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    root = Path(named) if named else find_cache_root()
+    if root is None:
+        return None
+    parent = root if named else root / "kernels"
+    folder = open_private_folder(parent / _compute_source_digest())
+    if folder is not None:
+        with suppress(OSError):
+            os.utime(folder)
+        _remove_unused_versions(folder)
+    return folder
+
+
+def _compute_source_digest() -> str:
+    """Return a digest of all sources of the library: machine code is valid for exactly these."""
+    digest = hashlib.blake2b(digest_size=10)
+    package = Path(__file__).parent
+    for path in sorted(package.rglob("*.py")):
+        source = path.read_bytes()
+        digest.update(f"{path.relative_to(package).as_posix()} {len(source)}\n".encode())
+        digest.update(source)
+    return f"robocov-{digest.hexdigest()}"
+
+
+def _remove_unused_versions(used: Path) -> None:
+    """Remove the machine code of other versions that has not been used for a long time."""
+    oldest = time.time() - _MAX_UNUSED_DAYS * 24 * 3600
+    for folder in used.parent.glob("robocov-*"):
+        with suppress(OSError):
+            if folder != used and folder.is_dir() and folder.stat().st_mtime < oldest:
+                shutil.rmtree(folder, ignore_errors=True)
+
+
+def compile_kernels() -> None:
+    """Compile the kernels of a run and of its summary, unless they are in the cache already.
+
+    If another process is compiling them, wait for it.
+    """
+    folder = cache_folder()
+    if folder is None:
+        _call_examples()
+        return
+    if (folder / _READY_FILE).exists():
+        return
+    with FileLock(folder / ".lock"):
+        if not (folder / _READY_FILE).exists():
+            _call_examples()
+            (folder / _READY_FILE).touch()
+
+
+def _call_examples() -> None:
+    for module in _EXAMPLE_MODULES:
+        importlib.import_module(module).example()

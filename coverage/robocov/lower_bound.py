@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 
 from robocov.arrays import Array, IntArray, frozen
-from robocov.compiled import inlined_kernel, inner_kernel
+from robocov.compiled import kernel
 from robocov.cost import CoverageCost
 from robocov.environment import GRID, Environment
 from robocov.errors import ParameterError, checked
@@ -155,7 +155,7 @@ class _Work(NamedTuple):
     """(3,) and at most the worth."""
 
 
-@inlined_kernel
+@kernel
 def _tangent(work: _Work, length: float, dx: float, dy: float, away: float) -> None:
     """Lower what is the least distance at the vertices by a way that begins along -(dx, dy)."""
     for k in range(3):
@@ -163,7 +163,7 @@ def _tangent(work: _Work, length: float, dx: float, dy: float, away: float) -> N
         work.least[k] = min(work.least[k], length + slope)
 
 
-@inner_kernel
+@kernel
 def _bounds(
     known: _Known, index: AngularWallIndex, prices: Array, triangles: Array, places: Array, work: _Work,
     out: Array,
@@ -214,7 +214,7 @@ class _Table(NamedTuple):
     distance: NDArray[np.float32]
 
 
-@inner_kernel
+@kernel
 def _table_worths(table: _Table, prices: Array, weights: Array, out: Array) -> None:
     """Write what the places of the table are worth."""
     for p in range(len(out)):
@@ -224,7 +224,7 @@ def _table_worths(table: _Table, prices: Array, weights: Array, out: Array) -> N
         out[p] = worth
 
 
-@inner_kernel
+@kernel
 def _robots_paid(table: _Table, prices: Array, shares: Array, out: Array) -> None:
     """Add up the shares of a robot, at the places of the table, that each site pays for."""
     for p in range(len(shares)):

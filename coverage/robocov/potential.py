@@ -13,7 +13,7 @@ What the paper leaves open is decided here:
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.compiled import inlined_kernel, inner_kernel, kernel
+from robocov.compiled import kernel
 from robocov.observation.neighbours import binned, row_of
 
 CONTACT_DISTANCE = 0.01
@@ -25,7 +25,7 @@ _TOGETHER = 1e-12
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 
-@inlined_kernel
+@kernel
 def _repulsion(distance: float, k_rep: float, rho_0: float) -> float:
     """Return the magnitude of (24) for each metre of offset, N/m; zero where that has no direction."""
     inverse = 1.0 / max(distance, CONTACT_DISTANCE)
@@ -33,7 +33,7 @@ def _repulsion(distance: float, k_rep: float, rho_0: float) -> float:
     return magnitude / distance if distance > 0.0 else 0.0
 
 
-@inlined_kernel
+@kernel
 def _attraction(square: float, k_att: float, limit: float) -> float:
     """Return the magnitude of (27) for each metre of offset, N/m."""
     return float(min(k_att * square, limit / max(np.sqrt(square), 1e-300)))
@@ -89,7 +89,7 @@ def potential_forces(
     return forces
 
 
-@inner_kernel
+@kernel
 def _push(forces: Array, i: int, j: int, dx: float, dy: float, k_rep: float, rho_0: float) -> None:
     """Add (24) on robot i from robot j to its sum."""
     square = dx * dx + dy * dy
@@ -104,7 +104,7 @@ def _push(forces: Array, i: int, j: int, dx: float, dy: float, k_rep: float, rho
     forces[2, i, 1] += part * dy
 
 
-@inner_kernel
+@kernel
 def _apart(i: int, j: int) -> tuple[float, float]:
     angle = _GOLDEN_ANGLE * (min(i, j) + 1.0) * (max(i, j) + 1.0)
     sign = 1.0 if i < j else -1.0

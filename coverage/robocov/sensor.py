@@ -1,136 +1,185 @@
-"""The range sensor, all that robots know of obstacles by: nearest point and ray scan, both asked of pymunk.
+"""The range sensor: the nearest obstacle point and ray scans, both by pymunk queries.
 
-The space that is asked holds no robots that work: they neither hide obstacles nor are taken for some.
+A sensor has a space of its own, which contains the obstacles and robots that have failed. Working robots are
+not in it: they neither hide obstacles nor are mistaken for any.
 """
 
 from __future__ import annotations
 
-import platform
-import sys
-from functools import cached_property
+import functools
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pymunk
 
-from robocov.arrays import Array, BoolArray, IntArray, frozen
-from robocov.compiled import call_c, kernel
+from robocov.arrays import Array, BoolArray
+from robocov.compiled import IS_COMPILER_ENABLED
 from robocov.observation import headings
-from robocov.world import obstacle_space
-from robocov.world.engine import addresses_of
+from robocov.world.bodies import Obstacles, build_obstacle_space
 from robocov.world.solid import Mover
 
-_FARTHEST = 1e6
-"""An unlimited range, in metres, as the engine's bounding boxes can hold it."""
-_ALL = pymunk.ShapeFilter()
-_IN_REGISTERS = sys.platform != "win32" and platform.machine() in ("x86_64", "aarch64", "arm64")
-"""Whether C takes a vector as two floats and a filter as two words, as kernels call it."""
+_MAX_RANGE_M = 1e6
+"""Stands for an unlimited range: pymunk's bounding boxes cannot hold an infinite one."""
+_EVERYTHING = pymunk.ShapeFilter()
 
 
 class RangeSensor:
-    """Asks a static pymunk space for what a robot would measure among pieces as of `solid.solid_pieces`.
+    """Measures what robots would measure among static and moving obstacles.
 
-    Obstacles that move are where they are at time zero, until they are to `show` another time.
+    Parameters
+    ----------
+    walls : tuple of (k, 2) arrays, m
+        Convex polygons that tile everything that is not free, as `world.solid.solid_pieces` returns them.
+    movers : tuple of Mover
+        Moving obstacles, which stand where they are at time zero until `set_time` moves them.
+
+    Examples
+    --------
+    >>> wall = np.array([[2.0, -1.0], [3.0, -1.0], [3.0, 1.0], [2.0, 1.0]])
+    >>> sensor = RangeSensor((wall,))
+    >>> sensor.find_nearest_points(np.array([[0.0, 0.5]]), ranges=np.array([3.0]))
+    array([[2. , 0.5]])
+    >>> distances, is_hit = sensor.scan(np.array([[0.0, 0.0]]), rays=4, ranges=np.array([3.0]))
+    >>> distances
+    array([[2., 3., 3., 3.]])
     """
 
-    def __init__(self, pieces: tuple[Array, ...], movers: tuple[Mover, ...] = ()) -> None:
-        self._pieces, self._movers = pieces, movers
-        self._space = obstacle_space((pieces, movers, None))
-        # an empty step builds the static index; queries never change the space
+    def __init__(self, walls: tuple[Array, ...], movers: tuple[Mover, ...] = ()) -> None:
+        self._walls = walls
+        self._movers = movers
+        self._space, self._mover_bodies = build_obstacle_space(Obstacles(walls, movers))
+        # An empty step builds the spatial index; queries never change the space.
         self._space.step(1e-9)
-        self._bodies = self._space.bodies
-        self._failed: dict[tuple[float, float, float], pymunk.Circle] = {}
+        self._failed_robots: dict[tuple[float, float, float], pymunk.Circle] = {}
 
     def copy(self) -> RangeSensor:
-        """Return one of the same obstacles, at time zero."""
-        return RangeSensor(self._pieces, self._movers)
+        """Return a sensor among the same obstacles at time zero."""
+        return RangeSensor(self._walls, self._movers)
 
     def __reduce__(self) -> tuple[type[RangeSensor], tuple[Any, ...]]:
-        """Return how to rebuild one of the same obstacles, at time zero."""
-        return RangeSensor, (self._pieces, self._movers)
+        """Pickle the obstacles; pymunk's space is built again, at time zero."""
+        return RangeSensor, (self._walls, self._movers)
 
-    def show(self, time: float, failed_robots: Array | None = None) -> None:
-        """Move to a time, s, at which some robots have failed, and are obstacles: x, y, radius, (w, 3) m."""
-        for body, mover in zip(self._bodies, self._movers, strict=True):
+    def set_time(self, time: float, failed_robots: Array | None = None) -> None:
+        """Move obstacles to where they are at a time.
+
+        Parameters
+        ----------
+        time : float, s
+            Simulation time.
+        failed_robots : (w, 3) array or None, m
+            x, y and radius of the robots that have failed by then, and are obstacles.
+        """
+        for body, mover in zip(self._mover_bodies, self._movers, strict=True):
             body.position = tuple(mover.path.shift(time).tolist())
             self._space.reindex_shapes_for_body(body)
-        wanted = set() if failed_robots is None else set(map(tuple, failed_robots.tolist()))
-        for gone in self._failed.keys() - wanted:
-            self._space.remove(self._failed.pop(gone))
-        for x, y, radius in sorted(wanted - self._failed.keys()):
+        failed = set() if failed_robots is None else set(map(tuple, failed_robots.tolist()))
+        for robot in self._failed_robots.keys() - failed:
+            self._space.remove(self._failed_robots.pop(robot))
+        for x, y, radius in sorted(failed - self._failed_robots.keys()):
             disc = pymunk.Circle(self._space.static_body, radius, (x, y))
             self._space.add(disc)
-            self._failed[x, y, radius] = disc
+            self._failed_robots[x, y, radius] = disc
 
-    def nearest(self, positions: Array, ranges: Array) -> Array:
-        """Return the closest solid point of each robot at (n, 2) m within its range, (n,) m; nan if none."""
-        points = np.array(positions, dtype=float)
-        if self._addresses is not None:
-            _nearest(self._addresses, points, ranges)
+    def find_nearest_points(self, positions: Array, ranges: Array) -> Array:
+        """Find the nearest obstacle point of each robot.
+
+        Parameters
+        ----------
+        positions : (n, 2) array, m
+        ranges : (n,) array, m
+            Sensing ranges; may be infinite.
+
+        Returns
+        -------
+        (n, 2) array, m
+            nan where no obstacle is in range. Read-only.
+        """
+        limits = np.minimum(ranges, _MAX_RANGE_M)
+        queries = _load_compiled_queries()
+        if queries is not None:
+            points: Array = queries.find_nearest_points(self._space, positions, limits)
         else:
-            for row, (place, reach) in enumerate(zip(points.tolist(), ranges.tolist(), strict=True)):
-                found = self._space.point_query_nearest(tuple(place), min(reach, _FARTHEST), _ALL)
-                points[row] = np.nan if found is None else found.point
+            points = np.full((len(positions), 2), np.nan)
+            for row, (position, limit) in enumerate(zip(positions.tolist(), limits.tolist(), strict=True)):
+                nearest = self._space.point_query_nearest(tuple(position), limit, _EVERYTHING)
+                if nearest is not None:
+                    points[row] = nearest.point
         points.setflags(write=False)
         return points
 
-    def scan(self, position: Array, rays: int, reach: float) -> tuple[Array, Array]:
-        """Return distances, (rays,) m, and ends, (rays, 2) m, of rays from one place; see `scans`."""
-        distances, _ = self.scans(np.asarray(position)[None], rays, np.array([reach]))
+    def scan(self, positions: Array, rays: int, ranges: Array) -> tuple[Array, BoolArray]:
+        """Cast rays evenly round a full turn from each position; the first points along +x.
+
+        Parameters
+        ----------
+        positions : (n, 2) array, m
+        rays : int
+            Number of rays of each robot.
+        ranges : (n,) array, m
+            Sensing ranges; may be infinite.
+
+        Returns
+        -------
+        distances : (n, rays) array, m
+            Distance to the first obstacle, or the range where there is none. Read-only.
+        is_hit : (n, rays) bool array
+            Whether an obstacle is in range. Read-only.
+        """
+        limits = np.minimum(ranges, _MAX_RANGE_M)
+        ends = positions[:, None, :] + limits[:, None, None] * headings(rays)
+        queries = _load_compiled_queries()
+        if queries is not None:
+            fractions, is_hit = queries.cast_rays(self._space, np.ascontiguousarray(positions), ends)
+        else:
+            fractions, is_hit = self._cast_rays(positions, ends)
+        distances = limits[:, None] * fractions
+        distances.setflags(write=False)
+        is_hit.setflags(write=False)
+        return distances, is_hit
+
+    def scan_from(self, position: Array, rays: int, sensing_range: float) -> tuple[Array, Array]:
+        """Cast rays evenly round a full turn from one position; the first points along +x.
+
+        Parameters
+        ----------
+        position : (2,) array, m
+        rays : int
+        sensing_range : float, m
+
+        Returns
+        -------
+        distances : (rays,) array, m
+            Distance to the first obstacle, or the range where there is none.
+        ends : (rays, 2) array, m
+            Where the rays end.
+        """
+        distances, _ = self.scan(np.asarray(position)[None], rays, np.array([sensing_range]))
         return distances[0], position + distances[0][:, None] * headings(rays)
 
-    def scans(self, positions: Array, rays: int, ranges: Array) -> tuple[Array, BoolArray]:
-        """Cast `rays` rays evenly round a full turn from each place, (n, 2) m, the first along +x.
-
-        Returns distances, (n, rays) m, the range, (n,) m, where nothing is met, and whether something is.
-        """
-        limit = np.minimum(ranges, _FARTHEST)
-        ends = positions[:, None, :] + limit[:, None, None] * headings(rays)
-        fraction, hit = np.ones(ends.shape[:2]), np.zeros(ends.shape[:2], dtype=bool)
-        if self._addresses is not None:
-            _first_met(self._addresses, np.array(positions), ends, fraction, hit)
-        else:
-            for row, (start, turn) in enumerate(zip(positions.tolist(), ends.tolist(), strict=True)):
-                for ray, end in enumerate(turn):
-                    found = self._space.segment_query_first(tuple(start), tuple(end), 0.0, _ALL)
-                    if found is not None:
-                        fraction[row, ray], hit[row, ray] = found.alpha, True
-        distances = limit[:, None] * fraction
-        distances.setflags(write=False)
-        hit.setflags(write=False)
-        return distances, hit
-
-    @cached_property
-    def _addresses(self) -> IntArray | None:
-        """The space and its queries for kernels; None where these cannot call them."""
-        if not _IN_REGISTERS:
-            return None
-        queries = "cpSpacePointQueryNearest", "cpSpaceSegmentQueryFirst"
-        addresses, point = addresses_of(self._space._space, *queries), np.array([[0.25, 0.5]])
-        expected = self._space.point_query_nearest((0.25, 0.5), _FARTHEST, _ALL)
-        _nearest(addresses, point, frozen([_FARTHEST]))
-        same = bool(np.isnan(point[0, 0])) if expected is None else tuple(point[0]) == expected.point
-        return addresses if same else None
+    def _cast_rays(self, positions: Array, ends: Array) -> tuple[Array, BoolArray]:
+        """Cast rays by pymunk's public query, as `compiled_queries.cast_rays` does."""
+        fractions = np.ones(ends.shape[:2])
+        is_hit = np.zeros(ends.shape[:2], dtype=bool)
+        for row, (position, ends_of_robot) in enumerate(zip(positions.tolist(), ends.tolist(), strict=True)):
+            for ray, end in enumerate(ends_of_robot):
+                hit = self._space.segment_query_first(tuple(position), tuple(end), 0.0, _EVERYTHING)
+                if hit is not None:
+                    fractions[row, ray] = hit.alpha
+                    is_hit[row, ray] = True
+        return fractions, is_hit
 
 
-@kernel
-def _nearest(addresses: IntArray, points: Array, ranges: Array) -> None:
-    """Replace points by the nearest solid ones."""
-    answer = np.empty(6)  # a cpPointQueryInfo: shape, point, ...
-    for i in range(len(points)):
-        reach = min(ranges[i], _FARTHEST)
-        asked = (addresses[0], points[i, 0], points[i, 1], reach, 0, -1, answer.ctypes.data)
-        found = call_c(addresses[1], asked)
-        points[i, 0], points[i, 1] = (answer[1], answer[2]) if found else (np.nan, np.nan)
+@functools.cache
+def _load_compiled_queries() -> ModuleType | None:
+    """Return `robocov.compiled_queries` if it works here; otherwise pymunk's public queries are used."""
+    if not IS_COMPILER_ENABLED:
+        return None
+    try:
+        from robocov import compiled_queries
 
-
-@kernel
-def _first_met(addresses: IntArray, positions: Array, ends: Array, fraction: Array, hit: BoolArray) -> None:
-    """Set at which parts of them segments meet something first."""
-    answer = np.empty(6)  # a cpSegmentQueryInfo, which ends with the part
-    for i in range(len(positions)):
-        for k in range(ends.shape[1]):
-            x, y = ends[i, k, 0], ends[i, k, 1]
-            start = (addresses[0], positions[i, 0], positions[i, 1])
-            if call_c(addresses[2], (*start, x, y, 0.0, 0, -1, answer.ctypes.data)):
-                fraction[i, k], hit[i, k] = answer[5], True
+        return compiled_queries if compiled_queries.is_usable() else None
+    except Exception:
+        # Whatever is wrong with a shortcut, the way without it works.
+        return None

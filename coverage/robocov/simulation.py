@@ -187,7 +187,7 @@ class Simulation:
         self._observation: tuple[Observations, Inbox | None] | None = None
         self._snapshot: Snapshot | None = None
         if self._obstacles_change:
-            self.sensor.show(self.time, self._world.failed_robots)
+            self.sensor.set_time(self.time, self._world.failed_robots)
 
     def __repr__(self) -> str:
         where = f"{self.controller.name} on {self.environment.name}"
@@ -244,12 +244,12 @@ class Simulation:
                 parts = [Neighbours.within(self.positions[run], ranges[run]) for run in runs]
                 neighbours = Neighbours.beside(parts)
             if scanning is not None and self._steps % scanning.every(self.dt) == 0:
-                scans = Scans(*self.sensor.scans(self.positions, scanning.rays, team.sensing_range))
+                scans = Scans(*self.sensor.scan(self.positions, scanning.rays, team.sensing_range))
             seen = Observations(
                 positions=self.positions,
                 velocities=self.velocities,
                 neighbours=neighbours,
-                obstacle_points=self.sensor.nearest(self.positions, team.sensing_range),
+                obstacle_points=self.sensor.find_nearest_points(self.positions, team.sensing_range),
                 region=self.environment.region,
                 time=self.time,
                 max_speeds=team.max_speed,

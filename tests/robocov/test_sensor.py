@@ -1,13 +1,17 @@
 from __future__ import annotations
 
+import platform
+import sys
+
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robocov.compiled import IS_COMPILER_ENABLED
 from robocov.environment import Environment
-from robocov.sensor import RangeSensor
+from robocov.sensor import RangeSensor, _load_compiled_queries
 from robocov.world.solid import solid_pieces
 
 
@@ -24,7 +28,7 @@ def free_points(environment: Environment, n: int, seed: int) -> np.ndarray:
 
 def test_nearest_points_agree_with_shapely(cluttered: Environment, sensor: RangeSensor) -> None:
     points = free_points(cluttered, 400, 0)
-    nearest = sensor.nearest(points, np.full(len(points), np.inf))
+    nearest = sensor.find_nearest_points(points, np.full(len(points), np.inf))
     expected = shapely.distance(shapely.points(points), cluttered.free.boundary)
     np.testing.assert_allclose(np.hypot(*(nearest - points).T), expected, atol=1e-9)
     on_wall = shapely.distance(shapely.points(nearest), cluttered.free.boundary)
@@ -35,26 +39,50 @@ def test_nothing_is_sensed_beyond_the_range(cluttered: Environment, sensor: Rang
     points = free_points(cluttered, 200, 1)
     distance = shapely.distance(shapely.points(points), cluttered.free.boundary)
     reach = np.where(np.arange(len(points)) % 2, 0.5, 1.5)
-    nearest = sensor.nearest(points, reach)
+    nearest = sensor.find_nearest_points(points, reach)
     assert (np.isnan(nearest[:, 0]) == (distance > reach)).all()
 
 
-def test_the_direct_queries_are_the_public_ones(cluttered: Environment, sensor: RangeSensor) -> None:
-    public = RangeSensor(solid_pieces(cluttered))
-    assert sensor._addresses is not None, "kernels can call C here"
-    public._addresses = None
-    points = free_points(cluttered, 100, 2)
-    for reach in (0.3, 1.0, np.inf):
-        ranges = np.full(len(points), reach)
-        assert np.array_equal(sensor.nearest(points, ranges), public.nearest(points, ranges), equal_nan=True)
+def test_compiled_queries_agree_with_public_ones(
+    cluttered: Environment, sensor: RangeSensor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    positions = free_points(cluttered, 100, 2)
+    for sensing_range in (0.3, 1.0, np.inf):
+        ranges = np.full(len(positions), sensing_range)
+        monkeypatch.undo()
+        nearest = sensor.find_nearest_points(positions, ranges)
+        distances, is_hit = sensor.scan(positions, 24, ranges)
+        monkeypatch.setattr("robocov.sensor._load_compiled_queries", lambda: None)
+        assert np.array_equal(sensor.find_nearest_points(positions, ranges), nearest, equal_nan=True)
+        public_distances, public_is_hit = sensor.scan(positions, 24, ranges)
+        assert np.array_equal(public_distances, distances)
+        assert np.array_equal(public_is_hit, is_hit)
+
+
+def test_compiled_queries_are_used_where_they_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    load = _load_compiled_queries.__wrapped__
+    monkeypatch.delenv("ROBOCOV_PUBLIC_QUERIES", raising=False)
+    if sys.platform == "linux" and platform.machine() == "x86_64" and IS_COMPILER_ENABLED:
+        assert load() is not None
+    monkeypatch.setenv("ROBOCOV_PUBLIC_QUERIES", "1")
+    assert load() is None
+
+
+@pytest.mark.skipif(not IS_COMPILER_ENABLED, reason="the queries are compiled")
+def test_wrong_results_of_compiled_queries_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Such as those of another pymunk, whose C functions take other arguments."""
+    from robocov import compiled_queries
+
+    monkeypatch.setattr(compiled_queries, "find_nearest_points", lambda *args: np.array([[7.0, 7.0]]))
+    assert not compiled_queries.is_usable()
 
 
 def test_a_query_does_not_depend_on_the_others(cluttered: Environment, sensor: RangeSensor) -> None:
     points = free_points(cluttered, 30, 3)
     ranges = np.full(len(points), 2.0)
-    together = sensor.nearest(points, ranges)
+    together = sensor.find_nearest_points(points, ranges)
     for i in range(len(points)):
-        alone = sensor.nearest(points[i : i + 1], ranges[i : i + 1])
+        alone = sensor.find_nearest_points(points[i : i + 1], ranges[i : i + 1])
         assert np.array_equal(alone[0], together[i], equal_nan=True)
 
 
@@ -68,7 +96,7 @@ def test_scan_agrees_with_shapely(
         shapely.Point(place)
     ):
         return
-    distances, points = sensor.scan(place, rays, reach)
+    distances, points = sensor.scan_from(place, rays, reach)
     for k in range(rays):
         angle = 2 * np.pi * k / rays
         end = place + reach * np.array([np.cos(angle), np.sin(angle)])
@@ -79,6 +107,6 @@ def test_scan_agrees_with_shapely(
 
 
 def test_the_first_ray_looks_east(sensor: RangeSensor) -> None:
-    distances, points = sensor.scan(np.array([1.0, 2.0]), 4, 50.0)
+    distances, points = sensor.scan_from(np.array([1.0, 2.0]), 4, 50.0)
     np.testing.assert_allclose(distances, [1.5, 3.0, 1.0, 2.0], atol=2e-3)
     np.testing.assert_allclose(points[0], [2.5, 2.0], atol=2e-3)

@@ -464,17 +464,21 @@ def test_a_copy_shares_nothing_that_is_changed(made: Callable[[], Simulation]) -
     simulation = made()
     simulation.step()
     twin, places, ranges = simulation.copy(), simulation.positions, simulation.team.sensing_range
-    before = simulation.positions.tobytes(), simulation.sensor.nearest(places, ranges).tobytes()
+    before = simulation.positions.tobytes(), simulation.sensor.find_nearest_points(places, ranges).tobytes()
     for _ in range(60):
         twin.step()
-    assert (simulation.positions.tobytes(), simulation.sensor.nearest(places, ranges).tobytes()) == before
+    assert (
+        simulation.positions.tobytes(),
+        simulation.sensor.find_nearest_points(places, ranges).tobytes(),
+    ) == before
     assert simulation.working.all() or simulation.working.tolist() == [True, True, False]
     for _ in range(60):
         simulation.step()
     assert simulation.positions.tobytes() == twin.positions.tobytes()
     places = twin.positions
     assert (
-        simulation.sensor.nearest(places, ranges).tobytes() == twin.sensor.nearest(places, ranges).tobytes()
+        simulation.sensor.find_nearest_points(places, ranges).tobytes()
+        == twin.sensor.find_nearest_points(places, ranges).tobytes()
     )
 
 

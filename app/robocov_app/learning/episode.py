@@ -273,7 +273,7 @@ def held(task: CoverageTask, simulation: Simulation, actions: Array, moments: li
 def _touching(simulation: Simulation, each: int) -> BoolArray:
     """Return which robots that work touch a wall or another robot now, (n,); there are `each` in a run."""
     positions, works, radius = simulation.positions, simulation.working, simulation.team.radius
-    touching = works & ~np.isnan(simulation.sensor.nearest(positions, radius + TOUCHING)[:, 0])
+    touching = works & ~np.isnan(simulation.sensor.find_nearest_points(positions, radius + TOUCHING)[:, 0])
     reach, run = 2.0 * float(radius.max()) + TOUCHING, np.arange(len(positions)) // each
     # nobody is near those of other runs
     apart = positions + (2.0 * (simulation.environment.region.diameter + reach) * run)[:, None]

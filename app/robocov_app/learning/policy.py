@@ -165,5 +165,5 @@ class ControllerPolicy:
         if number == self._scan_number:
             return None
         self._scan_number, simulation = number, episode.simulation
-        scans = simulation.sensor.scans(simulation.positions, scanning.rays, episode.team.sensing_range)
+        scans = simulation.sensor.scan(simulation.positions, scanning.rays, episode.team.sensing_range)
         return Scans(*scans)

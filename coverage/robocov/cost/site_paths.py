@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import inlined_kernel, inner_kernel
+from robocov.compiled import kernel
 from robocov.geodesic import Graph, relax
 from robocov.geodesic.visibility import AngularWallIndex, beyond_horizon, enter_walls, sees
 from robocov.geodesic.walls import LEAF, Walls, near2, skipped, useful
@@ -84,7 +84,7 @@ class Work(NamedTuple):
     that is nearest as the crow flies."""
 
 
-@inner_kernel
+@kernel
 def corner_views(
     walls: Walls, tiles: Tiles, begin: int, end: int, index: AngularWallIndex, rows: IntArray, spans: Array
 ) -> int:
@@ -116,7 +116,7 @@ def corner_views(
     return used
 
 
-@inner_kernel
+@kernel
 def _seen_sites(walls: Walls, index: AngularWallIndex, tiles: Tiles, k: int, tile: int, span: Array) -> int:
     """Return the mask of a tile's sites in useful view of a corner; write their span."""
     mask, least, most = 0, np.inf, 0.0
@@ -131,7 +131,7 @@ def _seen_sites(walls: Walls, index: AngularWallIndex, tiles: Tiles, k: int, til
     return mask
 
 
-@inner_kernel
+@kernel
 def _perhaps_nearest(
     boxes: Array, k: int, index: AngularWallIndex, given: IntArray, count: int, out: IntArray
 ) -> int:
@@ -144,7 +144,7 @@ def _perhaps_nearest(
     return _within(boxes, k, index, bound2, given, count, out)
 
 
-@inner_kernel
+@kernel
 def _within(
     boxes: Array, k: int, index: AngularWallIndex, bound2: float, given: IntArray, count: int, out: IntArray
 ) -> int:
@@ -158,7 +158,7 @@ def _within(
     return found
 
 
-@inlined_kernel
+@kernel
 def _paths_to_corners(known: CostMap, work: Work) -> None:
     """Write the shortest ways to the corners."""
     corners, boxes, n = known.walls.corners, known.walls.corner_boxes, len(work.sight.sources)
@@ -188,7 +188,7 @@ def _paths_to_corners(known: CostMap, work: Work) -> None:
     relax(known.graph, distance, ways, queue, waiting)
 
 
-@inlined_kernel
+@kernel
 def _straight_to_corner(walls: Walls, work: Work, k: int, i: int, waiting: int) -> int:
     """Write the straight way from a robot to a corner if it is the shortest; return how many then wait."""
     distance, ways, x, y = work.to_corners, work.corner_ways, walls.corners[k, 0], walls.corners[k, 1]
@@ -206,7 +206,7 @@ def _straight_to_corner(walls: Walls, work: Work, k: int, i: int, waiting: int) 
     return waiting
 
 
-@inlined_kernel
+@kernel
 def _nearest_robots(tiles: Tiles, tile: int, count: int, work: Work) -> None:
     """Write the nearest of `count` robots to the sites of a tile as the crow flies, of equals the first."""
     to_sites, ways, sources = work.to_sites, work.ways, work.sight.sources
@@ -226,7 +226,7 @@ def _nearest_robots(tiles: Tiles, tile: int, count: int, work: Work) -> None:
         sources[i, 2] = max(sources[i, 2], away)
 
 
-@inlined_kernel
+@kernel
 def _hide(known: CostMap, work: Work, tile: int, covered: BoolArray) -> bool:
     """Note which sites of a tile do not see their nearest robot; return whether there are any."""
     facts, to_sites, ways, mask = known.tiles.facts, work.to_sites, work.ways, 0
@@ -241,7 +241,7 @@ def _hide(known: CostMap, work: Work, tile: int, covered: BoolArray) -> bool:
     return mask != 0
 
 
-@inlined_kernel
+@kernel
 def _by_corners(known: CostMap, work: Work, tile: int) -> None:
     """Write the shortest ways to the hidden sites of a tile by a corner."""
     places, views, corners = known.tiles.places, known.views, known.walls.corners
@@ -263,7 +263,7 @@ def _by_corners(known: CostMap, work: Work, tile: int) -> None:
                     to_sites[tile, s], ways[0, tile, s], ways[1, tile, s] = total, owner, k
 
 
-@inlined_kernel
+@kernel
 def _farthest(work: Work, tile: int) -> float:
     """Return the longest of the ways to the hidden sites of a tile."""
     hidden, farthest = work.hidden[tile], 0.0
@@ -273,7 +273,7 @@ def _farthest(work: Work, tile: int) -> float:
     return farthest
 
 
-@inlined_kernel
+@kernel
 def _from_another(known: CostMap, work: Work, tile: int, i: int) -> None:
     """Write the straight ways from a robot to the hidden sites of a tile where they are the shortest."""
     to_sites, ways, index, hidden = work.to_sites, work.ways, work.sight, work.hidden[tile]
@@ -291,7 +291,7 @@ def _from_another(known: CostMap, work: Work, tile: int, i: int) -> None:
                 to_sites[tile, s], ways[0, tile, s], ways[1, tile, s] = away, i, -1
 
 
-@inlined_kernel
+@kernel
 def _unhide(known: CostMap, work: Work) -> None:
     """Write the ways to the sites that do not see the robot that is nearest as the crow flies."""
     tiles, index, lists = known.tiles, work.sight, work.lists
@@ -314,7 +314,7 @@ def _unhide(known: CostMap, work: Work) -> None:
                         _from_another(known, work, tile, lists[2, j])
 
 
-@inlined_kernel
+@kernel
 def _team_paths(known: CostMap, work: Work, robots: Array, covered: BoolArray) -> bool:
     """Write the ways of the nearest of (n, 2) robots; return whether there was room for what they see."""
     tiles, index, lists, n = known.tiles, work.sight, work.lists, len(robots)
@@ -341,7 +341,7 @@ def _team_paths(known: CostMap, work: Work, robots: Array, covered: BoolArray) -
     return True
 
 
-@inner_kernel
+@kernel
 def site_paths(
     known: CostMap, work: Work, teams: Array, covered: BoolArray, unit: float, out: Array, ways: IntArray
 ) -> bool:

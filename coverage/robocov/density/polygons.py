@@ -20,7 +20,7 @@ import numpy as np
 import shapely
 
 from robocov.arrays import Array, IntArray
-from robocov.compiled import inlined_kernel, kernel
+from robocov.compiled import kernel
 from robocov.density.base import CellEdges, Density, check_weight
 from robocov.errors import ParameterError
 
@@ -142,7 +142,7 @@ def _add_steps(jumps: Array, start: Array, end: Array, cell: IntArray, origins: 
                 total[c, 3] += width * ((right * right + right * left + left * left) / 3.0 + height * height)
 
 
-@inlined_kernel
+@kernel
 def _at(x: float, y: float, u: float, v: float, height: float) -> float:
     """Return x where an edge has a height."""
     return x + min(max((height - y) / (v - y), 0.0), 1.0) * (u - x)

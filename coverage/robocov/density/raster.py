@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from robocov.arrays import Array, IntArray, frozen
-from robocov.compiled import inlined_kernel, kernel
+from robocov.compiled import kernel
 from robocov.density.base import HEAVIEST, CellEdges, Density
 from robocov.errors import ParameterError, shown
 
@@ -192,7 +192,7 @@ def _integrals(
     return sums
 
 
-@inlined_kernel
+@kernel
 def _first_line(begin: float, along: float, lines: int) -> int:
     """Return the first inner line of a grid that is crossed on a way along an axis."""
     if along > 0.0:
@@ -200,7 +200,7 @@ def _first_line(begin: float, along: float, lines: int) -> int:
     return int(min(np.ceil(begin), lines + 0.0) - 1.0)
 
 
-@inlined_kernel
+@kernel
 def _crossed(line: int, begin: float, along: float, lines: int) -> float:
     """Return at which part of the way a line is crossed, if it is an inner one."""
     return (line - begin) / along if 0 < line < lines and along != 0.0 else np.inf

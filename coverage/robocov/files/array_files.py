@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-import platformdirs
 from numpy.typing import NDArray
 
 from robocov.errors import InputError, OutputError
 from robocov.files.atomic import written
+from robocov.files.cache_folders import find_cache_root, is_private
 
 MOST_BYTES = 2_000_000_000
 """Bytes that the arrays of one file may take: about the largest run that can be asked for."""
@@ -95,11 +95,9 @@ class ArrayCache:
 
     @classmethod
     def of_user(cls) -> ArrayCache | None:
-        """Return the cache in the user's folder, or that of ``ROBOCOV_CACHE``; None where that is empty."""
-        wanted = os.environ.get("ROBOCOV_CACHE")
-        if wanted == "":
-            return None
-        return cls(Path(wanted) if wanted else platformdirs.user_cache_path("robocov", appauthor=False))
+        """Return the cache in the user's folder, or that of ``ROBOCOV_CACHE``; None if that is empty."""
+        folder = find_cache_root()
+        return None if folder is None else cls(folder)
 
     @staticmethod
     def key(*parts: bytes | str | float) -> str:
@@ -118,7 +116,7 @@ class ArrayCache:
         path = self.folder / f"{key}{_SUFFIX}"
         # what was written whole can be read, except by a numpy that knows less than the writer's
         with suppress(OSError, InputError):
-            if path.stat().st_size > self.limit:
+            if path.stat().st_size > self.limit or not is_private(path):
                 return None
             data = path.read_bytes()
             start = len(_FORMAT) + _DIGEST
@@ -145,6 +143,7 @@ class ArrayCache:
             self.folder.mkdir(parents=True, exist_ok=True)
             with written(self.folder / f"{key}{_SUFFIX}", durable=False) as path:
                 path.write_bytes(b"".join([_FORMAT, _digest(payload), payload]))
+                path.chmod(0o600)  # `load` ignores what others may have written
             self._tidy()
 
     def _tidy(self) -> None:

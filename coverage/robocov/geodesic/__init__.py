@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import inner_kernel
+from robocov.compiled import kernel
 from robocov.environment import GRID, Environment
 from robocov.errors import InputError
 from robocov.geodesic.visibility import AngularWallIndex, beyond_horizon, enter_walls, sees
@@ -41,7 +41,7 @@ class Graph(NamedTuple):
     length: Array
 
 
-@inner_kernel
+@kernel
 def seen_corners(walls: Walls, index: AngularWallIndex, i: int, least: int, out: IntArray) -> int:
     """Write the corners from number `least` on in useful view of source i; return how many.
 
@@ -67,7 +67,7 @@ def seen_corners(walls: Walls, index: AngularWallIndex, i: int, least: int, out:
     return found
 
 
-@inner_kernel
+@kernel
 def _corner_links(
     walls: Walls, seen: IntArray, begin: int, end: int, index: AngularWallIndex, links: IntArray,
     lengths: Array,
@@ -93,7 +93,7 @@ def _corner_links(
     return used
 
 
-@inner_kernel
+@kernel
 def relax(graph: Graph, distance: Array, ways: IntArray, queue: IntArray, waiting: int) -> None:
     """Lower the distances of the corners from the sources to those by way of other corners.
 
@@ -118,7 +118,7 @@ def relax(graph: Graph, distance: Array, ways: IntArray, queue: IntArray, waitin
                     tail = tail + 1 if tail + 1 < size else 0
 
 
-@inner_kernel
+@kernel
 def _corner_distances(
     walls: Walls, index: AngularWallIndex, graph: Graph, points: Array, bends: bool, distance: Array,
     ways: IntArray, queue: IntArray,
@@ -146,7 +146,7 @@ def _corner_distances(
     return used
 
 
-@inner_kernel
+@kernel
 def _shortest(
     walls: Walls, index: AngularWallIndex, reach: Array, points: Array, last: Array, near: IntArray,
     table: Array,

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.compiled import inlined_kernel, inner_kernel
+from robocov.compiled import kernel
 from robocov.geodesic.walls import LEAF, Walls, cross, near2, sectors_hold, skipped, vertex_at
 
 _PAD = 1e-9
@@ -45,7 +45,7 @@ class AngularWallIndex(NamedTuple):
         )  # fmt: skip
 
 
-@inlined_kernel
+@kernel
 def pseudo_angle(dx: float, dy: float) -> float:
     """Return a number in [0, 4] that grows with the direction's angle, without trigonometry.
 
@@ -56,7 +56,7 @@ def pseudo_angle(dx: float, dy: float) -> float:
     return 1.0 + part if dx >= 0.0 else 3.0 - part
 
 
-@inner_kernel
+@kernel
 def beyond_horizon(boxes: Array, node: int, index: AngularWallIndex, i: int) -> bool:
     """Return whether all of a box is hidden from source i: beyond the horizon in every bin where it lies."""
     x, y, limits = index.sources[i, 0], index.sources[i, 1], index.limits
@@ -76,7 +76,7 @@ def beyond_horizon(boxes: Array, node: int, index: AngularWallIndex, i: int) -> 
     return True
 
 
-@inner_kernel
+@kernel
 def enter_walls(
     walls: Walls, index: AngularWallIndex, i: int, x: float, y: float, reach2: float, used: int
 ) -> int:
@@ -114,7 +114,7 @@ def enter_walls(
     return used
 
 
-@inner_kernel
+@kernel
 def _enter(walls: Walls, wall: int, index: AngularWallIndex, i: int, used: int) -> int:
     """Enter a wall into the bins that it spans, if it faces the source; return how many entries are used."""
     px, py, limits, ends = index.sources[i, 0], index.sources[i, 1], index.limits, walls.ends
@@ -156,7 +156,7 @@ def _enter(walls: Walls, wall: int, index: AngularWallIndex, i: int, used: int) 
     return used
 
 
-@inner_kernel
+@kernel
 def _chained(walls: Walls, wall: int, px: float, py: float, angle: float, wanted: float, far: float) -> float:
     """Return the farthest of a chain of walls that faces the source up to an angle, inf for none."""
     ends = walls.ends
@@ -177,7 +177,7 @@ def _chained(walls: Walls, wall: int, px: float, py: float, angle: float, wanted
     return np.inf
 
 
-@inlined_kernel
+@kernel
 def sees(walls: Walls, index: AngularWallIndex, i: int, x: float, y: float) -> bool:
     """Return whether source i sees a target, at any distance; from a vertex into its free space only."""
     dx, dy = x - index.sources[i, 0], y - index.sources[i, 1]
@@ -192,7 +192,7 @@ def sees(walls: Walls, index: AngularWallIndex, i: int, x: float, y: float) -> b
     return _sees_past(walls, index, i, k, dx, dy)
 
 
-@inner_kernel
+@kernel
 def _sees_past(walls: Walls, index: AngularWallIndex, i: int, k: int, dx: float, dy: float) -> bool:
     """Return whether source i sees what is at (dx, dy) from it, in bin k, by looking at each wall."""
     px, py = index.sources[i, 0], index.sources[i, 1]
@@ -210,7 +210,7 @@ def _sees_past(walls: Walls, index: AngularWallIndex, i: int, k: int, dx: float,
     return True
 
 
-@inlined_kernel
+@kernel
 def _hides(ends: Array, wall: int, px: float, py: float, dx: float, dy: float) -> bool:
     """Return whether a wall that faces p hides what is at (dx, dy) from there."""
     ax, ay, bx, by = ends[wall, 0] - px, ends[wall, 1] - py, ends[wall, 2] - px, ends[wall, 3] - py
@@ -221,7 +221,7 @@ def _hides(ends: Array, wall: int, px: float, py: float, dx: float, dy: float) -
     )
 
 
-@inner_kernel
+@kernel
 def _unhidden(walls: Walls, px: float, py: float, dx: float, dy: float) -> bool:
     """Return whether no wall hides what is at (dx, dy) from p, by looking along the segment."""
     boxes, ends, leaves = walls.boxes, walls.ends, len(walls.boxes) // 2

@@ -12,7 +12,7 @@ import shapely
 from shapely import MultiPolygon
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import inlined_kernel, inner_kernel
+from robocov.compiled import kernel
 
 BITS = 48
 """The square that holds the map is 2**48 grid steps wide: 4e-15 of its side, below a double's rounding
@@ -182,7 +182,7 @@ def box_tree(low: Array, high: Array) -> Array:
     return np.concatenate([np.full((1, 4), np.inf), *levels[::-1]]) * [1.0, 1.0, -1.0, -1.0]
 
 
-@inlined_kernel
+@kernel
 def cross(ux: float, uy: float, vx: float, vy: float) -> float:
     """Return ``ux vy - uy vx`` with its exact sign.
 
@@ -200,7 +200,7 @@ def cross(ux: float, uy: float, vx: float, vy: float) -> float:
     return value
 
 
-@inner_kernel
+@kernel
 def skipped(node: int) -> int:
     """Return the node that follows all that is below a node of a tree, 0 at the end."""
     while node & 1:
@@ -208,7 +208,7 @@ def skipped(node: int) -> int:
     return node + 1 if node else 0
 
 
-@inlined_kernel
+@kernel
 def near2(boxes: Array, node: int, x: float, y: float) -> float:
     """Return the squared distance of a point to a box."""
     dx: float = max(boxes[node, 0] - x, x - boxes[node, 2], 0.0)
@@ -216,7 +216,7 @@ def near2(boxes: Array, node: int, x: float, y: float) -> float:
     return dx * dx + dy * dy
 
 
-@inlined_kernel
+@kernel
 def useful(corners: Array, k: int, x: float, y: float) -> bool:
     """Return whether a shortest path that bends at a corner can come from, or go to, a point.
 
@@ -229,7 +229,7 @@ def useful(corners: Array, k: int, x: float, y: float) -> bool:
     return (first >= 0.0 or second >= 0.0) and (first <= 0.0 or second <= 0.0)
 
 
-@inner_kernel
+@kernel
 def vertex_at(vertices: Array, x: float, y: float) -> int:
     """Return the vertex that a point coincides with, -1 for none."""
     low, high = 0, len(vertices)
@@ -244,7 +244,7 @@ def vertex_at(vertices: Array, x: float, y: float) -> int:
     return -1
 
 
-@inner_kernel
+@kernel
 def sectors_hold(first: IntArray, sectors: Array, vertex: int, dx: float, dy: float) -> bool:
     """Return whether a direction from a vertex runs into its free space."""
     for s in range(first[vertex], first[vertex + 1]):
@@ -255,7 +255,7 @@ def sectors_hold(first: IntArray, sectors: Array, vertex: int, dx: float, dy: fl
     return False
 
 
-@inner_kernel
+@kernel
 def locate(walls: Walls, points: Array, holds: IntArray) -> None:
     """Write which components hold which of (n, 2) points, (n, c): 1 inside, more than 1 on the boundary.
 

@@ -20,7 +20,7 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.compiled import inlined_kernel, inner_kernel, kernel
+from robocov.compiled import kernel
 from robocov.density.base import CellEdges
 from robocov.errors import ParameterError, shown
 
@@ -108,7 +108,7 @@ def derivatives(edges: CellEdges, points: Array, f: Performance) -> Array:
     return _derivatives(edges.start, edges.end, edges.cell, points, f.kind, f.height)
 
 
-@inner_kernel
+@kernel
 def _seen(start: Array, end: Array, k: int, x: float, y: float) -> tuple[float, float, float, float, float]:
     """Return an edge's outward normal and length, d from a point, negative for one beyond it, and s₁."""
     along_x, along_y = end[k, 0] - start[k, 0], end[k, 1] - start[k, 1]
@@ -147,7 +147,7 @@ def _derivatives(start: Array, end: Array, cell: IntArray, points: Array, kind: 
     return found
 
 
-@inner_kernel
+@kernel
 def _over_edge(
     kind: int, height: float, d: float, s: float, e: float, size: float
 ) -> tuple[float, float, float]:
@@ -174,14 +174,14 @@ def _over_edge(
     return total, along, -d / (w * w) * (e / high - s / low + angle / w)
 
 
-@inlined_kernel
+@kernel
 def _inverse_over(d: float, s: float, e: float) -> float:
     """Return ∫ 1/r ds over an edge."""
     d = max(abs(d), 1e-300)
     return float(np.arcsinh(e / d) - np.arcsinh(s / d))
 
 
-@inner_kernel
+@kernel
 def _arctan_rest(x: float) -> float:
     """Return x - atan x without cancellation where x is small."""
     square, series = x * x, 0.0

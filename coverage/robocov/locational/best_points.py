@@ -16,7 +16,7 @@ jumps within a cell, the error is of the order of the distance of the nodes.
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
-from robocov.compiled import inner_kernel, kernel
+from robocov.compiled import kernel
 from robocov.density import Density
 from robocov.errors import ParameterError, unknown_name
 from robocov.locational import Distance, Performance, Sensing, SquaredDistance, derivatives
@@ -125,7 +125,7 @@ def _advance(
             searching[i] = False
 
 
-@inner_kernel
+@kernel
 def _newton_step(gx: float, gy: float, xx: float, xy: float, yy: float, size: float) -> tuple[float, float]:
     """Return Newton's step, or one that goes down where the Hessian is no bowl; at most as long as `size`."""
     trace, determinant = xx + yy, xx * yy - xy * xy
@@ -137,7 +137,7 @@ def _newton_step(gx: float, gy: float, xx: float, xy: float, yy: float, size: fl
     return x * part, y * part
 
 
-@inner_kernel
+@kernel
 def _downhill(gx: float, gy: float, xx: float, xy: float, yy: float) -> tuple[float, float]:
     """Return a step as Newton's, but with the sizes of the Hessian's eigenvalues: it always goes down."""
     mean, half = 0.5 * (xx + yy), 0.5 * (xx - yy)

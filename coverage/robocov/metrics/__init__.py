@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import inlined_kernel, kernel
+from robocov.compiled import kernel
 from robocov.cost import CoverageCost, MomentaryCost
 from robocov.drawing import Drawable
 from robocov.errors import counted, required
@@ -171,7 +171,7 @@ def clearances(record: Record) -> Array:
         sensor = RangeSensor(solid_pieces(record.environment))
         reach = 1.0  # a query costs the more the farther it reaches
         while len(left):
-            nearest[left] = sensor.nearest(positions[left], np.full(len(left), reach))
+            nearest[left] = sensor.find_nearest_points(positions[left], np.full(len(left), reach))
             left = left[np.isnan(nearest[left, 0])]
             reach *= 4.0
     gap = np.sqrt(((positions - nearest) ** 2).sum(axis=1)).reshape(record.positions.shape[:2])
@@ -186,9 +186,9 @@ def _clearances_asked_for(record: Record) -> Array:
     reach = np.full(len(radius), float(np.hypot(*np.ptp(environment.region.vertices, axis=0))))
     gap = np.full(working.shape, np.inf)
     for k, places in enumerate(record.positions):
-        sensor.show(float(record.time[k]), np.column_stack([places, radius])[failed[k]])
+        sensor.set_time(float(record.time[k]), np.column_stack([places, radius])[failed[k]])
         rows = np.flatnonzero(working[k])
-        nearest = sensor.nearest(places[rows], reach[rows])
+        nearest = sensor.find_nearest_points(places[rows], reach[rows])
         gap[k, rows] = np.sqrt(((places[rows] - nearest) ** 2).sum(axis=1)) - radius[rows]
     return gap
 
@@ -238,7 +238,7 @@ def _look_at_gaps(places: Array, radius: Array, order: IntArray, closest: Array)
     return began
 
 
-@inlined_kernel
+@kernel
 def _distance(places: Array, t: int, i: int, j: int) -> float:
     return math.sqrt((places[t, i, 0] - places[t, j, 0]) ** 2 + (places[t, i, 1] - places[t, j, 1]) ** 2)
 

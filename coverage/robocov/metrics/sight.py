@@ -14,7 +14,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, IntArray
-from robocov.compiled import inner_kernel
+from robocov.compiled import kernel
 from robocov.geodesic.visibility import AngularWallIndex, enter_walls, pseudo_angle
 from robocov.geodesic.walls import Grid, walls_of
 
@@ -60,7 +60,7 @@ def views(free: BaseGeometry, places: Array) -> Iterator[BaseGeometry]:
         yield view if shapely.is_valid(view) else shapely.make_valid(view)
 
 
-@inner_kernel
+@kernel
 def _nearest_walls(ends: Array, index: AngularWallIndex, rays: Array, nearest: IntArray) -> None:
     """Write which wall each of (m, 2) rays from the source hits first, -1 for none."""
     for m in range(len(rays)):

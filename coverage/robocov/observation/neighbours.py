@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import inlined_kernel, inner_kernel, kernel
+from robocov.compiled import kernel
 
 NOBODY: IntArray = np.empty(0, dtype=np.intp)
 
@@ -96,13 +96,13 @@ def close_pairs(positions: Array, reach: float) -> tuple[IntArray, IntArray, Arr
     return first, second, distance
 
 
-@inlined_kernel
+@kernel
 def row_of(along: float, scale: float) -> int:
     """Return the number of the row, or the column, of bins so far from the first; 0 of no number."""
     return int(along * scale) if along * scale > 0.0 else 0
 
 
-@inner_kernel
+@kernel
 def binned(
     points: Array, first: int, stop: int, reach: float, starts: IntArray, order: IntArray
 ) -> tuple[float, float, float, int, int]:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import inner_kernel
+from robocov.compiled import kernel
 from robocov.density.base import Density
 from robocov.observation import Observations, Scanning
 
@@ -86,7 +86,7 @@ def smaller_steps(gradient: Array, before: Array | None, step: Array | None) -> 
     return np.where(turned, 0.5 * step, np.minimum(1.2 * step, 1.0))
 
 
-@inner_kernel
+@kernel
 def behind(x: float, y: float, walls: Array) -> bool:
     """Return whether a place, relative to the robot, is farther away than the wall that it sees there."""
     rays = len(walls)
@@ -94,7 +94,7 @@ def behind(x: float, y: float, walls: Array) -> bool:
     return bool(x * x + y * y > walls[ray] ** 2)
 
 
-@inner_kernel
+@kernel
 def joined(x: float, y: float, dx: float, dy: float, walls: Array) -> bool:
     """Return whether the way (dx, dy) from a place in view leads past no wall that the robot sees."""
     clear = True

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import inlined_kernel, kernel
+from robocov.compiled import kernel
 from robocov.observation import headings
 from robocov.observation.region import Region
 
@@ -146,7 +146,7 @@ def _walls_gone(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> int:
     return count
 
 
-@inlined_kernel
+@kernel
 def _cell_of(at: float, low: float, side: float, count: int) -> int:
     return min(max(math.floor((at - low) / side), 0), count - 1)
 
@@ -251,7 +251,7 @@ def openness(state: NDArray[np.uint8], outside: BoolArray, blocks: int = BLOCKS)
     return _relaxed(np.where(outside, 255, state).astype(np.uint8), side)
 
 
-@inlined_kernel
+@kernel
 def _meet(
     here: int, there: int, i: int, j: int, a: int, b: int, links: Array, open_to: Array, closed_to: Array
 ) -> None:

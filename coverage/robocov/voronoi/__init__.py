@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.compiled import inner_kernel, kernel
+from robocov.compiled import kernel
 from robocov.density.base import REGION, CellEdges, Density
 from robocov.errors import InputError, shown
 from robocov.observation import Cells
@@ -35,7 +35,6 @@ _CHORDS = 64
 """For one arc of a disc, which is less than half a turn."""
 
 _NOT_HEARD = np.empty((0, 2))
-_NO_MESH = np.empty((2, 0), dtype=np.int32)
 _NO_EDGES = np.empty((0, 6))
 
 _AnyCells = TypeVar("_AnyCells", bound=Cells)
@@ -98,7 +97,8 @@ def partition(
     (array([2., 2.]), array([[0, 1]]))
     """
     points = generators_of(generators)
-    n, mesh = len(points), _NO_MESH
+    n = len(points)
+    mesh = np.empty((2, 0), dtype=np.int32)
     if neighbours is None or neighbours.indptr is None or neighbours.indices is None:
         if heard is not None:
             raise InputError("heard: given without the neighbours that they are of")
@@ -114,7 +114,8 @@ def partition(
     if count < 0:
         bad = -1 - count
         raise InputError(f"generators[{bad}]: {shown(points[bad].tolist())}, but finite numbers were wanted")
-    mesh = mesh if mesh.shape[1] and mesh[0, 0] >= 0 else _NO_MESH
+    if mesh.shape[1] > 0 and mesh[0, 0] < 0:
+        mesh = np.empty((2, 0), dtype=np.int32)  # the triangulation failed
     mesh.setflags(write=False)
     edges = partial(_edges, points, region.sides, known, indptr, indices, mesh, count)
     triangulation = mesh if mesh.shape[1] else None
@@ -198,14 +199,14 @@ def cells_of(
     return total
 
 
-@inner_kernel
+@kernel
 def _noted(near: Array, found: int, dx: float, dy: float, j: int) -> int:
     """Note a robot by which a cell may be cut; those at the very same place do not cut each other."""
     near[found, 0], near[found, 1], near[found, 2], near[found, 3] = dx, dy, dx * dx + dy * dy, j
     return found + 1 if near[found, 2] > 0.0 else found
 
 
-@inner_kernel
+@kernel
 def _triangulated_within(
     points: Array, region: Array, mesh: Mesh, places: Array, cotangent: Array, begins: IntArray
 ) -> float:
@@ -239,7 +240,7 @@ def _triangulated_within(
     return area
 
 
-@inner_kernel
+@kernel
 def _enclosed(
     ring: Array, near: Array, points: Array, region: Array, mesh: Mesh, cotangent: Array, begin: int, i: int
 ) -> tuple[int, int, int]:
@@ -259,7 +260,7 @@ def _enclosed(
     return count, side, 0
 
 
-@inner_kernel
+@kernel
 def _around(
     ring: Array, near: Array, points: Array, mesh: Mesh, cotangent: Array, begin: int, i: int
 ) -> tuple[int, int, int, float]:
@@ -291,7 +292,7 @@ def _around(
             return found, first, start, far
 
 
-@inner_kernel
+@kernel
 def _clipped(ring: Array, near: Array, found: int, points: Array, region: Array, i: int) -> tuple[int, int]:
     """Return number of vertices, and side of `ring`, of the region cut by the bisectors to `near`."""
     count, side, security = len(region), 0, 0.0
@@ -319,7 +320,7 @@ def _clipped(ring: Array, near: Array, found: int, points: Array, region: Array,
     return count, side
 
 
-@inner_kernel
+@kernel
 def _cut(ring: Array, old: int, count: int, dx: float, dy: float, level: float, other: float) -> int:
     """Put what has x dx + y dy <= level of ring[old] into ring[1 - old]; return its size, -1 for all of it.
 
@@ -362,7 +363,7 @@ def _cut(ring: Array, old: int, count: int, dx: float, dy: float, level: float, 
     return size
 
 
-@inner_kernel
+@kernel
 def _meet(ring: Array, new: int, size: int, old: int, inner: int, outer: int, beyond: float) -> None:
     """Put the place where an edge meets the line into ring[new, size]."""
     part = ring[old, inner, 3] / (ring[old, inner, 3] - ring[old, outer, 3])
@@ -371,7 +372,7 @@ def _meet(ring: Array, new: int, size: int, old: int, inner: int, outer: int, be
     ring[new, size, 2] = beyond
 
 
-@inner_kernel
+@kernel
 def _finished(
     ring: Array, side: int, count: int, start: int, points: Array, i: int, mass: Array, centroid: Array,
     edges: Array, total: int,

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, IntArray
-from robocov.compiled import inlined_kernel, inner_kernel
+from robocov.compiled import kernel
 
 Mesh: TypeAlias = NDArray[np.int32]
 """Corners and twins of the half-edges, (2, 8 n + 4)."""
@@ -26,7 +26,7 @@ _FLIPS = 16
 """A point, on average, after which triangulating has failed: rounding may flip in circles."""
 
 
-@inner_kernel
+@kernel
 def triangulated(mesh: Mesh, points: Array, cotangent: Array, stack: IntArray) -> bool:
     """Make `mesh`, (2, 8 n + 4), Delaunay, from what it is where that is a triangulation still; tell success.
 
@@ -68,26 +68,26 @@ def triangulated(mesh: Mesh, points: Array, cotangent: Array, stack: IntArray) -
     return _all_measured(mesh, points, cotangent)
 
 
-@inlined_kernel
+@kernel
 def following(h: int) -> int:
     """Return the next half-edge of the same triangle."""
     return h + 1 if h & 3 < 2 else h - 2
 
 
-@inlined_kernel
+@kernel
 def before(h: int) -> int:
     """Return the half-edge of the same triangle that ends where this one begins."""
     return h - 1 if h & 3 else h + 2
 
 
-@inlined_kernel
+@kernel
 def _link(mesh: Mesh, one: int, other: int) -> None:
     mesh[1, one] = other
     if other >= 0:
         mesh[1, other] = one
 
 
-@inner_kernel
+@kernel
 def _all_measured(mesh: Mesh, points: Array, cotangent: Array) -> bool:
     upright = True
     for h in range(0, mesh.shape[1], 4):
@@ -95,7 +95,7 @@ def _all_measured(mesh: Mesh, points: Array, cotangent: Array) -> bool:
     return upright
 
 
-@inner_kernel
+@kernel
 def _measured(mesh: Mesh, points: Array, cotangent: Array, h: int) -> bool:
     """Compute the cotangents in the triangle of which h is the first half-edge; return whether it is upright.
 
@@ -113,13 +113,13 @@ def _measured(mesh: Mesh, points: Array, cotangent: Array, h: int) -> bool:
     return upright
 
 
-@inlined_kernel
+@kernel
 def _bent(mesh: Mesh, cotangent: Array, h: int) -> bool:
     one, other = cotangent[h], cotangent[mesh[1, h]]
     return not one + other >= -_ROUNDING * (abs(one) + abs(other))
 
 
-@inner_kernel
+@kernel
 def _triangle_around(mesh: Mesh, points: Array, x: float, y: float, home: int, triangles: int) -> int:
     """Return the first half-edge of the triangle that a place lies in, by walking there; -1 when lost."""
     for _ in range(3 * triangles + 3):
@@ -136,7 +136,7 @@ def _triangle_around(mesh: Mesh, points: Array, x: float, y: float, home: int, t
     return -1
 
 
-@inner_kernel
+@kernel
 def _legalised(
     mesh: Mesh, points: Array, cotangent: Array, stack: IntArray, h: int, flips: int
 ) -> tuple[int, bool]:

@@ -38,7 +38,7 @@ from math import comb
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.compiled import inner_kernel, kernel
+from robocov.compiled import kernel
 from robocov.density.base import CellEdges, Density
 from robocov.errors import InputError, shown
 from robocov.observation import Cells
@@ -215,7 +215,7 @@ def _borders(points: Array, sides: Array, pairs: Array, edges: Array, straight: 
     return found[:used]
 
 
-@inner_kernel
+@kernel
 def _circles(curves: Array, pairs: Array, edges: Array) -> int:
     """Write the circles that may bound a cell after its lines; return the rows, -1 for a cell of nothing."""
     count, reach = len(edges), 0.0
@@ -241,7 +241,7 @@ def _circles(curves: Array, pairs: Array, edges: Array) -> int:
     return count
 
 
-@inner_kernel
+@kernel
 def _lines(curves: Array, pairs: Array, edges: Array, sides: Array, px: float, py: float) -> None:
     """Write the edges of a cell as lines between their ends.
 
@@ -267,7 +267,7 @@ def _lines(curves: Array, pairs: Array, edges: Array, sides: Array, px: float, p
         curves[e, 6], curves[e, 7] = edges[e, 4], edges[e, 5]
 
 
-@inner_kernel
+@kernel
 def _all_meetings(curves: Array, lines: int, meetings: Array) -> None:
     """Write where each curve enters and leaves the cell's side of each other; nan where they do not meet.
 
@@ -291,7 +291,7 @@ def _all_meetings(curves: Array, lines: int, meetings: Array) -> None:
             meetings[other, one, 1] = _parameter(curves[other], *_place(curves[one], enter))
 
 
-@inner_kernel
+@kernel
 def _meeting(one: Array, other: Array) -> tuple[float, float, int]:
     """Return where a curve enters the cell's side of another one, where it leaves it, and who is apart.
 
@@ -326,7 +326,7 @@ def _meeting(one: Array, other: Array) -> tuple[float, float, int]:
     return np.nan, np.nan, (1 if outside else 0) + (2 if outside == (g < 0.0) else 0)
 
 
-@inner_kernel
+@kernel
 def _parts(curve: Array, meetings: Array, found: Array, used: int) -> int:
     """Write the parts of a curve that all others leave; return how many pieces there are then."""
     begin, end = curve[4], curve[5]
@@ -350,7 +350,7 @@ def _parts(curve: Array, meetings: Array, found: Array, used: int) -> int:
     return _piece(curve, begin, end, found, used)
 
 
-@inner_kernel
+@kernel
 def _piece(curve: Array, begin: float, end: float, found: Array, used: int) -> int:
     """Write a part of a curve, at most half a circle a piece: cut where t is zero."""
     k = 2.0 * curve[3]
@@ -364,7 +364,7 @@ def _piece(curve: Array, begin: float, end: float, found: Array, used: int) -> i
     return used
 
 
-@inner_kernel
+@kernel
 def _place(curve: Array, t: float) -> tuple[float, float]:
     """Return q(t), m."""
     k = 2.0 * curve[3]
@@ -378,7 +378,7 @@ def _place(curve: Array, t: float) -> tuple[float, float]:
     return out * curve[0] - left * curve[1], out * curve[1] + left * curve[0]
 
 
-@inner_kernel
+@kernel
 def _parameter(curve: Array, x: float, y: float) -> float:
     """Return t where q(t) is nearest to a place next to the curve."""
     k = 2.0 * curve[3]
@@ -412,7 +412,7 @@ def _moments(pieces: Array, n: int, series: Array) -> Array:
     return sums
 
 
-@inner_kernel
+@kernel
 def _segment(half_angle: float, series: Array) -> tuple[float, float, float]:
     """Return area, lever and spread of the circular segment on a chord of length 1.
 

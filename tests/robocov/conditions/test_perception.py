@@ -144,7 +144,7 @@ def test_noise_is_as_large_as_it_says() -> None:
     still = np.zeros_like(STARTS)
     for _ in range(200):
         seen = one.observe()
-        true = one.sensor.nearest(one.positions, one.team.sensing_range)
+        true = one.sensor.find_nearest_points(one.positions, one.team.sensing_range)
         errors.append(seen.positions - one.positions)
         measured = np.hypot(*(seen.obstacle_points - seen.positions).T)
         ranges.append(measured - np.hypot(*(true - one.positions).T))
@@ -159,7 +159,7 @@ def test_noise_is_as_large_as_it_says() -> None:
 
 def test_a_sensed_point_keeps_its_bearing_and_goes_along_with_the_belief() -> None:
     one = simulation(Conditions(position_noise=0.3, sensing_noise=0.5, seed=4))
-    seen, true = one.observe(), one.sensor.nearest(one.positions, one.team.sensing_range)
+    seen, true = one.observe(), one.sensor.find_nearest_points(one.positions, one.team.sensing_range)
     felt, there = seen.obstacle_points - seen.positions, true - one.positions
     np.testing.assert_allclose(felt[:, 0] * there[:, 1], felt[:, 1] * there[:, 0], atol=1e-12)
     assert ((felt * there).sum(axis=1) > 0).all()

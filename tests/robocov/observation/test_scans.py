@@ -44,26 +44,15 @@ def test_scans_of_a_team_are_those_of_each_robot(cluttered: Environment) -> None
     sensor = RangeSensor(solid_pieces(cluttered))
     places = np.array([[1.0, 2.0], [1.5, 2.2], [0.6, 4.0]])
     ranges = np.array([0.7, 2.0, np.inf])
-    distances, hit = sensor.scans(places, 36, ranges)
+    distances, hit = sensor.scan(places, 36, ranges)
     for i in range(3):
-        alone, points = sensor.scan(places[i], 36, float(ranges[i]))
+        alone, points = sensor.scan_from(places[i], 36, float(ranges[i]))
         assert np.array_equal(alone, distances[i])
         ends = places[i] + distances[i][:, None] * headings(36)
         np.testing.assert_allclose(points, ends, atol=1e-9)
         assert np.array_equal(hit[i], distances[i] < min(ranges[i], 1e6))
     assert hit[2].all()
     assert not hit[0].all()
-
-
-def test_the_direct_ray_queries_are_the_public_ones(cluttered: Environment) -> None:
-    sensor, public = (RangeSensor(solid_pieces(cluttered)) for _ in range(2))
-    assert sensor._addresses is not None
-    public._addresses = None
-    places = np.random.default_rng(0).uniform(0.2, 4.8, size=(20, 2))
-    for one, other in zip(
-        *(each.scans(places, 30, np.full(20, 2.0)) for each in (sensor, public)), strict=True
-    ):
-        assert np.array_equal(one, other)
 
 
 @pytest.mark.parametrize(

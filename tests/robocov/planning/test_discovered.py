@@ -23,7 +23,7 @@ def explored(
     environment: Environment, sensor: RangeSensor, places: np.ndarray, reach: float
 ) -> DiscoveredMap:
     known = DiscoveredMap.nothing(Raster(environment.region, 0.1))
-    distances, hit = sensor.scans(places, 120, np.full(len(places), reach))
+    distances, hit = sensor.scan(places, 120, np.full(len(places), reach))
     for place, far, met in zip(places, distances, hit, strict=True):
         known = known.scanned(place, far, met)
     return known
@@ -51,7 +51,7 @@ def test_what_is_known_is_true(cluttered: Environment, sensor: RangeSensor, seed
 def test_a_scan_again_tells_nothing_new(cluttered: Environment, sensor: RangeSensor) -> None:
     places = free_places(cluttered, 4, 1)
     known = explored(cluttered, sensor, places, 3.0)
-    distances, hit = sensor.scans(places, 120, np.full(4, 3.0))
+    distances, hit = sensor.scan(places, 120, np.full(4, 3.0))
     assert known.scanned(places[-1], distances[-1], hit[-1]) is known
     assert deepcopy(known) is known
     with pytest.raises(ValueError, match="read-only"):

@@ -25,7 +25,7 @@ def test_who_touches_nothing_moves_as_if_nobody_did() -> None:
         alone.step(forces[1:2], DT)
         assert together.positions[1].tobytes() == alone.positions[0].tobytes()
         assert together.velocities[1].tobytes() == alone.velocities[0].tobytes()
-    assert together._touching() == [0, 2, 3]
+    assert together._list_touching() == [0, 2, 3]
 
 
 def test_whoever_is_pushed_on_pushes_on() -> None:
@@ -39,7 +39,7 @@ def test_whoever_is_pushed_on_pushes_on() -> None:
     velocities[0, 0] = 2.0
     world = World((FAR,), replace(row, mass=mass, max_speed=limit, viscosity=0.0 * mass), places, velocities)
     world.step(np.zeros((n, 2)), DT)
-    assert world._touching() == [0, 1]
+    assert world._list_touching() == [0, 1]
     assert (world.positions[1:, 0] > places[1:, 0] + 0.01).all()
     for _ in range(30):
         assert np.diff(world.positions[:, 0]).min() >= 0.2 - MAX_PENETRATION

@@ -101,11 +101,11 @@ def test_the_sensor_sees_it_where_it_is() -> None:
 
 def test_scans_see_it_where_it_is() -> None:
     one = Simulation(HALL, Rapf(), [[4.0, 1.0]])
-    before, _ = one.sensor.scan(one.positions[0], 4, 3.0)
+    before, _ = one.sensor.scan_from(one.positions[0], 4, 3.0)
     assert before[2] == pytest.approx(1.4, abs=2e-3)
     for _ in range(60):
         one.step(forces=np.zeros((1, 2)))
-    after, _ = one.sensor.scan(one.positions[0], 4, 3.0)
+    after, _ = one.sensor.scan_from(one.positions[0], 4, 3.0)
     assert after[2] == pytest.approx(0.9, abs=2e-3)
 
 

@@ -165,7 +165,7 @@ def test_scans_are_those_of_the_moment(cluttered: Environment) -> None:
     episode = begun(cluttered, observation=ObservationLayout(2, 12))
     place = episode.task.observation.blocks["rays"]
     for _ in range(3):
-        distances, hit = episode.simulation.sensor.scans(
+        distances, hit = episode.simulation.sensor.scan(
             episode.simulation.positions, 12, episode.team.sensing_range
         )
         rows = episode.observations()[:, place]

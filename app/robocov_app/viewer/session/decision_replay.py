@@ -25,8 +25,8 @@ def replayed_snapshot(state: State, time: float, dt: float = DEFAULT_DT) -> Snap
     """Return a moment as it was at a time, s; a controller that fails on it decided nothing."""
     setup, team, positions = state.setup, state.setup.team, state.positions
     region, density, sensor = setup.solid.region, setup.solid.density, sensor_in(setup.solid)
-    sensor.show(time)
-    points = sensor.nearest(positions, team.sensing_range)
+    sensor.set_time(time)
+    points = sensor.find_nearest_points(positions, team.sensing_range)
     neighbours = Neighbours.within(positions, team.communication_range)
     seen = Observations(positions, state.velocities, neighbours, points, region, time, team.max_speed)
     seen = replace(seen, density=density, steering=state.steering)

@@ -597,8 +597,8 @@ def _sensed_in(history: History, pane: int) -> Sensed:
     for k in range(0, len(history), max(1, len(history) // MOST_SENSED)):
         time, state = history.time(k), history[k].states[pane]
         setup, sensor = state.setup, sensor_in(state.setup.solid)
-        sensor.show(time)
-        found.add(time, setup.numbers, sensor.nearest(state.positions, setup.team.sensing_range))
+        sensor.set_time(time)
+        found.add(time, setup.numbers, sensor.find_nearest_points(state.positions, setup.team.sensing_range))
     return found
 
 

@@ -1,0 +1,182 @@
+"""A compiled shortcut to pymunk's read-only queries: many queries in one call.
+
+Calling `pymunk.Space.point_query_nearest` and `pymunk.Space.segment_query_first` from Python costs
+microseconds each, mostly for building their result objects. The functions here call the same C functions of
+the pymunk library from a compiled loop. This is the only module that uses anything but public pymunk.
+`is_usable` compares its results with those of the public queries, and `robocov.sensor` uses the latter where
+they differ. With the environment variable ``ROBOCOV_PUBLIC_QUERIES=1`` this module is never used.
+
+Importing this module imports numba.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from typing import Any
+
+import numpy as np
+import pymunk
+from llvmlite import ir
+from pymunk._chipmunk_cffi import ffi, lib
+
+from robocov.arrays import Array, BoolArray
+from robocov.compiled import import_numba, kernel
+
+numba = import_numba()
+
+PUBLIC_QUERIES_VARIABLE = "ROBOCOV_PUBLIC_QUERIES"
+"""Environment variable that switches to pymunk's public queries."""
+
+_PASSES_STRUCTS_IN_REGISTERS = sys.platform != "win32" and platform.machine() in (
+    "x86_64",
+    "aarch64",
+    "arm64",
+)
+"""Whether C functions take a vector as two floats and a filter as two integers, as the calls below do."""
+_POINT_INFO_FIELDS = {"shape": 0, "point": 8, "distance": 24, "gradient": 32}
+_SEGMENT_INFO_FIELDS = {"shape": 0, "point": 8, "normal": 24, "alpha": 40}
+"""Offsets of the fields of the structures that the queries fill, in bytes."""
+_NO_GROUP = 0
+_ALL_CATEGORIES = -1
+"""A filter's categories and mask as one integer, all bits set."""
+
+
+@numba.extending.intrinsic  # type: ignore[untyped-decorator]
+def call_c_function(typing_context: Any, address: Any, arguments: Any) -> Any:
+    """Call a C function at an address with floats and integers; return the integer that it returns."""
+    argument_types = numba.types.Tuple([numba.types.unliteral(argument) for argument in arguments])
+    signature = numba.types.intp(numba.types.intp, argument_types)
+
+    def generate_code(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        passed = [builder.extract_value(values[1], k) for k in range(len(argument_types))]
+        function_type = ir.FunctionType(ir.IntType(64), [value.type for value in passed])
+        return builder.call(builder.inttoptr(values[0], function_type.as_pointer()), passed)
+
+    return signature, generate_code
+
+
+def is_usable() -> bool:
+    """Return whether the compiled queries give the same as the public ones here."""
+    if os.environ.get(PUBLIC_QUERIES_VARIABLE, "0") not in ("", "0"):
+        return False
+    if not _PASSES_STRUCTS_IN_REGISTERS:
+        return False
+    if _read_offsets("cpPointQueryInfo") != _POINT_INFO_FIELDS:
+        return False
+    if _read_offsets("cpSegmentQueryInfo") != _SEGMENT_INFO_FIELDS:
+        return False
+    space = pymunk.Space()
+    space.add(pymunk.Poly(space.static_body, [(1.0, 0.0), (2.0, 0.25), (1.5, 1.0)]))
+    position = (0.25, 0.5)
+    nearest = space.point_query_nearest(position, 10.0, pymunk.ShapeFilter())
+    hit = space.segment_query_first(position, (3.0, 0.5), 0.0, pymunk.ShapeFilter())
+    positions = np.array([position])
+    points = find_nearest_points(space, positions, np.array([10.0]))
+    fractions, is_hit = cast_rays(space, positions, np.array([[[3.0, 0.5], [-3.0, 0.5]]]))
+    return (
+        nearest is not None
+        and hit is not None
+        and tuple(points[0].tolist()) == tuple(nearest.point)
+        and is_hit.tolist() == [[True, False]]
+        and float(fractions[0, 0]) == hit.alpha
+    )
+
+
+def find_nearest_points(space: pymunk.Space, positions: Array, ranges: Array) -> Array:
+    """Find the nearest point of any shape for each position, as `pymunk.Space.point_query_nearest` does.
+
+    Parameters
+    ----------
+    space : pymunk.Space
+    positions : (n, 2) array, m
+    ranges : (n,) array, m
+        Maximum distance, finite.
+
+    Returns
+    -------
+    (n, 2) array, m
+        nan where no shape is within the range.
+    """
+    points = np.empty((len(positions), 2))
+    _find_nearest_points(_get_address(space._space), _POINT_QUERY, positions, ranges, points)
+    return points
+
+
+def cast_rays(space: pymunk.Space, positions: Array, ends: Array) -> tuple[Array, BoolArray]:
+    """Cast rays from each position, as `pymunk.Space.segment_query_first` does.
+
+    Parameters
+    ----------
+    space : pymunk.Space
+    positions : (n, 2) array, m
+    ends : (n, rays, 2) array, m
+
+    Returns
+    -------
+    fractions : (n, rays) array
+        Fraction of each segment up to the first shape; 1 where there is none.
+    is_hit : (n, rays) bool array
+        Whether the segment meets a shape.
+    """
+    fractions = np.ones(ends.shape[:2])
+    is_hit = np.zeros(ends.shape[:2], dtype=np.bool_)
+    _cast_rays(_get_address(space._space), _SEGMENT_QUERY, positions, ends, fractions, is_hit)
+    return fractions, is_hit
+
+
+def _get_address(pointer: Any) -> int:
+    return int(ffi.cast("intptr_t", pointer))
+
+
+def _read_offsets(structure: str) -> dict[str, int]:
+    return {name: field.offset for name, field in ffi.typeof(structure).fields}
+
+
+_POINT_QUERY = _get_address(ffi.addressof(lib, "cpSpacePointQueryNearest"))
+_SEGMENT_QUERY = _get_address(ffi.addressof(lib, "cpSpaceSegmentQueryFirst"))
+
+
+@kernel
+def _find_nearest_points(space: int, query: int, positions: Array, ranges: Array, points: Array) -> None:
+    info = np.empty(6)  # a cpPointQueryInfo
+    for i in range(len(positions)):
+        arguments = (
+            space,
+            positions[i, 0],
+            positions[i, 1],
+            ranges[i],
+            _NO_GROUP,
+            _ALL_CATEGORIES,
+            info.ctypes.data,
+        )
+        if call_c_function(query, arguments):
+            points[i, 0] = info[1]
+            points[i, 1] = info[2]
+        else:
+            points[i, 0] = np.nan
+            points[i, 1] = np.nan
+
+
+@kernel
+def _cast_rays(
+    space: int, query: int, positions: Array, ends: Array, fractions: Array, is_hit: BoolArray
+) -> None:
+    info = np.empty(6)  # a cpSegmentQueryInfo
+    for i in range(len(positions)):
+        for ray in range(ends.shape[1]):
+            arguments = (
+                space,
+                positions[i, 0],
+                positions[i, 1],
+                ends[i, ray, 0],
+                ends[i, ray, 1],
+                0.0,
+                _NO_GROUP,
+                _ALL_CATEGORIES,
+                info.ctypes.data,
+            )
+            if call_c_function(query, arguments):
+                fractions[i, ray] = info[5]
+                is_hit[i, ray] = True

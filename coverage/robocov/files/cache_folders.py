@@ -1,0 +1,80 @@
+"""Where caches are kept, and which folders can be trusted with them."""
+
+from __future__ import annotations
+
+import os
+import stat
+import sys
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+
+import platformdirs
+
+CACHE_VARIABLE = "ROBOCOV_CACHE"
+"""Environment variable with another cache folder; empty for none."""
+
+
+def find_cache_root() -> Path | None:
+    """Return the folder of all caches: the user's, or that of `CACHE_VARIABLE`; None if that is empty."""
+    named = os.environ.get(CACHE_VARIABLE)
+    if named == "":
+        return None
+    if named is not None:
+        return Path(named)
+    return platformdirs.user_cache_path("robocov", appauthor=False)
+
+
+def open_private_folder(folder: Path) -> Path | None:
+    """Create a folder that only this user may write to, or check that it is one.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    Path or None
+        The folder; None if it cannot be created or written to, belongs to somebody else, may be written to by
+        others, or lies in a folder in which others could replace it.
+    """
+    with suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+        if is_private(folder):
+            return folder
+    return None
+
+
+def is_private(path: Path) -> bool:
+    """Return whether a file or folder is this user's, and nobody else could have changed or replaced it.
+
+    Systems without owners and modes of files, such as Windows, keep users apart by themselves.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    bool
+
+    Raises
+    ------
+    OSError
+        If the path cannot be looked at.
+    """
+    if sys.platform == "win32":
+        return True
+    real = path.resolve(strict=True)
+    status = real.stat()
+    if status.st_uid != os.geteuid() or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return False
+    return not any(_everybody_can_replace_entries(parent) for parent in real.parents)
+
+
+def _everybody_can_replace_entries(folder: Path) -> bool:
+    """Return whether all users may write to a folder, and rename entries that are not theirs."""
+    mode = folder.stat().st_mode
+    return bool(mode & stat.S_IWOTH) and not mode & stat.S_ISVTX

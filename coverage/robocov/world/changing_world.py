@@ -1,0 +1,176 @@
+"""The world of a team whose robots fail and join."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Any
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray
+from robocov.conditions import Conditions
+from robocov.environment import Environment
+from robocov.errors import StartError
+from robocov.robots import Team
+from robocov.world.relocation import nearest_free
+from robocov.world.solid import movers, solid_pieces
+from robocov.world.unicycles import initialize_steering
+from robocov.world.world import World
+
+
+class ChangingWorld:
+    """A world with a row for every robot that is ever part of the team.
+
+    A robot that has failed is an obstacle from then on. One that has not joined yet is nowhere; its position
+    is the one at which it would start, or is to join. Nothing changes for the others: whenever the team
+    changes, a new `World` of the robots that work takes over.
+
+    Parameters
+    ----------
+    conditions : Conditions
+        When robots fail and join.
+    environment : Environment
+    team : Team
+        All n robots.
+    positions : (n, 2) array, m
+    velocities : (n, 2) array or None, m/s
+    steering : (n, 2) array or None, rad and rad/s
+    time : float, s
+        Simulation time of this state.
+
+    Attributes
+    ----------
+    positions, velocities, steering
+        As those of `World`; read-only.
+    working : (n,) bool array
+        Which robots are present and have not failed. Read-only.
+    """
+
+    def __init__(
+        self,
+        conditions: Conditions,
+        environment: Environment,
+        team: Team,
+        positions: Array,
+        velocities: Array | None = None,
+        *,
+        steering: Array | None = None,
+        time: float = 0.0,
+    ) -> None:
+        self.team = team
+        self._conditions = conditions
+        self._environment = environment
+        self._pieces = solid_pieces(environment)
+        self._movers = movers(environment)
+        self.positions = np.array(positions, dtype=float)
+        self.velocities = np.zeros_like(self.positions) if velocities is None else np.array(velocities)
+        self.steering = initialize_steering(team, self.velocities, steering)
+        self.working = conditions.working(time, len(team))
+        self._failed = conditions.failed(time, len(team))
+        is_absent = ~(self.working | self._failed)
+        for join in conditions.joins:
+            if join.place is not None and is_absent[join.robot - 1]:
+                self.positions[join.robot - 1] = join.place
+        self._build_world()
+
+    @property
+    def failed_robots(self) -> Array:
+        """x, y and radius of the robots that have failed, (w, 3) m."""
+        return np.column_stack([self.positions, self.team.radius])[self._failed]
+
+    def copy(self) -> ChangingWorld:
+        """Return an independent world in the same state, which continues identically."""
+        twin = copy(self)
+        twin._world = None if self._world is None else self._world.copy()
+        return twin
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._protect_state()  # Pickles do not contain the flags of arrays.
+
+    def step(
+        self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
+    ) -> None:
+        """Move as `World.step` does; then robots fail and join.
+
+        Raises
+        ------
+        StartError
+            If there is no room for a robot that joins.
+        """
+        self._move_working_robots(forces, dt, external_forces, time)
+        self._change_team(time + dt)
+        self._protect_state()
+
+    def _move_working_robots(
+        self, forces: Array, dt: float, external_forces: Array | None, time: float
+    ) -> None:
+        self.positions = self.positions.copy()
+        self.velocities = np.zeros_like(self.velocities)
+        if self._world is None:
+            return
+        rows = self._working_rows
+        external = None if external_forces is None else external_forces[rows]
+        self._world.step(forces[rows], dt, external, time=time)
+        self.positions[rows] = self._world.positions
+        self.velocities[rows] = self._world.velocities
+        if self.steering is not None and self._world.steering is not None:
+            self.steering = self.steering.copy()
+            self.steering[rows] = self._world.steering
+
+    def _change_team(self, time: float) -> None:
+        """Let robots fail and join that do so until `time`."""
+        working = self._conditions.working(time, len(self.team))
+        failed = self._conditions.failed(time, len(self.team))
+        if (working == self.working).all() and (failed == self._failed).all():
+            return
+        is_present = self.working | self._failed
+        self._failed = failed & is_present
+        for robot in np.flatnonzero(working & ~is_present).tolist():
+            self.positions[robot] = self._find_joining_position(robot, is_present, time)
+            is_present[robot] = True
+        self.working = working
+        self.velocities[~working] = 0.0
+        if self.steering is not None:
+            # The turning rate of robots that have failed is zero.
+            self.steering = self.steering * np.column_stack([np.ones(len(working)), working])
+        self._build_world()
+
+    def _find_joining_position(self, robot: int, is_present: BoolArray, time: float) -> tuple[float, float]:
+        """Return the free position at which a robot joins, the nearest to the one where it should."""
+        x, y = self.positions[robot].tolist()
+        try:
+            return nearest_free(
+                self._environment.at(time),
+                float(self.team.radius[robot]),
+                self.positions[is_present],
+                (x, y),
+                self.team.radius[is_present],
+            )
+        except StartError:
+            raise StartError(
+                f"robot {robot + 1} joins at {time:g} s at [{x:g}, {y:g}], "
+                f"but there is no room for it in map {self._environment.name!r}"
+            ) from None
+
+    def _build_world(self) -> None:
+        """Build the world of the robots that work; there is none while no robot does."""
+        self._protect_state()
+        self._working_rows = np.flatnonzero(self.working)
+        self._world: World | None = None
+        if len(self._working_rows) > 0:
+            rows = self._working_rows
+            self._world = World(
+                self._pieces,
+                self.team[rows],
+                self.positions[rows],
+                self.velocities[rows],
+                steering=None if self.steering is None else self.steering[rows],
+                movers=self._movers,
+                failed_robots=self.failed_robots,
+            )
+
+    def _protect_state(self) -> None:
+        for array in (self.positions, self.velocities, self.working, self.steering):
+            if array is not None:
+                array.setflags(write=False)

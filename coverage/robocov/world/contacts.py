@@ -1,0 +1,239 @@
+"""Contacts: finding the robots that touch something, and moving them again in fine substeps.
+
+pymunk remembers more of a contact than positions and velocities: cached impulses, pushes out of an overlap
+that are still to be made, the shape of its search tree. A step must depend on nothing but positions and
+velocities, so that a copy of a world continues identically, bit for bit. Therefore all robots are first moved
+as if nothing touched (`FreeSpace`), and those that pymunk reports in contact are moved again, from the same
+state, by a `ContactSolver` that remembers nothing.
+"""
+
+from __future__ import annotations
+
+import math
+
+import pymunk
+
+from robocov.arrays import Array, IntArray
+from robocov.robots import Team
+from robocov.world.bodies import WALLS_ONLY, BodyArrays, Obstacles, build_obstacle_space, build_robot
+from robocov.world.dynamics import compute_clip_factor
+
+MAX_PENETRATION = 1e-3
+"""Depth in metres to which robots may sink into walls or each other; in contact no substep is longer."""
+
+_MAX_SUBSTEPS = 64
+_COLLISION_SLOP_M = 1e-4
+"""Overlap with a wall that pymunk does not correct."""
+_MIN_ITERATIONS = 20
+"""Solver iterations for robots of equal mass."""
+_MAX_CORNER_WALLS = 3
+"""Walls that a pushed robot is moved out of, one after the other, in a corner."""
+
+
+class FreeSpace:
+    """Moves robots as if nothing touched, and reports which of them did touch something.
+
+    Several teams may share the space; robots of different teams pass through each other.
+
+    Parameters
+    ----------
+    obstacles : Obstacles
+    team : Team
+        All robots of all teams, n of them.
+    positions, velocities : (n, 2) arrays, m and m/s
+    teams : int
+        Number of teams, of equal size.
+    """
+
+    def __init__(
+        self, obstacles: Obstacles, team: Team, positions: Array, velocities: Array, teams: int = 1
+    ) -> None:
+        space, movers = build_obstacle_space(obstacles)
+        space.iterations = 1
+        space.collision_persistence = 1
+        space.collision_bias = 1.0  # Overlaps are never pushed apart.
+        team_size = len(team) // teams
+        robots = []
+        for row, (mass, radius) in enumerate(zip(team.mass.tolist(), team.radius.tolist(), strict=True)):
+            body, disc = build_robot(mass=mass, radius=radius, team=row // team_size)
+            # Placed first: pymunk would remember a pair for any two discs that are added at one position.
+            body.position = tuple(positions[row].tolist())
+            space.add(body, disc)
+            robots.append(body)
+        self._space = space
+        self._arrays = BodyArrays(space, capacity=len(movers) + len(robots) + 1)
+        self._robot_rows = self._arrays.find_rows(robots)
+        self._mover_rows = self._arrays.find_rows(movers)
+        self._robot_of_body = {body.id: robot for robot, body in enumerate(robots)}
+        self.set_robots(positions, velocities)
+
+    def set_robots(self, positions: Array, velocities: Array) -> None:
+        """Set the positions, (n, 2) m, and velocities, (n, 2) m/s, of all robots."""
+        self._arrays.states[self._robot_rows, :2] = positions
+        self._arrays.states[self._robot_rows, 2:] = velocities
+        self._arrays.write_states()
+
+    def set_movers(self, states: Array) -> None:
+        """Set the states of moving obstacles, (m, 4) m and m/s, as `bodies.compute_mover_states` returns."""
+        self._arrays.states[self._mover_rows] = states
+        self._arrays.write_states()
+
+    def step(self, net_forces: Array, dt: float) -> Array:
+        """Move all robots under net forces, (n, 2) N, and return their states, (n, 4): x, y, vx, vy."""
+        self._arrays.forces[self._robot_rows] = net_forces
+        self._arrays.write_forces()
+        self._space.step(dt)
+        self._arrays.read_states()
+        return self._arrays.states[self._robot_rows].copy()
+
+    def list_touching_robots(self) -> list[int]:
+        """Return the robots that touched something in the last step, ascending."""
+        bodies = self._arrays.list_touching_bodies()
+        return sorted({self._robot_of_body[body] for body in bodies if body in self._robot_of_body})
+
+
+class ContactSolver:
+    """Moves robots that touch something, in a space that contains only them and the obstacles.
+
+    It remembers nothing between calls: pymunk forgets a contact when the discs leave the space.
+
+    Parameters
+    ----------
+    team : Team
+        All robots that may come into contact.
+    obstacles : Obstacles
+    """
+
+    def __init__(self, team: Team, obstacles: Obstacles) -> None:
+        self._team = team
+        self._max_mover_speed = obstacles.max_speed
+        space, self._movers = build_obstacle_space(obstacles)
+        # Sequential impulses: a light robot between a heavy one and a wall needs as many as the ratio of
+        # masses.
+        mass_ratio = float(team.mass.max() / team.mass.min())
+        space.iterations = _MIN_ITERATIONS + math.ceil(2.0 * mass_ratio)
+        space.collision_slop = _COLLISION_SLOP_M
+        # The fraction of an overlap that remains after a second. Nothing remains after a substep, unless a
+        # moving obstacle has run over a robot, which then comes out gradually.
+        space.collision_bias = 1e-9 if self._movers else 0.0
+        self._space = space
+        self._arrays = BodyArrays(space, capacity=len(self._movers) + len(team) + 1)
+        self._mover_rows = self._arrays.find_rows(self._movers)
+        self._robots = [
+            build_robot(mass=mass, radius=radius)
+            for mass, radius in zip(team.mass.tolist(), team.radius.tolist(), strict=True)
+        ]
+        self._max_travel = min(MAX_PENETRATION, 0.1 * float(team.radius.min()))
+
+    def move(
+        self,
+        robots: IntArray,
+        states: Array,
+        net_forces: Array,
+        mover_states: Array,
+        max_speed: Array,
+        dt: float,
+    ) -> Array:
+        """Move some robots by `dt` seconds, with contacts.
+
+        Parameters
+        ----------
+        robots : (k,) array
+            Their rows in the team, ascending.
+        states : (k, 4) array, m and m/s
+            x, y, vx, vy of these robots.
+        net_forces : (k, 2) array, N
+        mover_states : (m, 4) array, m and m/s
+            As `bodies.compute_mover_states` returns them.
+        max_speed : (k,) array, m/s
+            Speed to which each robot is limited afterwards: a contact can give it more than it can do itself.
+        dt : float, s
+
+        Returns
+        -------
+        (k, 4) array, m and m/s
+            x, y, vx, vy afterwards.
+        """
+        members = [self._robots[robot] for robot in robots.tolist()]
+        bodies = [body for body, _ in members]
+        discs = [disc for _, disc in members]
+        self._space.add(*bodies)
+        try:
+            rows = self._arrays.find_rows(bodies)
+            self._arrays.states[:] = 0.0  # also the row of the static body, wherever it is
+            self._arrays.states[self._mover_rows] = mover_states
+            self._arrays.states[rows] = states
+            self._arrays.write_states()
+            self._space.add(*discs)
+            self._arrays.forces[rows] = net_forces
+            substeps = self._count_substeps(robots, states, net_forces, dt)
+            self._make_substeps(members, substeps, dt / substeps)
+            self._space.remove(*discs)
+            self._arrays.read_states()
+            final = self._arrays.states[rows].copy()
+            for robot, (vx, vy) in enumerate(final[:, 2:].tolist()):
+                final[robot, 2:] *= compute_clip_factor(vx, vy, float(max_speed[robot]))
+            self._finish_pushes(members, dt / substeps)
+            final[:, :2] = self._arrays.states[rows, :2]
+            return final
+        finally:
+            # Also after an interruption the space contains no robots.
+            self._arrays.forces[:] = 0.0
+            self._space.remove(*[disc for disc in discs if disc.space is not None])
+            self._space.remove(*bodies)
+
+    def _count_substeps(self, robots: IntArray, states: Array, net_forces: Array, dt: float) -> int:
+        """Return the number of substeps in which no robot sinks into anything by more than allowed."""
+        max_square = 0.0
+        mass = self._team.mass[robots].tolist()
+        for (_, _, vx, vy), (fx, fy), m in zip(states.tolist(), net_forces.tolist(), mass, strict=True):
+            final_vx = vx + fx * (dt / m)
+            final_vy = vy + fy * (dt / m)
+            max_square = max(max_square, vx * vx + vy * vy, final_vx * final_vx + final_vy * final_vy)
+        speed = math.sqrt(max_square) + self._max_mover_speed
+        return min(_MAX_SUBSTEPS, max(1, math.ceil(speed * dt / self._max_travel)))
+
+    def _make_substeps(
+        self, members: list[tuple[pymunk.Body, pymunk.Circle]], substeps: int, dt: float
+    ) -> None:
+        """Make substeps of `dt` seconds each, all under the same forces."""
+        for _ in range(substeps):
+            positions = self._list_positions(members)
+            self._arrays.write_forces()
+            self._space.step(dt)
+            if self._movers:
+                self._keep_out_of_walls(members, positions)
+
+    def _finish_pushes(self, members: list[tuple[pymunk.Body, pymunk.Circle]], dt: float) -> None:
+        """Apply the push out of an overlap that pymunk has decided on but not yet made; read the states."""
+        self._arrays.states[:, 2:] = 0.0
+        self._arrays.write_states()
+        positions = self._list_positions(members)
+        self._space.step(dt)
+        if self._movers:
+            self._keep_out_of_walls(members, positions)
+        self._arrays.read_states()
+
+    def _list_positions(self, members: list[tuple[pymunk.Body, pymunk.Circle]]) -> list[pymunk.Vec2d]:
+        """Return the positions of robots; none if nothing can push them into a wall."""
+        if not self._movers:
+            return []
+        return [body.position for body, _ in members]
+
+    def _keep_out_of_walls(
+        self, members: list[tuple[pymunk.Body, pymunk.Circle]], old_positions: list[pymunk.Vec2d]
+    ) -> None:
+        """Leave robots that a moving obstacle has pushed into a wall in front of that wall.
+
+        Walls are stronger than moving obstacles, which then go over the robot.
+        """
+        for (body, disc), old_position in zip(members, old_positions, strict=True):
+            crossed = self._space.segment_query_first(old_position, body.position, 0.0, WALLS_ONLY)
+            if crossed is not None:
+                body.position = old_position
+            for _ in range(_MAX_CORNER_WALLS):  # Out of one wall may be into another one.
+                wall = self._space.point_query_nearest(body.position, disc.radius, WALLS_ONLY)
+                if wall is None or wall.distance >= disc.radius - _COLLISION_SLOP_M or wall.distance <= 0.0:
+                    break
+                away = body.position - wall.point
+                body.position = wall.point + away * (disc.radius / math.hypot(*away))

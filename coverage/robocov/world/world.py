@@ -1,0 +1,363 @@
+"""The world of a team that stays the same: its robots, driven by forces, among obstacles."""
+
+from __future__ import annotations
+
+import math
+from copy import copy
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray
+from robocov.errors import ParameterError
+from robocov.observation.neighbours import close_pairs
+from robocov.robots import Team
+from robocov.world.bodies import MAX_TEAMS_PER_SPACE, Obstacles, compute_mover_states
+from robocov.world.contacts import ContactSolver, FreeSpace
+from robocov.world.dynamics import MotionResponse, compute_net_forces, compute_response
+from robocov.world.solid import Mover
+from robocov.world.unicycles import compute_drive_command, initialize_steering, remove_sideways_velocity
+
+MAX_SUBSTEP_S = 0.02
+MAX_MASS_RATIO = 1000.0
+"""Mass of the heaviest robot over that of the lightest; beyond it contacts cannot be resolved."""
+
+_NO_FORCES = np.zeros((0, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class _SpeedLimits:
+    """Speeds that robots may reach in a substep, each (n,) m/s."""
+
+    driving: Array
+    """By their own force. A robot that is faster than its limit brakes as hard as it can."""
+    pushed: Array
+    """By external forces as well."""
+
+
+class World:
+    """Robots as pymunk bodies among static polygons, moving obstacles and failed robots.
+
+    Parameters
+    ----------
+    pieces : tuple of (k, 2) arrays, m
+        Convex polygons that tile everything that is not free, as `solid.solid_pieces` returns them.
+    team : Team
+        The n robots.
+    positions : (n, 2) array, m
+    velocities : (n, 2) array or None, m/s
+        By default robots are at rest.
+    steering : (n, 2) array or None, rad and rad/s
+        Heading and turning rate of unicycles; by default they face the direction in which they move.
+    movers : tuple of Mover
+        Moving obstacles.
+    failed_robots : (w, 3) array or None, m
+        x, y and radius of robots that have failed and stand in the way.
+    runs : int
+        Number of independent runs with teams of equal size. Row ``r * n / runs + i`` is robot i of run r;
+        robots of different runs pass through each other.
+
+    Attributes
+    ----------
+    positions, velocities : (n, 2) arrays, m and m/s
+        Read-only.
+    steering : (n, 2) array or None, rad and rad/s
+        Heading and turning rate of unicycles; None for a team without any. Read-only.
+    working : (n,) bool array
+        Which robots work; all of them do.
+
+    Raises
+    ------
+    ParameterError
+        If a robot is more than `MAX_MASS_RATIO` times as heavy as another one.
+
+    Notes
+    -----
+    In each step the controllers' forces, the viscous term of (28) and the kinematic limits are combined into
+    the net forces that pymunk integrates. Contacts are resolved by pymunk, in substeps fine enough that no
+    robot sinks into anything by more than `contacts.MAX_PENETRATION`. A step depends on nothing but
+    positions, velocities and steering, so that a copy continues identically, bit for bit.
+
+    Moving obstacles keep to their path whatever is in the way, and push what they meet. Walls are stronger
+    still: where no space is left between a moving obstacle and a wall, the robot stays in front of the wall
+    and the obstacle moves over it. Once there is space, the robot is pushed out on the nearest side.
+    """
+
+    def __init__(
+        self,
+        pieces: tuple[Array, ...],
+        team: Team,
+        positions: Array,
+        velocities: Array | None = None,
+        *,
+        steering: Array | None = None,
+        movers: tuple[Mover, ...] = (),
+        failed_robots: Array | None = None,
+        runs: int = 1,
+    ) -> None:
+        lightest = float(team.mass.min())
+        heaviest = float(team.mass.max())
+        if heaviest > MAX_MASS_RATIO * lightest:
+            raise ParameterError(
+                f"team.mass: expected robots at most {MAX_MASS_RATIO:g} times as heavy as the lightest, "
+                f"got {lightest:g} to {heaviest:g} kg"
+            )
+        self.team = team
+        self.failed_robots = failed_robots
+        self.working: BoolArray = np.ones(len(team), dtype=bool)
+        self._obstacles = Obstacles(pieces, movers, failed_robots)
+        self._is_unicycle = team.turns
+        self._max_team_speed = float(team.max_speed.max())
+        self._min_radius = float(team.radius.min())
+        self._runs = runs
+        self._team_size = len(team) // runs
+        if velocities is None:
+            velocities = np.zeros((len(team), 2))
+            self._may_exceed_max_speed = False
+        else:
+            self._may_exceed_max_speed = True
+        self._set_state(np.array(positions, dtype=float), np.array(velocities, dtype=float))
+        self.steering = initialize_steering(team, self.velocities, steering)
+        self._mover_states = compute_mover_states(movers, time=0.0, dt=1.0)
+        self._response: MotionResponse | None = None
+        self._response_dt = math.nan
+        # Both are built when they are needed, and are the only objects that a step changes in place.
+        self._spaces: list[tuple[slice, FreeSpace]] | None = None
+        self._contact_solver: ContactSolver | None = None
+
+    def place(self, run: int, positions: Array) -> None:
+        """Move the robots of a run to other positions, (n / runs, 2) m, at rest, and facing along +x."""
+        rows = self._rows_of_run(run)
+        new_positions = self.positions.copy()
+        new_velocities = self.velocities.copy()
+        new_positions[rows] = positions
+        new_velocities[rows] = 0.0
+        self._set_state(new_positions, new_velocities)
+        self._update_spaces()
+        if self.steering is not None:
+            steering = self.steering.copy()
+            steering[rows] = 0.0
+            steering.setflags(write=False)
+            self.steering = steering
+
+    def copy(self) -> World:
+        """Return an independent world in the same state, which continues identically."""
+        return copy(self)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Spaces are built when they are needed: nothing that matters is in them alone.
+        return {**vars(self), "_spaces": None, "_contact_solver": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        for array in (self.positions, self.velocities, self.steering):
+            if array is not None:
+                array.setflags(write=False)  # Pickles do not contain this flag.
+
+    def step(
+        self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
+    ) -> None:
+        """Move by `dt` seconds under the controllers' forces, viscosity and limits.
+
+        Parameters
+        ----------
+        forces : (n, 2) array, N
+            The controllers' forces.
+        dt : float, s
+        external_forces : (n, 2) array or None, N
+            Further forces to which no limits apply, such as those of a pointer that drags a robot. A robot
+            that they have made faster than its own limit brakes as hard as it can.
+        time : float, s
+            Simulation time at the beginning, on which moving obstacles depend.
+        """
+        external = _NO_FORCES
+        if external_forces is not None:
+            external = np.array(external_forces, dtype=float)
+        substeps = self._count_substeps(external, dt)
+        substep = dt / substeps
+        for k in range(substeps):
+            if self._obstacles.movers:
+                self._move_obstacles(time + k * substep, substep)
+            self._substep(forces, external, substep)
+
+    def _count_substeps(self, external: Array, dt: float) -> int:
+        """Return the number of substeps in which no robot can cross a thin wall."""
+        speed = self._max_team_speed
+        if self._may_exceed_max_speed or len(external) > 0:
+            speed = max(speed, float((self._compute_speeds() + self._compute_push(external) * dt).max()))
+        crossed_radii = (speed + self._obstacles.max_speed) * dt / self._min_radius
+        return max(math.ceil(dt / MAX_SUBSTEP_S - 1e-9), math.ceil(crossed_radii))
+
+    def _substep(self, forces: Array, external: Array, dt: float) -> None:
+        """Move all robots by `dt` seconds: freely at first, then again where they touch something."""
+        response = self._get_response(dt)
+        max_speed_after_contact = self.team.max_speed
+        if self._may_exceed_max_speed or len(external) > 0:
+            limits = self._compute_speed_limits(external, dt)
+            response = response._replace(max_speed=limits.driving)
+            max_speed_after_contact = limits.pushed
+        steering = self.steering
+        if steering is not None:
+            rolls = self._list_rolling(external)
+            command = compute_drive_command(
+                forces=forces,
+                velocities=self.velocities,
+                # Robots that are carried keep their heading, and do not turn.
+                steering=steering * np.column_stack([np.ones(len(rolls)), rolls]),
+                response=response,
+                track_width=self.team.track_width,
+                max_turning_rate=self.team.turning_rate,
+                rolls=rolls,
+                dt=dt,
+            )
+            forces = command.forces
+            steering = command.steering
+            response = command.response
+        net_forces = compute_net_forces(forces, self.velocities, response, external)
+        states = self._move_freely(net_forces, dt)
+        has_contacts = self._resolve_contacts(states, net_forces, max_speed_after_contact, dt)
+        positions = np.ascontiguousarray(states[:, :2])
+        velocities = np.ascontiguousarray(states[:, 2:])
+        if steering is not None:
+            if has_contacts:
+                wheel_speed = 0.5 * self.team.track_width * np.abs(steering[:, 1])
+                velocities = remove_sideways_velocity(
+                    velocities=velocities,
+                    steering=steering,
+                    max_speed=max_speed_after_contact - wheel_speed,
+                    rolls=rolls,
+                )
+            steering.setflags(write=False)
+            self.steering = steering
+        if self._may_exceed_max_speed or len(external) > 0:
+            speeds = np.hypot(velocities[:, 0], velocities[:, 1])
+            self._may_exceed_max_speed = bool((speeds > self.team.max_speed).any())
+        self._set_state(positions, velocities)
+        if has_contacts:
+            self._update_spaces()
+
+    def _get_response(self, dt: float) -> MotionResponse:
+        """Return the response of the team for substeps of `dt`, which is the same in nearly all substeps."""
+        if self._response is None or self._response_dt != dt:
+            self._response = compute_response(self.team, dt)
+            self._response_dt = dt
+        return self._response
+
+    def _compute_speed_limits(self, external: Array, dt: float) -> _SpeedLimits:
+        speeds = self._compute_speeds()
+        driving = np.maximum(self.team.max_speed, speeds - self.team.max_acceleration * dt)
+        pushed = driving
+        if len(external) > 0:
+            pushed = np.maximum(driving, speeds + self._compute_push(external) * dt)
+        return _SpeedLimits(driving, pushed)
+
+    def _list_rolling(self, external: Array) -> BoolArray:
+        """Return which robots are unicycles on their own wheels: those that no external force carries."""
+        if len(external) > 0:
+            return self._is_unicycle & ~external.any(axis=1)
+        return self._is_unicycle
+
+    def _compute_push(self, external: Array) -> Array:
+        """Return the acceleration by external forces, (n,) m/s², or (1,) zero without such forces."""
+        if len(external) == 0:
+            return np.zeros(1)
+        return np.asarray(np.hypot(external[:, 0], external[:, 1]) / self.team.mass)
+
+    def _compute_speeds(self) -> Array:
+        return np.asarray(np.hypot(self.velocities[:, 0], self.velocities[:, 1]))
+
+    def _set_state(self, positions: Array, velocities: Array) -> None:
+        """Set the state of all robots, in arrays that nobody who gets them can change."""
+        positions.setflags(write=False)
+        velocities.setflags(write=False)
+        self.positions = positions
+        self.velocities = velocities
+
+    def _rows_of_run(self, run: int) -> slice:
+        return slice(run * self._team_size, (run + 1) * self._team_size)
+
+    def _get_spaces(self) -> list[tuple[slice, FreeSpace]]:
+        """Return the spaces in which robots move freely, and the rows of their robots.
+
+        A space contains up to `MAX_TEAMS_PER_SPACE` runs.
+        """
+        if self._spaces is None:
+            self._spaces = []
+            robots_per_space = MAX_TEAMS_PER_SPACE * self._team_size
+            for start in range(0, len(self.team), robots_per_space):
+                rows = slice(start, min(start + robots_per_space, len(self.team)))
+                space = FreeSpace(
+                    obstacles=self._obstacles,
+                    team=self.team[rows],
+                    positions=self.positions[rows],
+                    velocities=self.velocities[rows],
+                    teams=(rows.stop - rows.start) // self._team_size,
+                )
+                space.set_movers(self._mover_states)
+                self._spaces.append((rows, space))
+        return self._spaces
+
+    def _update_spaces(self) -> None:
+        """Set the bodies to the state of the robots, which is no longer the one that pymunk has computed."""
+        if self._spaces is not None:
+            for rows, space in self._spaces:
+                space.set_robots(self.positions[rows], self.velocities[rows])
+
+    def _move_obstacles(self, time: float, dt: float) -> None:
+        self._mover_states = compute_mover_states(self._obstacles.movers, time, dt)
+        for _, space in self._get_spaces():
+            space.set_movers(self._mover_states)
+
+    def _move_freely(self, net_forces: Array, dt: float) -> Array:
+        """Return the states after a substep in which nothing is pushed, (n, 4): x, y, vx, vy."""
+        states = [space.step(net_forces[rows], dt) for rows, space in self._get_spaces()]
+        return states[0] if len(states) == 1 else np.concatenate(states)
+
+    def _list_touching(self) -> list[int]:
+        """Return the robots that touched something in the last free substep, ascending."""
+        touching: list[int] = []
+        for rows, space in self._get_spaces():
+            touching += [rows.start + robot for robot in space.list_touching_robots()]
+        return touching
+
+    def _resolve_contacts(self, states: Array, net_forces: Array, max_speed: Array, dt: float) -> bool:
+        """Correct free states in place where robots touch something; return whether any do."""
+        touching_in_run: dict[int, list[int]] = {}
+        for robot in self._list_touching():
+            touching_in_run.setdefault(robot // self._team_size, []).append(robot)
+        for run, touching in touching_in_run.items():
+            self._resolve_contacts_of_run(
+                run=run, touching=touching, states=states, net_forces=net_forces, max_speed=max_speed, dt=dt
+            )
+        return bool(touching_in_run)
+
+    def _resolve_contacts_of_run(
+        self, run: int, touching: list[int], states: Array, net_forces: Array, max_speed: Array, dt: float
+    ) -> None:
+        """Move the robots in contact again, and with them all that they are moved against."""
+        if self._contact_solver is None:
+            self._contact_solver = ContactSolver(self.team, self._obstacles)
+        rows = self._rows_of_run(run)
+        radius = self.team.radius[rows]
+        before = np.column_stack([self.positions, self.velocities])
+        is_resolved = np.zeros(self._team_size, dtype=bool)
+        robots = np.array(touching)
+        while True:
+            states[robots] = self._contact_solver.move(
+                robots=robots,
+                states=before[robots],
+                net_forces=net_forces[robots],
+                mover_states=self._mover_states,
+                max_speed=max_speed[robots],
+                dt=dt,
+            )
+            is_resolved[robots - rows.start] = True
+            positions = np.ascontiguousarray(states[rows, :2])
+            first, second, distance = close_pairs(positions, 2.0 * float(radius.max()))
+            overlaps = distance < radius[first] + radius[second]
+            is_reached = is_resolved[first] & ~is_resolved[second] & overlaps
+            if not is_reached.any():
+                return
+            is_resolved[second[is_reached]] = True
+            robots = rows.start + np.flatnonzero(is_resolved)
