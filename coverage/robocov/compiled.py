@@ -13,6 +13,7 @@ import hashlib
 import importlib
 import importlib.util
 import os
+import pickle
 import shutil
 import sys
 import threading
@@ -31,8 +32,10 @@ from robocov.files.cache_folders import find_cache_root, open_private_folder
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 IS_COMPILER_ENABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
-_MAX_UNUSED_DAYS = 30.0
-"""Machine code of other versions is removed once it has not been used for so long."""
+_MAX_KEPT_VERSIONS = 4
+"""Number of versions whose machine code is kept, the most recently used ones."""
+_MIN_UNUSED_DAYS = 1.0
+"""Machine code that was used more recently is kept in any case: a program may still be running with it."""
 _READY_FILE = "ready"
 """Name of the file that marks a folder with the machine code of all common kernels."""
 _EXAMPLE_MODULES = ("robocov.cost", "robocov.simulation", "robocov.metrics")
@@ -42,7 +45,10 @@ on_compile: list[Callable[[str], None]] = []
 """Functions that are called with the name of each kernel right before it is compiled."""
 
 _lock = threading.RLock()
+_is_cache_usable = True
 _is_interpreting = False
+_CACHE_ERRORS = (OSError, EOFError, pickle.UnpicklingError)
+"""What numba raises if its cache cannot be read or written; kernels themselves raise none of these."""
 
 
 def kernel(function: _Function) -> _Function:
@@ -89,9 +95,10 @@ class Kernel:
         functools.update_wrapper(self, function)
         self.py_func = function
         self._dispatcher: Any = None
+        self._is_cached = False
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """Call the compiled function, or the Python one while `interpret_until_ready` says so."""
+        """Call the compiled function; compile it first if there is no machine code for these types."""
         if _is_interpreting:
             with np.errstate(all="ignore"):
                 return self.py_func(*args, **kwargs)
@@ -103,26 +110,37 @@ class Kernel:
             if isinstance(error.__cause__, KeyboardInterrupt):
                 raise KeyboardInterrupt from None
             raise
+        except _CACHE_ERRORS:
+            if not _is_cache_usable:
+                raise
+            # A cache is never in the way: go on without it if it is damaged, or the disk is full.
+            _disable_cache()
+            return self.get_dispatcher()(*args, **kwargs)
 
     def get_dispatcher(self) -> Any:
         """Return numba's dispatcher for the function; import numba if this is the first kernel of all."""
         with _lock:
-            if self._dispatcher is None:
-                self._dispatcher = _build_dispatcher(self.py_func)
+            if self._dispatcher is None or (self._is_cached and not _is_cache_usable):
+                self._is_cached = _is_cache_usable and cache_folder() is not None
+                self._dispatcher = _build_dispatcher(self.py_func, is_cached=self._is_cached)
             return self._dispatcher
 
 
-def _build_dispatcher(function: Callable[..., Any]) -> Any:
+def _build_dispatcher(function: Callable[..., Any], *, is_cached: bool) -> Any:
     numba = import_numba()
-    folder = cache_folder()
     # A cache finds its folder when the dispatcher is built; the setting is numba's own again afterwards.
     previous = numba.config.CACHE_DIR
     try:
-        if folder is not None:
-            numba.config.CACHE_DIR = str(folder)
-        return numba.njit(function, cache=folder is not None, error_model="numpy")
+        if is_cached:
+            numba.config.CACHE_DIR = str(cache_folder())
+        return numba.njit(function, cache=is_cached, error_model="numpy")
     finally:
         numba.config.CACHE_DIR = previous
+
+
+def _disable_cache() -> None:
+    """Do without the cache for the rest of the process; kernels build new dispatchers when they are
+    needed.""" global _is_cache_usable _is_cache_usable = False
 
 
 @functools.cache
@@ -183,7 +201,7 @@ def cache_folder() -> Path | None:
     if folder is not None:
         with suppress(OSError):
             os.utime(folder)
-        _remove_unused_versions(folder)
+        _remove_unused_versions(folder.parent)
     return folder
 
 
@@ -198,13 +216,16 @@ def _compute_source_digest() -> str:
     return f"robocov-{digest.hexdigest()}"
 
 
-def _remove_unused_versions(used: Path) -> None:
-    """Remove the machine code of other versions that has not been used for a long time."""
-    oldest = time.time() - _MAX_UNUSED_DAYS * 24 * 3600
-    for folder in used.parent.glob("robocov-*"):
+def _remove_unused_versions(parent: Path) -> None:
+    """Remove the machine code of versions of the library that have not been used for long."""
+    newest_removed = time.time() - _MIN_UNUSED_DAYS * 24 * 3600
+    last_used: list[tuple[float, Path]] = []
+    for folder in parent.glob("robocov-*"):
         with suppress(OSError):
-            if folder != used and folder.is_dir() and folder.stat().st_mtime < oldest:
-                shutil.rmtree(folder, ignore_errors=True)
+            last_used.append((folder.stat().st_mtime, folder))
+    for when, folder in sorted(last_used, reverse=True)[_MAX_KEPT_VERSIONS:]:
+        if when < newest_removed:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def compile_kernels() -> None:

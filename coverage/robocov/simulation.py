@@ -524,4 +524,5 @@ def example() -> None:
     starts = np.array([[0.4, 0.4], [0.4, 0.8], [0.8, 0.4], [2.5, 0.5]])
     simulation = Simulation(Environment("example", square, (triangle,)), Rapf(), starts)
     for _ in range(3):
+        simulation.step()
         simulation.step(np.full((4, 2), -1000.0))  # against the walls

@@ -107,17 +107,21 @@ def test_changed_source_changes_cache_folder(tmp_path: Path, monkeypatch: pytest
     assert compiled._compute_source_digest() != before
 
 
-def test_unused_versions_are_removed(tmp_path: Path) -> None:
-    used = tmp_path / "robocov-used"
-    recent = tmp_path / "robocov-recent"
-    old = tmp_path / "robocov-old"
-    foreign = tmp_path / "other-old"
-    for folder in (used, recent, old, foreign):
+def test_versions_unused_for_long_are_removed(tmp_path: Path) -> None:
+    for k in range(6):
+        folder = tmp_path / f"robocov-{k}"
         folder.mkdir()
-    for folder in (used, old, foreign):
-        os.utime(folder, (0.0, 0.0))
-    compiled._remove_unused_versions(used)
-    assert sorted(tmp_path.iterdir()) == [foreign, recent, used]
+        if k < 3:
+            os.utime(folder, (1000.0 + k, 1000.0 + k))
+    (tmp_path / "other").mkdir()
+    compiled._remove_unused_versions(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "other",
+        "robocov-2",
+        "robocov-3",
+        "robocov-4",
+        "robocov-5",
+    ]
 
 
 def test_kernels_of_a_run_are_compiled_beforehand() -> None:

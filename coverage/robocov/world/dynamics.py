@@ -44,7 +44,8 @@ def compute_response(team: Team, dt: float) -> MotionResponse:
         velocity_per_force=effective_time / team.mass,
         force_per_velocity=team.mass / dt,
         max_velocity_change=team.max_acceleration * dt,
-        max_speed=team.max_speed,
+        # A copy: read-only arrays, such as those of a team, are another type to the compiler.
+        max_speed=team.max_speed.copy(),
     )
 
 

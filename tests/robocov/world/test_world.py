@@ -125,7 +125,8 @@ def test_a_pressed_crowd_neither_overlaps_nor_sinks_into_walls(
 def test_masses_whose_contacts_cannot_be_resolved_are_refused(empty: Environment) -> None:
     """The team itself is read all the same, as that of a record is."""
     team = Team.joined([Team.homogeneous(1, mass=0.5), Team.homogeneous(1, mass=501.0)])
-    with pytest.raises(ParameterError, match=r"team.mass: expected .* 1000 times as heavy .* got 0.5 to 501 kg"):
+    message = r"team.mass: expected .* 1000 times as heavy .* got 0.5 to 501 kg"
+    with pytest.raises(ParameterError, match=message):
         World(solid_pieces(empty), team, np.array([[2.0, 2.0], [2.0, 6.0]]))
 
 

@@ -19,9 +19,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.compiled import kernel
+from robocov.compiled import cache_folder
 from robocov.errors import InputError, RobocovError
-from robocov.files.atomic import locked
 from robocov.mapfile import load_map
 from robocov_app.cli import main
 from robocov_app.toolkit import clipboard
@@ -636,30 +635,19 @@ def test_a_program_that_asks_for_heads_alone_gets_them(display):
                 assert error.code == status
 
 
-def test_a_served_window_uses_the_caches_of_kernels_and_arrays(tmp_path, monkeypatch):
+def test_served_window_uses_the_caches_of_kernels_and_arrays(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
     monkeypatch.setenv("ROBOCOV_CACHE", str(tmp_path / "arrays"))
-    (tmp_path / "folder").mkdir()
-    with confined(tmp_path / "folder"):
-        for name in ("kernels", "arrays"):
-            (tmp_path / name).mkdir()
-            with locked(tmp_path / name, ".some.lock", remove=True):
-                (tmp_path / name / "entry").write_text("")
-
-
-def test_where_no_kernel_can_be_kept_nobody_waits_for_one(tmp_path, monkeypatch):
-    """A folder that says it can be written to, and cannot: each kernel would be waited for for a minute."""
-    monkeypatch.setattr("robocov.compiled._PATIENCE", 1e9)
-    (tmp_path / "folder").mkdir()
-    (tmp_path / "kernels").mkdir()
-    with confined(tmp_path / "folder"):
-        monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
-
-        @kernel
-        def tripled(x):
-            return 3.0 * x
-
-        assert tripled(0.5) == 1.5
+    cache_folder.cache_clear()
+    try:
+        kernels = cache_folder()
+        (tmp_path / "folder").mkdir()
+        with confined(tmp_path / "folder"):
+            (tmp_path / "arrays").mkdir()
+            for folder in (kernels, tmp_path / "arrays"):
+                (folder / "entry").write_text("")
+    finally:
+        cache_folder.cache_clear()
 
 
 def test_a_served_window_reads_and_writes_below_its_folder_alone(tmp_path):
