@@ -139,8 +139,9 @@ def _build_dispatcher(function: Callable[..., Any], *, is_cached: bool) -> Any:
 
 
 def _disable_cache() -> None:
-    """Do without the cache for the rest of the process; kernels build new dispatchers when they are
-    needed.""" global _is_cache_usable _is_cache_usable = False
+    """Go on without the cache for the rest of the process; kernels build new dispatchers when needed."""
+    global _is_cache_usable
+    _is_cache_usable = False
 
 
 @functools.cache

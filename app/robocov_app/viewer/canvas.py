@@ -146,7 +146,9 @@ class ViewerCanvas:
             rays = min(RAYS, MOST_RAYS // len(rows))
             reach = np.where(np.isfinite(ranges), ranges, FAR_SCAN).tolist()
             for row in rows if rays >= 24 else ():
-                scans.append((places[row], pane.simulation.sensor.scan_from(places[row], rays, reach[row])[1]))
+                scans.append(
+                    (places[row], pane.simulation.sensor.scan_from(places[row], rays, reach[row])[1])
+                )
         path = known.path if known is not None and viewer.cursor is not None else None
         look: dict[str, Any] = {"field": field, "field_limit": self._limit, "cost": self._caption_cost(pane)}
         look |= {"selected": selected, "scans": scans, "sensed": pane.sensed, "path": path}
