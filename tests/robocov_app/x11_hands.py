@@ -21,7 +21,7 @@ MARKS = [
     pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}"),
 ]
 
-PATIENCE = 15.0
+PATIENCE = 45.0
 
 
 def ended(process: subprocess.Popen) -> int:

@@ -8,6 +8,7 @@ import numpy as np
 from robocov.arrays import Array
 
 SMALLEST, LARGEST = 1e-4, 1e7  # zoom, px/m: from a hundred times the largest map to a tenth of the smallest
+FARTHEST_PIXEL = 1e8
 Box: TypeAlias = tuple[float, float, float, float]
 
 
@@ -34,9 +35,14 @@ class Camera:
         return left + width / 2, top + height / 2
 
     def to_pixels(self, points: Array) -> Array:
-        """Return the pixels of (..., 2) points in metres."""
+        """Return the pixels of (..., 2) points in metres.
+
+        Drafts of maps may hold any number: what is too far away for pygame is moved to `FARTHEST_PIXEL`.
+        """
         scale = np.array([self.zoom, -self.zoom])
-        return np.asarray((points - np.array(self.center)) * scale + np.array(self.middle))
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = np.asarray((points - np.array(self.center)) * scale + np.array(self.middle))
+        return found.clip(-FARTHEST_PIXEL, FARTHEST_PIXEL)
 
     def to_world(self, pixels: Array) -> Array:
         scale = np.array([1.0 / self.zoom, -1.0 / self.zoom])

@@ -17,6 +17,7 @@ from platformdirs import user_state_path
 from robocov.errors import MapError, OutputError
 from robocov.files.atomic import locked, written
 from robocov.files.strictjson import parse, read_bytes
+from robocov_app.toolkit.opening import require_regular_file
 
 FOLDER = "ROBOCOV_DRAFTS"  # environment variable with another folder to keep work in; empty for none
 SERVED_FOLDER = ".drafts"  # folder for drafts below the folder of a window that is shown in browsers
@@ -132,13 +133,12 @@ class Autosaver:
                 self._writing, self._hurried = True, False
             (path, content), began, trouble = job, time.perf_counter(), ""
             try:
-                file = None if path is None else str(path.absolute())
+                file = None if path is None else _encode_path(path.absolute())
                 when = datetime.now().astimezone().isoformat(timespec="seconds")
                 record: dict[str, Any] = {"format": self._kind, "version": 1, "path": file, "when": when}
                 record |= content() if content is not None else {}
                 with written(self._place / _FILE) as part:
-                    # paths may hold bytes that are no UTF-8, which JSON can escape alone
-                    part.write_text(json.dumps(record, ensure_ascii=True), encoding="utf-8")
+                    part.write_text(json.dumps(record, ensure_ascii=False), encoding="utf-8")
                 self._holds = content is not None
             except Exception as error:  # the thread goes on: later work may be kept again
                 trouble = f"work is not kept aside: {error}"
@@ -210,10 +210,11 @@ def remove_draft(folder: Path) -> None:
 
 def opened_elsewhere(folder: Path | None, kind: str, path: Path) -> bool:
     """Return whether a living program has this file open; to be asked before making one's own `Autosaver`."""
-    wanted = path.resolve()
+    wanted = os.path.realpath(path)  # raises nothing where links lead in a circle
     for place in _places(folder):
         with suppress(MapError, OSError):
-            if (named := read_record(place, kind).path) is not None and named.resolve() == wanted:
+            named = read_record(place, kind).path
+            if named is not None and os.path.realpath(named) == wanted:
                 try:
                     with locked(place):
                         pass
@@ -224,15 +225,33 @@ def opened_elsewhere(folder: Path | None, kind: str, path: Path) -> bool:
 
 def read_record(folder: Path, kind: str) -> Record:
     file = folder / _FILE
+    require_regular_file(file)
     held = parse(read_bytes(file), str(file))
     if not isinstance(held, dict) or held.get("format") != kind or held.get("version") != 1:
         raise MapError(f"{file}: is no {kind}")
     content = {name: held[name] for name in held if name not in ("format", "version", "path", "when")}
     try:
-        path = None if held["path"] is None else Path(held["path"])
+        path = None if held["path"] is None else _decode_path(held["path"])
         return Record(folder, path, datetime.fromisoformat(held["when"]).astimezone(), content)
     except (TypeError, ValueError, KeyError) as error:
         raise MapError(f"{file}: is no whole {kind}: {error}") from None
+
+
+def _encode_path(path: Path) -> str | dict[str, str]:
+    """Return a path as JSON can hold it: as text, or as its bytes if they are not UTF-8."""
+    text = str(path)
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return {"bytes": os.fsencode(path).hex()}
+    return text
+
+
+def _decode_path(encoded: Any) -> Path:
+    """Return the path; raise TypeError, ValueError or KeyError if it is none."""
+    if isinstance(encoded, dict):
+        return Path(os.fsdecode(bytes.fromhex(encoded["bytes"])))
+    return Path(encoded)
 
 
 def _places(folder: Path | None) -> list[Path]:

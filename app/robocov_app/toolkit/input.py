@@ -1,5 +1,6 @@
 """Names of keys, events without control characters, and the state of the mouse that every window keeps."""
 
+import math
 from contextlib import suppress
 
 import pygame
@@ -45,8 +46,11 @@ def key_words(key: str) -> str:
 
 
 def wheel_notches(event: pygame.event.Event) -> float:
-    """Return by how many notches the wheel was turned; touch pads turn it by parts of one."""
-    return float(min(max(getattr(event, "precise_y", event.y) or event.y, -5.0), 5.0))
+    """Return the number of notches that the wheel was turned by; touch pads turn it by fractions of one."""
+    notches = float(getattr(event, "precise_y", event.y) or event.y)
+    if not math.isfinite(notches):
+        notches = float(event.y)
+    return min(max(notches, -5.0), 5.0)
 
 
 _cursor = pygame.SYSTEM_CURSOR_ARROW

@@ -660,9 +660,14 @@ class Ui:
 
     def dropdown(self, key: str, options: Sequence[str], now: str, *, tip: str = "") -> str | None:
         rect = self.cell()
-        picked = self.open_list.picked if self.open_list is not None and self.open_list.key == key else None
-        if picked is not None:
-            self.open_list = None
+        picked: str | None = None
+        if self.open_list is not None and self.open_list.key == key:
+            picked = self.open_list.picked
+            is_old = self.open_list.options != list(options)  # what there is to choose has changed meanwhile
+            if picked is not None or is_old:
+                self.open_list = None
+            if picked not in options:
+                picked = None
         opened = self._clicks("menu", key, rect, now, now, tip, "") or self._key(key) == "down"
         if opened and picked is None:
             row = self.px(LIST_ROW)

@@ -29,6 +29,7 @@ from robocov_app.toolkit.termination import is_ending
 FPS = 60  # frames per second while something moves
 CALM = 0.8  # seconds of peace after which the loop waits for events; tool tips appear earlier
 PAUSE = 0.1  # seconds between two looks for something new, at most, while it waits
+_LEAST_SIZE = (320, 240)  # pixels, of what is drawn, however small the window is
 _MAX_FAULTS_IN_A_ROW = 5  # of updating or drawing; after that it is tried again only now and then:
 _RETRY_S = 1.0
 
@@ -143,7 +144,7 @@ class BaseWindow:
         self._touched = bool(events)
         for event in events:
             if event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
-                self.screen = pygame.display.get_surface() or self.screen
+                self.adopt_display()
             self._take_safely(event)
         if self.closed:
             return
@@ -226,6 +227,28 @@ class BaseWindow:
         """Draw a message alone, over what was drawn before drawing failed."""
         width, height = self.screen.get_size()
         draw_message(self.screen, message, (0, 0, width, height), LIGHT, 1.0, trouble=True)
+        self.show_screen()
+
+    def adopt_display(self) -> None:
+        """Draw on the display from now on; if that is tiny, on a larger surface of which it shows a part.
+
+        Window managers that tile may make a window as small as a pixel, in which nothing can be laid out.
+        """
+        found = pygame.display.get_surface()
+        if found is None:
+            return
+        width, height = found.get_size()
+        least_width, least_height = _LEAST_SIZE
+        if width < least_width or height < least_height:
+            self.screen = Surface((max(width, least_width), max(height, least_height)), 0, 32)
+        else:
+            self.screen = found
+
+    def show_screen(self) -> None:
+        """Show what was drawn."""
+        shown = pygame.display.get_surface()
+        if shown is not None and shown is not self.screen:
+            shown.blit(self.screen, (0, 0))
         pygame.display.flip()
 
     def toggle_fullscreen(self) -> None:

@@ -13,6 +13,7 @@ from robocov.mapfile import bundled_maps, load_map, save_map
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit.autosave import Record
 from robocov_app.toolkit.faults import describe_os_error
+from robocov_app.toolkit.opening import require_regular_file
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
@@ -267,6 +268,7 @@ class Presenter:
         self.say(f"session saved: {saved}")
 
     def open_file(self, path: Path) -> None:
+        require_regular_file(path)
         if path.suffix == SUFFIX:
             self.open_session(path)
         else:

@@ -369,7 +369,7 @@ class Window(BaseWindow):
         if self.help:
             draw_keys(self.screen, theme, layout.scale, self.commands.listed, GROUPS, _HINT)
         self.dialogs.draw(self.screen, theme, layout.scale)
-        pygame.display.flip()
+        self.show_screen()
         if self.film is not None:
             self.film.add(self.screen, self._unfilmed)
         self._unfilmed = 0.0

@@ -19,6 +19,7 @@ from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.snapping import Guide
 from robocov_app.editor.tools.tool import KNOB, Handle, Preview
 from robocov_app.render import sprites
+from robocov_app.render.camera import FARTHEST_PIXEL
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry
 from robocov_app.render.theme import Colour, Theme, mix
 from robocov_app.toolkit.overlay import tag
@@ -39,8 +40,12 @@ def problem_colour(theme: Theme, *, grave: bool) -> Colour:
 
 
 def pixels(canvas: Canvas, points: Iterable[Point]) -> Array:
-    """Return the pixels of points in metres, (k, 2)."""
-    return canvas.camera.to_pixels(np.array(list(points), dtype=float).reshape(-1, 2))
+    """Return the pixels of points in metres, (k, 2).
+
+    A draft may hold any number. What has no place, as the middle of an endless box, is far away.
+    """
+    found = canvas.camera.to_pixels(np.array(list(points), dtype=float).reshape(-1, 2))
+    return np.nan_to_num(found, nan=-FARTHEST_PIXEL)
 
 
 def _ring(canvas: Canvas, at: Point, radius: float, colour: Colour, width: float) -> None:

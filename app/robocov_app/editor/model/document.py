@@ -1,5 +1,6 @@
 """The map that is open: its history, its file, and the copy that is kept aside."""
 
+import stat
 from collections.abc import Callable, Hashable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -214,8 +215,11 @@ def state_of(before: OnDisk) -> State:
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
+    """Return size and time of change, in ns, of a file; None if there is none, or it is not a regular one."""
     with suppress(OSError, ValueError):
-        return (status := path.stat()).st_size, status.st_mtime_ns
+        status = path.stat()
+        if stat.S_ISREG(status.st_mode):
+            return status.st_size, status.st_mtime_ns
     return None
 
 

@@ -11,6 +11,7 @@ from PIL import Image, UnidentifiedImageError
 
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, map_file
+from robocov.text import remove_controls
 from robocov_app.editor.edits.properties import underlaid
 from robocov_app.editor.model import require
 from robocov_app.editor.model.background import picture_laid
@@ -21,6 +22,7 @@ from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.importing import Imported, Importing
 from robocov_app.formats import EXPORTERS, IMPORTERS, Importer, detect, export_map
 from robocov_app.toolkit.dialogs import Option, file_choice, list_choice
+from robocov_app.toolkit.opening import require_regular_file
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Worker
 
 Act: TypeAlias = Callable[[], object]
@@ -84,6 +86,7 @@ class FileCommands:
         self.editor.dialogs.ask(list_choice("Open a recent or bundled map", lambda: names, chosen))
 
     def open(self, path: Path) -> None:
+        require_regular_file(path)
         own = self.editor.document.path
         if own is not None and own.exists() and path.exists() and path.samefile(own):
             self.reload()
@@ -195,13 +198,19 @@ class FileCommands:
 
 def lay_under(editor: Editor, path: Path) -> None:
     """Put a picture under the map, as wide as the map is, or 20 m."""
+    require_regular_file(path)
     try:
         with Image.open(path) as picture:
             pixels = picture.size
     except (OSError, UnidentifiedImageError, Image.DecompressionBombError, ValueError, SyntaxError):
         raise MapError(f"{path}: not a picture that can be read") from None
     bounds = editor.sketch.bounds
-    laid = picture_laid(_from_map(path, editor.document.path), pixels)
+    name = _from_map(path, editor.document.path)
+    if remove_controls(name) != name:
+        raise MapError(
+            f"{path}: expected a picture whose path is text, got control characters or other bytes"
+        )
+    laid = picture_laid(name, pixels)
     if bounds is not None and editor.sketch.background is None:
         laid = picture_laid(laid.path, pixels, max(bounds[2] - bounds[0], 1.0))
     editor.shown.add("picture")
@@ -219,6 +228,7 @@ def _from_map(path: Path, of: Path | None) -> str:
 
 def opened(path: Path, drafts: Path | None) -> Document | Importer:
     """Return the document of a file; or the format of one that has to be imported."""
+    require_regular_file(path)
     if path.suffix.lower() == SUFFIX and not path.exists():
         return Document.new(drafts, path)
     try:

@@ -213,7 +213,7 @@ class EditorWindow(BaseWindow):
         if self.help:
             draw_keys(self.screen, theme, layout.scale, self.commands.listed, GROUPS, _HINT)
         self.dialogs.draw(self.screen, theme, layout.scale)
-        pygame.display.flip()
+        self.show_screen()
 
     def do(self, name: str) -> None:
         if name == "cancel" and self.help:
@@ -261,7 +261,7 @@ class EditorWindow(BaseWindow):
         trial.close()
         trial.keeper.finish()
         self.trial = self.inner = None
-        self.screen = pygame.display.get_surface() or self.screen
+        self.adopt_display()
         self.windowed = trial.windowed
         editor, viewer = self.editor, trial.viewer
         editor.theme = viewer.theme

@@ -1,0 +1,312 @@
+"""Random events for a window: keys, text, mouse, fingers, files, sizes and focus, as of a clumsy user."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import random
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pygame
+from driven_window import MODIFIERS, key_event
+
+from robocov.mapfile import bundled_maps, load_map, save_map
+from robocov_app.toolkit import clipboard
+from robocov_app.toolkit.window import BaseWindow
+from robocov_app.web import events as page_events
+
+EVENTS_PER_FRAME = 8
+RARE_COMMANDS = {
+    "screenshot": 3,
+    "film": 2,
+    "fullscreen": 4,
+    "save": 6,
+    "save:as": 4,
+    "save:map": 3,
+    "save:run": 0,
+    "export": 4,
+    "more": 10,
+    "tour": 3,
+    "try": 6,
+}
+"""Commands that write files or take long, and how often each is pressed at most."""
+
+SIZES = ((1, 1), (2, 1), (3, 700), (200, 200), (460, 600), (640, 480), (900, 600), (1300, 30), (2000, 700))
+SCALES = (0.25, 0.5, 1.0, 1.0, 1.5, 3.0, 8.0)
+BUTTONS = (1, 1, 1, 1, 1, 2, 3, 3, 4, 5, 8, 20)
+SECONDS = (0.0, 0.001, 0.01, 0.02, 0.05, 0.3)
+STORM_KEYS = ("a", "space", "tab", "return", "escape", "backspace", "delete", "left", "ctrl+z")
+STRANGE_KEYS = (0, 1, 127, pygame.K_CAPSLOCK, pygame.K_F15, 2**30 + 250, -1)
+WORDS = (
+    *("a\x00b", "\x00", "\x1b[31mred", "\r\n", "\u202eabc", "\udcff", "\ud83e", "\u2028", "𝔸 é ñ 中 🤖"),
+    *("nan", "inf", "-inf", "1e309", "-1", "0", "1e-320", "9" * 400, "٣", "½", "1,5", "2 x 3", "@1<45"),
+    *("%s {x}", "..", "/", "~", "~nobody/x", "a/../../b", "C:\\x", "x" * 3000, "robots 3", "seed 9"),
+    *("radius 0.3", "map square", "map nowhere", "controller lloyd", "k_rep nan", "speed 0", "time 1e308"),
+    *(
+        "branch 9",
+        "open .",
+        "open odd.json",
+        "save a\x00b",
+        "grid 0",
+        "move 1e308 1",
+        "rotate nan",
+        "scale 0",
+    ),
+)
+POLYGON = {"kind": "polygon", "vertices": [[0, 0], [1, 1], [0, 1], [1, 0]]}
+CIRCLE: dict[str, Any] = {"kind": "circle", "center": [5, 5], "radius": 0.5}
+MAP: dict[str, Any] = {"format": "robocov-map", "version": 1}
+PASTED = (
+    *(
+        "",
+        " ",
+        "\x00",
+        "{",
+        "[" * 2000,
+        "[[0,0],[1,0],[1,1]]",
+        "[[0,0],[1,0]]",
+        "[null]",
+        "NaN",
+        "x" * 50_000,
+    ),
+    '{"kind": "circle", "center": [5, 5], "radius": 0.4, "note": "a\\u0000b\\ud800"}',
+    "\udcff" * 10,
+    *map(json.dumps, (POLYGON, [POLYGON, CIRCLE], {"kind": "circle"}, CIRCLE | {"radius": 1e308})),
+    *map(json.dumps, (CIRCLE | {"name": "a\x00b"}, CIRCLE | {"note": "\x00\x1b"}, MAP | {"name": "\x00"})),
+    json.dumps(MAP | {"format": "robocov-clipboard", "obstacles": [{"kind": "wall", "points": []}]}),
+    json.dumps(MAP | {"name": "odd", "boundary": [[0, 0]], "obstacles": [CIRCLE], "starts": {"": 1}}),
+)
+MESSAGES: tuple[dict[str, Any], ...] = (
+    {"kind": "paste", "text": "a\x00b"},
+    {"kind": "text", "text": "\x00\x1bx"},
+    {"kind": "blur"},
+    {"kind": "leave"},
+    {"kind": "wheel", "x": -1e5, "y": 1e5, "up": 100.0, "right": -100.0},
+    {"kind": "key", "key": "\x00", "down": True},
+    {"kind": "key", "key": "😀", "down": True, "held": 15},
+    {"kind": "move", "x": 1e5, "y": -1e5, "button": 3},
+    {"kind": "button", "button": 3, "down": True, "x": 10.5, "y": 10.2},
+)
+KINDS = (
+    *("WINDOWLEAVE", "WINDOWENTER", "WINDOWFOCUSLOST", "WINDOWFOCUSGAINED", "WINDOWMINIMIZED", "USEREVENT"),
+    *("WINDOWRESTORED", "WINDOWMOVED", "WINDOWSHOWN", "WINDOWHIDDEN", "WINDOWCLOSE", "CLIPBOARDUPDATE"),
+    *("DROPBEGIN", "DROPCOMPLETE", "KEYMAPCHANGED", "LOCALECHANGED", "AUDIODEVICEREMOVED", "WINDOWEXPOSED"),
+    *("RENDER_TARGETS_RESET", "APP_LOWMEMORY", "APP_TERMINATING", "WINDOWDISPLAYCHANGED", "ACTIVEEVENT"),
+)
+BOMB = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR\x7f\xff\xff\xff\x7f\xff\xff\xff\x08\x02" + bytes(3)
+ODD_FILES: dict[str, bytes] = {
+    "empty.json": b"",
+    "odd.json": b'{"format": "robocov-map", "version": 1, "name": "odd", "boundary": [[0,0],[1,0]]}',
+    "binary.json": bytes(range(256)),
+    "deep.json": b"[" * 5000,
+    "list.json": b"[1, 2]",
+    "nul.json": b'{"format": "robocov-map", "version": 1, "name": "a\\u0000b"}',
+    "new\nline.json": b"{}",
+    "cut.png": b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR",
+    "bomb.png": BOMB,
+    "text.png": b"hello",
+    "x.svg": b"<svg xmlns='http://www.w3.org/2000/svg'><path d='M0 0 L1e400 nan z'/></svg>",
+    "x.dxf": b"0\nSECTION\n",
+    "x.osm": b"<osm><way id='1'/></osm>",
+    "x.wkt": b"POLYGON ((0 0, 1 0",
+    "x.yaml": b"image: [\n",
+    "x.geojson": b'{"type": "Polygon", "coordinates": []}',
+    "x.robocov": b'{"format": "robocov-session", "version": 1}',
+    "x.exe": b"MZ",
+    "no suffix": b"?",
+}
+
+
+def write_odd_files(folder: Path) -> list[str]:
+    """Write files that nobody should drop on a window; return their names, and some of no file."""
+    folder.mkdir()
+    (folder / "folder.json").mkdir()
+    for name, content in ODD_FILES.items():
+        (folder / name).write_bytes(content)
+    save_map(load_map("square"), folder / "fine.json")
+    names = [*ODD_FILES, "fine.json", "folder.json", "missing.json", "missing/x.json"]
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(folder / "pipe.json")
+        os.mkfifo(folder / "pipe.png")
+        (folder / "loop.json").symlink_to(folder / "loop.json")
+        names += ["pipe.json", "pipe.png", "loop.json", "/dev/null", "/dev/zero"]
+    paths = [str(folder / name) for name in names]
+    if os.name == "posix":
+        raw = os.fsencode(folder) + b"/not\xffutf8.json"
+        with open(raw, "wb") as file:  # noqa: PTH123 - a name of bytes
+            file.write((folder / "fine.json").read_bytes())
+        paths.append(os.fsdecode(raw))
+    long_name = "x" * 5000 + ".json"
+    return [*paths, "", ".", "\x00", "a\x00b.json", long_name, *map(str, bundled_maps().values())]
+
+
+class RandomEvents:
+    """Posts events to a window and lets it run.
+
+    Parameters
+    ----------
+    window : BaseWindow
+        Window on a display that nobody sees.
+    folder : Path
+        Folder for odd files, not there yet.
+    seed : int
+        The same seed gives the same events.
+    """
+
+    def __init__(self, window: BaseWindow, folder: Path, seed: int) -> None:
+        self.window = window
+        self.random = random.Random(seed)
+        self.files = write_odd_files(folder)
+        self.page = page_events.Hands()
+        self.at = (5, 5)
+        self.held: list[int] = []
+        self.pressed: dict[str, int] = {}
+
+    def play(self, count: int, after_frame: Callable[[], object] = lambda: None) -> None:
+        """Post `count` events, and run a frame after some of them each time."""
+        kinds: list[tuple[float, Callable[[], None]]] = [
+            (0.24, self.press_key_of_command),
+            (0.05, self.storm_keys),
+            (0.06, self.type_text),
+            (0.02, self.compose_text),
+            (0.04, self.paste),
+            (0.015, self.drop_file),
+            (0.22, self.move),
+            (0.18, self.press_button),
+            (0.05, self.turn_wheel),
+            (0.03, self.touch),
+            (0.02, self.resize),
+            (0.03, self.post_other),
+            (0.02, self.send_message),
+            (0.01, self.quit),
+            (0.005, self.use_palette),
+        ]
+        weights = [weight for weight, _ in kinds]
+        actions = [action for _, action in kinds]
+        for number in range(count):
+            self.random.choices(actions, weights)[0]()
+            if number % EVENTS_PER_FRAME == 0:
+                self.window.frame(self.random.choice(SECONDS))
+                self.window.closed = False
+                after_frame()
+
+    def post(self, kind: int, **content: Any) -> None:
+        pygame.event.post(pygame.event.Event(kind, **content))
+
+    def post_key(self, name: str) -> None:
+        content = key_event(name)
+        self.post(pygame.KEYDOWN, **content)
+        if content["unicode"]:
+            self.post(pygame.TEXTINPUT, text=content["unicode"])
+        if self.random.random() < 0.9:
+            self.post(pygame.KEYUP, **content)
+
+    def press_key_of_command(self) -> None:
+        commands: Any = (self.window.inner or self.window).commands  # type: ignore[attr-defined]
+        pairs = [(command.name, key) for command in commands.listed for key in command.keys]
+        name, key = self.random.choice(pairs)
+        self.pressed[name] = self.pressed.get(name, 0) + 1
+        if self.pressed[name] <= RARE_COMMANDS.get(name, math.inf):
+            self.post_key(key)
+
+    def storm_keys(self) -> None:
+        content = key_event(self.random.choice(STORM_KEYS))
+        for _ in range(self.random.randint(2, 25)):
+            self.post(pygame.KEYDOWN, **content)
+            if content["unicode"]:
+                self.post(pygame.TEXTINPUT, text=content["unicode"])
+        code, mod = self.random.choice(STRANGE_KEYS), self.random.randrange(2**15)
+        self.post(pygame.KEYDOWN, key=code, mod=mod, unicode="\x00", scancode=0)
+
+    def type_text(self) -> None:
+        text = self.random.choice(WORDS)
+        if self.random.random() < 0.5:
+            self.post(pygame.TEXTINPUT, text=text)
+        else:
+            for letter in text[:40]:
+                self.post(pygame.KEYDOWN, key=min(ord(letter), 2**20), mod=0, unicode=letter, scancode=0)
+                self.post(pygame.TEXTINPUT, text=letter)
+        if self.random.random() < 0.6:
+            self.post_key("return")
+
+    def compose_text(self) -> None:
+        self.post(pygame.TEXTEDITING, text=self.random.choice((*WORDS, "", "")), start=0, length=0)
+
+    def paste(self) -> None:
+        clipboard.put(self.random.choice((*PASTED, *WORDS)))
+        self.post_key(self.random.choice(("ctrl+v", "ctrl+shift+v")))
+
+    def drop_file(self) -> None:
+        self.post(pygame.DROPFILE, file=self.random.choice(self.files))
+
+    def choose_place(self) -> tuple[int, int]:
+        width, height = self.window.screen.get_size()
+        dice = self.random.random()
+        if dice < 0.04:
+            return self.random.choice((-(2**15), -1, 0, 10**5)), self.random.choice((-(2**15), -1, 0, 10**5))
+        panel = getattr(self.window.inner or self.window, "panel", None)
+        if dice < 0.45 and panel is not None and panel.ui.shown:
+            box = self.random.choice(list(panel.ui.shown.values())).rect
+            return self.random.randint(box.left, box.right), self.random.randint(box.top, box.bottom)
+        return self.random.randint(-10, width + 10), self.random.randint(-10, height + 10)
+
+    def move(self) -> None:
+        before, self.at = self.at, self.choose_place()
+        rel = self.at[0] - before[0], self.at[1] - before[1]
+        buttons = tuple(int(k in self.held) for k in (1, 2, 3))
+        self.post(pygame.MOUSEMOTION, pos=self.at, rel=rel, buttons=buttons, touch=False)
+
+    def press_button(self) -> None:
+        if self.held and self.random.random() < 0.7:
+            self.post(pygame.MOUSEBUTTONUP, pos=self.at, button=self.held.pop(), touch=False)
+            return
+        self.move()
+        button = self.random.choice(BUTTONS)
+        self.held.append(button)
+        for _ in range(self.random.choice((1, 1, 2))):
+            self.post(pygame.MOUSEBUTTONDOWN, pos=self.at, button=button, touch=False)
+
+    def turn_wheel(self) -> None:
+        amount = self.random.choice((-1, 1, 1, 3, -3, 10**6, -(10**6), 0))
+        precise = self.random.choice((float(amount), 0.0, 1e-9, math.nan, math.inf, -1e30))
+        turned = {"x": 0, "y": amount, "precise_x": 0.0, "precise_y": precise}
+        self.post(pygame.MOUSEWHEEL, **turned, flipped=False, touch=False)
+
+    def touch(self) -> None:
+        kind = self.random.choice((pygame.FINGERDOWN, pygame.FINGERMOTION, pygame.FINGERUP))
+        x, y = self.random.uniform(-1, 2), self.random.uniform(-1, 2)
+        self.post(kind, touch_id=0, finger_id=1, x=x, y=y, dx=0.1, dy=math.nan, pressure=1.0)
+        self.post(pygame.MULTIGESTURE, touch_id=0, x=x, y=y, pinched=math.inf, rotated=0.1, num_fingers=2)
+
+    def resize(self) -> None:
+        size = self.random.choice(SIZES)
+        pygame.display.set_mode(size, pygame.RESIZABLE)
+        kind = self.random.choice((pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED))
+        self.post(kind, size=size, w=size[0], h=size[1], x=size[0], y=size[1])
+        if self.random.random() < 0.3:
+            theme = self.random.choice(("light", "dark"))
+            self.window.suit(self.random.choice(SCALES), theme, panel=self.random.choice((None, True, False)))
+
+    def post_other(self) -> None:
+        pygame.key.set_mods(self.random.choice((0, 0, 0, *MODIFIERS.values())))
+        kind = getattr(pygame, self.random.choice(KINDS), None)
+        if kind is not None:
+            self.post(kind)
+
+    def send_message(self) -> None:
+        message = page_events.MESSAGES.validate_python(self.random.choice(MESSAGES))
+        for event in self.page.events(message):  # type: ignore[arg-type]
+            pygame.event.post(event)
+
+    def quit(self) -> None:
+        """Ask the window to close, and cancel that."""
+        self.post(pygame.QUIT)
+        self.post_key(self.random.choice(("escape", "c")))
+
+    def use_palette(self) -> None:
+        self.post_key("ctrl+k")
+        self.post(pygame.TEXTINPUT, text=self.random.choice(WORDS))
+        self.post_key("return")

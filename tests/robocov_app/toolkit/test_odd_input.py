@@ -1,0 +1,139 @@
+"""Odd sizes, files, numbers and texts, each of which once raised something in a window or held it up."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from pathlib import Path
+
+import pygame
+import pytest
+from driven_editor import opened_editor, sheet
+from driven_window import Driver, opened
+
+from robocov.environment import CircleObstacle
+from robocov_app.editor.edits.create import circle_drawn
+from robocov_app.editor.model.background import Background
+from robocov_app.editor.model.document import Document, recoverable
+from robocov_app.editor.model.selection import Selection
+from robocov_app.toolkit.input import wheel_notches
+from robocov_app.toolkit.worker import LatestWorker
+
+posix_only = pytest.mark.skipif(sys.platform == "win32", reason="pipes and links")
+
+
+@pytest.mark.parametrize("precise", [math.nan, math.inf, -math.inf])
+def test_a_wheel_turned_by_no_number_counts_whole_notches(precise: float) -> None:
+    event = pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=2, precise_x=0.0, precise_y=precise)
+    assert wheel_notches(event) == 2.0
+
+
+def resize(driver: Driver, size: tuple[int, int]) -> None:
+    pygame.display.set_mode(size, pygame.RESIZABLE)
+    driver.post(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1])
+    driver.settle()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (3, 700), (1300, 30)])
+def test_a_tiny_window_shows_a_part_of_a_larger_one(size: tuple[int, int], tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        resize(driver, size)
+        assert pygame.display.get_surface().get_size() == size
+        driver.key("ctrl+k")
+        driver.key("escape")
+        driver.key("f1")
+        resize(driver, (900, 600))
+        assert driver.window.screen is pygame.display.get_surface()
+    with opened_editor(tmp_path) as hands:
+        resize(hands, size)
+        hands.key("ctrl+k")
+        hands.key("escape")
+        hands.key("f5")
+        hands.key("f5")
+        resize(hands, (900, 600))
+        assert hands.window.screen is pygame.display.get_surface()
+
+
+@posix_only
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("suffix", [".json", ".png", ".robocov"])
+def test_a_dropped_pipe_or_circle_of_links_is_refused(suffix: str, tmp_path: Path) -> None:
+    pipe, link = tmp_path / f"pipe{suffix}", tmp_path / f"loop{suffix}"
+    os.mkfifo(pipe)
+    link.symlink_to(link)
+    with opened(tmp_path / "viewer") as driver:
+        for path, expected in ((pipe, "got a pipe or a device"), (link, "got a link to nothing")):
+            driver.post(pygame.DROPFILE, file=str(path))
+            driver.settle()
+            assert expected in driver.viewer.message
+    with opened_editor(tmp_path) as hands:
+        for path, expected in ((pipe, "got a pipe or a device"), (link, "got a link to nothing")):
+            hands.post(pygame.DROPFILE, file=str(path))
+            hands.settle()
+            assert expected in hands.said
+
+
+@posix_only
+@pytest.mark.timeout(60)
+def test_a_picture_that_is_a_pipe_does_not_hold_the_window_up(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "plan.png")
+    sketch = sheet(background=Background("plan.png", (10, 10)))
+    with opened_editor(tmp_path, sketch) as hands:
+        hands.editor.shown.add("picture")
+        hands.window.frame(0.1)
+        assert "got a pipe or a device" in hands.said
+
+
+def test_a_draft_with_an_endless_circle_is_drawn(tmp_path: Path) -> None:
+    sketch = sheet(CircleObstacle((5.0, 5.0), 1e308), CircleObstacle((1e308, -1e308), 0.5))
+    with opened_editor(tmp_path, sketch) as hands:
+        hands.select(*(item.key for item in sketch.obstacles))
+        assert hands.editor.selection == Selection.of(0, 1)
+        hands.window.frame(0.1)
+
+
+def test_an_open_list_whose_names_have_changed_chooses_nothing(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        driver.click(*driver.widget("menu", "map").rect.center)
+        assert driver.window.panel.ui.open_list is not None
+        driver.viewer.open_map("square")
+        driver.key("return")
+        assert driver.viewer.map_name == "square"
+
+
+@posix_only
+def test_a_map_whose_file_name_is_no_text_has_drafts(tmp_path: Path) -> None:
+    path = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9.json"))
+    document = Document.new(tmp_path / "drafts", path)
+    with opened_editor(tmp_path, document=document) as hands:
+        hands.editor.change(circle_drawn(hands.sketch, (5.0, 5.0), 1.0))
+        hands.window.frame(0.1)
+        assert document.flush()
+    (draft,) = recoverable(tmp_path / "drafts")
+    assert draft.path == path and len(draft.sketch().obstacles) == 1
+
+
+def test_a_question_that_cannot_be_sent_is_not_waited_for(capfd: pytest.CaptureFixture[str]) -> None:
+    worker = LatestWorker[object]("slow_service:Slow", "works")
+    try:
+        worker.put(lambda: None)  # functions without a name cannot be sent
+        for _ in range(2000):
+            worker.poll()
+            if not worker.busy:
+                break
+            pygame.time.wait(10)
+        assert not worker.busy and "has ended" in worker.trouble
+    finally:
+        worker.close()
+
+
+def test_a_process_that_cannot_be_started_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(service: str) -> None:
+        raise OSError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr("robocov_app.toolkit.worker.started", refuse)
+    worker = LatestWorker[object]("slow_service:Slow", "works")
+    worker.put(1)
+    assert not worker.busy and worker.poll() is None
+    assert worker.trouble == "the process that works cannot be started: Resource temporarily unavailable"

@@ -1,0 +1,133 @@
+"""Signals end real windows in whatever state, with their drafts written, and without questions."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from called import COMMAND
+from served_window import served
+from x11_hands import MARKS, Hands, invisible_display, run_window
+
+from robocov_app.toolkit.autosave import FOLDER as DRAFTS
+from robocov_app.toolkit.autosave import SERVED_FOLDER
+from robocov_app.toolkit.settings import FOLDER
+
+pytestmark = MARKS
+
+HANG_LIMIT_S = 8.0  # it takes a second at most; machines of tests are busy
+
+
+@pytest.fixture(scope="module")
+def display() -> Iterator[str]:
+    with invisible_display() as number:
+        yield number
+
+
+def environment_in(folder: Path, *, is_cold: bool) -> dict[str, str]:
+    """Return environment variables; with empty caches everything has to be compiled first."""
+    (folder / "settings").mkdir()
+    (folder / "settings/window.json").write_text("{}")  # not the first start, at which a lesson is offered
+    found = {FOLDER: str(folder / "settings"), DRAFTS: str(folder / "drafts")}
+    if is_cold:
+        found |= {"NUMBA_CACHE_DIR": str(folder / "kernels"), "ROBOCOV_CACHE": str(folder / "cache")}
+    return found
+
+
+def end(process: subprocess.Popen[str], number: int) -> None:
+    began = time.monotonic()
+    process.send_signal(number)
+    process.wait(HANG_LIMIT_S)
+    assert time.monotonic() - began < HANG_LIMIT_S
+
+
+def drafts_in(folder: Path) -> list[dict]:
+    return [json.loads(path.read_text()) for path in folder.rglob("draft.json")]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_window_that_compiles_ends(display: str, tmp_path: Path, number: int) -> None:
+    command = [*COMMAND, "demo", "square", "--robots", "3", "--folder", str(tmp_path)]
+    with run_window(display, tmp_path, command, **environment_in(tmp_path, is_cold=True)) as hands:
+        end(hands.process, number)
+
+
+def test_a_served_window_that_compiles_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in environment_in(tmp_path, is_cold=True).items():
+        monkeypatch.setenv(name, value)
+    with served("demo", "square", "--robots", "3", "--folder", str(tmp_path)) as link:
+        end(link.process, signal.SIGTERM)
+
+
+def draw_circle(hands: Hands) -> None:
+    hands.shot()
+    hands.key("c")
+    hands.drag((300, 300), (330, 300), (350, 300))
+    hands.shot()
+
+
+def ask_to_save(hands: Hands) -> None:
+    hands.key("ctrl+q")
+
+
+def choose_a_file(hands: Hands) -> None:
+    hands.key("ctrl+o")
+
+
+def show_palette(hands: Hands) -> None:
+    hands.key("ctrl+k")
+
+
+def drag_something(hands: Hands) -> None:
+    hands.move(400, 400)
+    hands.tool("mousedown", 1)
+    hands.move(430, 430)
+
+
+@pytest.mark.parametrize("act", [ask_to_save, choose_a_file, show_palette, drag_something])
+def test_an_editor_with_a_dialog_ends_and_keeps_its_draft(
+    display: str, tmp_path: Path, act: Callable[[Hands], None]
+) -> None:
+    command = [*COMMAND, "edit", str(tmp_path / "m.json"), "--folder", str(tmp_path), "--size", "1000x640"]
+    with run_window(display, tmp_path, command, **environment_in(tmp_path, is_cold=False)) as hands:
+        draw_circle(hands)
+        act(hands)
+        time.sleep(0.3)
+        assert hands.process.poll() is None
+        end(hands.process, signal.SIGTERM)
+    (draft,) = drafts_in(tmp_path / "drafts")
+    assert len(draft["sketch"]["obstacles"]) == 1
+
+
+def test_a_map_that_is_tried_and_changed_is_kept(display: str, tmp_path: Path) -> None:
+    command = [*COMMAND, "edit", "square", "--folder", str(tmp_path), "--size", "1000x640"]
+    with run_window(display, tmp_path, command, **environment_in(tmp_path, is_cold=False)) as hands:
+        hands.shot()
+        hands.key("F5")
+        time.sleep(1.0)
+        draw_circle(hands)
+        deadline = time.monotonic() + 20.0
+        while not any((draft.get("sketch") or {}).get("obstacles") for draft in drafts_in(tmp_path)):
+            assert time.monotonic() < deadline, "no draft of what was drawn"
+            time.sleep(0.1)
+        hands.process.kill()
+
+
+def test_a_served_editor_with_a_question_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    connect = pytest.importorskip("websockets.sync.client").connect
+    monkeypatch.delenv(DRAFTS)
+    with served("edit", "--folder", str(tmp_path)) as link:
+        place, token = link.split("/?token=")
+        with connect(f"{place.replace('http', 'ws', 1)}/socket?token={token}", proxy=None) as line:
+            line.send(json.dumps({"kind": "page", "width": 900, "height": 700, "ratio": 1.0, "dark": False}))
+            for key, held in (("ctrl+a", 2), ("q", 2)):
+                for down in (True, False):
+                    line.send(json.dumps({"kind": "key", "key": key[-1], "down": down, "held": held}))
+            time.sleep(1.0)
+            end(link.process, signal.SIGTERM)
+    assert not drafts_in(tmp_path / SERVED_FOLDER) or drafts_in(tmp_path / SERVED_FOLDER)

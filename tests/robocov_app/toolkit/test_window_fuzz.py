@@ -1,0 +1,107 @@
+"""Ten thousand random events for each of the two windows: nothing is raised, and the windows can be used."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pygame
+import pytest
+from driven_editor import Hands, opened_editor
+from driven_window import Driver, opened
+from random_events import RandomEvents
+
+from robocov_app.editor.edits.create import circle_drawn
+from robocov_app.editor.model.document import History
+from robocov_app.toolkit.faults import FaultLog
+from robocov_app.toolkit.window import BaseWindow
+
+EVENTS = 10_000
+FEW_EVENTS = 150
+SEED = 1
+
+
+def contain_faults(window: BaseWindow, folder: Path) -> FaultLog:
+    """Let a window go on after a fault, so that one run finds all of them."""
+    window.contains_faults = True
+    window.faults = FaultLog(folder / "faults")
+    return window.faults
+
+
+def assert_no_fault(log: FaultLog) -> None:
+    assert log.file is not None
+    assert log.count == 0, log.file.read_text()
+
+
+def play_editor(folder: Path, seed: int, events: int) -> FaultLog:
+    with opened_editor(folder, drafts=folder / "drafts") as hands:
+        log = contain_faults(hands.window, folder)
+        fuzz = RandomEvents(hands.window, folder / "odd", seed)
+
+        def stay_open() -> None:
+            hands.window.documents.leaving = False
+
+        fuzz.play(events, stay_open)
+        leave_everything(hands)
+        history: History = hands.editor.document.history
+        before = history.sketch
+        hands.editor.change(circle_drawn(history.sketch, (1.0, 1.0), 0.25))
+        hands.key("ctrl+z")
+        assert history.sketch == before
+    return log
+
+
+def play_viewer(folder: Path, seed: int, events: int) -> FaultLog:
+    with opened(folder, lattice=4, robots=2) as driver:
+        log = contain_faults(driver.window, folder)
+        fuzz = RandomEvents(driver.window, folder / "odd", seed)
+
+        def keep_small() -> None:
+            session, viewer = driver.session, driver.viewer
+            is_large = len(session.numbers) > 6 or len(session.environment.obstacles) > 20
+            if is_large or session.scenario.robots > 6:
+                viewer.attempt(lambda: viewer.open_map("square"))
+                viewer.attempt(lambda: viewer.restart(robots=2))
+
+        fuzz.play(events, keep_small)
+        leave_everything(driver)
+        for pane in driver.session.panes:
+            assert np.isfinite(pane.simulation.positions).all()
+        driver.key("ctrl+k")
+        assert driver.window.dialogs.open
+    return log
+
+
+def leave_everything(driver: Driver | Hands) -> None:
+    """Release what is held, end what is going on, and give the window its usual size."""
+    pygame.event.clear()
+    pygame.key.set_mods(0)
+    for button in (1, 2, 3):
+        driver.release(button)
+    pygame.display.set_mode((900, 600), pygame.RESIZABLE)
+    driver.post(pygame.VIDEORESIZE, size=(900, 600), w=900, h=600)
+    driver.post(pygame.WINDOWFOCUSLOST)
+    driver.window.suit(1.0, "light", panel=True)
+    for _ in range(8):
+        driver.key("escape")
+        driver.window.closed = False
+
+
+def test_the_editor_bears_some_random_events(tmp_path: Path) -> None:
+    assert_no_fault(play_editor(tmp_path, SEED + 1, FEW_EVENTS))
+
+
+def test_the_viewer_bears_some_random_events(tmp_path: Path) -> None:
+    assert_no_fault(play_viewer(tmp_path, SEED + 1, FEW_EVENTS))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(500)
+def test_the_editor_bears_ten_thousand_random_events(tmp_path: Path) -> None:
+    assert_no_fault(play_editor(tmp_path, SEED, EVENTS))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(500)
+def test_the_viewer_bears_ten_thousand_random_events(tmp_path: Path) -> None:
+    assert_no_fault(play_viewer(tmp_path, SEED, EVENTS))
