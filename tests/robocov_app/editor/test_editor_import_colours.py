@@ -1,0 +1,205 @@
+"""Colours in the import dialogue: by a click, by the keyboard, with a live preview."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from driven_editor import Hands, opened_editor, sheet
+from PIL import Image, ImageDraw
+
+from robocov_app.editor.ui.import_dialog import ImportDialog
+from robocov_app.editor.ui.import_sheet import declared_colours, find_role, give_role, make_sheet, next_role
+from robocov_app.editor.ui.importing import Importing
+from robocov_app.formats import IMPORTERS, ReadOptions
+from robocov_app.toolkit.worker import DirectWorker
+
+SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="10000mm" height="6000mm" viewBox="0 0 10 6">
+<rect width="10" height="6" fill="#c8c8c8"/>
+<path d="M0 0H10V6H0Z M5 0V4" fill="none" stroke="#000" stroke-width="0.2"/>
+<rect x="1" y="1" width="3" height="2" fill="#e0e0ff"/></svg>"""
+ROOM = 9.8 * 5.8 - 0.2 * 3.9
+RUG = (2.5, 4.0)  # a place on it, m
+
+
+@pytest.fixture
+def drawing(tmp_path: Path) -> Path:
+    (tmp_path / "plan.svg").write_text(SVG)
+    return tmp_path / "plan.svg"
+
+
+def dialog(path: Path, kind: str = "svg") -> ImportDialog:
+    asked = ImportDialog(path, IMPORTERS[kind], DirectWorker(Importing()), lambda _: None)
+    asked.poll()
+    return asked
+
+
+def free_area(asked: ImportDialog) -> float:
+    asked.poll()
+    assert asked.imported is not None and asked.trouble == ""
+    return asked.imported.environment.free_area
+
+
+def test_a_colour_goes_through_its_roles_and_back(drawing: Path) -> None:
+    asked = dialog(drawing)
+    assert free_area(asked) == pytest.approx(ROOM - 6)
+    for role, area in (("free", ROOM), ("solid", ROOM - 6), ("ignore", ROOM), (None, ROOM - 6)):
+        asked.cycle_colour((224, 224, 255))
+        assert find_role(asked.given, (224, 224, 255)) == role
+        assert free_area(asked) == pytest.approx(area)
+        # what is left out can still be clicked
+        assert asked.imported is not None and asked.imported.sheet is not None
+        assert asked.imported.sheet.find_colour(*RUG) == (224, 224, 255)
+    assert asked.given == {}
+
+
+def test_what_was_typed_stays_beside_what_is_clicked() -> None:
+    given = {"free_colour": "red, lightblue", "cell": "1"}
+    give_role(given, (0, 0, 255), "free")
+    assert given == {"free_colour": "red, lightblue, #0000ff", "cell": "1"}
+    give_role(given, (255, 0, 0), "solid")
+    assert given == {"free_colour": "lightblue, #0000ff", "solid_colour": "#ff0000", "cell": "1"}
+    assert declared_colours(given) == [(173, 216, 230), (0, 0, 255), (255, 0, 0)]
+    give_role(given, (255, 0, 0), None)
+    assert "solid_colour" not in given
+    # half a name is no colour yet
+    given["free_colour"] = "lightbl"
+    assert declared_colours(given) == []
+    assert next_role(next_role(next_role(next_role(None)))) is None
+
+
+def test_the_topmost_shape_is_the_one_that_is_clicked(drawing: Path) -> None:
+    found = make_sheet(IMPORTERS["svg"].read(drawing, ReadOptions()))
+    assert found is not None
+    assert found.colours == ((200, 200, 200), (0, 0, 0), (224, 224, 255))
+    assert found.find_colour(*RUG) == (224, 224, 255)
+    assert found.find_colour(5.0, 5.0) == (0, 0, 0)
+    assert found.find_colour(8.0, 1.0) == (200, 200, 200)
+    assert found.find_colour(-1.0, 1.0) is None
+
+
+def picture(folder: Path) -> Path:
+    """A plan whose edges are soft, with a pale blue rug and a red line."""
+    large = Image.new("RGB", (800, 480), "white")
+    draw = ImageDraw.Draw(large)
+    draw.rectangle((0, 0, 799, 479), outline="black", width=16)
+    draw.rectangle((83, 83, 322, 242), fill="#a0c0ff")
+    draw.line((0, 350, 799, 350), fill="red", width=8)
+    large.resize((200, 120), Image.Resampling.LANCZOS).save(folder / "plan.png")
+    return folder / "plan.png"
+
+
+def test_colours_of_a_picture_are_those_that_were_meant(tmp_path: Path) -> None:
+    found = make_sheet(IMPORTERS["picture"].read(picture(tmp_path), ReadOptions(cell=0.1)))
+    assert found is not None
+    names = {(255, 255, 255), (160, 192, 255), (0, 0, 0), (255, 0, 0)}
+    assert set(found.colours) == names
+    assert found.find_colour(5.0, 8.0) == (160, 192, 255)
+    assert found.find_colour(5.0, 12.0 - 35.0 / 4) == (255, 0, 0)
+    assert found.find_colour(25.0, 5.0) is None and found.find_colour(5.0, -0.01) is None
+    asked = dialog(picture(tmp_path), "picture")
+    asked.set("cell", "0.1")
+    split = free_area(asked)
+    asked.cycle_colour((255, 0, 0))
+    assert find_role(asked.given, (255, 0, 0)) == "free"
+    assert free_area(asked) > split + 50
+
+
+def test_a_map_without_colours_has_no_sheet(tmp_path: Path) -> None:
+    foreign = IMPORTERS["svg"].read(dialog_file(tmp_path), ReadOptions())
+    assert make_sheet(foreign) is not None
+    path = tmp_path / "plan.wkt"
+    path.write_text(shapely.box(0, 0, 5, 5).wkt)
+    asked = dialog(path, "wkt")
+    assert free_area(asked) == pytest.approx(25.0)
+    assert asked.imported is not None and asked.imported.sheet is None and not asked.has_colours
+
+
+def dialog_file(folder: Path) -> Path:
+    path = folder / "plan.svg"
+    path.write_text(SVG)
+    return path
+
+
+@pytest.fixture(params=[("light", (900, 600)), ("dark", (1280, 720))])
+def hands(request: Any, tmp_path: Path) -> Iterator[Hands]:
+    theme, size = request.param
+    dialog_file(tmp_path)
+    with opened_editor(tmp_path, sheet(), theme=theme, size=size) as driver:
+        driver.key("ctrl+o")
+        driver.type("plan.svg")
+        driver.key("return")
+        driver.frames(3)
+        yield driver
+
+
+def shown(hands: Hands) -> tuple[ImportDialog, Any]:
+    hands.frames(2)
+    asked = hands.editor.dialogs.asked
+    assert isinstance(asked, ImportDialog)
+    return asked, hands.window.dialogs._ui.shown
+
+
+def pixel(hands: Hands, point: Any) -> tuple[int, ...]:
+    x, y = (round(value) for value in point)
+    return tuple(hands.window.screen.get_at((x, y)))[:3]
+
+
+def test_a_click_on_the_preview_changes_a_colour_and_the_preview(hands: Hands) -> None:
+    asked, widgets = shown(hands)
+    hands.click(*widgets["button:clicks:colour"].rect.center)
+    asked, widgets = shown(hands)
+    before, after = (camera.to_pixels(np.array(RUG)) for camera in asked.cameras)
+    assert pixel(hands, before) == (224, 224, 255)
+    solid = pixel(hands, after)
+    hands.click(*before.tolist())
+    asked, widgets = shown(hands)
+    assert asked.given == {"free_colour": "#e0e0ff"}
+    # the rows of colours are in sight, and do not move the maps
+    chip = widgets["button:colour:#e0e0ff"]
+    assert chip.text.strip() == "free"
+    assert pixel(hands, asked.cameras[1].to_pixels(np.array(RUG))) != solid
+    # a click into the right map still keeps a part
+    hands.click(*asked.cameras[1].to_pixels(np.array((8.0, 1.0))).tolist())
+    asked, _ = shown(hands)
+    assert [float(word) for word in asked.given["inside"].split()] == pytest.approx((8.0, 1.0), abs=0.1)
+
+
+def test_colours_are_reached_by_the_keyboard(hands: Hands) -> None:
+    shown(hands)
+    ui = hands.window.dialogs._ui
+    for _ in range(60):
+        if ui.focus == "clicks:colour":
+            break
+        hands.key("tab")
+        hands.frames(1)
+    assert ui.focus == "clicks:colour"
+    hands.key("space")
+    hands.frames(2)
+    for _ in range(10):
+        if ui.focus == "colour:#e0e0ff":
+            break
+        hands.key("tab")
+        hands.frames(1)
+    hands.key("space")
+    asked, _ = shown(hands)
+    assert asked.given == {"free_colour": "#e0e0ff"}
+    assert ui.focus is not None and ui.focus == "colour:#e0e0ff"
+    hands.key("space")
+    asked, _ = shown(hands)
+    assert asked.given == {"solid_colour": "#e0e0ff"}
+
+
+def test_the_report_is_in_sight(hands: Hands) -> None:
+    asked, _ = shown(hands)
+    foot = max(camera.view[1] + camera.view[3] for camera in asked.cameras)
+    left = round(asked.cameras[0].view[0])
+    lines = np.array(
+        [
+            [hands.window.screen.get_at((x, y))[:3] for x in range(left, left + 120)]
+            for y in range(round(foot) + 8, round(foot) + 60)
+        ]
+    )
+    assert len(np.unique(lines.reshape(-1, 3), axis=0)) > 5
