@@ -59,6 +59,8 @@ TITLE = "Title"  # key of the text chunk with the name of what is shown
 _NOISE = 1.5  # single cells beside dark ones come of how a JPEG is saved
 _THUMBNAIL = 640  # pixels of the longer side of a thumbnail, at most, but for pictures beyond all measure
 _FEW_LIGHT = 0.02  # light pixels for each dark one, at most, of a drawing without paper: soft edges
+_FEW_LINES = 0.25  # of the pixels: lines that are walls cover less
+_LINE_SHARE = 0.05  # of the shorter side of a picture: no line is as wide
 _NO_KEY = ColourKey()
 _OPAQUE = 128  # less opaque pixels count as transparent, of 255
 
@@ -441,6 +443,15 @@ def _drop_strokes(cells: Cells, options: ReadOptions, cell: float, where: str) -
     return (f"{what} in {counted(pieces, 'piece')}, {area} (--min-stroke)",)
 
 
+def _is_line_drawing(cells: Cells) -> bool:
+    """Return whether what is free are thin lines on a dark ground, as in a blueprint."""
+    free = cells == FREE
+    if not 0.0 < free.mean() < _FEW_LINES:
+        return False
+    width = min(max(round(_LINE_SHARE * min(cells.shape)), 3), MAX_STROKE_PIXELS)
+    return not remove_thin_strokes(free, width).any()
+
+
 def _require_both(
     cells: Cells,
     unknown: str,
@@ -467,6 +478,9 @@ def _require_both(
             f"nothing is solid: {share:.3g} % of the pixels are transparent (less than half opaque), "
             "which --unknown free takes as free"
         )
+    elif _is_line_drawing(cells):
+        part = f"only {100 * counts[FREE] / cells.size:.2g} % of the pixels are light, all of them thin lines"
+        notes.append(f"{part}: if they are the walls, --invert takes them as such")
     elif not counts[BLOCKED] and not counts[UNKNOWN]:
         least = picture.level.min() / picture.full
         notes.append(f"nothing is solid: the darkest pixel has a brightness of {least:.2g} (--threshold)")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageOps
 
 from robocov.errors import MapError, ParameterError
 from robocov_app.formats import ForeignMap, ImportReport, ReadOptions, Shaping, import_map
@@ -204,3 +204,24 @@ def test_brightness_is_named_where_all_is_solid_or_free(tmp_path: Path) -> None:
         imported(tmp_path, picture)
     _, report, _ = imported(tmp_path, Image.new("L", (30, 30), 204))
     assert any("the darkest pixel has a brightness of 0.8" in note for note in report.notes)
+
+
+def test_light_lines_on_a_dark_ground_are_named(tmp_path: Path) -> None:
+    blueprint = ImageOps.invert(flat())
+    ImageDraw.Draw(blueprint).line((100, 41, 100, 79), fill="white", width=3)
+    _, report, _ = imported(tmp_path, blueprint)
+    assert any("if they are the walls, --invert takes them as such" in note for note in report.notes)
+    # rooms amid dark rock are no lines
+    rooms = Image.new("L", (200, 120), 0)
+    ImageDraw.Draw(rooms).rectangle((20, 20, 59, 59), fill=255)
+    _, report, _ = imported(tmp_path, rooms)
+    assert not any("--invert" in note for note in report.notes)
+
+
+def test_a_thin_frame_at_the_edge_is_dropped_as_other_strokes(tmp_path: Path) -> None:
+    picture = flat()
+    ImageDraw.Draw(picture).rectangle((0, 0, 199, 119), outline="black")
+    assert imported(tmp_path, picture)[0] > 200.0
+    area, report, _ = imported(tmp_path, picture, min_stroke="2px")
+    assert area == pytest.approx(7.4 * 3.4 - 0.2 * 2.2, abs=0.1)
+    assert any("paper around a plan" in note for note in report.notes)

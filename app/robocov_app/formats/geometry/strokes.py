@@ -42,12 +42,12 @@ def remove_thin_strokes(solid: BoolArray, width: int) -> BoolArray:
 
 
 def _open(solid: BoolArray, width: int, *, above: bool, below: bool) -> BoolArray:
-    # what touches the edge of the picture goes on beyond it
+    # a frame along the edge of the picture is thin, too
     margin = ((width if above else 0, width if below else 0), (width, width))
-    padded = np.pad(solid, margin, mode="edge")
+    padded = np.pad(solid, margin)
     # a disc around the corner of four cells has an even width: a square of four, then a disc around a cell
     is_even = width % 2 == 0
-    core = ndimage.binary_erosion(padded, _SQUARE, border_value=1) if is_even else padded
+    core = ndimage.binary_erosion(padded, _SQUARE) if is_even else padded
     radius = (width - is_even - 1) / 2
     core = _distance(core) > radius
     opened = _distance(~core) <= radius
