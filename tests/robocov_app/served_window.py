@@ -15,9 +15,9 @@ class Link(str):
 
 
 @contextmanager
-def served(command: str, *arguments: str, **how: object) -> Iterator[Link]:
-    """Serve a window at any free port, and give its link; `how`: more for the process."""
-    call = [sys.executable, "-m", "robocov_app", command, *arguments, "--serve", "--port", "0"]
+def served(command: str, *arguments: str, port: int = 0, **how: object) -> Iterator[Link]:
+    """Serve a window, by default at any free port, and give its link; `how`: more for the process."""
+    call = [sys.executable, "-m", "robocov_app", command, *arguments, "--serve", "--port", str(port)]
     environment = {**os.environ, "PYTHONUNBUFFERED": "1", "ROBOCOV_SETTINGS": ""}
     process = subprocess.Popen(call, stdout=subprocess.PIPE, env=environment, text=True, **how)
     try:

@@ -156,6 +156,7 @@ class Listener:
         if response is not None:
             if len(response.body) > WRITE_LIMIT_BYTES:
                 self._on_answered(connection)
+                connection.close_timeout = RESPONSE_TIMEOUT_S
                 loop = asyncio.get_running_loop()
                 loop.call_later(RESPONSE_TIMEOUT_S, connection.transport.abort)
             if method == "HEAD":
