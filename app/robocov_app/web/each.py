@@ -255,7 +255,10 @@ class Sessions:
         visitor = read_id(self._visitor_token(request))
         session = await self._find_or_start(visitor)
         if session is None:
-            text = f"All {self._max_sessions} windows are in use. Trying again …"
+            taken = (
+                f"All {self._max_sessions} windows are" if self._max_sessions > 1 else "The only window is"
+            )
+            text = f"{taken} in use. Trying again …"
             await connection.close(TRY_AGAIN_LATER, text)
             return
         session.n_pages += 1

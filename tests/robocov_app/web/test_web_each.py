@@ -65,11 +65,12 @@ def press(line, key, held=0):
 
 
 def close_of(line):
-    """Return the code and the reason with which a page's socket is closed."""
+    """Return the code and the reason with which a page's socket is closed; None without a goodbye."""
     with pytest.raises(ConnectionClosed) as closed:
         while True:
             line.recv(PATIENCE_S)
-    return closed.value.rcvd.code, closed.value.rcvd.reason
+    received = closed.value.rcvd
+    return received and (received.code, received.reason)
 
 
 def wait_until(condition):
@@ -209,6 +210,17 @@ def test_a_signal_ends_all_windows_without_a_traceback(tmp_path, starting, numbe
                 assert link.process.wait(10) == 130
         assert link.process.stderr.read() == "robocov: stopped\n"
         link.process.stderr.close()
+        wait_until(lambda: not any(map(alive, pids)))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
+def test_windows_do_not_outlive_a_server_that_is_killed(tmp_path):
+    options = ("--paused", "--each", "--folder", str(tmp_path))
+    with served("demo", "rooms", *options, start_new_session=True) as link, Visitor().page(link) as line:
+        first_frame(line)
+        pids = children(link.process)
+        link.process.kill()
+        assert close_of(line) is None
         wait_until(lambda: not any(map(alive, pids)))
 
 

@@ -1,0 +1,199 @@
+"""Windows of visitors: who gets a place, who gives one back, and which folder is whose."""
+
+import asyncio
+import json
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("websockets")
+
+from robocov.errors import InputError
+from robocov_app.web import each
+from robocov_app.web.each import Sessions, Window
+from robocov_app.web.visitors import FILE_NAME, VisitorFolders, create_id, is_signed, read_id, sign
+
+
+class Process:
+    """A process that ends when it is asked to."""
+
+    def __init__(self):
+        self.lives = True
+
+    def is_alive(self):
+        return self.lives
+
+    def terminate(self):
+        self.lives = False
+
+    kill = terminate
+
+
+class FakeSessions(Sessions):
+    """Windows without processes."""
+
+    def __init__(self, folder, max_sessions, max_idle_s=600.0):
+        super().__init__(lambda _: 0, SimpleNamespace(folder=folder), max_sessions, max_idle_s)
+        self.opened = []
+        self.trouble = None
+
+    async def _open(self, folder):
+        await asyncio.sleep(0)
+        if self.trouble is not None:
+            raise self.trouble
+        window = Window(Process(), folder, port=1, token="")
+        self.opened.append(window)
+        return window
+
+    async def visit(self, visitor, *, leaves=True):
+        """Open a page, and close it; return the window, or None without a place."""
+        session = await self._find_or_start(visitor)
+        if session is None:
+            return None
+        window = await asyncio.shield(session.opening)
+        session.n_pages += not leaves
+        return window
+
+    def pass_time(self, visitor, seconds):
+        self._sessions[visitor].unwatched_since -= seconds
+
+
+ADA, BEN, CLEO = (letter * 24 for letter in "abc")
+
+
+def test_a_visitor_comes_back_to_their_window(tmp_path):
+    async def visits():
+        sessions = FakeSessions(tmp_path, 2)
+        windows = await asyncio.gather(*(sessions.visit(ADA) for _ in range(5)))
+        assert len({id(window) for window in windows}) == len(sessions.opened) == 1
+        assert (await sessions.visit(BEN)).folder != windows[0].folder
+
+    asyncio.run(visits())
+
+
+def test_a_place_is_given_back_when_nobody_has_looked_for_a_minute_and_somebody_waits(tmp_path):
+    async def visits():
+        sessions = FakeSessions(tmp_path, 2)
+        hers = await sessions.visit(ADA)
+        his = await sessions.visit(BEN, leaves=False)
+        assert await sessions.visit(CLEO) is None
+        sessions.pass_time(ADA, each.MIN_IDLE_S / 2)
+        sessions.pass_time(BEN, 1e6)
+        assert await sessions.visit(CLEO) is None
+        sessions.pass_time(ADA, each.MIN_IDLE_S)
+        assert await sessions.visit(CLEO) is not None
+        assert (hers.process.lives, his.process.lives) == (False, True)
+        sessions.pass_time(CLEO, 1e6)
+        again = await sessions.visit(ADA)
+        assert again is not hers
+        assert again.folder == hers.folder
+
+    asyncio.run(visits())
+
+
+def test_a_window_that_nobody_looks_at_is_ended(tmp_path):
+    async def visits():
+        sessions = FakeSessions(tmp_path, 3, max_idle_s=100.0)
+        hers = await sessions.visit(ADA)
+        his = await sessions.visit(BEN)
+        for seconds, lives in ((99.0, True), (2.0, False)):
+            sessions.pass_time(ADA, seconds)
+            sessions._look_after()
+            await asyncio.sleep(0.1)
+            assert (hers.process.lives, his.process.lives) == (lives, True)
+        assert list(sessions._sessions) == [BEN]
+
+    asyncio.run(visits())
+
+
+def test_a_window_that_ended_by_itself_gives_its_place_back_at_once(tmp_path):
+    async def visits():
+        sessions = FakeSessions(tmp_path, 1)
+        for visitor in (ADA, BEN, BEN, ADA):
+            window = await sessions.visit(visitor, leaves=False)
+            window.process.lives = False
+        assert len(sessions.opened) == 4
+
+    asyncio.run(visits())
+
+
+def test_a_window_that_does_not_open_takes_no_place(tmp_path):
+    async def visits():
+        sessions = FakeSessions(tmp_path, 1)
+        sessions.trouble = InputError("no")
+        for _ in range(3):
+            with pytest.raises(InputError):
+                await sessions.visit(ADA)
+            sessions._look_after()
+        sessions.trouble = None
+        assert await sessions.visit(BEN) is not None
+
+    asyncio.run(visits())
+
+
+def test_a_visitor_who_is_known_takes_the_place_of_the_window_that_is_kept_ready(tmp_path):
+    async def visits():
+        sessions = FakeSessions(tmp_path, 1)
+        folder = (await sessions.visit(ADA)).folder
+        later = FakeSessions(tmp_path, 1)
+        later._spare = spare = await later._open(later._folders.create())
+        assert (await later.visit(ADA)).folder == folder
+        assert not spare.process.lives
+        assert not spare.folder.exists()
+
+    asyncio.run(visits())
+
+
+def test_folders_are_of_one_visitor_each_also_after_a_restart(tmp_path):
+    (tmp_path / "session-1").mkdir()  # that of nobody knows whom
+    before = VisitorFolders(tmp_path)
+    assert before.find(ADA) is None
+    before.assign(ADA, before.create())
+    again = VisitorFolders(tmp_path)
+    assert again.cookie == before.cookie
+    assert again.find(ADA) == tmp_path / "session-2"
+    again.assign(BEN, again.create())
+    assert again.find(BEN) == tmp_path / "session-3"
+    before.assign(CLEO, before.create())  # both at the same time
+    assert VisitorFolders(tmp_path).find(BEN) == tmp_path / "session-3"
+    assert ADA not in (tmp_path / FILE_NAME).read_text()
+    (tmp_path / "session-2").rmdir()
+    assert VisitorFolders(tmp_path).find(ADA) is None
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "{",
+        "[]",
+        "null",
+        '{"cookie": 5, "visitors": []}',
+        '{"cookie": "a\\r\\nb: c", "visitors": {"a": 5}}',
+    ],
+)
+def test_a_broken_list_of_visitors_is_no_trouble(tmp_path, content):
+    (tmp_path / FILE_NAME).write_text(content)
+    folders = VisitorFolders(tmp_path)
+    assert folders.cookie.removeprefix("robocov-").isalnum()
+    folders.assign(ADA, folders.create())
+    assert VisitorFolders(tmp_path).find(ADA)
+
+
+@pytest.mark.parametrize("name", ["../elsewhere", "/etc", "session-1/..", "session-", "session-1/../..", ""])
+def test_no_list_of_visitors_leads_elsewhere(tmp_path, name):
+    folders = VisitorFolders(tmp_path)
+    folders.assign(ADA, folders.create())
+    content = json.loads((tmp_path / FILE_NAME).read_text())
+    content["visitors"] = dict.fromkeys(content["visitors"], name)
+    (tmp_path / FILE_NAME).write_text(json.dumps(content))
+    assert VisitorFolders(tmp_path).find(ADA) is None
+
+
+def test_tokens_of_visitors_are_known_by_the_server_that_let_them_in():
+    visitor = create_id()
+    token = sign(visitor, "key")
+    assert read_id(token) == visitor
+    assert is_signed(token, "key")
+    for wrong in (sign(visitor, "other"), visitor, f"{visitor}.", token + "x", token[1:], "", ".", "ä." * 9):
+        assert not is_signed(wrong, "key")
