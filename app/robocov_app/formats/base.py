@@ -21,7 +21,8 @@ Primitive: TypeAlias = CircleObstacle | WallObstacle
 _LENGTH = (1e-6, 1e4, "m")
 _STROKE = re.compile(r"(\d{1,6}(?:\.\d{0,9})?|\.\d{1,9})\s*(px|m)?", re.ASCII)
 _KEYS = {name: f"{name}_m" for name in ("size", "tolerance", "moved")} | {"others": "other_parts_m"}
-_KEYS |= {name: f"{name}_m2" for name in ("area", "area_read", "area_kept", "area_written", "moved_area")}
+_AREAS = ("area", "area_read", "area_kept", "area_written", "moved_area", "removed_area")
+_KEYS |= {name: f"{name}_m2" for name in _AREAS}
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +56,7 @@ class ForeignMap:
     `free`, m, y up: may be invalid, empty, of many parts, and stick out of `boundary`. `boundary`, m: what is
     inside of it and not free becomes obstacles; without it, or where walls separate the free space from it,
     the outline of the free space is the boundary. `has_named_boundary`: it stays even there.
+    `boundary_source`: what the boundary is, for the report.
     `vertices_read`: of a raster, corners of the outline of its free cells. `cell`, m: the longer side of one.
     `specks`, m²: smaller obstacles are noise of how such maps are made. `cut_corners`: by a step or two of a
     grid, so that `geometry.simplify.sharpened` makes them whole. `primitives`: obstacles that the file draws
@@ -68,6 +70,7 @@ class ForeignMap:
     format: str = ""
     boundary: Polygon | MultiPolygon | None = None
     has_named_boundary: bool = False
+    boundary_source: str = ""
     vertices_read: int = 0
     cell: float | None = None
     specks: float = 0.0
@@ -107,8 +110,9 @@ class ImportReport(_Report):
 
     `changed`: on purpose (simplified, grown). `size`: of the boundary. `tolerance`: by how much walls were
     allowed to move. `moved_area`: was free and is not, or is and was not, for the simplification. `moved`: by
-    how much a wall moved for it, at most. `others`: a place in each large part of the free space that was
-    left out, as `Shaping.inside` takes it.
+    how much a wall moved for it, at most: the Hausdorff distance of what remained. `removed`, `removed_area`:
+    hairs, that is slits and spurs thinner than the decimals of a map. `others`: a place in each large part
+    of the free space that was left out, as `Shaping.inside` takes it.
     """
 
     source: str
@@ -122,6 +126,8 @@ class ImportReport(_Report):
     tolerance: float = 0.0
     moved_area: float = 0.0
     moved: float = 0.0
+    removed: int = 0
+    removed_area: float = 0.0
     others: tuple[tuple[float, float], ...] = ()
     repaired: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import re
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple, NoReturn
@@ -104,13 +104,15 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         if not dark.is_empty:
             shapes.outlines.append(Outline(dark, room.labels))
     free = None if main is None else main.free
+    source = ""
     if free is None and shapes.outlines:
         found = shapes.find_surrounding()
         free = found.area
-        shapes.notes.append(f"the boundary is {found.source}")
+        source = found.source
     shapes.cell = max((room.cell for room in rooms if room.cell is not None), default=None)
     name = world.root.text("name") or path.stem
-    return shapes.foreign_map(name, "A world of Stage, imported.", solid=True, world=free)
+    foreign = shapes.foreign_map(name, "A world of Stage, imported.", solid=True, world=free)
+    return replace(foreign, boundary_source=source) if source else foreign
 
 
 class _World:

@@ -46,11 +46,12 @@ def test_the_largest_part_and_its_obstacles() -> None:
 
 def test_the_part_around_a_place() -> None:
     track = box(30, 0, 60, 20) - box(32, 2, 58, 18)
-    whole = foreign(ROOM, CLOSET, track, boundary=box(-1, -1, 61, 21))
+    whole = foreign(ROOM, CLOSET, track, boundary=box(-1, -1, 61, 21), has_named_boundary=True)
     environment, report = shaped(whole, Shaping(inside=(21.0, 1.0)), "plan")
     # the boundary is around all of the file, and not around this part
     assert environment.boundary_polygon.equals(CLOSET)
-    (note,) = report.notes
+    edge, note = report.notes
+    assert edge == "the boundary is the inner edge of the walls around the free space"
     assert note.startswith("only 3.3 % of the free area stays: --inside ")
     assert note.endswith("keeps another part, --keep all every part")
     assert len(report.others) == 2
@@ -125,7 +126,9 @@ def test_hull_and_margin() -> None:
 
 def test_a_boundary_that_is_given() -> None:
     outer = box(-1, -1, 11, 9)
-    environment, _ = shaped(foreign(ROOM, boundary=outer), Shaping(), "plan")
+    named = foreign(ROOM, boundary=outer, has_named_boundary=True, boundary_source="what is called 'hall'")
+    environment, report = shaped(named, Shaping(), "plan")
+    assert report.notes == ("the boundary is what is called 'hall'",)
     assert environment.boundary_polygon.equals(outer)
     assert environment.free_area == pytest.approx(ROOM.area)
     assert [len(shape.holes) for shape in environment.obstacles if hasattr(shape, "holes")] == [1, 0, 0]
@@ -136,6 +139,20 @@ def test_a_boundary_that_is_given() -> None:
     environment, report = shaped(foreign(ROOM, boundary=crossed), Shaping(), "plan")
     assert report.repaired[0].startswith("the boundary met itself: self-intersection at [")
     assert environment.free_area == pytest.approx(ROOM.area)
+
+
+def test_a_boundary_behind_walls_gives_way_to_them() -> None:
+    outer = box(-1, -1, 11, 9)
+    environment, report = shaped(foreign(ROOM, boundary=outer), Shaping(), "plan")
+    assert environment.boundary_polygon.equals(box(0, 0, 10, 8))
+    assert report.notes == ("the boundary is the inner edge of the walls around the free space",)
+    # it stays as far as the free space reaches it
+    door = ROOM | box(4, 7, 6, 9)
+    environment, report = shaped(foreign(door, boundary=outer), Shaping(), "plan")
+    assert environment.boundary_polygon.equals(outer)
+    # and where several parts stay, walls are among them
+    environment, _ = shaped(foreign(ROOM, CLOSET, boundary=box(-1, -1, 24, 9)), Shaping(keep="all"), "plan")
+    assert environment.boundary_polygon.equals(box(-1, -1, 24, 9))
 
 
 def test_no_slivers_along_a_boundary_that_the_free_space_touches() -> None:
@@ -305,10 +322,11 @@ def test_by_how_much_walls_moved() -> None:
 
 def test_a_map_of_many_vertices_says_what_that_means() -> None:
     angle = [k * math.tau / 6000 for k in range(6000)]
-    round_room = Polygon([(20 * math.cos(a), 20 * math.sin(a)) for a in angle])
+    round_room = Polygon([(400 * math.cos(a), 400 * math.sin(a)) for a in angle])
     _, report = shaped(foreign(round_room), Shaping(simplify=0.0), "plan")
+    assert report.vertices_kept > 5900  # after rounding, some are on the line between their neighbours
     assert report.notes[-1].startswith(
-        "6000 vertices are many: before a run the exact distances among them take"
+        f"{report.vertices_kept} vertices are many: before a run the exact distances among them take"
     )
     assert "many" not in lines(shaped(foreign(round_room), Shaping(), "plan")[1])
 

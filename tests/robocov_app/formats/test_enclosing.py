@@ -46,10 +46,8 @@ def test_the_largest_outline_that_holds_the_rest_is_the_boundary() -> None:
     assert foreign.boundary is not None
     assert foreign.boundary.equals(box(0, 0, 20, 10))
     assert foreign.free.area == pytest.approx(200 - 1 - 2)
-    assert foreign.notes == (
-        "the boundary is the largest closed outline of 200 m²",
-        "3 closed outlines taken as solid (--outlines free: as free space)",
-    )
+    assert foreign.boundary_source == "the largest closed outline of 200 m²"
+    assert foreign.notes == ("3 closed outlines taken as solid (--outlines free: as free space)",)
 
 
 def test_a_name_is_the_boundary_whatever_its_size() -> None:
@@ -59,7 +57,8 @@ def test_a_name_is_the_boundary_whatever_its_size() -> None:
     foreign = taken(chosen)
     assert foreign.free.area == pytest.approx(64.0)
     assert foreign.dropped == ("1 shape by the names that were asked for",)
-    assert foreign.notes[0] == "the boundary is what is called 'East Wing'"
+    assert foreign.boundary_source == "what is called 'East Wing'"
+    assert foreign.has_named_boundary
 
 
 def test_lines_of_that_name_are_the_boundary_where_they_close() -> None:
@@ -84,7 +83,8 @@ def test_without_a_boundary_there_is_room_around_everything() -> None:
     foreign = taken(shapes(square(0, 0, 2, 2), square(5, 5, 2, 2), around=3.0))
     assert foreign.boundary.equals(box(-3, -3, 10, 10))  # type: ignore[union-attr]
     assert foreign.free.area == pytest.approx(13 * 13 - 8)
-    assert "--around" in foreign.notes[0]
+    assert "--around" in foreign.boundary_source
+    assert not foreign.has_named_boundary
 
 
 def test_geometries_are_free_unless_one_holds_the_others() -> None:

@@ -53,7 +53,7 @@ def test_footprints_in_a_boundary_are_obstacles(tmp_path: Path) -> None:
     foreign = read(tmp_path, "geojson", document, thickness=0.2)
     assert (foreign.name, foreign.description) == ("the yard", "With\\nsheds.")
     assert foreign.free.area == pytest.approx(200 - 12 - 1)
-    assert "the boundary is the largest closed outline, 'yard', of 200 m²" in foreign.notes
+    assert foreign.boundary_source == "the largest closed outline, 'yard', of 200 m²"
     assert foreign.dropped == (
         "1 feature without a geometry",
         "1 point (--pillar RADIUS makes pillars of them)",

@@ -1,9 +1,11 @@
 """From what a reader found to an environment, and how the two compare."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal, TypeVar
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 import shapely
@@ -12,6 +14,7 @@ from shapely import MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from robocov import environment as env
+from robocov.arrays import Array
 from robocov.environment import Environment, Ring
 from robocov.errors import MapError, ParameterError, counted, one_line, shown
 from robocov.mapfile import from_json, to_json
@@ -19,8 +22,19 @@ from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
 from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.formats.base import ForeignMap, ImportReport, Options, Primitive, square_metres
-from robocov_app.formats.geometry.polygons import bounded, filled, made_valid, polygons_of, rounded, sides_of
-from robocov_app.formats.geometry.simplify import rays, sharpened, simplified
+from robocov_app.formats.geometry.cleaning import Cleaned, Deviation, measure_deviation, remove_hairs
+from robocov_app.formats.geometry.polygons import (
+    bounded,
+    filled,
+    made_valid,
+    polygons,
+    polygons_of,
+    rounded,
+    sides_of,
+    tidy_ring,
+    united,
+)
+from robocov_app.formats.geometry.simplify import Simplified, rays, sharpened, simplified
 
 _CRUMB = 1e-4  # obstacles and parts that are smaller, in m², come of rounding
 DEFAULT_TOLERANCE = 0.02  # by how much walls of vector formats may move, in metres
@@ -44,6 +58,9 @@ _MOST_ROBOTS = 1000  # of a file, so many are looked at
 _ZERO = 1e-100  # coordinates nearer to zero, in metres, are zero; as of map files
 _SQUARES, _MOST_RAYS = 1024, 5_000_000  # squares of each size that are cut; sides that rays may cross
 _QUARTERS = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])
+_MITRE_LIMIT = 5.0  # of corners when an area is grown or shrunk
+_BESIDE = 1e-3  # metres from a pocket to the obstacles beside it
+_MAX_ROUNDS = 5  # of the search for primitives that leave no pockets
 _SLIVER = 2.0  # tolerances of width below which a difference is a wall that moved, not one that was lost
 
 
@@ -52,8 +69,8 @@ class Shaping(Options):
     """Parameters of the conversion of a foreign map to an environment."""
 
     simplify: float | None = None
-    """Walls may move by so many metres, and corners by twice as much, where that saves vertices; 0 keeps
-    all. By default one cell of a grid, 0.02 of the rest."""
+    """Walls may move by so many metres where that saves vertices; 0 keeps all. By default one cell of a
+    grid, 0.02 of the rest."""
     specks: float | None = None
     """Obstacles smaller than so many m² are dropped. By default single cells of ROS maps and JPEGs are, else
     none."""
@@ -90,6 +107,22 @@ def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environme
     return _Shaper(foreign, shaping, where).shaped()
 
 
+class _Plan(NamedTuple):
+    """A boundary, m, the polygons and the primitives in it that are solid, and what has moved for them."""
+
+    boundary: Polygon
+    solid: list[Polygon]
+    primitives: list[Primitive]
+    deviation: Deviation
+
+    def find_free(self) -> MultiPolygon:
+        """Return what is free, as `Environment` has it, m."""
+        blocked = shapely.union_all(
+            [*self.solid, *(primitive.polygon for primitive in self.primitives)], grid_size=env.GRID
+        )
+        return polygons_of(shapely.difference(self.boundary, blocked, grid_size=env.GRID))
+
+
 class _Shaper:
     """Makes the environment, and notes what the report will say."""
 
@@ -106,72 +139,38 @@ class _Shaper:
         self.digits = -math.floor(math.log10(grid) + 1e-9)
 
     def shaped(self) -> tuple[Environment, ImportReport]:
-        foreign, shaping, digits, cell = self.foreign, self.shaping, self.digits, self.foreign.cell
-        outer = self._valid_boundary()
-        read = self._valid(outer)
-        parts = self._without_specks(self._kept(read))
-        before = MultiPolygon(parts)
-        chosen = shaping.inside is not None or (foreign.robots and shaping.keep == "largest")
-        chosen = chosen or self.is_enclosed
-        if chosen and outer is not None and outer.contains_properly(parts[0]):
-            outer = None  # what is around the other parts is not around this one
+        """Return the environment, and the report on how it was made."""
+        outlines = self._valid_boundary()
+        read = self._valid(outlines)
+        cleaned = self._remove_hairs(read)
+        parts = self._without_specks(self._kept(cleaned.free))
+        outer = self._choose_boundary(outlines, parts)
         self._require_few(sum(len(part.interiors) for part in parts), "obstacles", MAX_OBSTACLES)
         self._require_room(parts)
-        tolerance = self._tolerance()
-        drawn = [sharpened(part, tolerance) for part in parts] if foreign.cut_corners else parts
-        simple = simplified(MultiPolygon(drawn), tolerance, cell, self.radius)
-        self.changed += simple.changed
-        base = None
-        if outer is not None:
-            base = filled(simplified(MultiPolygon([outer]), tolerance, cell, self.radius).free)
-        free = rounded(simple.free, digits)
-        if free.is_empty:
-            few = f"{read.area:.3g} m² are free, but more was wanted"
-            raise MapError(f"{self.where}: {few}: is the scale right?")
-        self._require_few(shapely.count_coordinates(free), "vertices", MAX_KEPT)
-        moved, by = moved_walls(before, free)
-        if by >= 1e-3:
-            part = f"{100 * moved / free.area:.2g} % of the free area"
-            walls = f"walls moved by at most {by:.2g} m; {square_metres(moved, 2)} changed sides"
-            self.changed.append(f"{walls}, {part}")
-        boundary, solid = bounded(free, base, hull=shaping.hull, margin=shaping.margin, digits=digits)
-        if outer is not None:
-            solid = _without_slivers(solid, shapely.difference(outer, read), tolerance)
-        primitives: list[Primitive] = []
-        if foreign.primitives and shapely.get_num_coordinates(free) <= _SOON:
-            places = max(len(rooms(space, self.radius)) for space in (before, free))
-            primitives, solid = self._with_primitives(solid, boundary, simple.tolerance, places)
-            if primitives:  # its vertices where polygons began that are gone
-                boundary = boundary.simplify(0.0)
-        environment = Environment(
-            name=one_line(foreign.name)[:100].strip() or "map",
-            boundary=self._ring(boundary.exterior),
-            obstacles=(*self._obstacles(solid), *primitives),
-            starts=self._starts(free),
-            description=foreign.description[:10_000],
-        )
-        # through the rules of map files: what is imported can be saved and loaded
-        environment = from_json(to_json(environment), self.where)
-        if shapely.get_num_coordinates(environment.free) <= _SOON:
-            reached = sorted((place.area for place in rooms(environment.free, self.radius)), reverse=True)
-            if len(reached) > 1:
-                what = f"{counted(len(reached) - 1, 'place')} of {square_metres(sum(reached[1:]), 3)}"
-                self.notes.append(f"{what} no robot of radius {self.radius:g} m reaches from the largest one")
-        width, height = np.ptp(np.array(environment.boundary), axis=0).tolist()
+        before = MultiPolygon(parts)
+        drawing = self._simplify(before, read)
+        self._require_few(shapely.count_coordinates(drawing.free), "vertices", MAX_KEPT)
+        plan = self._build(drawing, outer, before, read)
+        self._report_deviation(plan.deviation, drawing.free)
+        environment = self._to_environment(plan, drawing.free)
+        self._report_reach(environment)
         kept = vertex_count(environment)
         self.notes += [many_vertices(kept)] if kept > MANY_VERTICES else []
+        width, height = np.ptp(np.array(environment.boundary), axis=0).tolist()
         return environment, ImportReport(
             source=self.where,
-            format=foreign.format,
-            vertices_read=foreign.vertices_read,
+            format=self.foreign.format,
+            vertices_read=self.foreign.vertices_read,
             vertices_kept=kept,
             area_read=float(read.area),
             area_kept=environment.free_area,
-            size=(round(width, digits), round(height, digits)),
+            size=(round(width, self.digits), round(height, self.digits)),
             obstacles=len(environment.obstacles),
-            tolerance=simple.tolerance,
-            moved_area=moved,
-            moved=by,
+            tolerance=drawing.tolerance,
+            moved_area=plan.deviation.area,
+            moved=plan.deviation.distance,
+            removed=cleaned.number,
+            removed_area=cleaned.area,
             others=tuple(self.others),
             repaired=tuple(self.repaired),
             dropped=tuple(self.dropped),
@@ -179,17 +178,136 @@ class _Shaper:
             notes=tuple(self.notes),
         )
 
-    def _valid_boundary(self) -> Polygon | None:
-        outer = self.foreign.boundary
-        if isinstance(outer, MultiPolygon):
-            outer = outer.geoms[0] if len(outer.geoms) == 1 else None
-        if outer is None or outer.is_valid:
-            return None if outer is None else Polygon(outer.exterior)
-        self.repaired.append(f"the boundary met itself: {_reason(outer)}")
-        valid = polygons_of(made_valid(outer))
-        return None if valid.is_empty else filled(valid)
+    def _remove_hairs(self, free: MultiPolygon) -> Cleaned:
+        """Return the free space without what is thinner than the decimals of a map; cells have no such."""
+        if self.foreign.cell is not None:
+            return Cleaned(free)
+        grid = 10.0**-self.digits
+        cleaned = remove_hairs(free, 2 * grid, max(self._tolerance(), 2 * grid))
+        if cleaned.number:
+            what = f"{counted(cleaned.number, 'hair')} (slits, spurs) thinner than {2000 * grid:g} mm"
+            self.changed.append(f"removed {what}, {square_metres(cleaned.area, 2)}")
+        return cleaned
 
-    def _valid(self, outer: Polygon | None) -> MultiPolygon:
+    def _choose_boundary(self, outlines: MultiPolygon | None, parts: list[Polygon]) -> Polygon | None:
+        """Return the boundary around the parts that stay; None where it is the outline of these.
+
+        A boundary counts as far as the free space reaches it. Where walls separate all of the free space from
+        it, what is behind them is no concern of the robots: the known region would be larger than what they
+        can cover, and draw them to the walls. So the boundary is then the inner edge of the walls, in all
+        formats. Only a boundary that the file or the user calls so stays, unless the user chooses another
+        part of the free space.
+        """
+        foreign, shaping = self.foreign, self.shaping
+        outer = None
+        if outlines is not None:
+            around = [each for each in outlines.geoms if shapely.intersects(each, parts).all()]
+            outer = around[0] if around else None
+        is_chosen = shaping.inside is not None or (foreign.robots != () and shaping.keep == "largest")
+        stays = foreign.has_named_boundary and not (is_chosen or self.is_enclosed)
+        if outer is not None and len(parts) == 1 and not stays and outer.contains_properly(parts[0]):
+            self.notes.insert(0, "the boundary is the inner edge of the walls around the free space")
+            return None
+        if outer is not None and foreign.boundary_source:
+            self.notes.insert(0, f"the boundary is {foreign.boundary_source}")
+        return outer
+
+    def _simplify(self, before: MultiPolygon, read: MultiPolygon) -> Simplified:
+        """Return the free space with fewer vertices, rounded; walls moved by the tolerance at most."""
+        foreign, tolerance = self.foreign, self._tolerance(report=True)
+        sharp = before
+        if foreign.cut_corners:
+            sharp = MultiPolygon([sharpened(part, tolerance) for part in before.geoms])
+        grid = 10.0**-self.digits
+        # where the steps add up to more than is allowed, they do less
+        attempts = [(sharp, tolerance), (sharp, tolerance / 2), (before, tolerance / 2), (before, 0.0)]
+        for plan, allowed in attempts:
+            simple = simplified(plan, allowed, foreign.cell, self.radius)
+            free = rounded(simple.free, self.digits)
+            if free.is_empty:
+                few = f"{read.area:.3g} m² are free, but more was wanted"
+                raise MapError(f"{self.where}: {few}: is the scale right?")
+            if measure_deviation(before, free).distance <= tolerance + grid:
+                break
+        self.changed += simple.changed
+        return simple._replace(free=free)
+
+    def _build(
+        self, drawing: Simplified, outer: Polygon | None, before: MultiPolygon, read: MultiPolygon
+    ) -> _Plan:
+        """Return boundary and obstacles that leave what is free in a drawing."""
+        shaping, free = self.shaping, drawing.free
+        if outer is not None:
+            simple = simplified(MultiPolygon([outer]), self._tolerance(), self.foreign.cell, self.radius)
+            base = filled(simple.free)
+        elif len(free.geoms) == 1 and self.foreign.primitives:
+            base = self._fill_notches(free.geoms[0])
+        else:
+            base = None
+        boundary, solid = bounded(free, base, hull=shaping.hull, margin=shaping.margin, digits=self.digits)
+        if outer is not None:
+            solid = _without_slivers(solid, shapely.difference(outer, read), drawing.tolerance)
+        plan = _Plan(boundary, solid, [], measure_deviation(before, free))
+        if not self.foreign.primitives or shapely.get_num_coordinates(free) > _SOON:
+            return plan
+        return self._with_primitives(plan, drawing, before)
+
+    def _fill_notches(self, outline: Polygon) -> Polygon:
+        """Return the outline of free space without the notches that walls of the file are.
+
+        These walls stay what they are, obstacles. They lie in the convex hull of the outline, so that the
+        region that robots know is the same.
+        """
+        outline = Polygon(outline.exterior)
+        walls = [each for each in self.foreign.primitives if isinstance(each, env.WallObstacle)]
+        if not walls:
+            return outline
+        reach = max(wall.width for wall in walls) / 2 + 2 * self._tolerance()
+        grown = outline.buffer(reach, join_style="mitre", mitre_limit=_MITRE_LIMIT)
+        closed = grown.buffer(-reach, join_style="mitre", mitre_limit=_MITRE_LIMIT)
+        notches = np.array(polygons(shapely.difference(closed & outline.convex_hull, outline)), dtype=object)
+        covered = shapely.union_all([wall.polygon for wall in walls]).buffer(2 * self._tolerance())
+        notches = notches[shapely.covers(covered, notches)]
+        return filled(rounded(united([outline, *notches.tolist()]), self.digits))
+
+    def _to_environment(self, plan: _Plan, free: MultiPolygon) -> Environment:
+        environment = Environment(
+            name=one_line(self.foreign.name)[:100].strip() or "map",
+            boundary=self._ring(plan.boundary.exterior),
+            obstacles=(*self._obstacles(plan.solid), *plan.primitives),
+            starts=self._starts(free),
+            description=self.foreign.description[:10_000],
+        )
+        # through the rules of map files: what is imported can be saved and loaded
+        return from_json(to_json(environment), self.where)
+
+    def _report_deviation(self, deviation: Deviation, free: MultiPolygon) -> None:
+        if deviation.distance >= 1e-3:
+            part = f"{100 * deviation.area / free.area:.2g} % of the free area"
+            walls = f"walls moved by at most {deviation.distance:.2g} m"
+            self.changed.append(f"{walls}; {square_metres(deviation.area, 2)} changed sides, {part}")
+
+    def _report_reach(self, environment: Environment) -> None:
+        """Report which places a robot does not reach from the largest one, where that is soon known."""
+        if shapely.get_num_coordinates(environment.free) > _SOON:
+            return
+        reached = sorted((place.area for place in rooms(environment.free, self.radius)), reverse=True)
+        if len(reached) > 1:
+            what = f"{counted(len(reached) - 1, 'place')} of {square_metres(sum(reached[1:]), 3)}"
+            self.notes.append(f"{what} no robot of radius {self.radius:g} m reaches from the largest one")
+
+    def _valid_boundary(self) -> MultiPolygon | None:
+        """Return the parts of the boundary, without holes; None where there is none."""
+        given = self.foreign.boundary
+        if given is None:
+            return None
+        if not given.is_valid:
+            self.repaired.append(f"the boundary met itself: {_reason(given)}")
+            given = made_valid(given)
+        valid = [Polygon(part.exterior) for part in polygons(given)]
+        return MultiPolygon(valid) if valid else None
+
+    def _valid(self, outer: MultiPolygon | None) -> MultiPolygon:
         """Return the free space within `outer` as disjoint valid polygons, the largest first."""
         given = self.foreign.free
         if not np.isfinite(shapely.get_coordinates(given)).all():
@@ -306,14 +424,14 @@ class _Shaper:
             note(f"{tiny} obstacles are smaller than {_TINY:g} m² (--specks {_TINY:g} drops them)")
         return result
 
-    def _tolerance(self) -> float:
+    def _tolerance(self, *, report: bool = False) -> float:
         """Return by how much walls may move, m: where cells are larger than robots, each one counts."""
         cell, width = self.foreign.cell, 2 * self.radius
         if self.shaping.simplify is not None:
             return self.shaping.simplify
         if cell is None:
             return DEFAULT_TOLERANCE
-        if cell > width:
+        if cell > width and report:
             what = f"walls move by at most {width:g} m, not by one (--simplify {cell:g})"
             self.notes.append(f"cells are larger than robots: {what}")
         return min(cell, width)
@@ -347,6 +465,7 @@ class _Shaper:
     def _ring(self, ring: BaseGeometry) -> Ring:
         """Return a closed ring as a map has it: counter-clockwise from its leftmost vertex."""
         points = np.round(shapely.get_coordinates(ring)[:-1], self.digits) + 0.0
+        points = tidy_ring(points, self.digits)
         if not shapely.is_ccw(ring):
             points = points[::-1]
         first = int(np.lexsort((points[:, 1], points[:, 0]))[0])
@@ -361,7 +480,7 @@ class _Shaper:
         radius = min(room - clearance, 2.0)
         starts: dict[str, env.StartSpec] = {"uniform": env.UniformStart()}
         if radius >= 0.02:
-            disc = env.DiscStart((round(x, 2), round(y, 2)), math.floor(100 * radius) / 100)
+            disc = env.DiscStart((round(x, 2) + 0.0, round(y, 2) + 0.0), math.floor(100 * radius) / 100)
             both: dict[str, env.StartSpec] = {"room": disc, **starts}
             starts = both if self.shaping.default_start == "room" else dict(reversed(both.items()))
         if robots:
@@ -377,26 +496,55 @@ class _Shaper:
             self.notes.append(f'start "robots": {many} of robots in the file{rest}')
         return starts
 
-    def _with_primitives(
-        self, solid: list[Polygon], boundary: Polygon, tolerance: float, places: int
-    ) -> tuple[list[Primitive], list[Polygon]]:
-        """Return the primitives that make up polygons of `solid`, in their order, and the polygons that stay.
+    def _with_primitives(self, plan: _Plan, drawing: Simplified, before: MultiPolygon) -> _Plan:
+        """Return a plan with circles and walls in place of the polygons that they make up.
+
+        Not where a pocket would be left between one and what is beside it, nor any where walls would have
+        moved by more than the tolerance.
+        """
+        places = max(len(rooms(space, self.radius)) for space in (before, drawing.free))
+        unwanted: frozenset[Primitive] = frozenset()
+        for _ in range(_MAX_ROUNDS):
+            found = self._match_primitives(plan, drawing.tolerance, places, unwanted)
+            if not found.primitives:
+                return plan
+            pockets = _find_pockets(found)
+            beside = {
+                each for each in found.primitives if (shapely.distance(each.polygon, pockets) < _BESIDE).any()
+            }
+            if not beside:
+                # its vertices where polygons began that are gone
+                boundary = rounded(found.boundary.simplify(0.0), self.digits).geoms[0]
+                deviation = measure_deviation(before, found.find_free())
+                # a circle stays within its sagitta, whatever number of sides it is drawn with
+                limit = self._tolerance() + 10.0**-self.digits + env.SAGITTA
+                if deviation.distance > max(limit, plan.deviation.distance):
+                    return plan
+                return found._replace(boundary=boundary, deviation=deviation)
+            unwanted |= beside
+        return plan
+
+    def _match_primitives(
+        self, plan: _Plan, tolerance: float, places: int, unwanted: frozenset[Primitive]
+    ) -> _Plan:
+        """Return a plan with the primitives that make up its polygons, in their order, and the others.
 
         A polygon goes where the primitives on it cover the same inside the boundary: neither reaches further
         than twice the tolerance beyond the other, as corners may, their areas differ by no more than the
         tolerance all along the outline, and the primitives have fewer points. Those of several primitives
         stay, or all of them, where a robot would have more than so many `places`, apart from each other.
         """
+        boundary, solid = plan.boundary, plan.solid
         slack = tolerance + 10.0**-self.digits
-        rounded = {
+        rounded_to = {
             with_numbers(each, lambda value: round(value, self.digits) + 0.0): each
             for each in self.foreign.primitives
         }
-        usable = [primitive for primitive in rounded if _fits(primitive)]
+        usable = [each for each in rounded_to if _fits(each) and each not in unwanted]
         if not usable or len(usable) > MOST_PRIMITIVES:
-            return [], solid
+            return plan
         # of another radius, however near, a circle may be drawn with another number of sides
-        covered = np.array([rounded[primitive].polygon for primitive in usable], dtype=object)
+        covered = np.array([rounded_to[primitive].polygon for primitive in usable], dtype=object)
         shapely.prepare(boundary)
         outside = ~shapely.covers(boundary, covered)
         covered[outside] = shapely.intersection(covered[outside], boundary)
@@ -417,10 +565,17 @@ class _Shaper:
         for most in (len(usable), 1):
             kept = [usable[k] for k in sorted(set().union(*(own for own in made if len(own) <= most)))]
             rest = [part for part, own in zip(solid, made, strict=True) if not 0 < len(own) <= most]
-            obstacles = shapely.union_all([*rest, *(primitive.polygon for primitive in kept)])
-            if len(rooms(shapely.difference(boundary, obstacles), self.radius)) <= places:
-                return kept, rest
-        return [], solid
+            found_plan = plan._replace(solid=rest, primitives=kept)
+            if len(rooms(found_plan.find_free(), self.radius)) <= places:
+                return found_plan
+        return plan
+
+
+def _find_pockets(plan: _Plan) -> Array:
+    """Return parts of the free space that no file means: they are smaller than what comes of rounding."""
+    parts = shapely.get_parts(plan.find_free())
+    area = shapely.area(parts)
+    return np.asarray(parts[area < min(_CRUMB, area.max(initial=0.0))])
 
 
 def _reason(geometry: BaseGeometry) -> str:
@@ -452,7 +607,7 @@ def _length_along(part: Polygon, page: Polygon) -> float:
 
 def _place_in(part: Polygon) -> tuple[float, float]:
     point = shapely.point_on_surface(part)
-    return round(point.x, 2), round(point.y, 2)
+    return round(point.x, 2) + 0.0, round(point.y, 2) + 0.0
 
 
 def _squared(parts: list[Polygon]) -> str:
@@ -571,14 +726,3 @@ def roomiest(free: Polygon, tolerance: float, enough: float = math.inf) -> tuple
         side /= 2
         centres = (centres[:, None] + side / 2 * _QUARTERS).reshape(-1, 2)
     return (float(place[0]), float(place[1])), best
-
-
-def moved_walls(before: MultiPolygon, after: MultiPolygon) -> tuple[float, float]:
-    """Return what area, m², was free and is not, or is and was not; and how far walls moved, m, at most."""
-    distance = 0.0
-    for one, other in ((before, after), (after, before)):
-        points = shapely.points(np.unique(shapely.get_coordinates(one), axis=0))
-        walls = STRtree(shapely.linestrings(sides_of(other)))
-        _, away = walls.query_nearest(points, return_distance=True, all_matches=False)
-        distance = max(distance, float(away.max()))
-    return float(shapely.symmetric_difference(before, after).area), distance

@@ -143,6 +143,8 @@ class Interpretation:
     boundary : MultiPolygon or None, m
         As of `ForeignMap`.
     has_named_boundary : bool
+    boundary_source : str
+        What the boundary is, for the report.
     primitives : tuple of obstacles
     outside : int
         Number of shapes outside of the boundary.
@@ -155,6 +157,7 @@ class Interpretation:
     free: MultiPolygon
     boundary: MultiPolygon | None
     has_named_boundary: bool
+    boundary_source: str
     primitives: tuple[Primitive, ...]
     outside: int
     page: Polygon | None = None
@@ -210,6 +213,7 @@ def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation
         free=free,
         boundary=_choose_outer(drawing, boundary, region, free, obstacles, are_solid=are_solid),
         has_named_boundary=boundary is not None and boundary.is_named,
+        boundary_source=boundary.source if boundary is not None and are_solid else "",
         primitives=obstacles.primitives,
         outside=obstacles.outside,
         page=drawing.page if _is_background(drawing, boundary) else None,
@@ -654,8 +658,6 @@ class _Report:
         """Report what the boundary is, and what the other shapes were taken for."""
         if boundary is not None and boundary.gaps:
             self.repaired.append(boundary.gaps)
-        if boundary is not None and boundary.source and are_solid:
-            self.notes.append(f"the boundary is {boundary.source}")
         # where the format says what all of it is, outlines need no word
         is_found = boundary is None or boundary.source != ""
         if is_found and obstacles.count:

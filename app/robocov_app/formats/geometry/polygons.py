@@ -170,7 +170,10 @@ def filled(geometry: BaseGeometry) -> Polygon:
 
 
 def rounded(geometry: BaseGeometry, digits: int) -> MultiPolygon:
-    """Return the polygons of `geometry` with coordinates of so many decimals, valid; the largest first."""
+    """Return the polygons of `geometry` with coordinates of so many decimals, valid; the largest first.
+
+    Vertices that are the same after rounding, or on the line between their neighbours, are left out.
+    """
 
     def decimals(points: Array) -> Array:
         return np.round(points, digits) + 0.0  # no negative zero
@@ -179,7 +182,58 @@ def rounded(geometry: BaseGeometry, digits: int) -> MultiPolygon:
     if not plain.is_valid:
         # simplified walls may cross a boundary that was simplified beside them, which GEOS refuses to round
         plain = shapely.transform(shapely.set_precision(made_valid(geometry), 10.0**-digits), decimals)
-    return polygons_of(plain)
+    parts = polygons(plain)
+    tidy = [_tidy_polygon(part, digits) for part in parts]
+    if not all(part.is_valid for part in tidy):  # rings that touched where a vertex was
+        tidy = parts
+    return polygons_of(MultiPolygon(tidy))
+
+
+def _tidy_polygon(polygon: Polygon, digits: int) -> Polygon:
+    outer, *holes = (
+        tidy_ring(shapely.get_coordinates(ring)[:-1], digits)
+        for ring in (polygon.exterior, *polygon.interiors)
+    )
+    return Polygon(outer, holes)
+
+
+def tidy_ring(points: Array, digits: int) -> Array:
+    """Return a ring without vertices that say nothing: repeated ones, and those on a straight line.
+
+    Parameters
+    ----------
+    points : (k, 2) array
+        Vertices of so many `digits`, the first one not repeated.
+    digits : int
+
+    Returns
+    -------
+    (m, 2) array
+        As many of them, in their order. The area that the ring encloses is the same.
+    """
+    # whole numbers, whose products are exact
+    places = [tuple(place) for place in np.rint(points * 10.0**digits).astype(np.int64).tolist()]
+    kept: list[int] = []
+    for k in range(len(places)):
+        while len(kept) > 1 and _is_straight(places[kept[-2]], places[kept[-1]], places[k]):
+            kept.pop()
+        if kept and places[kept[-1]] == places[k]:
+            continue
+        kept.append(k)
+    # the same where the ring closes
+    while len(kept) > 2:
+        if _is_straight(places[kept[-2]], places[kept[-1]], places[kept[0]]):
+            kept.pop()
+        elif _is_straight(places[kept[-1]], places[kept[0]], places[kept[1]]):
+            kept.pop(0)
+        else:
+            break
+    return points[kept]
+
+
+def _is_straight(a: tuple[int, int], b: tuple[int, int], c: tuple[int, int]) -> bool:
+    """Return whether b is on the line through a and c, or the same as one of them."""
+    return (b[0] - a[0]) * (c[1] - b[1]) == (b[1] - a[1]) * (c[0] - b[0])
 
 
 def bounded(
@@ -192,7 +246,8 @@ def bounded(
     """
     parts = list(free.geoms)
     if given is not None:
-        base = filled(rounded(shapely.union(given, free), digits))
+        # rounded first: where the two run along each other they do so afterwards, too
+        base = filled(rounded(shapely.union(filled(rounded(given, digits)), free), digits))
     else:
         base = free.convex_hull if len(parts) > 1 else Polygon(parts[0].exterior)
     if hull:
@@ -203,7 +258,7 @@ def bounded(
         return base, [Polygon(hole) for hole in parts[0].interiors]
     base = filled(rounded(base, digits))
     if not shapely.covers(base, free):  # by a rounded hair
-        base = filled(shapely.union(base, free))
+        base = filled(rounded(shapely.union(base, free), digits))
     return base, polygons(rounded(shapely.difference(base, free), digits))
 
 

@@ -295,6 +295,7 @@ class Shapes:
             free=found.free,
             boundary=found.boundary,
             has_named_boundary=found.has_named_boundary,
+            boundary_source=found.boundary_source,
             vertices_read=self.vertices,
             cell=self.cell,
             primitives=found.primitives,

@@ -1,8 +1,9 @@
 """Fewer vertices for a free space, and nothing closed by it.
 
 Walls move by at most the tolerance. Afterwards it is checked that no outline meets another one or
-itself, that every obstacle keeps its size, and that a robot passes wherever it passed; where something is
-not so, the tolerance is smaller around that place, and it is said.
+itself, that every obstacle and every part that is as thin as the tolerance keeps its size, and that a robot
+passes wherever it passed; where something is not so, the tolerance is smaller around that place, and it is
+reported.
 
 Along a wall at an angle the outline of cells is a flight of stairs: every short side between two
 opposite turns becomes its middle, and these lie along the wall to within a third of a cell. Then the
@@ -20,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon, STRtree
+from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, BoolArray, IntArray, beginnings, ranges
 from robocov.errors import counted
@@ -44,6 +46,16 @@ _SHORT, _NEAR, _PARALLEL = 1.5, 2.0, 0.1
 _CHUNK = 2048  # sides that are looked at together for gaps, which bounds the memory
 _MOST_GAPS, _MOST_RAYS = 200_000, 300_000_000  # looked at; sides that rays cross to tell what is inside
 _CLEARLY = 1 + 1e-6  # a gap of just a robot's diameter is none
+_THIN = 1.5  # a part is thin if it is narrower than so many tolerances
+_MIN_THIN_LENGTH = 2.5  # in tolerances: what is shorter is a bump
+_MIN_THIN_WIDTH = 0.01  # in tolerances: what is thinner comes of rounding
+_THIN_SLACK = (
+    0.5  # in tolerances squared: by how much the area of a thin part may change, next to KEPT_OUTLINE
+)
+_MAX_THIN_VERTICES = (
+    80_000  # of an outline: in larger ones to look for thin parts takes more than some seconds
+)
+_MITRE_LIMIT = 5.0  # of corners when an area is grown or shrunk
 _LONGEST = 1024  # most vertices between two that must stay: the algorithm's depth may grow with their number
 
 
@@ -53,6 +65,17 @@ class Simplified(NamedTuple):
     free: MultiPolygon
     tolerance: float
     changed: tuple[str, ...] = ()
+
+
+class ThinParts(NamedTuple):
+    """Parts of a free space, or of what is solid, about as thin as the tolerance.
+
+    `areas`, (n,) m². `vertex` and `part`, (m,): vertices of an outline, and the part that each belongs to.
+    """
+
+    areas: Array
+    vertex: IntArray
+    part: IntArray
 
 
 class Rings:
@@ -229,6 +252,42 @@ class Outline(Rings):
         begin = np.searchsorted(twice, drawing.begin)
         return Rings(points[twice] + part[:, None] * way, begin, twice.astype(float))
 
+    @cached_property
+    def walls(self) -> STRtree:
+        """The sides of all rings."""
+        return STRtree(shapely.linestrings(self.ends))
+
+    def restrain(self, drawing: Rings, tolerance: Array) -> Rings:
+        """Return `drawing` with vertices that are farther from all walls than the tolerance put back."""
+        vertex = drawing.vertex
+        # where each vertex comes from: a vertex of the outline, or the middle of the side after it
+        half = (drawing.source % 1.0)[:, None]
+        origin = (1.0 - half) * self.points[vertex] + half * self.points[self.after[vertex]]
+        moved = np.flatnonzero((drawing.points != origin).any(axis=1))
+        places = shapely.points(drawing.points[moved])
+        _, distance = self.walls.query_nearest(places, return_distance=True, all_matches=False)
+        too_far = moved[distance > tolerance[vertex[moved]]]
+        points = drawing.points.copy()
+        points[too_far] = origin[too_far]
+        return Rings(points, drawing.begin, drawing.source)
+
+    def find_thin_parts(self, free: MultiPolygon, tolerance: float) -> ThinParts:
+        """Return the thin parts of the free space that this is the outline of, and of what is solid."""
+        if len(self.points) > _MAX_THIN_VERTICES:
+            return ThinParts(np.empty(0), np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp))
+        radius = _THIN * tolerance / 2
+        grown, shrunk = (_offset(free, distance) for distance in (radius, -radius))
+        closed, opened = _offset(grown, -radius), _offset(shrunk, radius)
+        thin = [shapely.difference(closed, free), shapely.difference(free, opened)]
+        pieces = shapely.get_parts(shapely.get_parts(thin))
+        x, y, right, top = shapely.bounds(pieces).T
+        is_long = np.maximum(right - x, top - y) > _MIN_THIN_LENGTH * tolerance
+        is_rounding = shapely.area(pieces) < _MIN_THIN_WIDTH * tolerance * shapely.length(pieces)
+        pieces = pieces[is_long & ~is_rounding]
+        reach = 1e-9 if self.cell is None else 1.5 * NECK * self.cell
+        part, vertex = STRtree(shapely.points(self.points)).query(pieces, "dwithin", distance=reach)
+        return ThinParts(np.asarray(shapely.area(pieces)), vertex, part)
+
     def polygons(self, drawing: Rings) -> MultiPolygon:
         rings = shapely.linearrings(drawing.points, indices=drawing.ring)
         return MultiPolygon(list(shapely.polygons(rings, indices=self.owner)))
@@ -246,12 +305,15 @@ def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius:
     if cell is not None:
         allowed[(np.abs(outline.areas) < _BLOCKS * cell * cell)[outline.ring]] = 0.0
     fixed = np.zeros(len(outline.points), dtype=bool)
+    thin = outline.find_thin_parts(free, tolerance)
     found: Counter[str] = Counter()
     for attempt in range(min(_ROUNDS, 1 + _WORK // len(allowed))):
         drawing = outline.balanced(outline.drawn(allowed, fixed), allowed)
+        drawing = outline.restrain(drawing, allowed)
         check = _Check(outline, drawing, allowed, tolerance, 2 * radius, found)
         wrong, far = check.misdrawn()
         parts = None
+        wrong |= check.find_misshapen(thin)
         if not (wrong.any() or far.any()):
             parts, wrong = check.met()
         if parts is None or wrong.any():
@@ -274,6 +336,7 @@ def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius:
 def _told(found: Counter[str], radius: float) -> tuple[str, ...]:
     less = {
         "narrow place": f"so that a robot of radius {radius:g} m passes where it passed",
+        "thin part": f"whose area would have changed by more than {100 * KEPT_OUTLINE:g} %",
         "outline": f"whose area would have changed by more than {100 * KEPT_OUTLINE:g} %",
         "place": "where walls would have met",
     }
@@ -324,6 +387,47 @@ class _Check:
             self.found["area"] += 1
             wrong = allowed > 0.0
         return wrong, far
+
+    def find_misshapen(self, thin: ThinParts) -> BoolArray:
+        """Return what is of a thin part that has another size in the drawing."""
+        wrong = np.zeros(len(self.outline.points), dtype=bool)
+        if not len(thin.areas):
+            return wrong
+        changes = self._measure_changes()
+        # a side counts once, of however many vertices of the part it is the side
+        pairs = np.unique(np.column_stack([thin.part, self.side[thin.vertex]]), axis=0)
+        change = np.bincount(pairs[:, 0], changes[pairs[:, 1]], minlength=len(thin.areas))
+        off = np.abs(change) > KEPT_OUTLINE * thin.areas + _THIN_SLACK * self.tolerance**2
+        vertex, part = thin.vertex[off[thin.part]], thin.part[off[thin.part]]
+        self.found["thin part"] += len(np.unique(part[self.allowed[vertex] == self.tolerance]))
+        wrong[vertex] = True
+        return wrong & (self.allowed > 0.0)
+
+    def _measure_changes(self) -> Array:
+        """Return by how much the area of rings changes at each side of the drawing, (m,) m².
+
+        It is the signed area between the side and the run of the outline that it stands for: together, the
+        difference of the areas of the rings.
+        """
+        outline, drawing = self.outline, self.drawing
+        first, last = drawing.vertex, drawing.vertex[drawing.after]
+        # along the outline, from the run's first vertex to its last: summed up from the ring's beginning,
+        # and once more around where a run passes that
+        origin = outline.points[outline.begin[outline.ring]]
+        local = outline.points - origin
+        steps = _cross(local, local[outline.after])
+        total = np.append(0.0, np.cumsum(steps))
+        run = total[last] - total[first]
+        begin, size = outline.begin[drawing.ring], outline.size[drawing.ring]
+        passes = last <= first
+        run += np.where(passes, total[begin + size] - total[begin], 0.0)
+        start, end = (
+            drawing.points - outline.points[begin],
+            drawing.points[drawing.after] - outline.points[begin],
+        )
+        before, after = local[first], local[last]
+        drawn = _cross(before, start) + _cross(start, end) + _cross(end, after)
+        return np.asarray((drawn - run) / 2)
 
     def met(self) -> tuple[MultiPolygon, BoolArray]:
         outline, drawing, allowed = self.outline, self.outline.with_necks(self.drawing), self.allowed
@@ -420,6 +524,12 @@ def _stairs(path: Rings, kept: IntArray, drawing: Rings) -> tuple[BoolArray, Arr
     return (number >= _FEW) & (2 * number >= length), drawing.points + centre, along
 
 
+def _offset(area: BaseGeometry, distance: float) -> BaseGeometry:
+    """Return an area grown by a distance, m, with corners as they are."""
+    grown: BaseGeometry = shapely.buffer(area, distance, join_style="mitre", mitre_limit=_MITRE_LIMIT)
+    return grown
+
+
 def _meeting(a: Array, u: Array, b: Array, v: Array) -> tuple[Array, Array]:
     """Return where the lines through a along u and through b along v meet, and u cross v."""
     cross = _cross(u, v)
@@ -461,7 +571,8 @@ def _sharpened(ring: Array, tolerance: float) -> Array:
     turns = np.abs(sine) > _PARALLEL * length[long] * length[following]
     runs = np.split(np.roll(ring, -long[0] - 1, axis=0), long[1:] - long[0])
     for k in np.flatnonzero(turns & (np.array([len(run) for run in runs]) > 1)):
-        if np.hypot(*(runs[k] - corner[k]).T).max() <= _NEAR * tolerance:
+        is_near = np.hypot(*(runs[k] - corner[k]).T).max() <= _NEAR * tolerance
+        if is_near and shapely.LineString(runs[k]).distance(shapely.Point(corner[k])) <= tolerance:
             runs[k] = corner[k : k + 1]
     return np.concatenate(runs)
 
