@@ -182,10 +182,21 @@ def autosave_folder(served_from: Path | None = None) -> Path | None:
 
 
 def recoverable(folder: Path | None, kind: str, read: Callable[[Record], _Work | None]) -> tuple[_Work, ...]:
-    """Return what `read` makes of work that ended programs left, the newest first; remove empty folders."""
+    """Return the drafts that ended programs left, the newest first; remove empty folders.
+
+    Parameters
+    ----------
+    folder : Path or None
+        Folder for drafts.
+    kind : str
+        Kind of document.
+    read : callable
+        Makes of a record what is to be offered, or None if there is nothing to offer. A draft for which it
+        raises anything is left where it is: one bad file must not keep windows from opening.
+    """
     found = []
     for place in _places(folder):
-        with suppress(OutputError, MapError, OSError):  # in use, or not to be read
+        with suppress(Exception):  # in use, or not to be read
             with locked(place):
                 record = read_record(place, kind) if (place / _FILE).exists() else None
                 work = None if record is None else read(record)
@@ -233,7 +244,7 @@ def read_record(folder: Path, kind: str) -> Record:
     try:
         path = None if held["path"] is None else _decode_path(held["path"])
         return Record(folder, path, datetime.fromisoformat(held["when"]).astimezone(), content)
-    except (TypeError, ValueError, KeyError) as error:
+    except (TypeError, ValueError, KeyError, OverflowError, OSError) as error:
         raise MapError(f"{file}: is no whole {kind}: {error}") from None
 
 

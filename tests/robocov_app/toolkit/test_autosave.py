@@ -226,6 +226,8 @@ def test_where_nothing_can_be_kept_work_goes_on(tmp_path):
         '{"format": "robocov-test", "version": 1, "path": 3, "when": "2030-05-17T12:00:00", "work": 1}',
         '{"format": "robocov-test", "version": 1, "path": null, "when": "x", "work": 1}',
         '{"format": "robocov-test", "version": 2, "path": null, "when": "2030-05-17T12:00:00", "work": 1}',
+        '{"format": "robocov-test", "version": 1, "path": null, "when": "0001-01-01T00:00+14:00", "work": 1}',
+        '{"format": "robocov-test", "version": 1, "path": {"bytes": "x"}, "when": "2030-05-17", "work": 1}',
     ],
 )
 def test_what_cannot_be_read_is_left_alone(folder, content):
@@ -235,6 +237,24 @@ def test_what_cannot_be_read_is_left_alone(folder, content):
     os.utime(place, (0, 0))
     assert found(folder) == ()
     assert (place / "draft.json").read_text() == content
+
+
+def test_a_draft_for_which_reading_raises_anything_is_left_alone(folder):
+    keeper = Autosaver(folder, KIND)
+    keeper.keep(lambda: {"work": 1})
+    keeper.close(discard=False)
+    assert recoverable(folder, KIND, lambda record: record.content["missing"]) == ()
+    assert works(folder) == [1]
+
+
+def test_work_that_cannot_be_written_does_not_stop_the_thread(folder):
+    keeper = Autosaver(folder, KIND)
+    keeper.keep(lambda: {"work": "\udcff"})
+    assert not keeper.flush() and "not kept aside" in keeper.trouble
+    keeper.keep(lambda: {"work": 2})
+    assert keeper.flush() and keeper.trouble == ""
+    keeper.close(discard=False)
+    assert works(folder) == [2]
 
 
 def test_folders_without_work_are_removed_when_they_are_old(folder):

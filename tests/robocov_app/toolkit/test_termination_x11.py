@@ -15,7 +15,6 @@ from served_window import served
 from x11_hands import MARKS, Hands, invisible_display, run_window
 
 from robocov_app.toolkit.autosave import FOLDER as DRAFTS
-from robocov_app.toolkit.autosave import SERVED_FOLDER
 from robocov_app.toolkit.settings import FOLDER
 
 pytestmark = MARKS
@@ -116,18 +115,3 @@ def test_a_map_that_is_tried_and_changed_is_kept(display: str, tmp_path: Path) -
             assert time.monotonic() < deadline, "no draft of what was drawn"
             time.sleep(0.1)
         hands.process.kill()
-
-
-def test_a_served_editor_with_a_question_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    connect = pytest.importorskip("websockets.sync.client").connect
-    monkeypatch.delenv(DRAFTS)
-    with served("edit", "--folder", str(tmp_path)) as link:
-        place, token = link.split("/?token=")
-        with connect(f"{place.replace('http', 'ws', 1)}/socket?token={token}", proxy=None) as line:
-            line.send(json.dumps({"kind": "page", "width": 900, "height": 700, "ratio": 1.0, "dark": False}))
-            for key, held in (("ctrl+a", 2), ("q", 2)):
-                for down in (True, False):
-                    line.send(json.dumps({"kind": "key", "key": key[-1], "down": down, "held": held}))
-            time.sleep(1.0)
-            end(link.process, signal.SIGTERM)
-    assert not drafts_in(tmp_path / SERVED_FOLDER) or drafts_in(tmp_path / SERVED_FOLDER)

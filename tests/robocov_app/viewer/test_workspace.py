@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from touched_run import begun, positions_of, stepped, viewer_of
 
 from robocov.errors import MapError
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.workspace import Workspace, offer, recoverable, recovered
+from robocov_app.viewer.session.workspace import KIND, Workspace, offer, recoverable, recovered
 
 
 def kept(workspace: Workspace) -> None:
@@ -40,6 +41,16 @@ def test_what_was_not_saved_is_offered_and_gone_on_with(tmp_path: Path) -> None:
     assert not again.unsaved
     again.close()
     assert recoverable(tmp_path) == ()
+
+
+@pytest.mark.parametrize("session", [None, [], {}, {"touches": 3}])
+def test_a_broken_draft_is_not_offered(session: object, tmp_path: Path) -> None:
+    place = tmp_path / "broken"
+    place.mkdir()
+    head = {"format": KIND, "version": 1, "path": None, "when": "2030-05-17T12:00:00"}
+    (place / "draft.json").write_text(json.dumps(head | {"session": session}))
+    assert recoverable(tmp_path) == ()
+    assert (place / "draft.json").exists()
 
 
 def test_a_session_that_was_saved_and_closed_leaves_nothing(tmp_path: Path) -> None:

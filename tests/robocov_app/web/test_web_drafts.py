@@ -116,6 +116,7 @@ def test_a_killed_served_editor_loses_at_most_about_a_second(tmp_path: Path, num
         client.drag((300, 300), (330, 300), (350, 300))
         # a second, and as long as it takes until the circle is there
         wait_for(lambda: drafts_in(tmp_path) and drafts_in(tmp_path)[0].get("sketch"))
+        client.press("q", held=2)  # which asks whether to save
         link.process.send_signal(number)
         link.process.wait(PATIENCE_S)
     (draft,) = drafts_in(tmp_path)

@@ -68,7 +68,16 @@ class Workspace:
 
 
 def recoverable(folder: Path | None) -> tuple[autosave.Record, ...]:
-    return autosave.recoverable(folder, KIND, lambda record: record if "session" in record.content else None)
+    """Return the drafts of sessions that ended programs left, the newest first."""
+    return autosave.recoverable(folder, KIND, _check_draft)
+
+
+def _check_draft(record: autosave.Record) -> autosave.Record | None:
+    """Return a record whose session can be described; None if all was saved, KeyError if it is broken."""
+    if "session" not in record.content:
+        return None
+    offer(record)
+    return record
 
 
 def offer(work: autosave.Record) -> str:
