@@ -79,22 +79,23 @@ def _as_list(content: bytes, suffix: str) -> bytes | None:
     """Return a sequence of GeoJSON texts as a JSON list with the same lines; None where it is no sequence."""
     text = content.removeprefix(BOM_UTF8)
     if text.lstrip().startswith(_RECORD_SEPARATOR):
-        separator, records = b"", text.split(_RECORD_SEPARATOR)
-    else:
-        separator, records = b"\n", text.split(b"\n")
-        first = next((line for line in records if line.strip()), b"")
-        is_named_so = suffix in _LINES_SUFFIXES
-        if not (is_named_so or _SECOND_RECORD.search(text)) or not _is_json(first):
-            return None
-    pieces = []
-    has_record = False
-    for record in records:
-        if record.strip():
-            pieces.append(b"," + record if has_record else record)
-            has_record = True
-        else:
-            pieces.append(record)
-    return b"[" + separator.join(pieces) + b"]"
+        # each separator becomes a comma, but the first, and those that nothing stands between
+        _, first, *others = text.split(_RECORD_SEPARATOR)
+        has_record = bool(first.strip())
+        pieces = [b"[", first]
+        for record in others:
+            is_next = has_record and bool(record.strip())
+            pieces.append(b"," + record if is_next else b" " + record)
+            has_record |= bool(record.strip())
+        return b"".join(pieces) + b"]"
+    lines = text.split(b"\n")
+    used = [k for k, line in enumerate(lines) if line.strip()]
+    is_sequence = suffix in _LINES_SUFFIXES or _SECOND_RECORD.search(text) is not None
+    if len(used) < 2 or not is_sequence or not _is_json(lines[used[0]]):
+        return None
+    for k in used[:-1]:
+        lines[k] += b","
+    return b"[" + b"\n".join(lines) + b"]"
 
 
 def _is_json(line: bytes) -> bool:

@@ -94,7 +94,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     without_floor = 0
     for name in ("unit", "fixture", "kiosk", "opening"):
         for k, feature in enumerate(archive.features(name)):
-            if feature["properties"].get("level_id") not in on_floor:
+            if _level_id(feature) not in on_floor:
                 continue
             category = _category(feature)
             role: Role = _unit_role(category) if name == "unit" else "solid"
@@ -179,7 +179,7 @@ def _read_levels(archive: _Archive) -> dict[str, _Level]:
 
 def _choose_floor(archive: _Archive, levels: dict[str, _Level], asked: str | None, shapes: Shapes) -> float:
     """Return the ordinal of the floor to read: that which the user named or numbered, or the ground floor."""
-    used = {feature["properties"].get("level_id") for feature in archive.features("unit")}
+    used = {_level_id(feature) for feature in archive.features("unit")}
     floors = {level.ordinal: 1.0 for number, level in levels.items() if number in used}
     if not floors:
         raise MapError(f"{archive.where}: expected units on its levels, got none")
@@ -220,6 +220,11 @@ def _venue_name(archive: _Archive) -> str:
         for name in _names(feature["properties"].get("name")):
             return name
     return ""
+
+
+def _level_id(feature: dict[str, Any]) -> str | None:
+    number = feature["properties"].get("level_id")
+    return number if isinstance(number, str) else None
 
 
 def _category(feature: dict[str, Any]) -> str:

@@ -227,6 +227,8 @@ class _Map:
         is_whole = np.array([self._fills_tile(each) for each in figures], dtype=bool)
         rows, columns = cells[is_whole[kinds]].T
         full[rows, columns] = True
+        part_counts = np.array([len(each) for each in figures], dtype=int)
+        self._require_few_parts(int(part_counts[kinds[~is_whole[kinds]]].sum()))
         # by kind, and of a kind row by row
         for k in np.flatnonzero(~is_whole[kinds])[
             np.argsort(kinds[~is_whole[kinds]], kind="stable")
@@ -247,10 +249,13 @@ class _Map:
     def _fills_tile(self, figures: list[tuple[str, Array]]) -> bool:
         return any(np.array_equal(points, _RECTANGLE * self.tile) for _, points in figures)
 
-    def _add_part(self, element: Element, kind: str, points: Array, labels: tuple[str, ...]) -> None:
-        self.parts += 1
-        if self.parts > MOST_PARTS:
+    def _require_few_parts(self, more: int) -> None:
+        if self.parts + more > MOST_PARTS:
             self.root.refuse(f"more than {MOST_PARTS} parts of tiles, but fewer were wanted")
+
+    def _add_part(self, element: Element, kind: str, points: Array, labels: tuple[str, ...]) -> None:
+        self._require_few_parts(1)
+        self.parts += 1
         self._add(element, kind, points, labels)
 
     def _add_objects(self, layers: list[_Layer], *, anything: bool) -> None:

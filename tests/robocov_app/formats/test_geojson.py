@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from vector_files import read, square
 
 from robocov.errors import MapError
-from robocov_app.formats import IMPORTERS, ReadOptions, detect
+from robocov_app.formats import IMPORTERS, ReadOptions, detect, import_map
 
 
 def feature(geometry: Any, **properties: Any) -> dict[str, Any]:
@@ -168,3 +168,51 @@ def test_free_space_is_what_shapely_reads(tmp_path_factory: pytest.TempPathFacto
     wanted = shapely.union_all(valid, grid_size=1e-7)
     length = max(sum(polygon.length for polygon in polygons), 1.0)
     assert shapely.symmetric_difference(found, wanted, grid_size=1e-7).area <= 2e-6 * length
+
+
+# Sequences
+
+
+FEATURE = '{"type": "Feature", "properties": {"name": "hall"}, "geometry": %s}'
+WEST = '{"type": "Polygon", "coordinates": [[[0, 0], [400, 0], [400, 400], [0, 400], [0, 0]]]}'
+EAST = '{"type": "Polygon", "coordinates": [[[400, 0], [900, 0], [900, 400], [400, 400], [400, 0]]]}'
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("plan.geojsonl", f"{FEATURE % WEST}\n{FEATURE % EAST}\n"),
+        ("plan.ndjson", f"\ufeff{WEST}\r\n\r\n  {FEATURE % EAST}"),
+        ("plan.geojson", f"{FEATURE % WEST}\n{EAST}\n"),
+        ("plan.geojson", f"\x1e{FEATURE % WEST}\n\x1e{EAST}\n"),
+        ("plan.json", f"\x1e\x1e{FEATURE % WEST}".replace(", ", ",\n") + f"\n\x1e{EAST}"),
+        ("plan.geojsonl", f'{{"type": "FeatureCollection", "features": [{FEATURE % WEST}]}}\n{EAST}'),
+    ],
+    ids=["lines", "mark", "unnamed", "separators", "pretty", "collection"],
+)
+def test_a_sequence_of_texts_is_read_as_one_map(tmp_path: Path, name: str, text: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(text.encode())
+    assert detect(path) is IMPORTERS["geojson"]
+    environment, _, _ = import_map(path, options=ReadOptions(units="metres"))
+    assert environment.free_area == pytest.approx(900 * 400)
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        (
+            f"{WEST}\n\n" + '{"type": "Point", "coordinates": [1, "x"]}',
+            r"plan\.geojsonl:3:35: \[1\]\.coordinates",
+        ),
+        (f"{WEST}\n{EAST[:-1]}\n", r"plan\.geojsonl:3:"),
+        (f"{WEST}\n3\n", r"plan\.geojsonl:2:1: \[1\]: 3, but one of Point, "),
+        (f"\x1e{WEST}\n\x1e{WEST[:40]}\n\x1e{EAST}\n", r"plan\.geojsonl:3:1: .*not JSON"),
+    ],
+    ids=["value", "cut", "number", "separated"],
+)
+def test_what_is_wrong_in_a_sequence_is_told_with_its_line(tmp_path: Path, text: str, wanted: str) -> None:
+    path = tmp_path / "plan.geojsonl"
+    path.write_text(text)
+    with pytest.raises(MapError, match=wanted):
+        import_map(path)

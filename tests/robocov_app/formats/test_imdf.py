@@ -196,6 +196,7 @@ def test_content_that_is_refused(tmp_path: Path) -> None:
         ("level", [], "expected units on its levels, got none"),
         ("unit", [], "expected units on its levels, got none"),
         ("unit", [3], "unit.geojson:1:44: features[0]: 3, but a feature with properties was wanted"),
+        ("unit", [{**unit("office", 0, 0, 9, 9), "properties": {"level_id": []}}], "got none"),
         ("level", [feature("level", None)], "features[0].properties.ordinal: null"),
         ("unit", [unit("office", 0, 0, 0, 0)], "expected spaces with an area on this level, got none"),
         ("unit", [unit("column", 0, 0, 1, 1)], "expected spaces with an area on this level, got none"),

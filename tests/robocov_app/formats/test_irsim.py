@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from PIL import Image
 from raster_files import drawn, pgm
 from shapely import affinity, box
 
@@ -269,3 +270,10 @@ def test_without_irsim_a_bundled_map_is_said_to_need_it(
     place = f"{tmp_path / 'world.yaml'}: world.obstacle_map: "
     wanted = "expected a picture beside the file, or one that IR-SIM brings along, got 'cave.png'. "
     assert str(caught.value) == place + wanted + "IR-SIM is not installed (pip install ir-sim)."
+
+
+def test_transparency_is_named_as_the_cause(tmp_path: Path) -> None:
+    Image.new("LA", (4, 4), (0, 0)).save(tmp_path / "dark.png")
+    cause = "no cell is free: 100 % of the pixels are transparent, and count by the colour that is hidden"
+    with pytest.raises(MapError, match=cause):
+        read(tmp_path, "  obstacle_map: dark.png\n")

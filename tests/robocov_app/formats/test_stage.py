@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 import shapely
+from PIL import Image
 from raster_files import drawn, pgm
 from shapely import affinity, box
 
@@ -193,3 +194,35 @@ def test_a_bitmap_without_walls_is_refused_and_one_that_is_all_wall_is_solid(tmp
     (tmp_path / "a.pgm").write_bytes(pgm(drawn("###\n###")))
     foreign = read(tmp_path, ROOM + 'room ( ) model ( bitmap "a.pgm" size [2 1] pose [5 -3 0 0] )')
     assert foreign.free.area == pytest.approx(100 - 2)
+
+
+# Files that include each other
+
+
+def test_files_that_include_each_other_tenfold_are_refused(tmp_path: Path) -> None:
+    names = [f"part{k}.inc" for k in range(10)]
+    body = "".join(f'include "{name}"\n' for name in names)
+    for name in names:
+        (tmp_path / name).write_text(body)
+    with pytest.raises(MapError, match="which does not include itself"):
+        read(tmp_path, body + "model ( )")
+
+
+def test_files_that_are_included_are_limited_together(tmp_path: Path) -> None:
+    for k in range(9):
+        (tmp_path / f"part{k}.inc").write_text(f'include "part{k + 1}.inc"\n' * 10)
+    (tmp_path / "part9.inc").write_text("# nothing\n")
+    with pytest.raises(MapError, match="more than 200 files are included, expected at most 200"):
+        read(tmp_path, 'include "part0.inc"\nmodel ( )')
+    (tmp_path / "long.inc").write_text("#" * 500_000)
+    with pytest.raises(MapError, match="the included files have more than 5 MB together"):
+        read(tmp_path, 'include "long.inc"\n' * 11 + "model ( )")
+    # one that is included from two places is no mistake
+    assert read(tmp_path, 'include "long.inc"\n' * 2 + "model ( )").free.area > 0
+
+
+def test_transparency_is_named_as_the_cause(tmp_path: Path) -> None:
+    Image.new("LA", (4, 4), (0, 0)).save(tmp_path / "dark.png")
+    cause = "all is dark, .*: 100 % of the pixels are transparent, and count by the colour that is hidden"
+    with pytest.raises(MapError, match=cause):
+        read(tmp_path, 'model ( size [4 4 1] bitmap "dark.png" )')

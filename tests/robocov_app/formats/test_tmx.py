@@ -272,3 +272,18 @@ def test_a_large_map_is_read(tmp_path: Path) -> None:
     foreign = IMPORTER.read(path, ReadOptions(cell=0.1))
     # but for the necks
     assert math.isclose(foreign.free.area, 0.01 * (cells == 0).sum(), rel_tol=1e-3)
+
+
+def test_tilesets_are_limited_together(tmp_path: Path) -> None:
+    sides = 'width="1" height="1" tilewidth="8" tileheight="8"'
+    layer = f'<layer name="walls" {sides}><data encoding="csv">1</data></layer>'
+    path = tmp_path / "plan.tmx"
+    for tiles, count, wanted in (
+        (1, 201, "more than 200 files"),
+        (60_000, 2, "tilesets of more than 100000"),
+    ):
+        named = "".join(f'<tileset firstgid="{k + 1}" source="t.tsx"/>' for k in range(count))
+        path.write_text(f"<map {sides}>{named}{layer}</map>")
+        (tmp_path / "t.tsx").write_text('<tileset tilewidth="8">' + '<tile id="1"/>' * tiles + "</tileset>")
+        with pytest.raises(MapError, match=wanted):
+            import_map(path)
