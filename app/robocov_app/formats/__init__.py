@@ -121,8 +121,6 @@ def detect(path: str | Path) -> Importer:
     if imdf.is_archive_folder(path):
         return IMPORTERS["imdf"]
     head = files.head(path)
-    if imdf.sniff(path, head):
-        return IMPORTERS["imdf"]
     if (kind := named_kind(path, head)) is not None:
         raise MapError(f"{one_line(path)}: {one_line(kind)}")
     for candidate in IMPORTERS.values():

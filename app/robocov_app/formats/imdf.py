@@ -27,9 +27,7 @@ _REQUIRED = ("level", "unit")
 _READ = (*_REQUIRED, "opening", "fixture", "kiosk", "venue")
 _ZIP = b"PK\x03\x04"
 _ZIP_ENTRY = b"PK\x01\x02"  # begins the entry of a file in the directory of a zip
-_FILE_NAMES = tuple(
-    f"{name}.geojson".encode() for name in (*_READ, "building", "footprint", "address", "amenity")
-)
+_FILE_NAMES = tuple(f"{name}.geojson".encode() for name in ("level", "opening", "unit", "venue"))
 # categories of units, up to the first dot
 _SOLID = {"brick", "column", "concrete", "drywall", "glass", "structure", "vegetation", "wood"}
 _NO_FLOOR = {"elevator", "escalator", "movingwalkway", "opentobelow", "stairs", "steps"}
