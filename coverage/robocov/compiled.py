@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import importlib
 import importlib.util
 import os
 import pickle
@@ -18,6 +17,7 @@ import shutil
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -25,7 +25,6 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 import numpy as np
-from filelock import FileLock
 
 from robocov.files.cache_folders import find_cache_root, open_private_folder
 
@@ -36,17 +35,14 @@ _MAX_KEPT_VERSIONS = 4
 """Number of versions whose machine code is kept, the most recently used ones."""
 _MIN_UNUSED_DAYS = 1.0
 """Machine code that was used more recently is kept in any case: a program may still be running with it."""
-_READY_FILE = "ready"
-"""Name of the file that marks a folder with the machine code of all common kernels."""
-_EXAMPLE_MODULES = ("robocov.cost", "robocov.simulation", "robocov.metrics")
-"""Modules whose function `example` calls the kernels of the coverage cost, of a step, and of a summary."""
 
 on_compile: list[Callable[[str], None]] = []
 """Functions that are called with the name of each kernel right before it is compiled."""
 
 _lock = threading.RLock()
 _is_cache_usable = True
-_is_interpreting = False
+_must_interpret: Callable[[str], bool] | None = None
+_kernels: weakref.WeakSet[Kernel] = weakref.WeakSet()
 _CACHE_ERRORS = (OSError, EOFError, pickle.UnpicklingError)
 """What numba raises if its cache cannot be read or written; kernels themselves raise none of these."""
 
@@ -89,17 +85,21 @@ class Kernel:
     ----------
     py_func : callable
         The function in Python.
+    name : str
+        Its module and name.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
+        self.name = f"{function.__module__}.{function.__qualname__}"
         self._dispatcher: Any = None
         self._is_cached = False
+        _kernels.add(self)
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Call the compiled function; compile it first if there is no machine code for these types."""
-        if _is_interpreting:
+        if _must_interpret is not None and _must_interpret(self.name):
             with np.errstate(all="ignore"):
                 return self.py_func(*args, **kwargs)
         dispatcher = self._dispatcher or self.get_dispatcher()
@@ -117,6 +117,11 @@ class Kernel:
             _disable_cache()
             return self.get_dispatcher()(*args, **kwargs)
 
+    @property
+    def is_compiled(self) -> bool:
+        """Whether this process has machine code of the kernel, for any types."""
+        return self._dispatcher is not None and len(self._dispatcher.signatures) > 0
+
     def get_dispatcher(self) -> Any:
         """Return numba's dispatcher for the function; import numba if this is the first kernel of all."""
         with _lock:
@@ -124,6 +129,23 @@ class Kernel:
                 self._is_cached = _is_cache_usable and cache_folder() is not None
                 self._dispatcher = _build_dispatcher(self.py_func, is_cached=self._is_cached)
             return self._dispatcher
+
+
+def interpret_kernels(must_interpret: Callable[[str], bool] | None) -> None:
+    """Run some kernels as Python, which gives the same results, only later.
+
+    Parameters
+    ----------
+    must_interpret : callable or None
+        Returns whether the kernel of a name, `Kernel.name`, is to be run as Python. None: no kernel is.
+    """
+    global _must_interpret
+    _must_interpret = must_interpret
+
+
+def list_compiled_kernels() -> list[str]:
+    """Return the names of the kernels that this process has compiled, or loaded from the cache."""
+    return sorted(each.name for each in _kernels if each.is_compiled)
 
 
 def _build_dispatcher(function: Callable[..., Any], *, is_cached: bool) -> Any:
@@ -227,25 +249,3 @@ def _remove_unused_versions(parent: Path) -> None:
     for when, folder in sorted(last_used, reverse=True)[_MAX_KEPT_VERSIONS:]:
         if when < newest_removed:
             shutil.rmtree(folder, ignore_errors=True)
-
-
-def compile_kernels() -> None:
-    """Compile the kernels of a run and of its summary, unless they are in the cache already.
-
-    If another process is compiling them, wait for it.
-    """
-    folder = cache_folder()
-    if folder is None:
-        _call_examples()
-        return
-    if (folder / _READY_FILE).exists():
-        return
-    with FileLock(folder / ".lock"):
-        if not (folder / _READY_FILE).exists():
-            _call_examples()
-            (folder / _READY_FILE).touch()
-
-
-def _call_examples() -> None:
-    for module in _EXAMPLE_MODULES:
-        importlib.import_module(module).example()

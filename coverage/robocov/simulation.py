@@ -19,7 +19,7 @@ from robocov.controllers import CONTROLLERS, informed, remembers
 from robocov.controllers.base import Controller, IndividualController, for_team
 from robocov.controllers.user_modules import fault_of
 from robocov.drawing import show
-from robocov.environment import Environment, PolygonObstacle, require_environment
+from robocov.environment import Environment, require_environment
 from robocov.errors import (
     ParameterError,
     RobocovError,
@@ -514,15 +514,3 @@ def check_dt(dt: float) -> None:
     """Check a control period; raises ParameterError when it is out of range."""
     if not is_number(dt) or not 1e-4 <= dt <= 1.0:
         raise ParameterError(f"dt: {shown(dt)} s, but a number from 0.0001 to 1 s was wanted")
-
-
-def example() -> None:
-    """Call the kernels of a step."""
-    from robocov.controllers import Rapf
-
-    square, triangle = ((0, 0), (3, 0), (3, 3), (0, 3)), PolygonObstacle(((1, 1), (2, 1), (2, 2)))
-    starts = np.array([[0.4, 0.4], [0.4, 0.8], [0.8, 0.4], [2.5, 0.5]])
-    simulation = Simulation(Environment("example", square, (triangle,)), Rapf(), starts)
-    for _ in range(3):
-        simulation.step()
-        simulation.step(np.full((4, 2), -1000.0))  # against the walls

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from robocov import compiled
-from robocov.compiled import compile_kernels, kernel, on_compile
+from robocov.compiled import kernel, on_compile
 from robocov.controllers import Rapf
 from robocov.cost import CoverageCost
+from robocov.kernel_compilation import compile_kernels
 from robocov.mapfile import load_map
 from robocov.metrics import cost_history, summarise
 from robocov.record import Recorder

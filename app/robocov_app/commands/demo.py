@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -76,6 +76,7 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
 
 
 def command(options: Arguments) -> int:
+    from robocov.kernel_compilation import compile_in_background
     from robocov_app.toolkit.termination import ending_on_signals
     from robocov_app.web import prepare, serve_each
 
@@ -83,21 +84,20 @@ def command(options: Arguments) -> int:
     if options.each:
         return serve_each(command, options)
     headless = options.frames is not None or options.video is not None
-    with nullcontext() if headless else ending_on_signals():
+    with ExitStack() as stack:
+        if not headless:
+            stack.enter_context(ending_on_signals())
+            stack.enter_context(compile_in_background())
         return _open_window(options, headless=headless)
 
 
 def _open_window(options: Arguments, *, headless: bool) -> int:
-    from robocov.compiled import on_compile
     from robocov.controllers import controller_kinds
-    from robocov_app.toolkit.window import show_compiling
     from robocov_app.viewer.launch import Launcher
     from robocov_app.viewer.session.file import SUFFIX, load_session
     from robocov_app.viewer.session.session import Session
     from robocov_app.web import show
 
-    if not headless and not options.serve:
-        on_compile.append(lambda _: show_compiling(window_size(options.size) or (900, 600)))
     file, name, laws = None, options.map, (*controller_kinds(), *options.controllers)
     if options.map.endswith(SUFFIX):
         file = Path(options.map)

@@ -1,6 +1,6 @@
 """``robocov edit``: the map editor."""
 
-from contextlib import nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -41,6 +41,7 @@ class Arguments(WindowOptions):
 
 
 def command(options: Arguments) -> int:
+    from robocov.kernel_compilation import compile_in_background
     from robocov_app.toolkit.termination import ending_on_signals
     from robocov_app.web import prepare, serve_each
 
@@ -48,7 +49,10 @@ def command(options: Arguments) -> int:
     if options.each:
         return serve_each(command, options)
     headless = options.screenshot is not None
-    with nullcontext() if headless else ending_on_signals():
+    with ExitStack() as stack:
+        if not headless:
+            stack.enter_context(ending_on_signals())
+            stack.enter_context(compile_in_background())
         return _open_editor(options)
 
 

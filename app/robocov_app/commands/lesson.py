@@ -28,7 +28,7 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> int:
-    from robocov.compiled import compile_kernels
+    from robocov.kernel_compilation import compile_kernels
     from robocov_app.viewer.lessons import checked, load_lesson
 
     saved = load_lesson(options.file)

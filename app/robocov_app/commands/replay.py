@@ -65,9 +65,10 @@ class Arguments(JsonOption, WebOptions):
 def command(options: Arguments) -> int:
     if options.headless:
         return _replay(options)
+    from robocov.kernel_compilation import compile_in_background
     from robocov_app.toolkit.termination import ending_on_signals
 
-    with ending_on_signals():
+    with ending_on_signals(), compile_in_background():
         return _replay(options)
 
 

@@ -89,9 +89,9 @@ def remade(options: Arguments) -> int:
 
 def saved_stories(options: Arguments, stop: Interruption) -> Iterator[dict[str, Any]]:
     """Make the stories of a session that the options name again, each in its folder; yield what was saved."""
-    from robocov.compiled import compile_kernels
     from robocov.errors import InputError
     from robocov.files.result_folder import results
+    from robocov.kernel_compilation import compile_kernels
     from robocov_app.viewer.headless import save_story
     from robocov_app.viewer.session.file import load_session, save_session
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.compiled import compile_kernels
 from robocov.controllers import controller_kind, gains_of
 from robocov.cost import CoverageCost, MomentaryCost
 from robocov.errors import ParameterError, counted, unknown_name
 from robocov.files.result_folder import Kind, results
+from robocov.kernel_compilation import compile_kernels
 from robocov_app.runs.cost import built_cost, cost_for_pictures
 from robocov_app.runs.options import RunOptions
 from robocov_app.runs.run import Run, saved_run

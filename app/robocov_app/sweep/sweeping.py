@@ -12,8 +12,8 @@ from itertools import compress, takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robocov.compiled import compile_kernels
 from robocov.errors import OutputError, RobocovError, checked, counted
+from robocov.kernel_compilation import compile_kernels
 from robocov.text import escape_controls
 from robocov_app.sweep.executors import Cluster, Executor, LocalPool, processors
 from robocov_app.sweep.ledger import Ledger, difference_of, opened

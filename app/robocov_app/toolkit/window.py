@@ -319,17 +319,6 @@ def open_window(size: tuple[int, int]) -> Surface:
     return screen
 
 
-def show_compiling(size: tuple[int, int]) -> None:
-    with suppress(pygame.error):
-        pygame.display.init()
-        screen = pygame.display.get_surface() or open_window(size)
-        screen.fill("white")
-        words = label("compiling the simulation, once", 18, (60, 60, 60))
-        screen.blit(words, words.get_rect(center=screen.get_rect().center))
-        pygame.display.flip()
-        pygame.event.pump()
-
-
 @contextmanager
 def undisturbed() -> Iterator[None]:
     """Keep the garbage collector away from all that is there now, modules most of all."""

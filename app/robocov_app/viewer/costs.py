@@ -13,6 +13,7 @@ from robocov.arrays import Array
 from robocov.cost import LATTICE, CoverageCost, CoverageResult, MomentaryCost, Sites
 from robocov.environment import Environment
 from robocov.errors import InputError, RobocovError
+from robocov.kernel_compilation import call_cost_kernels, compile_kernels
 from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, Worker
 
@@ -183,6 +184,8 @@ class CostService:
     failing = "the cost could not be computed"
 
     def __init__(self) -> None:
+        # If another process is compiling these kernels already, wait for it.
+        compile_kernels([call_cost_kernels])
         self._cost: CoverageCost | None = None
         self._told: CoverageCost | None = None
         self._momentary: MomentaryCost | None = None

@@ -16,7 +16,7 @@ from robocov.arrays import Array, BoolArray, IntArray, beginnings, frozen, weigh
 from robocov.cost.site_paths import GROUP, TILE, CornerViews, CostMap, Tiles, Work, corner_views, site_paths
 from robocov.density.base import means_over_squares
 from robocov.drawing import Drawable
-from robocov.environment import Environment, PolygonObstacle, require_environment
+from robocov.environment import Environment, require_environment
 from robocov.errors import InputError, ParameterError, checked, counted, numeric, shown
 from robocov.geodesic import BINS, Geodesics
 from robocov.geodesic.visibility import AngularWallIndex
@@ -419,9 +419,3 @@ def _checked_speeds(speeds: object, robots: int) -> Array:
         if not 0.0 < value < np.inf:
             raise InputError(f"speeds[{k}]: {shown(value)} m/s, but a number above 0 was wanted")
     return values
-
-
-def example() -> None:
-    """Call all kernels of the cost."""
-    square, triangle = ((0, 0), (3, 0), (3, 3), (0, 3)), PolygonObstacle(((1, 1), (2, 1), (2, 2)))
-    CoverageCost(Environment("example", square, (triangle,)), 2)(np.array([[0.5, 0.5]]))

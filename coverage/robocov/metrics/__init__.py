@@ -243,11 +243,6 @@ def _distance(places: Array, t: int, i: int, j: int) -> float:
     return math.sqrt((places[t, i, 0] - places[t, j, 0]) ** 2 + (places[t, i, 1] - places[t, j, 1]) ** 2)
 
 
-def example() -> None:
-    """Call the kernel of a summary."""
-    _look_at_gaps(np.zeros((1, 1, 2)), np.ones(1), np.zeros((1, 1), dtype=np.intp), np.zeros(1))
-
-
 def summarise(record: Record, history: CostHistory) -> dict[str, Any]:
     """Return the summary that ``run.json`` holds; units are in the key names."""
     clearance = clearances(record)

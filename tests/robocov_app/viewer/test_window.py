@@ -15,7 +15,6 @@ from touched_run import RAPF, begun
 
 from robocov_app.toolkit.input import shown_cursor
 from robocov_app.toolkit.settings import FOLDER
-from robocov_app.toolkit.window import show_compiling
 from robocov_app.viewer.launch import Launcher
 from robocov_app.viewer.status import cursor_words
 
@@ -323,10 +322,3 @@ def test_settings_are_written_and_read_again(tmp_path: Path, monkeypatch: pytest
         assert second.viewer.theme == "dark" and second.viewer.fade and second.panel.tab == "show"
         assert "cells" not in second.viewer.shown and "robots" in second.viewer.shown
         second.close()
-
-
-def test_while_kernels_are_compiled_the_window_says_so() -> None:
-    show_compiling((300, 200))
-    pixels = pygame.surfarray.array3d(pygame.display.get_surface())
-    assert (pixels == 255).mean() > 0.5
-    assert (pixels < 128).any()

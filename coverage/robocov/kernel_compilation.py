@@ -1,0 +1,262 @@
+"""Compilation of kernels in advance: before a long computation, or in the background of a window.
+
+Numba compiles a kernel for the types of the arguments with which it is called. Each *example* below calls a
+group of kernels as robocov itself does. Once an example has been called, the machine code of its kernels is
+in the cache folder, and a file there says so. No two processes call the same example at the same time.
+
+``python -m robocov.kernel_compilation`` calls all examples.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+from filelock import FileLock
+
+from robocov.arrays import Array
+from robocov.compiled import cache_folder, interpret_kernels, list_compiled_kernels
+from robocov.conditions import Conditions
+from robocov.controllers import CONTROLLERS, Lloyd, Rapf
+from robocov.cost import CoverageCost
+from robocov.density import Density, Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
+from robocov.environment import Environment, PolygonObstacle
+from robocov.files.atomic import written
+from robocov.metrics import cost_history, summarise
+from robocov.robots import Team
+from robocov.simulation import Simulation
+
+Example: TypeAlias = Callable[[], None]
+
+_COMPILED_LIST = "compiled.json"
+"""File in the cache folder with the names of the kernels whose machine code is there."""
+_LOOK_PERIOD_S = 0.25
+"""Time between two looks whether more kernels have been compiled."""
+_UNTIL_STDIN_CLOSES = "--until-stdin-closes"
+"""Option with which the module ends when the process that started it does, whatever way that ends."""
+_SQUARE = ((0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0))
+_TRIANGLE = PolygonObstacle(((3.0, 3.0), (4.0, 3.0), (4.0, 4.0)))
+_MAP = Environment("example", _SQUARE, (_TRIANGLE,))
+
+
+def call_cost_kernels() -> None:
+    """Call the kernels of the coverage cost."""
+    cost = CoverageCost(_MAP, 2)
+    cost(np.array([[0.5, 0.5]]))
+    cost(np.array([[0.5, 0.5], [5.0, 5.0]]), speeds=np.array([1.0, 2.0]))
+
+
+def call_step_kernels() -> None:
+    """Call the kernels of a step with the paper's controllers, free and in contact."""
+    for controller in (Rapf(), Lloyd()):
+        simulation = Simulation(_MAP, controller, _place_robots(4))
+        simulation.step()
+        simulation.step(np.full((4, 2), -1000.0))  # into a wall
+        simulation.step()
+
+
+def call_summary_kernels() -> None:
+    """Call the kernels of a run's metrics."""
+    record = Simulation(_MAP, Rapf(), _place_robots(2)).run(0.1)
+    summarise(record, cost_history(record, CoverageCost(_MAP, 2)))
+
+
+def call_large_team_kernels() -> None:
+    """Call the kernels of teams whose cells come from a triangulation."""
+    simulation = Simulation(_MAP, Rapf(), _place_robots(25))
+    for _ in range(3):
+        simulation.step()
+
+
+def call_team_kernels() -> None:
+    """Call the kernels of unicycles, limited communication, message loss, and cells by travel time."""
+    unicycles = Team.homogeneous(4, kinematics="unicycle", communication_range=3.0)
+    mixed_speeds = replace(Team.homogeneous(4), max_speed=np.array([1.0, 0.5, 1.0, 2.0]))
+    lossy = Conditions(loss=0.1)
+    for team, controller, conditions in (
+        (unicycles, Rapf(), None),
+        (mixed_speeds, Rapf(cells="time"), None),
+        (Team.homogeneous(4), Rapf(), lossy),
+    ):
+        simulation = Simulation(_MAP, controller, _place_robots(4), team, conditions=conditions)
+        simulation.step()
+        simulation.step(np.full((4, 2), -1000.0))
+        simulation.step()
+
+
+def call_density_kernels() -> None:
+    """Call the kernels of all kinds of density."""
+    densities: Sequence[Density] = (
+        Gaussians((Gaussian((2.0, 2.0), weight=5.0, sigma=1.0),), floor=1.0),
+        WeightedPolygons((WeightedArea(((1.0, 1.0), (2.0, 1.0), (2.0, 2.0)), weight=3.0),), background=1.0),
+        Raster(np.array([[1.0, 2.0], [3.0, 4.0]]), extent=(0.0, 0.0, 6.0, 6.0)),
+    )
+    for density in densities:
+        environment = replace(_MAP, density=density)
+        simulation = Simulation(environment, Rapf(), _place_robots(4))
+        simulation.step()
+        CoverageCost(environment, 2)(simulation.positions)
+
+
+def call_controller_kernels() -> None:
+    """Call the kernels of all built-in controllers."""
+    for controller in CONTROLLERS.values():
+        simulation = Simulation(_MAP, controller(), _place_robots(4))
+        for _ in range(3):
+            simulation.step()
+
+
+COMMON_EXAMPLES: tuple[Example, ...] = (call_cost_kernels, call_step_kernels, call_summary_kernels)
+"""What a run of the paper's controllers and its summary need."""
+ALL_EXAMPLES: tuple[Example, ...] = (
+    call_step_kernels,
+    call_cost_kernels,
+    call_summary_kernels,
+    call_large_team_kernels,
+    call_team_kernels,
+    call_density_kernels,
+    call_controller_kernels,
+)
+
+
+def _place_robots(count: int) -> Array:
+    """Return positions of robots in rows, the first of them in a corner."""
+    robots = np.arange(count)
+    return np.column_stack([0.3 + 0.5 * (robots % 5), 0.3 + 0.5 * (robots // 5)])
+
+
+def compile_kernels(examples: Sequence[Example] = COMMON_EXAMPLES) -> None:
+    """Compile the kernels of examples, unless their machine code is in the cache already.
+
+    Without a cache folder the kernels are compiled for this process. If another process is compiling the same
+    kernels, this function waits for it.
+
+    Parameters
+    ----------
+    examples : sequence of functions
+        By default those that a run and its summary need.
+    """
+    folder = cache_folder()
+    for example in examples:
+        if folder is None:
+            example()
+        elif not _get_marker(folder, example).exists():
+            with FileLock(folder / f"{example.__name__}.lock"):
+                if not _get_marker(folder, example).exists():
+                    example()
+                    _get_marker(folder, example).touch()
+                    _save_compiled_list(folder)
+
+
+def are_kernels_compiled(examples: Sequence[Example] = COMMON_EXAMPLES) -> bool:
+    """Return whether the machine code of the kernels of examples is in the cache."""
+    folder = cache_folder()
+    return folder is not None and all(_get_marker(folder, example).exists() for example in examples)
+
+
+@contextmanager
+def compile_in_background() -> Iterator[None]:
+    """Compile all kernels in another process, and run those that are not ready as Python.
+
+    The results are the same. A step of six robots in Python takes less than a millisecond, so that a window
+    shows them in real time from the beginning. On leaving the context the other process is ended; what it has
+    not compiled, the next one does.
+    """
+    folder = cache_folder()
+    if folder is None or are_kernels_compiled(ALL_EXAMPLES):
+        yield
+        return
+    compilation = _BackgroundCompilation(folder)
+    interpret_kernels(compilation.must_interpret)
+    try:
+        yield
+    finally:
+        interpret_kernels(None)
+        compilation.close()
+
+
+class _BackgroundCompilation:
+    """Another process that compiles all kernels."""
+
+    def __init__(self, folder: Path) -> None:
+        self._list = folder / _COMPILED_LIST
+        self._compiled: set[str] = set()
+        self._time_of_next_look = 0.0
+        self._process: subprocess.Popen[bytes] | None = None
+        search_path = os.pathsep.join(filter(None, sys.path))
+        with suppress(OSError):
+            self._process = subprocess.Popen(
+                # -P: modules in the working folder are not meant.
+                [sys.executable, "-P", "-m", __name__, _UNTIL_STDIN_CLOSES],
+                env={**os.environ, "PYTHONPATH": search_path},
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
+
+    def must_interpret(self, kernel: str) -> bool:
+        """Return whether there is no machine code of a kernel yet, and the other process is making it."""
+        if kernel in self._compiled:
+            return False
+        if time.monotonic() >= self._time_of_next_look:
+            self._time_of_next_look = time.monotonic() + _LOOK_PERIOD_S
+            self._look()
+        return kernel not in self._compiled
+
+    def _look(self) -> None:
+        """Read which kernels are compiled; if the process has ended, all others are compiled here."""
+        has_ended = self._process is None or self._process.poll() is not None
+        with suppress(OSError, ValueError):
+            self._compiled = set(json.loads(self._list.read_text(encoding="utf-8")))
+        if has_ended:
+            interpret_kernels(None)
+
+    def close(self) -> None:
+        """End the other process."""
+        if self._process is not None:
+            with self._process:  # which also closes the pipe
+                self._process.kill()
+
+
+def _get_marker(folder: Path, example: Example) -> Path:
+    """Return the file whose existence says that an example has been called."""
+    return folder / f"{example.__name__}.ready"
+
+
+def _save_compiled_list(folder: Path) -> None:
+    """Add the kernels that this process has compiled to the list in the cache folder."""
+    path = folder / _COMPILED_LIST
+    with FileLock(folder / "list.lock"):
+        compiled = set(list_compiled_kernels())
+        with suppress(OSError, ValueError):
+            compiled |= set(json.loads(path.read_text(encoding="utf-8")))
+        with written(path, durable=False) as part:
+            part.write_text(json.dumps(sorted(compiled)), encoding="utf-8")
+
+
+def main() -> None:
+    """Compile all kernels, at a low priority."""
+    if _UNTIL_STDIN_CLOSES in sys.argv[1:]:
+        threading.Thread(target=_exit_when_stdin_closes, daemon=True).start()
+    if hasattr(os, "nice"):
+        os.nice(5)
+    compile_kernels(ALL_EXAMPLES)
+
+
+def _exit_when_stdin_closes() -> None:
+    sys.stdin.buffer.read()
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
