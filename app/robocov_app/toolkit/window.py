@@ -17,7 +17,6 @@ from pygame import Surface
 from robocov.errors import InputError
 from robocov.files.atomic import written
 from robocov.text import remove_controls
-from robocov_app.render.fonts import label
 from robocov_app.render.theme import LIGHT
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit.faults import FaultLog
