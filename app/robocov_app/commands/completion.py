@@ -91,4 +91,5 @@ def _described(kind: Any) -> tuple[list[str], list[str], set[str]]:
         elif each.default_factory not in groups:
             name = next((told.name for told in more if getattr(told, "name", None)), each.name)
             flags.append(f"--{'no-' * (each.default is True)}{name.replace('_', '-')}")
+            flags += each.metadata.get("aliases", ())
     return flags + [flag for group in groups for flag in _described(group)[0]], words, positionals

@@ -61,6 +61,7 @@ _THUMBNAIL = 640  # pixels of the longer side of a thumbnail, at most, but for p
 _FEW_LIGHT = 0.02  # light pixels for each dark one, at most, of a drawing without paper: soft edges
 _FEW_LINES = 0.25  # of the pixels: lines that are walls cover less
 _LINE_SHARE = 0.05  # of the shorter side of a picture: no line is as wide
+_SOFT_EDGE = 2  # pixels from one colour to the next
 _NO_KEY = ColourKey()
 _OPAQUE = 128  # less opaque pixels count as transparent, of 255
 
@@ -392,12 +393,32 @@ def _classify(picture: Brightness, options: ReadOptions) -> tuple[Cells, list[st
                 notes.append(f"{100 * share:.3g} % of the pixels are {', '.join(names)}, taken as {what}")
         cells[picture.roles == ROLES.index("free") + 1] = FREE
         cells[picture.roles == ROLES.index("solid") + 1] = BLOCKED
+        if not options.invert:
+            _free_soft_edges(cells, picture, picture.roles, options)
     if transparent is not None:
         cells[transparent] = UNKNOWN
     if picture.roles is not None and options.ignore_colour:
         ignored = picture.roles == ROLES.index("ignore") + 1
         _fill_from_around(cells, ignored)
     return cells, notes
+
+
+def _free_soft_edges(
+    cells: Cells, picture: Brightness, roles: NDArray[np.uint8], options: ReadOptions
+) -> None:
+    """Free what lies between a dark colour that is declared and light paint, and mixes the two.
+
+    It is neither the one nor the other: without this, soft edges would become walls around such colours.
+    """
+    declared = [sum(colour) / 765 for colour, role in options.colour_key().entries if role != "solid"]
+    if not declared or min(declared) >= 0.5:
+        return
+    mixed = (cells == BLOCKED) & (roles == NO_ROLE) & (picture.level > min(declared) * picture.full)
+    around = np.ones((3, 3), dtype=bool)
+    is_declared = (roles == ROLES.index("free") + 1) | (roles == ROLES.index("ignore") + 1)
+    mixed &= ndimage.binary_dilation(is_declared, around, iterations=_SOFT_EDGE)
+    mixed &= ndimage.binary_dilation((cells == FREE) & (roles == NO_ROLE), around, iterations=_SOFT_EDGE)
+    cells[mixed] = FREE
 
 
 def _fill_from_around(cells: Cells, ignored: BoolArray) -> None:

@@ -141,6 +141,17 @@ def test_colours_of_a_picture_are_what_is_declared(tmp_path: Path, name: str) ->
     assert [note.rpartition(" ")[2] for note in shares] == ["free", "obstacles", "out"]
 
 
+@pytest.mark.parametrize("role", ["free", "ignore"])
+def test_soft_edges_of_a_dark_colour_are_no_walls(tmp_path: Path, role: str) -> None:
+    large = Image.new("RGB", (800, 480), "white")
+    draw = ImageDraw.Draw(large)
+    draw.rectangle((0, 0, 799, 479), outline="black", width=16)
+    draw.rectangle((501, 101, 702, 303), fill="#204080")
+    soft = large.resize((200, 120), Image.Resampling.LANCZOS)
+    area, _, _ = imported(tmp_path, soft, **{f"{role}_colour": ("#204080",)})
+    assert area == pytest.approx(19.2 * 11.2, abs=0.3)
+
+
 def test_an_ignored_line_leaves_the_wall_below_it(tmp_path: Path) -> None:
     _, _, foreign = imported(tmp_path, coloured(), ignore_colour=("red",))
     low_x, _, high_x, _ = foreign.free.bounds

@@ -25,7 +25,7 @@ class Arguments(JsonOption):
       ros        YAML of ROS map_server with its PGM or PNG: --unknown --threshold --anywhere
       movingai   .map of Moving AI's benchmarks: --cell --trees --water
       picture    PNG, JPEG, BMP, TIFF, PGM, PPM of a plan, dark is an obstacle: --cell --threshold
-                 --invert --unknown
+                 --invert --unknown --min-stroke --free-colour --solid-colour --ignore-colour
       stage, argos, irsim
                  worlds of these simulators, robots as a start: --only --skip --anywhere
       tmx        map of Tiled, --only LAYER says which tiles are solid: --cell --scale --skip --thickness
@@ -35,7 +35,10 @@ class Arguments(JsonOption):
       imdf       a floor of an indoor map, zip or folder: --level --thickness --only --skip
       wkt, geojson, svg, dxf, rings
                  drawings and geometries: --scale --thickness --outlines --boundary --around and others;
-                 a wrong one is answered with those that there are
+                 a wrong one is answered with those that there are; svg also by colour, as a picture
+
+    --ignore-layer (or --skip) and --only choose by the name of a layer, group, class or shape; options of
+    several values can be repeated.
 
     Example: robocov import office.yaml -o office.json --preview office.png
     """
