@@ -8,7 +8,7 @@ in common, and where the file leaves out the wall between them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -119,14 +119,19 @@ def build_floor(shapes: Shapes, figures: Sequence[IndoorFigure], name: str, text
     edges = [*(edge for space in spaces for edge in shapely.get_rings(shapely.get_parts(space))), *outlines]
     Crossings(shapes.where).add(edges)
     gaps = [_opening_area(figure) for figure in openings]
-    floor = _join(spaces, gaps, shapes)
+    snap = default_snap(spaces) if shapes.options.snap is None else shapes.options.snap
+    joined = close_gaps(spaces, snap)
+    floor = _join(joined.area, gaps, shapes)
     outer_walls = [wall.figure.rings[0] for wall in wanted if wall.role == "wall"]
     for line in _cut_walls([*outlines, *map(shapely.LineString, filter(_has_length, outer_walls))], gaps):
         shapes.add_line(Line(line, shapes.thickness, ("wall",)))
     shapes.join_lines()
     _add_obstacles(shapes, wanted, floor)
     shapes.notes.append(f"{counted(len(spaces), 'space')}, {counted(len(openings), 'opening')}")
-    return shapes.foreign_map(name, text, solid=True, world=floor)
+    foreign = shapes.foreign_map(name, text, solid=True, world=floor)
+    if joined.number:
+        return replace(foreign, repaired=(*foreign.repaired, joined.describe()))
+    return foreign
 
 
 def _area(figure: Figure, shapes: Shapes) -> MultiPolygon:
@@ -148,13 +153,8 @@ def _opening_area(figure: Figure) -> BaseGeometry:
     return shapely.LineString(line).buffer(REACH_M, cap_style="flat", join_style="mitre")
 
 
-def _join(spaces: list[MultiPolygon], gaps: list[BaseGeometry], shapes: Shapes) -> MultiPolygon:
-    """Return all spaces as one area, with a passage through each opening where a wall is between them."""
-    snap = default_snap(spaces) if shapes.options.snap is None else shapes.options.snap
-    joined = close_gaps(spaces, snap)
-    if joined.number:
-        shapes.notes.append(joined.describe())
-    floor = joined.area
+def _join(floor: MultiPolygon, gaps: list[BaseGeometry], shapes: Shapes) -> MultiPolygon:
+    """Return the area of all spaces with a passage through each opening where a wall is between them."""
     tree = shapely.STRtree(list(floor.geoms))
     passages = []
     for gap in gaps:
