@@ -24,6 +24,7 @@ MAX_QUEUED_MESSAGES = 4  # from one page, before reading from it pauses
 WRITE_LIMIT_BYTES = 1 << 16
 MAX_UNANSWERED = 256  # connections without an open socket; the oldest one is ended when there are more
 REQUEST_TIMEOUT_S = 10.0  # for a request to come in
+MAX_FILES_BYTES = 1 << 29  # of files that browsers are taking at the same time
 RESPONSE_TIMEOUT_S = 600.0  # for a browser to take a file
 SEND_TIMEOUT_S = 30.0  # for a page to take a message
 CLOSE_TIMEOUT_S = 5.0
@@ -68,6 +69,7 @@ class Listener:
         self._talk = talk
         self._connections: set[ServerConnection] = set()
         self._unanswered: dict[ServerConnection, asyncio.TimerHandle] = {}  # in the order in which they came
+        self._files: dict[ServerConnection, int] = {}  # bytes of the files that browsers are taking
         self._server: Server | None = None
 
     async def listen(self, host: str, port: int) -> int:
@@ -137,6 +139,7 @@ class Listener:
 
     def _on_lost(self, connection: ServerConnection) -> None:
         self._connections.discard(connection)
+        self._files.pop(connection, None)
         self._on_answered(connection)
 
     def _on_answered(self, connection: ServerConnection) -> None:
@@ -153,15 +156,23 @@ class Listener:
         except Exception:
             report_fault("a request of a browser failed")
             return respond(connection, HTTPStatus.INTERNAL_SERVER_ERROR, "The request failed.\n")
-        if response is not None:
-            if len(response.body) > WRITE_LIMIT_BYTES:
-                self._on_answered(connection)
-                connection.close_timeout = RESPONSE_TIMEOUT_S
-                loop = asyncio.get_running_loop()
-                loop.call_later(RESPONSE_TIMEOUT_S, connection.transport.abort)
-            if method == "HEAD":
-                response.body = b""
+        if response is None:
+            return None
+        if method == "HEAD":
+            response.body = b""
+        if len(response.body) > WRITE_LIMIT_BYTES:
+            if sum(self._files.values()) + len(response.body) > MAX_FILES_BYTES:
+                text = "Too many files are being downloaded; try again in a minute.\n"
+                return respond(connection, HTTPStatus.SERVICE_UNAVAILABLE, text)
+            self._give_time(connection, len(response.body))
         return response
+
+    def _give_time(self, connection: ServerConnection, n_bytes: int) -> None:
+        """Let a browser with a slow connection take a file."""
+        self._on_answered(connection)
+        self._files[connection] = n_bytes
+        connection.close_timeout = RESPONSE_TIMEOUT_S
+        asyncio.get_running_loop().call_later(RESPONSE_TIMEOUT_S, connection.transport.abort)
 
     async def _handle_socket(self, connection: ServerConnection) -> None:
         self._on_answered(connection)

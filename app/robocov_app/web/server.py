@@ -59,7 +59,6 @@ EVENTS_PER_PIECE = 8.0  # and each piece of it
 MAX_WAITING_EVENTS = 5000  # for the window
 MAX_NOTICES = 8  # that wait for a page
 MAX_COPIED_CHARACTERS = 100_000
-MAX_DOWNLOADS_BYTES = 1 << 29  # on their way at a time
 NARROW_PX = 700  # width of a page, in pixels of CSS, below which the panel is hidden
 MAX_IN_FLIGHT = 2  # frames that are on their way to a page
 FEW_WATCHERS = 3
@@ -156,7 +155,6 @@ class WebDisplay:
         self._watchers_frame: Frame | None = None
         self._watchers_due = 0.0
         self._control_was_served = False
-        self._downloads_bytes = 0
         self._background: set[asyncio.Task[None]] = set()
         self._loop: asyncio.AbstractEventLoop
         self._stirred = asyncio.Event()
@@ -284,23 +282,12 @@ class WebDisplay:
         return respond_with_page(connection, may_be_framed=is_given, cookie=cookie)
 
     async def _download(self, connection: ServerConnection, name: str) -> Response:
-        if self._downloads_bytes > MAX_DOWNLOADS_BYTES:
-            text = "Too many files are being downloaded; try again in a minute.\n"
-            return respond(connection, HTTPStatus.SERVICE_UNAVAILABLE, text)
         try:
             name, body = await self._loop.run_in_executor(self._file_thread, read_saved, self.folder / name)
         except TransferError as error:
             return respond(connection, HTTPStatus.NOT_FOUND, f"{error}\n")
-        self._start_in_background(self._count_download(connection, len(body)))
         headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(name)}"}
         return respond_with(connection, HTTPStatus.OK, body, "application/octet-stream", headers)
-
-    async def _count_download(self, connection: ServerConnection, n_bytes: int) -> None:
-        self._downloads_bytes += n_bytes
-        try:
-            await connection.wait_closed()
-        finally:
-            self._downloads_bytes -= n_bytes
 
     def _start_in_background(self, work: Any) -> None:
         task = asyncio.create_task(work)

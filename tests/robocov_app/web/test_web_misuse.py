@@ -269,6 +269,21 @@ def test_files_that_are_large_are_not_read_into_memory(display, tmp_path):
         assert b"larger than 256 MB; copy it from the folder" in answer.read()
 
 
+def test_files_that_nobody_takes_are_bounded(display, tmp_path, monkeypatch):
+    monkeypatch.setattr("robocov_app.web.connections.MAX_FILES_BYTES", 20 << 20)
+    (tmp_path / "film.mp4").write_bytes(bytes(8 << 20))
+    display._saved = ("film.mp4",)
+    request = f"GET /saved/film.mp4?token={display.token} HTTP/1.1\r\n\r\n".encode()
+    with raw(display) as first, raw(display) as second:
+        for line in (first, second):
+            line.sendall(request)
+            assert line.recv(1000).startswith(b"HTTP/1.1 200")
+        assert answer_to(display, request).startswith(b"HTTP/1.1 503")
+    end = time.monotonic() + PATIENCE_S
+    while not answer_to(display, request).startswith(b"HTTP/1.1 200"):
+        assert time.monotonic() < end
+
+
 def test_a_download_that_is_taken_slowly_is_not_cut(tmp_path, monkeypatch):
     monkeypatch.setattr("robocov_app.web.connections.REQUEST_TIMEOUT_S", 0.2)
     monkeypatch.setattr("robocov_app.web.connections.CLOSE_TIMEOUT_S", 0.2)
