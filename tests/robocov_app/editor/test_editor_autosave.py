@@ -1,11 +1,13 @@
 """Maps that are kept aside, and what is offered of them after a crash."""
 
 import json
+from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
 import pytest
 from drawn_sketches import HALL
+from driven_editor import of_map, opened_editor
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
@@ -76,3 +78,27 @@ def test_words_for_days():
     ]:
         found = Autosave(Path("x"), Path("/maps/hall.json"), "Hall", when, 1, None)
         assert found.words(now) == f"“Hall”, 1 obstacle, {words}, not saved to hall.json"
+
+
+@pytest.mark.parametrize("ends", ["killed", "closed"])
+def test_what_is_changed_while_a_map_is_tried_is_in_its_draft(ends, tmp_path):
+    drafts = tmp_path / "drafts"
+    with opened_editor(tmp_path, of_map("square"), drafts=drafts) as hands:
+        before = len(hands.shapes)
+        hands.key("f5")
+        trial = hands.window.trial
+        session = trial.viewer.session
+        circle = CircleObstacle((5.0, 5.0), 0.3)
+        obstacles = (*session.environment.obstacles, circle)
+        session.edit(replace(session.environment, obstacles=obstacles), "drawn")
+        if ends == "killed":
+            hands.window.frame(0.1)
+        else:
+            hands.window.close()
+        assert hands.editor.document.flush()
+        (file,) = drafts.glob("*/draft.json")
+        kept = json.loads(file.read_text())["sketch"]["obstacles"]
+        assert len(kept) == before + 1
+        if ends == "killed":
+            hands.key("f5")
+            assert hands.shapes[-1] == circle

@@ -286,7 +286,11 @@ class EditorWindow(BaseWindow):
         now = monotonic()
         if environment is self._drafted or viewer.elsewhere or (now < self._draft_due and not at_once):
             return
-        self._drafted, self._draft_due = environment, now + _DRAFT_PAUSE_S
+        is_unchanged = self._drafted is None and environment is viewer.tried
+        self._drafted = environment
+        if is_unchanged:
+            return
+        self._draft_due = now + _DRAFT_PAUSE_S
         change = brought_back(self.editor.sketch, viewer.tried, environment)
         if change is None:
             document.keep()
