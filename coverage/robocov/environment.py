@@ -571,7 +571,7 @@ class _Search:
             empty[empty] = shapely.contains_properly(self.free, middle[empty])
             for k in some[empty].tolist():
                 if self._leads_on(corner[k], edge[k], q[k], width[k]):
-                    one, other = sorted(map(tuple, np.round([p[k], q[k]], _DIGITS).tolist()))
+                    one, other = sorted(map(tuple, (np.round([p[k], q[k]], _DIGITS) + 0.0).tolist()))
                     yield Gap(round(float(width[k]), _DIGITS), (one, other))
 
     def _leads_on(self, corner: int, edge: int, q: Array, width: float) -> bool:
