@@ -400,6 +400,8 @@ class Sessions:
     async def _open(self, folder: Path) -> Window:
         """Open a window in a process of its own; raises `InputError` with its message if it does not open."""
         async with self._openings:
+            if self._is_ending:
+                raise InputError("the server is ending")
             options = replace(self._options, each=False, host="127.0.0.1", port=0, folder=folder)
             context = multiprocessing.get_context("spawn")
             receiver, sender = context.Pipe(duplex=False)
