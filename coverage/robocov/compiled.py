@@ -143,6 +143,11 @@ def interpret_kernels(must_interpret: Callable[[str], bool] | None) -> None:
     _must_interpret = must_interpret
 
 
+def is_interpreting() -> bool:
+    """Return whether some kernels may be run as Python; see `interpret_kernels`."""
+    return _must_interpret is not None
+
+
 def list_compiled_kernels() -> list[str]:
     """Return the names of the kernels that this process has compiled, or loaded from the cache."""
     return sorted(each.name for each in _kernels if each.is_compiled)
@@ -166,12 +171,17 @@ def _disable_cache() -> None:
     _is_cache_usable = False
 
 
-@functools.cache
 def import_numba() -> ModuleType:
     """Import numba, in spite of a folder `coverage` on the path, and let its kernels call ours.
 
     Numba takes any module `coverage` for coverage.py, also our source root of that name.
     """
+    with _lock:
+        return _import_numba()
+
+
+@functools.cache
+def _import_numba() -> ModuleType:
     is_source_root = False
     if "numba" not in sys.modules and "coverage" not in sys.modules:
         found = importlib.util.find_spec("coverage")

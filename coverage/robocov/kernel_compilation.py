@@ -25,7 +25,7 @@ import numpy as np
 from filelock import FileLock
 
 from robocov.arrays import Array
-from robocov.compiled import cache_folder, interpret_kernels, list_compiled_kernels
+from robocov.compiled import cache_folder, import_numba, interpret_kernels, list_compiled_kernels
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Lloyd, Rapf
 from robocov.cost import CoverageCost
@@ -192,6 +192,9 @@ class _BackgroundCompilation:
         self._list = folder / _COMPILED_LIST
         self._compiled: set[str] = set()
         self._time_of_next_look = 0.0
+        # Importing numba takes a while, too.
+        self._import = threading.Thread(target=import_numba, daemon=True)
+        self._import.start()
         self._process: subprocess.Popen[bytes] | None = None
         search_path = os.pathsep.join(filter(None, sys.path))
         with suppress(OSError):
@@ -206,6 +209,8 @@ class _BackgroundCompilation:
 
     def must_interpret(self, kernel: str) -> bool:
         """Return whether there is no machine code of a kernel yet, and the other process is making it."""
+        if self._import.is_alive():
+            return True
         if kernel in self._compiled:
             return False
         if time.monotonic() >= self._time_of_next_look:

@@ -14,7 +14,7 @@ import numpy as np
 import pymunk
 
 from robocov.arrays import Array, BoolArray
-from robocov.compiled import IS_COMPILER_ENABLED
+from robocov.compiled import IS_COMPILER_ENABLED, is_interpreting
 from robocov.observation import headings
 from robocov.world.bodies import Obstacles, build_obstacle_space
 from robocov.world.solid import Mover
@@ -97,7 +97,7 @@ class RangeSensor:
             nan where no obstacle is in range. Read-only.
         """
         limits = np.minimum(ranges, _MAX_RANGE_M)
-        queries = _load_compiled_queries()
+        queries = _get_compiled_queries()
         if queries is not None:
             points: Array = queries.find_nearest_points(self._space, positions, limits)
         else:
@@ -129,7 +129,7 @@ class RangeSensor:
         """
         limits = np.minimum(ranges, _MAX_RANGE_M)
         ends = positions[:, None, :] + limits[:, None, None] * headings(rays)
-        queries = _load_compiled_queries()
+        queries = _get_compiled_queries()
         if queries is not None:
             fractions, is_hit = queries.cast_rays(self._space, np.ascontiguousarray(positions), ends)
         else:
@@ -171,9 +171,14 @@ class RangeSensor:
         return fractions, is_hit
 
 
+def _get_compiled_queries() -> ModuleType | None:
+    """Return `robocov.compiled_queries` if it can be used now; otherwise pymunk's public queries are."""
+    return None if is_interpreting() else _load_compiled_queries()
+
+
 @functools.cache
 def _load_compiled_queries() -> ModuleType | None:
-    """Return `robocov.compiled_queries` if it works here; otherwise pymunk's public queries are used."""
+    """Return `robocov.compiled_queries` if it works here."""
     if not IS_COMPILER_ENABLED:
         return None
     try:

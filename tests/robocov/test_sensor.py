@@ -52,7 +52,7 @@ def test_compiled_queries_agree_with_public_ones(
         monkeypatch.undo()
         nearest = sensor.find_nearest_points(positions, ranges)
         distances, is_hit = sensor.scan(positions, 24, ranges)
-        monkeypatch.setattr("robocov.sensor._load_compiled_queries", lambda: None)
+        monkeypatch.setattr("robocov.sensor._get_compiled_queries", lambda: None)
         assert np.array_equal(sensor.find_nearest_points(positions, ranges), nearest, equal_nan=True)
         public_distances, public_is_hit = sensor.scan(positions, 24, ranges)
         assert np.array_equal(public_distances, distances)

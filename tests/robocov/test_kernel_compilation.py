@@ -1,0 +1,171 @@
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robocov import compiled
+from robocov.compiled import IS_COMPILER_ENABLED, Kernel, cache_folder, interpret_kernels, is_interpreting
+from robocov.controllers import Controller, Lloyd, Rapf
+from robocov.environment import Environment
+from robocov.kernel_compilation import (
+    are_kernels_compiled,
+    call_step_kernels,
+    compile_in_background,
+    compile_kernels,
+)
+from robocov.robots import Team
+from robocov.simulation import Simulation
+
+ROOT = Path(__file__).parents[2]
+PATIENCE_S = 120.0
+
+pytestmark = pytest.mark.skipif(not IS_COMPILER_ENABLED, reason="kernels are Python without the compiler")
+
+
+@pytest.fixture
+def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    cache_folder.cache_clear()
+    folder = cache_folder()
+    assert folder is not None
+    yield folder
+    cache_folder.cache_clear()
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize(
+    ("controller", "team"),
+    [
+        (Rapf(), Team.homogeneous(5)),
+        (Lloyd(), Team.homogeneous(20)),
+        (Rapf(), Team.homogeneous(5, kinematics="unicycle", communication_range=2.0)),
+    ],
+)
+def test_interpreted_kernels_give_the_same_bits(
+    cluttered: Environment, controller: Controller, team: Team
+) -> None:
+    starts = cluttered.start("uniform").sample(len(team), seed=1)
+    compiled_run = Simulation(cluttered, controller, starts, team)
+    interpreted_run = Simulation(cluttered, controller, starts, team)
+    for _ in range(60):
+        compiled_run.step()
+    interpret_kernels(lambda name: True)
+    try:
+        for _ in range(60):
+            interpreted_run.step()
+    finally:
+        interpret_kernels(None)
+    assert np.array_equal(interpreted_run.positions, compiled_run.positions)
+    assert np.array_equal(interpreted_run.velocities, compiled_run.velocities)
+
+
+def test_only_kernels_that_must_be_are_interpreted() -> None:
+    interpreted: list[str] = []
+
+    def record(name: str) -> bool:
+        interpreted.append(name)
+        return name.endswith("first")
+
+    def first(x: float) -> object:
+        return type(x)
+
+    def second(x: float) -> float:
+        return 2.0 * x
+
+    interpret_kernels(record)
+    try:
+        assert Kernel(first)(1.0) is float  # which no compiled kernel returns
+        assert Kernel(second)(1.0) == 2.0
+    finally:
+        interpret_kernels(None)
+    assert len(interpreted) == 2
+
+
+def test_examples_are_called_once_for_a_cache(empty_cache: Path) -> None:
+    calls: list[str] = []
+
+    def example() -> None:
+        calls.append("called")
+
+    assert not are_kernels_compiled([example])
+    compile_kernels([example])
+    compile_kernels([example])
+    assert calls == ["called"]
+    assert are_kernels_compiled([example])
+
+
+def test_without_a_cache_examples_are_called_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robocov.kernel_compilation.cache_folder", lambda: None)
+    calls: list[str] = []
+    compile_kernels([lambda: calls.append("first"), lambda: calls.append("second")])
+    assert calls == ["first", "second"]
+    with compile_in_background():
+        assert not is_interpreting(), "machine code of another process could not be loaded"
+
+
+@pytest.mark.slow
+def test_kernels_are_interpreted_until_another_process_has_compiled_them(
+    empty_cache: Path, cluttered: Environment
+) -> None:
+    simulation = Simulation(cluttered, Rapf(), cluttered.start("uniform").sample(4, seed=1))
+    with compile_in_background():
+        simulation.step()
+        assert is_interpreting()
+        name = "robocov.world.dynamics.compute_net_forces"
+        must_interpret = compiled._must_interpret
+        assert must_interpret is not None
+        assert must_interpret(name)
+        wait_until(lambda: not must_interpret(name))
+        assert are_kernels_compiled([call_step_kernels])
+        simulation.step()
+    assert not is_interpreting()
+
+
+SCRIPT = """
+import subprocess, time
+from robocov import kernel_compilation
+started = []
+class Recorded(subprocess.Popen):
+    def __init__(self, *args, **options):
+        super().__init__(*args, **options)
+        print(self.pid, flush=True)
+subprocess.Popen = Recorded
+with kernel_compilation.compile_in_background():
+    time.sleep(600)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="kill -9 is of POSIX")
+def test_background_process_ends_with_a_killed_program(tmp_path: Path) -> None:
+    variables = {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT / "coverage")}
+    program = subprocess.Popen(
+        [sys.executable, "-c", SCRIPT], env=os.environ | variables, stdout=subprocess.PIPE, text=True
+    )
+    assert program.stdout is not None
+    with program:
+        background = int(program.stdout.readline())
+        program.send_signal(signal.SIGKILL)
+
+    def has_ended() -> bool:
+        try:
+            os.kill(background, 0)
+        except ProcessLookupError:
+            return True
+        return Path(f"/proc/{background}/stat").read_text().split()[2] == "Z"
+
+    wait_until(has_ended)
