@@ -5,12 +5,14 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
+import pygame
 import pytest
 from drawn_sketches import HALL
 from driven_editor import of_map, opened_editor
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
+from robocov_app.editor.edits.create import circle_drawn
 from robocov_app.editor.model.document import KIND, Autosave, content, recoverable, state_of, write_sketch
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.toolkit.autosave import Autosaver, remove_draft
@@ -102,3 +104,16 @@ def test_what_is_changed_while_a_map_is_tried_is_in_its_draft(ends, tmp_path):
         if ends == "killed":
             hands.key("f5")
             assert hands.shapes[-1] == circle
+
+
+def test_a_file_can_be_opened_after_leaving_for_it_was_cancelled(tmp_path):
+    write_sketch(SKETCH, tmp_path / "hall.json")
+    with opened_editor(tmp_path, drafts=tmp_path / "drafts") as hands:
+        hands.editor.change(circle_drawn(hands.sketch, (5.0, 5.0), 1.0))
+        for answer in ("escape", "escape", "d"):
+            hands.post(pygame.DROPFILE, file=str(tmp_path / "hall.json"))
+            hands.settle()
+            assert hands.editor.dialogs.asked is not None, hands.said
+            hands.key(answer)
+        assert hands.editor.document.title == "hall.json"
+        assert len(list((tmp_path / "drafts").iterdir())) == 1

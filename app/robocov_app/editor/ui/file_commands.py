@@ -38,6 +38,7 @@ class FileCommands:
     def __init__(self, editor: Editor, drafts: Path | None, fit: Act, *, patient: bool = False) -> None:
         self.editor, self.drafts, self._fit, self._patient = editor, drafts, fit, patient
         self.leaving = False
+        self._pending: Document | None = None  # opened, until the present document may be left for it
 
     def leave(self, then: Act) -> None:
         document = self.editor.document
@@ -54,7 +55,20 @@ class FileCommands:
         answers = (("Save", "s", save), ("Discard", "d", discard), _CANCEL)
         self.editor.ask("Save the changes?", words, *answers)
 
+    def _leave_for(self, document: Document, words: str) -> None:
+        """Show another document, as soon as the present one may be left."""
+        self._pending = document
+        self.leave(lambda: self._put(document, words))
+
+    def _close_pending(self) -> None:
+        """Close a document that was opened, but for which the present one was not left."""
+        if self._pending is not None:
+            self._pending.close(discard=True)
+            self._pending = None
+
     def _put(self, document: Document, words: str) -> None:
+        if document is self._pending:
+            self._pending = None
         self.editor.put(document)
         self._fit()
         if document.path is not None:
@@ -91,19 +105,21 @@ class FileCommands:
         if own is not None and own.exists() and path.exists() and path.samefile(own):
             self.reload()
             return
+        self._close_pending()
         if opened_elsewhere(self.drafts, path=path):
             raise MapError(f"{path.name}: another editor has it open")
         found = opened(path, self.drafts)
         if isinstance(found, Document):
-            self.leave(lambda: self._put(found, heading(found)))
+            self._leave_for(found, heading(found))
         else:
             self.ask_import(path, found)
 
     def ask_import(self, path: Path, importer: Importer) -> None:
         def put(imported: Imported) -> None:
             sketch = Sketch.from_environment(imported.environment)
+            self._close_pending()
             document = Document(sketch, self.drafts, saved=False, stem=path.stem)
-            self.leave(lambda: self._put(document, f"imported: {path.name}, not saved yet"))
+            self._leave_for(document, f"imported: {path.name}, not saved yet")
 
         worker: Worker[Imported] = DirectWorker(Importing())
         if not self._patient:
