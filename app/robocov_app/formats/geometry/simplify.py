@@ -33,6 +33,7 @@ _BLOCKS = 16  # a thing of fewer cells stays as it is: what it is like, its cell
 # wrong stays, and until everything does everywhere, as it does after so many times the vertices
 _HALVINGS, _PATIENCE, _ROUNDS, _WORK = 3, 24, 60, 1_000_000
 _MIDDLES, _FEW = 0.75, 3  # cells of tolerance from which on stairs are lines; middles that make a line
+_MIN_STAIRS_SIZE = 8.0  # side of the square, in cells, as large as a thing whose stairs are lines
 _UNBALANCED = 0.02  # from this part of it on, the area that a ring lost is given back to it
 # of a thing with the area of a square of so many tolerances and more, all of the tolerance is left out; of
 # smaller ones less is, but always so much, in cells
@@ -207,7 +208,9 @@ class Outline(Rings):
         if cell is None:
             return self
         turn = np.sign(np.round(_cross(self.sides[self.before], self.sides) / cell**2, 6))
-        wide = tolerance >= _MIDDLES * cell
+        # the steps of a small thing are its shape, not the stairs of a wall
+        is_large = np.sqrt(np.abs(self.areas)) >= _MIN_STAIRS_SIZE * cell
+        wide = (tolerance >= _MIDDLES * cell) & is_large[self.ring]
         short = self.lengths <= cell * (1 + 1e-6)
         step = short & (turn * turn[after] < 0) & wide & wide[after]
         keep = np.column_stack([~(step | step[self.before]), step]).ravel()
