@@ -24,6 +24,11 @@ FEW_EVENTS = 150
 SEED = 1
 
 
+@pytest.fixture(autouse=True)
+def _work_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # names without a folder are typed and dropped, too, and maps saved there
+
+
 def contain_faults(window: BaseWindow, folder: Path) -> FaultLog:
     """Let a window go on after a fault, so that one run finds all of them."""
     window.contains_faults = True
