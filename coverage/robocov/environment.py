@@ -37,6 +37,10 @@ SAGITTA = 1e-3
 """Largest distance in metres between a circle and the polygon that stands for it."""
 START_GAP = 0.02
 """Smallest gap, as a part of a robot's radius, left between two robots and to walls at the start."""
+MAX_COUNTED_ROBOTS = 2000
+"""Robots of a start that are counted one by one; the capacity of larger ones is estimated from the area."""
+_PACKING_TRIALS, _FEW_ROBOTS = 6, 300
+"""Number of packings that are tried where there is room for few robots, and how many are few."""
 _LEAST_OVERLAP = 1e-6
 """Area in m² from which an obstacle is in the way: what is less is rounding, of obstacles that touch."""
 NEGLIGIBLE = math.pi * DEFAULT_RADIUS**2
@@ -317,18 +321,56 @@ class Start:
         if room.is_empty:
             raise self._error(f"no room for a robot of radius {radius:g} m; a wider start was wanted")
         rng = np.random.default_rng([seed, n])
-        # no packing of equal discs is denser than the hexagonal one
-        most = 1 + math.floor(room.buffer(spacing / 2).area / (spacing**2 * math.sqrt(3) / 2))
         points = np.empty((0, 2))
-        if n <= most:
+        if n <= _max_packed(room, spacing):
             points = _darts(rng, room, n, spacing)
             if len(points) < n:
                 points = _hexagonal(rng, room, n, spacing)
-            most = len(points)
+            if len(points) < n <= MAX_COUNTED_ROBOTS:
+                packed = _densest(room, spacing)
+                if len(packed) >= n:
+                    points = packed[np.sort(rng.choice(len(packed), size=n, replace=False))]
         if len(points) < n:
-            found = f"room for about {most} robots of radius {radius:g} m, but {n} were asked for"
-            raise self._error(f"{found}; fewer robots or a wider start was wanted")
+            raise self._error(self._describe_lack_of_space(n, radius))
         return points
+
+    def capacity(self, radius: float = DEFAULT_RADIUS) -> int:
+        """Return about how many robots of a radius fit.
+
+        It depends on the start and the radius alone: the number of robots in the densest packing that is
+        found, with the gaps that `sample` leaves. For so many robots `sample` finds positions with any seed;
+        now and then, by chance, one or two more fit. Where there is room for thousands, or where positions
+        are given, it is estimated from the area, or their number.
+
+        Parameters
+        ----------
+        radius : float, m
+
+        Returns
+        -------
+        int
+            0 if not even one robot fits.
+        """
+        if isinstance(self.spec, PointsStart):
+            return len(self.spec.positions)
+        room = self.room(radius)
+        if room.is_empty:
+            return 0
+        spacing = 2.0 * radius * (1.0 + START_GAP)
+        if _max_packed(room, spacing) > MAX_COUNTED_ROBOTS:
+            # each robot of a hexagonal packing takes a cell of this area
+            return max(1, int(room.area / (spacing**2 * math.sqrt(3) / 2)))
+        return len(_densest(room, spacing))
+
+    def _describe_lack_of_space(self, n: int, radius: float) -> str:
+        found = (
+            f"room for about {self.capacity(radius)} robots of radius {radius:g} m, but {n} were asked for"
+        )
+        ways = ["fewer or smaller robots", "another map"]
+        if not isinstance(self.spec, UniformStart):
+            everywhere = Start("uniform", UniformStart(), self.free).capacity(radius)
+            ways.insert(1, f"start 'uniform' (room for about {everywhere})")
+        return f"{found}. Try {', '.join(ways[:-1])} or {ways[-1]}."
 
     def room(self, radius: float) -> BaseGeometry:
         """Return where the centre of a robot of that radius may be, unless positions are given."""
@@ -361,6 +403,23 @@ class Start:
             found = f"positions[{i}] and positions[{j}] are {gaps.min():.3g} m apart"
             raise self._error(f"{found}, but at least {2 * radius:g} m, a robot's diameter, was wanted")
         return points
+
+
+def _max_packed(room: BaseGeometry, spacing: float) -> int:
+    """Return a number of robots that is never exceeded: no packing is denser than the hexagonal one."""
+    return 1 + int(room.buffer(spacing / 2).area / (spacing**2 * math.sqrt(3) / 2))
+
+
+def _densest(room: BaseGeometry, spacing: float) -> Array:
+    """Return the most points that are found at least `spacing` apart, (k, 2); the same for the same room."""
+    best, most = np.empty((0, 2)), _max_packed(room, spacing)
+    for trial in range(_PACKING_TRIALS if most <= _FEW_ROBOTS else 1):
+        rng = np.random.default_rng(trial)
+        # in passages that are hardly wider than a robot darts are denser than lattices
+        for points in (_hexagonal(rng, room, most, spacing), _darts(rng, room, most, spacing)):
+            if len(points) > len(best):
+                best = points
+    return best
 
 
 def _darts(rng: np.random.Generator, room: BaseGeometry, n: int, spacing: float) -> Array:

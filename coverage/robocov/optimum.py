@@ -153,7 +153,8 @@ class _Search:
         pieces = [_spread(self.room.parts[k], spacing) for k in covered]
         self.component = np.repeat(covered, [len(piece) for piece in pieces]).astype(np.intp)
         if len(self.component) < robots:
-            room = f"there is room for about {len(self.component)}" if fit else "there is no room for any"
+            capacity = sum(len(_spread(self.room.parts[k], self.room.spacing)) for k in fit)
+            room = f"there is room for about {capacity}" if fit else "there is no room for any"
             told = f"{robots} of radius {radius:g} m, but {room} in map {environment.name!r}"
             raise ParameterError(f"robots: {told}")
         self.places = np.concatenate(pieces)

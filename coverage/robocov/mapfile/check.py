@@ -369,7 +369,5 @@ def _start_report(environment: Environment, name: str, radius: float) -> StartRe
     spec = environment.starts[name]
     if isinstance(spec, PointsStart):
         return StartReport(name, "points", len(spec.positions))
-    # robots in the densest packing, a hexagonal one
-    cell = 2 * math.sqrt(3) * (radius * (1 + START_GAP)) ** 2
-    capacity = max(1, int(environment.start(name).room(radius).area / cell))
-    return StartReport(name, "disc" if isinstance(spec, DiscStart) else "uniform", capacity)
+    kind = "disc" if isinstance(spec, DiscStart) else "uniform"
+    return StartReport(name, kind, environment.start(name).capacity(radius))

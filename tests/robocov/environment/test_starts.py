@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov.environment import DiscStart, Environment, PointsStart, Start
+from robocov.environment import DiscStart, Environment, PointsStart, Start, UniformStart
 from robocov.errors import StartError
 
 SQUARE = shapely.box(0, 0, 10, 10)
@@ -99,3 +99,32 @@ def test_given_positions_are_taken_in_their_order() -> None:
 def test_a_start_without_room_says_so() -> None:
     with pytest.raises(StartError, match=r"start 'slit': no room for a robot of radius 0.1 m"):
         Start("slit", DiscStart((5.0, 5.0), 0.5), shapely.box(0, 4.95, 10, 5.05)).sample(1)
+
+
+@pytest.mark.parametrize("spec", [DiscStart((5.0, 5.0), 0.9), DiscStart((0.0, 0.0), 1.5)])
+def test_one_number_says_how_many_fit_whatever_was_asked_for(spec: DiscStart) -> None:
+    start = Start("tight", spec, SQUARE)
+    capacity = start.capacity(0.1)
+    assert Start("tight", spec, SQUARE).capacity(0.1) == capacity
+    told = set()
+    for n, seed in ((capacity + 10, 0), (capacity + 10, 1), (2 * capacity, 0), (5000, 3)):
+        with pytest.raises(StartError, match=f"room for about {capacity} robots") as refused:
+            start.sample(n, seed, 0.1)
+        told.add(str(refused.value).replace(f"but {n} were", ""))
+    assert len(told) == 1
+    assert "Try fewer or smaller robots, start 'uniform' (room for about" in told.pop()
+    for seed in range(4):
+        assert start.sample(capacity, seed, 0.1).shape == (capacity, 2)
+
+
+def test_in_a_narrow_passage_darts_are_counted() -> None:
+    """Lattices lose there; the number is what can be drawn."""
+    start = Start("slit", DiscStart((5.0, 5.0), 4.0), shapely.box(0, 4.85, 10, 5.15))
+    capacity = start.capacity(0.1)
+    assert capacity >= 20
+    assert len(start.sample(capacity, seed=7)) == capacity
+
+
+def test_a_uniform_start_is_no_way_out_of_itself() -> None:
+    with pytest.raises(StartError, match=r"Try fewer or smaller robots or another map\.$"):
+        Start("uniform", UniformStart(), shapely.box(0, 0, 1, 1)).sample(500)

@@ -28,7 +28,7 @@ def test_a_report_has_every_figure(hall: Environment) -> None:
         "obstacles": "0, with 4 vertices (boundary included)",
         "components": "1 (100 m²)",
         "narrowest gap": "none",
-        "start corner": "disc, room for about 21",
+        "start corner": "disc, room for about 23",
     }
 
 
@@ -43,8 +43,8 @@ def test_what_has_changed_is_told_with_what_it_was(hall: Environment) -> None:
     assert after["narrowest gap"].startswith("0.100 m, between [") and after["narrowest gap"].endswith(
         ", was none"
     )
-    assert after["start all"] == "disc, room for about 21, was none"
-    assert after["start corner"] == "none, was disc, room for about 21"
+    assert after["start all"] == "disc, room for about 23, was none"
+    assert after["start corner"] == "none, was disc, room for about 23"
     assert after["warning"].endswith("does not pass (new)")
     assert after["name"] == "hall"
 
