@@ -54,55 +54,98 @@ def main(arguments: list[str] | None = None) -> int:
         near = get_close_matches(name, COMMANDS, n=1)
         hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(COMMANDS)}"
         return _complain(f"unknown command {name!r}: {hint}")
-    return _guarded(name, rest)
+    # what is called from other code, as tests do, stays in this process
+    return _guarded(name, rest, supervised=arguments is None)
 
 
-def _guarded(name: str, rest: list[str]) -> int:
-    from robocov.errors import ParameterError, RobocovError
+def _guarded(name: str, rest: list[str], *, supervised: bool = False) -> int:
+    from robocov_app.terminal.standard_streams import StandardStreams
+    from robocov_app.terminal.supervision import (
+        begin_supervised,
+        can_supervise,
+        find_own_controllers,
+        report_status,
+        supervise,
+    )
 
+    controllers = find_own_controllers(rest)
+    if supervised and controllers and can_supervise():
+        status, complaint = supervise(controllers)
+        return _complain(complaint, FAILED) if complaint else status
+    descriptor = begin_supervised() if supervised else None
+    streams = StandardStreams()
     try:
-        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # stdout belongs to answers
-        with _stopping_at_once():
-            module = importlib.import_module(f"robocov_app.commands.{COMMANDS[name][0]}")
-            from robocov_app.terminal.arguments import parsed
+        status = _run_command(name, rest)
+        closed = streams.restore()
+    except BaseException as error:
+        closed = streams.restore()
+        status = FAILED if closed else _explain(error, name)
+    if closed:
+        who = f"controller {', '.join(controllers)}" if controllers else "the command"
+        status = _complain(f"{who}: it closed the {' and the '.join(closed)}", FAILED)
+    streams.close()
+    if descriptor is not None:
+        report_status(descriptor, status)
+    return status
 
-            options = parsed(module.Arguments, name, rest)
-        if name in _COMPILING:
-            from robocov_app.terminal.progress import tell_of_compiling
 
-            tell_of_compiling()
+def _run_command(name: str, rest: list[str]) -> int:
+    """Run a command and return its exit status; it may raise anything."""
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # stdout belongs to answers
+    with _stopping_at_once():
+        module = importlib.import_module(f"robocov_app.commands.{COMMANDS[name][0]}")
+        from robocov_app.terminal.arguments import parsed
+
+        options = parsed(module.Arguments, name, rest)
+    if name in _COMPILING:
+        from robocov_app.terminal.progress import tell_of_compiling
+
+        tell_of_compiling()
+    from robocov_app.terminal.interruption import noting_interrupts
+
+    with noting_interrupts():
         status = module.command(options)
-        sys.stdout.flush()
-        return int(status or OK)
-    except ParameterError as error:
+    sys.stdout.flush()
+    return int(status or OK)
+
+
+def _explain(error: BaseException, name: str) -> int:
+    """Say in one line why a command has failed, and return its exit status."""
+    from robocov.controllers.user_modules import users_fault
+    from robocov.errors import ControllerEndedError, ParameterError, RobocovError
+    from robocov_app.terminal.interruption import was_interrupted
+    from robocov_app.terminal.output import echo
+
+    if isinstance(error, ControllerEndedError):
+        return _complain(str(error), FAILED)
+    if isinstance(error, ParameterError):
         from robocov_app.terminal.arguments import by_option
 
+        module = importlib.import_module(f"robocov_app.commands.{COMMANDS[name][0]}")
         return _complain(by_option(module.Arguments, str(error)))
-    except RobocovError as error:
+    if isinstance(error, RobocovError):
         return _complain(str(error))
-    except KeyboardInterrupt:
-        print("robocov: stopped", file=sys.stderr)
+    fault = users_fault(error)
+    if isinstance(error, KeyboardInterrupt) and (was_interrupted() or fault is None):
+        echo("robocov: stopped", to_stderr=True)
         return INTERRUPTED
-    except BrokenPipeError:
+    if isinstance(error, BrokenPipeError):
         # the reader (head, say) has had enough; keep the interpreter from complaining at its end
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OK
-    except OSError as error:
+    if isinstance(error, OSError):
         file = error.filename
         what = "the answer cannot be written" if file is None else f"{os.fsdecode(file)}: cannot be used"
         return _complain(f"{what}: {error.strerror or error}")
-    except SystemExit as ending:
-        return ending.code if isinstance(ending.code, int) else BAD_INPUT
-    except Exception as error:
-        from robocov.controllers.user_modules import users_fault
-
-        if fault := users_fault(error):
-            return _complain(str(fault))
-        from robocov_app.terminal.output import echo
-
-        echo(traceback.format_exc(), end="", to_stderr=True)
-        echo("robocov: this is a fault of robocov, not of your input; please report it", to_stderr=True)
-        return FAILED
+    if isinstance(error, SystemExit) and fault is None:
+        return error.code if isinstance(error.code, int) else OK if error.code is None else BAD_INPUT
+    if fault is not None:
+        return _complain(str(fault), FAILED if isinstance(fault, ControllerEndedError) else BAD_INPUT)
+    if not isinstance(error, Exception | SystemExit):
+        return _complain(f"ended by {type(error).__name__}: {error}", FAILED)
+    echo("".join(traceback.format_exception(error)), end="", to_stderr=True)
+    echo("robocov: this is a fault of robocov, not of your input; please report it", to_stderr=True)
+    return FAILED
 
 
 @contextmanager
@@ -137,7 +180,7 @@ def _prepare_output() -> None:
             stream.reconfigure(errors="replace")
 
 
-def _complain(message: str) -> int:
+def _complain(message: str, status: int = BAD_INPUT) -> int:
     from robocov_app.terminal.output import echo
 
     if os.environ.get(TRACEBACK):
@@ -146,7 +189,7 @@ def _complain(message: str) -> int:
     line = " ".join(message.splitlines())
     line = line if len(line) <= _LONGEST else f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 3 :]}"
     echo(f"robocov: error: {line}", to_stderr=True)
-    return BAD_INPUT
+    return status
 
 
 def _overview() -> str:

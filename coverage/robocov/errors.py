@@ -5,6 +5,7 @@
     │   ├── MapError          a map file, with line, column and JSON path of the place
     │   ├── StartError        a start without room for the team
     │   └── ParameterError    a gain, a limit, a name of a controller
+    ├── ControllerEndedError  a user's controller ended Python (exit status 1)
     └── OutputError           a result cannot be written (exit status 2)
 
 Every message is one line and names the source (file or argument), the place in it,
@@ -95,13 +96,21 @@ class ParameterError(InputError):
     """A gain, a limit of the team, or a name is out of range or unknown."""
 
 
+class ControllerEndedError(RobocovError):
+    """A user's controller ended Python, tried to, or closed its output."""
+
+
 class OutputError(RobocovError):
     """A result cannot be written: no permission, no space, a folder that is in use."""
 
 
 def shown(value: object) -> str:
     """Return `value` as it is quoted in messages: its repr on one line, cut where it is long."""
-    return _cut(" ".join(repr(value).split()))
+    try:
+        text = repr(value)
+    except Exception:  # an object of a user may have no usable one
+        text = f"<{type(value).__name__}>"
+    return _cut(" ".join(text.split()))
 
 
 def shown_json(value: object) -> str:

@@ -16,8 +16,8 @@ from robocov.arrays import Array, BoolArray
 from robocov.conditions import SOON, Conditions, Joined
 from robocov.conditions.perception import Inbox, Perception, of_working
 from robocov.controllers import CONTROLLERS, informed, remembers
-from robocov.controllers.base import Controller, IndividualController, for_team
-from robocov.controllers.user_modules import fault_of
+from robocov.controllers.base import Controller, IndividualController, Individually, for_team
+from robocov.controllers.user_modules import fault_of, location_of
 from robocov.drawing import show
 from robocov.environment import Environment, require_environment
 from robocov.errors import (
@@ -178,8 +178,8 @@ class Simulation:
         self.memory = self._asked(self._law.begin, environment.region, self.team)
         self._scanning: Scanning | None = self._asked(getattr, controller, "scanning", None)
         if not isinstance(self._scanning, Scanning | None):
-            found = f"controller {controller.name!r}: scanning: {shown(self._scanning)}"
-            raise ParameterError(f"{found}, but a Scanning was wanted")
+            found = f"controller {controller.name!r}: scanning: expected a Scanning"
+            raise ParameterError(f"{found}, got {shown(self._scanning)}")
         self._begin_step()
 
     def _begin_step(self) -> None:
@@ -273,15 +273,16 @@ class Simulation:
             with suppress(Exception):  # there may be no way to copy it
                 memory = deepcopy(memory)
         made = self._asked(self._law.decide, replace(seen), memory)
-        return detached(checked_decision(made, count, name, seen.time), name)
+        source = "" if isinstance(self._law, Individually) else location_of(self._law.decide)
+        return detached(checked_decision(made, count, name, seen.time, source), name, source)
 
     def _asked(self, question: Callable[..., Any], *args: Any) -> Any:
         """Ask the controller; a fault of a controller that is not ours becomes one clear line."""
         try:
             return question(*args)
-        except RobocovError:
+        except (RobocovError, KeyboardInterrupt):
             raise
-        except (Exception, SystemExit) as error:
+        except BaseException as error:
             if self._built_in:
                 raise
             where = f"controller {self.controller.name!r}"

@@ -11,9 +11,9 @@ SHORT = ("--duration", "1.0", "--lattice", "16", "--size", "480x320")
 COMMAND = (sys.executable, "-m", "robocov_app")
 
 
-def complaint(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+def complaint(capsys: pytest.CaptureFixture[str], *words: str, status: int = 2) -> str:
     """Call the command with something wrong; return the one line that it must say."""
-    assert main(list(words)) == 2
+    assert main(list(words)) == status
     said = capsys.readouterr()
     assert said.out == ""
     lines = said.err.strip().splitlines()

@@ -21,6 +21,7 @@ from robocov.errors import InputError, OutputError
 from robocov.extras import extra
 from robocov_app.sweep.study import Task
 from robocov_app.sweep.worker import Outcome, failed, perform
+from robocov_app.terminal.supervision import describe_status
 from robocov_app.toolkit.worker import READY, asked, ended, receive, started
 
 _ENDS = 2  # workers that may end through a task before it counts as failed
@@ -196,8 +197,10 @@ class _Worker:
         if reply is not None and isinstance(reply.answer, Outcome):
             return reply.answer
         status, said = self.end()
-        cause = f"signal {-status}" if status < 0 else f"exit status {status}"
-        return Lost(f"its process ended ({cause})", said, blamed=status != _OUTSIDE)
+        # a controller of the user's may have ended it
+        whose = "" if task.source is None else f"controller {task.controller!r}: "
+        cause = f"{whose}its process ended ({describe_status(status)})"
+        return Lost(cause, said, blamed=status != _OUTSIDE)
 
     def _begun(self) -> subprocess.Popen[bytes]:
         for _ in range(_STARTS):
@@ -211,8 +214,11 @@ class _Worker:
             assert process.stdout
             if receive(process.stdout) == READY:
                 return process
-        said = self.end()[1].strip().splitlines() or ["it says nothing"]
-        raise OutputError(f"no process for the runs can be started: {said[-1]}")
+        status, complaints = self.end()
+        ending = f"worker {describe_status(status)} while starting"
+        said = complaints.strip().splitlines()
+        reason = f"{ending}: {said[-1]}" if said else ending
+        raise OutputError(f"no process for the runs can be started: {reason}")
 
     def end(self) -> tuple[int, str]:
         """Make sure that the process has ended; return its status and its last words."""

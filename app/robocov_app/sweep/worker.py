@@ -97,7 +97,7 @@ def perform(task: Task) -> Outcome:
                 figures |= finite(figures_of(record, history))
                 files[EFFORT] = json_text(effort).encode()
             return Outcome(files, figures)
-        except (Exception, SystemExit) as error:
+        except BaseException as error:  # a user's controller may raise anything
             message = str(error) if isinstance(error, RobocovError) else f"{type(error).__name__}: {error}"
             return failed(message, traceback.format_exc())
         finally:

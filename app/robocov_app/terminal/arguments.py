@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
+from difflib import get_close_matches
 from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import tyro
@@ -27,11 +28,13 @@ _WORDING: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     ),
     (
         r"^invalid choice (.*) for argument '(\S+)'\. Expected one of \((.*?),? ?\) ?\.$",
-        lambda match: f"{match[2]}: {match[1]}, but one of {_choices(match[3])} was wanted",
+        lambda match: f"{match[2]}: expected {_choices(match[3])}, got {match[1]}",
     ),
     (r"^Missing value for argument '(\S+)'\..*$", r"\1: a value was wanted"),
-    (r"^Missing from robocov \w+: (\S+).*$", r"\1: this option is required"),
-    (r"^Unrecognized options: (.*)$", r"unknown option \1"),
+    (r"^Missing from robocov \w+: (-\S+).*$", r"\1: this option is required"),
+    (r"^Missing from robocov \w+: (\S+).*$", r"missing argument: expected \1"),
+    (r"^Unrecognized options: (-[^\s,]+).*$", r"unknown option \1"),
+    (r"^Unrecognized options: ([^\s,]*).*$", r"unexpected argument \1"),
 )
 _FIRST = ("map", "controller", "controllers", "out", "robots", "gains", "duration", "seed", "start", "video")
 _LAST = ("json", "overwrite")  # the help ends with these, as it begins with those
@@ -41,8 +44,12 @@ _JSON_WORDS = frozenset(("null", "true", "false", "NaN", "Infinity"))  # no word
 
 
 def _choices(text: str) -> str:
-    choices = text.split(", ")
-    return ", ".join(sorted(set(choices) - {"'None'"}) if "'None'" in choices else choices)
+    choices = [choice.strip("'") for choice in text.split(", ")]
+    if "None" in choices:
+        choices = sorted(set(choices) - {"None"})
+    if len(choices) < 2:
+        return "".join(choices)
+    return f"{', '.join(choices[:-1])} or {choices[-1]}"
 
 
 def parsed(kind: type[T], command: str, words: list[str]) -> T:
@@ -56,7 +63,37 @@ def parsed(kind: type[T], command: str, words: list[str]) -> T:
     except SystemExit as ending:
         if not ending.code:
             raise
-        raise InputError(f"{one_line(complaint.getvalue())} (robocov {command} -h explains)") from None
+        problem = _with_hint(one_line(complaint.getvalue()), kind, command)
+        raise InputError(f"{problem} (robocov {command} -h explains)") from None
+
+
+def _with_hint(problem: str, kind: Any, command: str) -> str:
+    """Return what is wrong with the words of a command, with what may have been meant."""
+    options = [f"--{name}" for name in _option_names(kind)]
+    if found := re.match(r"unexpected argument (\S+)", problem):
+        word = found[1]
+        text = f"unexpected argument {shown(word)}"
+        meant = [f"{option} {word}" for option in options if option in ("--controller", "--controllers")]
+        near = get_close_matches(f"--{word}", options, n=1, cutoff=0.8)
+        if meant and _is_controller(word):
+            return f"{text}: did you mean {meant[0]}?"
+        return f"{text}: did you mean {near[0]}?" if near else text
+    if (found := re.fullmatch(r"unknown option (-[^-]\S+)", problem)) and f"-{found[1]}" in options:
+        return f"{problem}: did you mean -{found[1]}?"
+    # values of arguments without an option are known by the command alone
+    if (found := re.match(r"([a-z]\w*): expected ", problem)) and found[1] in _option_names(kind):
+        return f"{command}: {problem.removeprefix(f'{found[1]}: ')}"
+    return problem
+
+
+def _option_names(kind: Any) -> list[str]:
+    return [each.name.replace("_", "-") for one in (kind, *groups_of(kind)) for each in fields(one)]
+
+
+def _is_controller(word: str) -> bool:
+    from robocov.controllers import CONTROLLERS
+
+    return word in CONTROLLERS or bool(re.search(r"\.py:\w+$", word))
 
 
 def merge_repeated(kind: Any, words: list[str]) -> list[str]:

@@ -3,11 +3,43 @@
 import os
 import signal
 import threading
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Self
 
 INTERRUPTED = 130  # exit status
+
+
+_arrived: set[int] = set()
+"""Signals that have arrived since the command began."""
+
+
+def was_interrupted() -> bool:
+    """Return whether a `KeyboardInterrupt` comes from Ctrl-C, rather than from a user's controller."""
+    return bool(_arrived)
+
+
+@contextmanager
+def noting_interrupts() -> Iterator[None]:
+    """Note Ctrl-C for `was_interrupted`, and raise `KeyboardInterrupt` as Python does by itself."""
+    _arrived.clear()
+    main = threading.current_thread() is threading.main_thread()
+    if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        _arrived.add(signal.SIGINT)  # it cannot be known
+        yield
+        return
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        _arrived.add(number)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    finally:
+        if signal.getsignal(signal.SIGINT) is interrupt:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class Interruption:
@@ -28,6 +60,7 @@ class Interruption:
             signal.signal(number, handler)
 
     def _note(self, number: int, frame: FrameType | None) -> None:
+        _arrived.add(number)
         if self.requested:
             raise KeyboardInterrupt
         self.requested = True

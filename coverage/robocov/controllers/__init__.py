@@ -97,7 +97,9 @@ def _offered(only: str | None = None) -> dict[str, type[Any]]:
             if entry.name in CONTROLLERS:
                 raise ParameterError("the name is that of a built-in one")
             kinds[entry.name] = _named(entry.load(), entry.name)
-        except (Exception, SystemExit) as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
             where = f"controller {entry.name!r} of entry point {entry.value!r} cannot be loaded"
             if only is not None:
                 raise fault_of(where, error) from error

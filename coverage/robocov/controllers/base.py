@@ -2,15 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass
+from math import isfinite
 from typing import Any, ClassVar, Literal, Protocol, Self, TypeAlias, get_args, runtime_checkable
 
 import numpy as np
 
 from robocov.arrays import Array
 from robocov.controllers.gains import choice, validate_gains
+from robocov.controllers.user_modules import location_of
 from robocov.environment import Environment
 from robocov.errors import ParameterError, shown, unknown_name
-from robocov.observation import Decision, Observations
+from robocov.observation import Decision, Observations, to_numbers
 from robocov.observation.region import Region
 from robocov.robots import Team
 from robocov.voronoi import VoronoiPartition, partition
@@ -76,6 +78,9 @@ def informed(controller: Controller, environment: Environment) -> Controller:
         told = f"it has a method informed(environment), but its information is {information!r}"
         raise ParameterError(f"controller {controller.name!r}: {told}; 'whole map' was wanted")
     known: Controller = tell(environment)
+    if isinstance(known, type) or not isinstance(known, Controller):
+        got = f"returned {shown(known)}{location_of(tell)}, expected a controller"
+        raise ParameterError(f"controller {controller.name!r}: informed(environment) {got}")
     return known
 
 
@@ -221,11 +226,23 @@ class Individually:
             heading = None if seen.steering is None else float(seen.steering[i, 0])
             known_now = i, place, velocity, heard, point, seen.region, seen.time, cells
             own = OwnView(*known_now, heading=heading, memory=memory.own[i])
-            force = np.asarray(self.law.force(own), dtype=float)
-            if force.shape != (2,):
-                told = f"gave {shown(force.tolist())}, but two numbers in newtons were wanted"
-                raise ParameterError(f"controller {self.name!r}: force(own) {told}")
-            forces[i] = force
+            try:
+                returned = self.law.force(own)
+            except BaseException as error:
+                error.add_note(f"robot {i + 1}")  # for the message, see `fault_of`
+                raise
+            forces[i] = self._check_force(returned, i, seen.time)
             memories.append(own.memory)
         memory = Memories(memories, cells.triangulation)
         return Decision(forces=forces, goals=cells.centroid, cells=cells, memory=memory)
+
+    def _check_force(self, returned: object, robot: int, time: float) -> Array:
+        """Return the force on a robot, counted from 0; raises ParameterError unless it is one."""
+        force = to_numbers(returned)
+        if force is not None and force.shape == (2,) and isfinite(force[0]) and isfinite(force[1]):
+            return force
+        missing = " (is a return statement missing?)" if returned is None else ""
+        raise ParameterError(
+            f"controller {self.name!r}: force(own) returned {shown(returned)}{missing} for robot {robot + 1} "
+            f"at {time:.3f} s{location_of(self.law.force)}, expected two finite numbers in newtons"
+        )

@@ -142,5 +142,7 @@ def with_gains(kind: type[Any], values: Mapping[str, object]) -> Any:
         return kind(**given)
     except RobocovError:
         raise
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         raise fault_of(f"controller {where!r} cannot be made", error) from error

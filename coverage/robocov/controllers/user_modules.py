@@ -7,6 +7,7 @@ import ast
 import hashlib
 import importlib.abc
 import importlib.util
+import inspect
 import os
 import sys
 import sysconfig
@@ -18,7 +19,7 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from robocov.errors import ParameterError, shown, unknown_name
+from robocov.errors import ControllerEndedError, ParameterError, RobocovError, shown, unknown_name
 
 _MODULE = "robocov_user_"  # prefix of the names of modules loaded from files of users
 _OURS = str(Path(__file__).parents[1])
@@ -40,16 +41,49 @@ class Source(NamedTuple):
     modules: Mapping[str, Module] = {}
 
 
-def fault_of(where: str, error: BaseException, when: str = "") -> ParameterError:
-    """Return the error that tells where and when code that is not ours went wrong, and in which line."""
+def fault_of(where: str, error: BaseException, when: str = "") -> RobocovError:
+    """Describe what went wrong in code that is not ours.
+
+    Parameters
+    ----------
+    where : str
+        The controller, with which the message begins.
+    error : BaseException
+        What the code raised; its notes, as "robot 3", are added to the message.
+    when : str
+        The end of the message, as " at 0.117 s".
+
+    Returns
+    -------
+    ControllerEndedError
+        If the exception would have ended Python, as `SystemExit` does.
+    ParameterError
+        For any other exception. Both name file and line.
+    """
     frames = _frames(error)
     theirs = [frame for frame in frames if frame[0].startswith(_MODULE)]
     theirs = theirs or [frame for frame in frames if not frame[1].startswith((_OURS, "<"))]
     at = f" ({Path(theirs[-1][1]).name}, line {theirs[-1][2]})" if theirs else ""
-    return ParameterError(f"{where}: {type(error).__name__}: {error}{at}{when}")
+    notes = "".join(f" for {note}" for note in getattr(error, "__notes__", ()) if note.startswith("robot "))
+    try:
+        message = str(error)
+    except Exception:  # it is the user's own
+        message = "it has no message"
+    what = f"{type(error).__name__}: {message}" if message else type(error).__name__
+    if isinstance(error, Exception):
+        return ParameterError(f"{where}: {what}{at}{notes}{when}")
+    return ControllerEndedError(f"{where}: it ended Python by {what}{at}{notes}{when}")
 
 
-def users_fault(error: BaseException) -> ParameterError | None:
+def location_of(function: object) -> str:
+    """Return file and line of a function or method of a user, as " (mine.py, line 12)"; empty if unknown."""
+    with suppress(Exception):  # it may be any object that can be called
+        code = inspect.unwrap(getattr(function, "__func__", function)).__code__  # type: ignore[arg-type]
+        return f" ({Path(code.co_filename).name}, line {code.co_firstlineno})"
+    return ""
+
+
+def users_fault(error: BaseException) -> RobocovError | None:
     """Return what tells of an error that came up in a user's file; None where it did elsewhere."""
     theirs = any(frame[0].startswith(_MODULE) for frame in _frames(error))
     return fault_of("a controller of your own", error) if theirs else None
@@ -79,7 +113,9 @@ def class_in_file(name: str, source: Source | None) -> type[Any]:
     try:
         with provided({} if source is None else source.modules):
             spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         raise fault_of(f"{where}: {file} cannot be run", error) from error
     kind, wrong = vars(module).get(class_name), ""
     if kind is None:

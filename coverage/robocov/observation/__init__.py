@@ -240,37 +240,62 @@ class Cells(ABC):
         return self.polar_moment - self.mass * (lever[:, 0] ** 2 + lever[:, 1] ** 2)
 
 
-def checked_decision(made: Any, count: int, controller: str, time: float) -> Decision:
-    """Return what a controller decided for `count` robots if it can be carried out and recorded.
+def checked_decision(made: Any, count: int, controller: str, time: float, source: str = "") -> Decision:
+    """Return what a controller decided, if it can be carried out and recorded.
 
-    Raises ParameterError when it is no decision, or its forces are not finite and (n, 2).
+    Parameters
+    ----------
+    made : object
+        What the controller's `decide` returned.
+    count : int
+        Number of robots.
+    controller : str
+        Its name, for messages.
+    time : float, s
+    source : str
+        File and line of its `decide`, for messages, as " (mine.py, line 12)".
+
+    Raises
+    ------
+    ParameterError
+        If it is no decision, or its forces are not finite numbers of shape (count, 2).
     """
+    where = f"controller {controller!r}: decide(seen, memory)"
+    when = f" at {time:.3f} s{source}"
     if not isinstance(made, Decision):
-        gave = f"decide gave {shown(made)}, but a Decision was wanted"
-        raise ParameterError(f"controller {controller!r}: {gave}")
+        missing = " (is a return statement missing?)" if made is None else ""
+        raise ParameterError(f"{where} returned {shown(made)}{missing}{when}, expected a Decision")
     decision: Decision = made
-    forces = _rows(decision.forces, count, "forces", controller)
-    goals = None if decision.goals is None else _rows(decision.goals, count, "goals", controller)
+    forces = _rows(decision.forces, count, f"{where} returned forces", when)
+    goals = decision.goals
+    if goals is not None:
+        goals = _rows(goals, count, f"{where} returned goals", when)
     if forces is not decision.forces or goals is not decision.goals:
         decision = replace(decision, forces=forces, goals=goals)
     if not _finite(forces):
         robot = int(np.flatnonzero(~np.isfinite(forces).all(axis=1))[0])
-        raise ParameterError(
-            f"controller {controller!r}: force {forces[robot].tolist()} on robot {robot + 1} "
-            f"at {time:.3f} s, but finite newtons were wanted"
-        )
+        got = f"the force {forces[robot].tolist()} for robot {robot + 1}{when}"
+        raise ParameterError(f"{where} returned {got}, expected two finite numbers in newtons")
     return decision
 
 
-def detached(decision: Decision, controller: str) -> Decision:
+def detached(decision: Decision, controller: str, source: str = "") -> Decision:
     """Return a checked decision with arrays of its own: a user's controller may use its arrays again.
 
-    Raises ParameterError when its terms are none.
+    `controller` and `source` are as in `checked_decision`. Raises ParameterError when its terms or cells are
+    of no use.
     """
+    where = f"controller {controller!r}: decide(seen, memory) returned"
     if not isinstance(decision.terms, Mapping):
-        wanted = "but a dict of forces was wanted"
-        raise ParameterError(f"controller {controller!r}: terms: {shown(decision.terms)}, {wanted}")
-    terms = {name: np.array(term) for name, term in decision.terms.items()}
+        raise ParameterError(f"{where} terms {shown(decision.terms)}{source}, expected a dict of forces")
+    count = len(decision.forces)
+    terms = {
+        name: _rows(term, count, f"{where} the term {shown(name)}", source).copy()
+        for name, term in decision.terms.items()
+    }
+    if decision.cells is not None and not isinstance(decision.cells, Cells):
+        got = f"{shown(decision.cells)}{source}"
+        raise ParameterError(f"{where} cells {got}, expected what robocov.partition returns, or None")
     goals = None if decision.goals is None else decision.goals.copy()
     return replace(decision, forces=decision.forces.copy(), goals=goals, terms=terms)
 
@@ -279,8 +304,22 @@ def given_forces(values: Any, count: int, what: str) -> Array:
     """Return forces from outside, N; a ParameterError when they are not finite and (n, 2)."""
     forces = _rows(values, count, what)
     if not _finite(forces):
-        raise ParameterError(f"{what}: {shown(forces.tolist())}, but finite newtons were wanted")
+        raise ParameterError(f"{what}: expected finite newtons, got {shown(forces.tolist())}")
     return forces
+
+
+def to_numbers(values: object) -> Array | None:
+    """Return real numbers as an array of floats, the same one if it is one; None if they are none.
+
+    Complex numbers, texts and objects are no real numbers, whatever they can be converted to.
+    """
+    if isinstance(values, np.ndarray) and values.dtype == np.float64:
+        return values
+    try:
+        array = np.asarray(values)
+        return array.astype(np.float64) if array.dtype.kind in "biuf" else None
+    except (TypeError, ValueError, OverflowError):
+        return None
 
 
 def _finite(forces: Array) -> bool:
@@ -288,13 +327,11 @@ def _finite(forces: Array) -> bool:
     return isfinite(np.vdot(forces, forces)) or bool(np.isfinite(forces).all())
 
 
-def _rows(values: Any, count: int, what: str, controller: str | None = None) -> Array:
+def _rows(values: Any, count: int, what: str, when: str = "") -> Array:
     """Return two numbers for each robot as an array, the same one where it is one already."""
-    try:
-        array = np.asarray(values, dtype=np.float64)
-        if array.shape == (count, 2):
-            return array
-        found = f" of shape {array.shape}, but {(count, 2)} was wanted"
-    except (TypeError, ValueError):
-        found = f": {shown(values)}, but numbers were wanted"
-    raise ParameterError((what if controller is None else f"controller {controller!r}: {what}") + found)
+    array = to_numbers(values)
+    if array is None:
+        raise ParameterError(f"{what} {shown(values)}{when}, expected numbers of shape {(count, 2)}")
+    if array.shape != (count, 2):
+        raise ParameterError(f"{what} of shape {array.shape}{when}, expected {(count, 2)}")
+    return array

@@ -88,14 +88,20 @@ def test_a_controller_of_ones_own_is_kept_with_its_text(tmp_path: Path) -> None:
     [
         (
             "        1 / 0\n",
-            "controller 'Mine': ZeroDivisionError: division by zero (mine.py, line 11) at 0.000 s",
+            "controller 'Mine': ZeroDivisionError: division by zero (mine.py, line 11) for robot 1 at",
         ),
-        ("        raise SystemExit(3)\n", "controller 'Mine': SystemExit: 3 (mine.py, line 11) at 0.000 s"),
+        (
+            "        raise SystemExit(3)\n",
+            "controller 'Mine': it ended Python by SystemExit: 3 (mine.py, line 11) for robot 1 at 0.000 s",
+        ),
         (
             "        raise ValueError('a\\nb\\udcff')\n",
             "controller 'Mine': ValueError: a b? (mine.py, line 11)",
         ),
-        ("        return [float('nan'), 0]\n", "controller 'Mine': force [nan, 0.0] on robot 1 at 0.000 s"),
+        (
+            "        return [float('nan'), 0]\n",
+            "controller 'Mine': force(own) returned [nan, 0] for robot 1 at 0.000 s",
+        ),
         ("        pass\n\n1 / 0\n", "controller 'mine.py:Mine': mine.py cannot be run: ZeroDivisionError: "),
     ],
 )

@@ -186,7 +186,7 @@ def _circumstances_of(record: Record, cast: PaneSetup) -> Iterator[PaneSetup]:
 def _memories_of(record: Record, law: ControllerChoice) -> list[Any]:
     """Return what the controller, asked again, remembers at each moment; None once it decides otherwise."""
     found: list[Any] = []
-    with suppress(Exception, SystemExit):  # a user's controller may do anything; a lost one is not there
+    with suppress(BaseException):  # a user's controller may do anything; a lost one is not there
         controller = law.made()
         if not remembers(controller):
             return [None] * len(record)

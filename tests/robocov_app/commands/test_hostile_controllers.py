@@ -1,0 +1,115 @@
+"""Controllers that end Python, or close its output: one line that names them, and status 1."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from called import COMMAND
+
+from robocov.text import escape_controls
+
+HEAD = """
+import ctypes, os, signal, sys
+from dataclasses import dataclass
+
+class Odd(BaseException):
+    pass
+
+class Unspeakable(Exception):
+    def __str__(self):
+        raise ValueError("no words")
+
+@dataclass(frozen=True)
+class Mine:
+    def force(self, own):
+        if own.time > 0.1:
+            BODY
+        return 0.0, 0.0
+"""
+SMALL = ["--duration", "0.3", "--robots", "2", "--lattice", "16", "--no-pictures", "--out", "out"]
+RAISED = {
+    "sys.exit()": "controller 'Mine': it ended Python by SystemExit (mine.py, line 16) for robot 1 at 0.",
+    "sys.exit(0)": "controller 'Mine': it ended Python by SystemExit: 0 (mine.py, line 16)",
+    "raise Odd('hm')": "controller 'Mine': it ended Python by Odd: hm (mine.py, line 16)",
+    "raise GeneratorExit": "controller 'Mine': it ended Python by GeneratorExit (mine.py, line 16)",
+    "raise KeyboardInterrupt": "of your own: it ended Python by KeyboardInterrupt (mine.py, line 16)",
+    "sys.stdout.close()": "controller mine.py:Mine: it closed the standard output",
+    "os.close(1)": "controller mine.py:Mine: it closed the standard output",
+    "os.close(2)": "controller mine.py:Mine: it closed the standard error",
+}
+ENDED = {
+    "os._exit(0)": "controller mine.py:Mine: it ended Python (exit status 0) before the command was done",
+    "os._exit(3)": "controller mine.py:Mine: it ended Python (exit status 3)",
+    "os.kill(os.getpid(), signal.SIGKILL)": "it ended Python (killed by signal 9 (SIGKILL))",
+    "os.abort()": "it ended Python (killed by signal 6 (SIGABRT))",
+}
+ORDINARY = {
+    "self.force(own)": "controller 'Mine': RecursionError: ",
+    "bytearray(1 << 62)": "controller 'Mine': MemoryError (mine.py, line 16)",
+    "raise Unspeakable": "controller 'Mine': Unspeakable: it has no message (mine.py, line 16)",
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path
+
+
+def call(folder: Path, body: str, *words: str) -> subprocess.CompletedProcess[str]:
+    (folder / "mine.py").write_text(HEAD.replace("BODY", body))
+    return subprocess.run([*COMMAND, *words], cwd=folder, capture_output=True, text=True, timeout=300)
+
+
+def last_line(ended: subprocess.CompletedProcess[str]) -> str:
+    assert "Traceback" not in ended.stderr and "fault of robocov" not in ended.stderr
+    errors = [line for line in ended.stderr.splitlines() if line.startswith("robocov: error: ")]
+    assert len(errors) == 1, ended.stderr
+    assert escape_controls(errors[0]) == errors[0]
+    return errors[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("body", [*RAISED, *ENDED])
+def test_one_line_names_a_controller_that_ends_python(folder: Path, body: str) -> None:
+    ended = call(folder, body, "run", "square", "--controller", "mine.py:Mine", *SMALL)
+    assert ended.returncode == 1, ended.stderr
+    assert (RAISED | ENDED)[body] in last_line(ended)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("body", ORDINARY)
+def test_one_line_names_a_controller_that_fails(folder: Path, body: str) -> None:
+    ended = call(folder, body, "run", "square", "--controller", "mine.py:Mine", *SMALL)
+    assert ended.returncode == 2, ended.stderr
+    assert ORDINARY[body] in last_line(ended)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="commands are not supervised there")
+def test_a_comparison_that_a_controller_ends_says_so(folder: Path) -> None:
+    ended = call(folder, "os._exit(0)", "compare", "square", "--controllers", "rpf", "mine.py:Mine", *SMALL)
+    assert ended.returncode == 1
+    assert ENDED["os._exit(0)"] in last_line(ended)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="commands are not supervised there")
+def test_a_controller_that_behaves_is_only_watched(folder: Path) -> None:
+    ended = call(folder, "pass", "run", "square", "--controller", "mine.py:Mine", *SMALL, "--json")
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.startswith('{"out": "out"')
+    wrong = call(folder, "pass", "run", "square", "--controller", "mine.py:Yours", *SMALL)
+    assert wrong.returncode == 2
+    assert "unknown class 'Yours' (known: Mine" in last_line(wrong)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("body", ["os._exit(0)", "os.kill(os.getpid(), signal.SIGKILL)"])
+def test_a_sweep_names_the_controller_that_ends_its_worker(folder: Path, body: str) -> None:
+    study = 'maps = ["square"]\ncontrollers = ["mine.py:Mine"]\nduration = 0.3\nrobots = 2\nlattice = 16\n'
+    (folder / "study.toml").write_text(study)
+    ended = call(folder, body, "sweep", "study.toml", "--workers", "1", "--out", "out")
+    assert ended.returncode == 1
+    row = (folder / "out" / "results.csv").read_text().splitlines()[1]
+    assert "mine.py:Mine" in row and "its process ended (" in row
