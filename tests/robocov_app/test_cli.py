@@ -273,7 +273,10 @@ LONG = "x" * 300
         (f"report run --out {LONG}", f"{LONG}: cannot be "),
         (f"report {LONG}", f"{LONG}: "),
         (f"metrics {LONG}", f"{LONG}"),
-        (f"generate --width 1 --kind {LONG * 20}", "--kind: 'xxx"),
+        (
+            f"generate --width 1 --kind {LONG * 20}",
+            "--kind: expected polygons, blocks, rooms, mazes or caves, got 'xxx",
+        ),
         ("replay run --frames --out loop", "loop: "),
         ("replay loop", "loop: "),
         (

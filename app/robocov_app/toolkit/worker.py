@@ -22,6 +22,7 @@ from math import inf
 from typing import IO, Any, BinaryIO, Generic, Protocol, TypeAlias, TypeVar
 
 from robocov.errors import RobocovError
+from robocov_app.terminal.supervision import describe_status
 
 _Answer = TypeVar("_Answer")
 READY = "ready"  # first message of a process: its service is loaded
@@ -72,6 +73,7 @@ class LatestWorker(Generic[_Answer]):
         self._since = 0.0
         self._number = self._answered = 0
         self._ended = False
+        self._ready = False
         self._told: Reply | None = None
         self._replies: deque[Reply] = deque(maxlen=1)
         self._questions: deque[tuple[int, object]] = deque(maxlen=1)
@@ -125,9 +127,17 @@ class LatestWorker(Generic[_Answer]):
         if reply is not None:
             self._answered, self.trouble, self._since = reply.number, reply.trouble, time.monotonic()
         if ended and self.busy:
-            self._answered, self.trouble = self._number, f"the process that {self._doing} has ended"
+            self._answered = self._number
+            self.trouble = f"the process that {self._doing} has ended{self._describe_end()}"
             return None
         return None if reply is None else reply.answer
+
+    def _describe_end(self) -> str:
+        """Return how the process has ended, and whether that was while it started."""
+        assert self.process is not None
+        status = self.process.poll()
+        ending = "" if status is None else f" ({describe_status(status)})"
+        return f"{ending}{'' if self._ready else ' while starting'}"
 
     def close(self) -> None:
         if self.process is not None:
@@ -158,7 +168,7 @@ class LatestWorker(Generic[_Answer]):
         assert process.stdout is not None
         try:
             with process.stdout as stream:
-                receive(stream)  # READY
+                self._ready = receive(stream) == READY
                 while (reply := receive(stream)) is not None:
                     if not reply.final:
                         self._told = reply

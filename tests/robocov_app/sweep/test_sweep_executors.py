@@ -142,11 +142,11 @@ def test_a_process_that_ends_is_replaced(tmp_path: Path) -> None:
     }
     assert errors == {
         "": None,
-        "exits.py": "its process ended (exit status 3)",
-        "kills.py": "its process ended (signal 9)",
+        "exits.py": f"controller {names['exits.py']!r}: its process ended (exit status 3)",
+        "kills.py": f"controller {names['kills.py']!r}: its process ended (killed by signal 9 (SIGKILL))",
         "once.py": None,
         "talks.py": None,
-        "crashes.py": "its process ended (signal 11)",
+        "crashes.py": f"controller {names['crashes.py']!r}: its process ended (killed by signal 11 (SIGSEGV))",
     }
     (crashed,) = (task.name for task in tasks_of(study) if "crashes.py" in task.controller)
     assert b"crashes.py" in outcomes[crashed].files["error.json"], "its last words say where"
@@ -223,3 +223,20 @@ def test_the_number_of_processors_is_what_this_process_may_use() -> None:
     assert 1 <= processors() <= (os.cpu_count() or 1)
     if sys.platform == "linux":
         assert processors() == len(os.sched_getaffinity(0))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="processes are ended by signals")
+def test_a_worker_that_is_killed_while_it_starts_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever kills it, as a system without memory does, before it has said anything."""
+
+    def start(service: str, **options: object) -> subprocess.Popen[bytes]:
+        dying = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
+        pipe = subprocess.PIPE
+        return subprocess.Popen([sys.executable, "-c", dying], stdin=pipe, stdout=pipe)
+
+    monkeypatch.setattr(pool_module, "started", start)
+    with LocalPool(1) as pool:
+        pool.submit(next(iter(tasks_of(small_study()))))
+        ending = r"worker killed by signal 9 \(SIGKILL\) while starting$"
+        with pytest.raises(OutputError, match=ending):
+            pool.next(PATIENCE)
