@@ -275,7 +275,7 @@ LONG = "x" * 300
         (f"metrics {LONG}", f"{LONG}"),
         (
             f"generate --width 1 --kind {LONG * 20}",
-            "--kind: expected polygons, blocks, rooms, mazes or caves, got 'xxx",
+            "--kind: expected polygons, blocks, rooms",
         ),
         ("replay run --frames --out loop", "loop: "),
         ("replay loop", "loop: "),

@@ -109,7 +109,7 @@ class LatestWorker(Generic[_Answer]):
                 self._answered = self._number
                 self.trouble = f"the process that {self._doing} cannot be started: {error.strerror or error}"
                 return
-            self.process, self._ended = process, False
+            self.process, self._ended, self._ready = process, False, False
             known = self.process, self._wire()
             calls = self._write, self._read
             self._threads = [threading.Thread(target=call, args=known, daemon=True) for call in calls]

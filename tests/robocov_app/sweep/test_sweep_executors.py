@@ -146,7 +146,8 @@ def test_a_process_that_ends_is_replaced(tmp_path: Path) -> None:
         "kills.py": f"controller {names['kills.py']!r}: its process ended (killed by signal 9 (SIGKILL))",
         "once.py": None,
         "talks.py": None,
-        "crashes.py": f"controller {names['crashes.py']!r}: its process ended (killed by signal 11 (SIGSEGV))",
+        "crashes.py": f"controller {names['crashes.py']!r}: its process ended "
+        "(killed by signal 11 (SIGSEGV))",
     }
     (crashed,) = (task.name for task in tasks_of(study) if "crashes.py" in task.controller)
     assert b"crashes.py" in outcomes[crashed].files["error.json"], "its last words say where"
