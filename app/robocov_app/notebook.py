@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from robocov.controllers.gains import gain_values
 from robocov.cost import LATTICE, CoverageResult
 from robocov.environment import Environment
-from robocov.errors import ParameterError, RobocovError, counted, shown
+from robocov.errors import ParameterError, RobocovError, format_count, quote
 from robocov.mapfile import load_map, save_map
 from robocov.metrics import CostHistory, cost_history
 from robocov.record import Record
@@ -104,7 +104,7 @@ def plot_result(
     team = Team.homogeneous(n)
     if radius is not None:
         team = replace(team, radius=np.broadcast_to(np.asarray(radius, dtype=float), (n,)))
-    facts = f"{counted(n, 'robot')}, {mean_label(environment)} {result.mean_distance:.3f} m"
+    facts = f"{format_count(n, 'robot')}, {mean_label(environment)} {result.mean_distance:.3f} m"
     if sites.lattice < PICTURE_LATTICE:
         finer = built_cost(environment, PICTURE_LATTICE, quiet=True)
         sites, result = finer.sites, finer(result.positions)
@@ -124,7 +124,7 @@ def environment_html(environment: Environment) -> str:
     starts = ", ".join(environment.starts) or "uniform"
     facts = (
         f"{width:.4g} × {height:.4g} m, {environment.free_area:.4g} m² free, "
-        f"{counted(len(environment.obstacles), 'obstacle')}; "
+        f"{format_count(len(environment.obstacles), 'obstacle')}; "
         f"start{'s' if len(environment.starts) > 1 else ''} {starts}"
     )
     return escape_controls(
@@ -218,7 +218,7 @@ def _checked(axes: Any) -> Any:
 
     flat = isinstance(axes, Axes) and axes.transData.is_separable and not hasattr(axes, "get_zlim")
     if axes is not None and not flat:
-        raise ParameterError(f"axes: {shown(axes)}, but one matplotlib Axes with straight x and y was wanted")
+        raise ParameterError(f"axes: {quote(axes)}, but one matplotlib Axes with straight x and y was wanted")
     return axes
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from importlib.metadata import entry_points
 from typing import Any, ClassVar, Protocol
 
-from robocov.errors import ParameterError, RobocovError, unknown_name
+from robocov.errors import ParameterError, RobocovError, describe_unknown_name
 
 GROUP = "robocov.drawing"
 DEFAULT = "matplotlib"
@@ -108,7 +108,7 @@ def drawing_backend(name: str | None = None) -> DrawingBackend:
         raise RobocovError(f"{what}: pip install robocov")
     name = (DEFAULT if DEFAULT in entries else min(entries)) if name is None else name
     if name not in entries:
-        raise ParameterError(unknown_name("drawing backend", name, entries))
+        raise ParameterError(describe_unknown_name("drawing backend", name, entries))
     entry = entries[name]
     try:
         backend: DrawingBackend = entry.load()

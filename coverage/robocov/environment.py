@@ -21,7 +21,7 @@ from robocov.arrays import Array, IntArray, frozen
 from robocov.density import Density
 from robocov.density.base import masses_of_polygons
 from robocov.drawing import Drawable
-from robocov.errors import StartError, counted, is_number, required, unknown_name
+from robocov.errors import StartError, describe_unknown_name, format_count, is_number, require_type
 from robocov.observation.region import Region
 from robocov.robots import DEFAULT_RADIUS
 
@@ -199,7 +199,7 @@ class Environment(Drawable):
 
     def __repr__(self) -> str:
         width, height = np.ptp(np.asarray(self.boundary, dtype=float), axis=0).tolist()
-        obstacles = counted(len(self.obstacles), "obstacle")
+        obstacles = format_count(len(self.obstacles), "obstacle")
         return f"<Environment {self.name}, {width:.4g} x {height:.4g} m, {obstacles}>"
 
     @cached_property
@@ -288,7 +288,7 @@ class Environment(Drawable):
         starts.setdefault("uniform", UniformStart())
         name = next(iter(starts)) if name is None else name
         if name not in starts:
-            raise StartError(f"map {self.name!r}: {unknown_name('start', name, starts)}")
+            raise StartError(f"map {self.name!r}: {describe_unknown_name('start', name, starts)}")
         return Start(name, starts[name], self.free)
 
 
@@ -674,4 +674,4 @@ def _area(ring: Array) -> float:
 
 def require_environment(value: object) -> None:
     """Raise a ParameterError unless a value is a map."""
-    required("environment", value, Environment, 'a map, as in load_map("rooms"),')
+    require_type("environment", value, Environment, 'a map, as in load_map("rooms"),')

@@ -56,7 +56,7 @@ class Mistake(NamedTuple):
     @classmethod
     def at(cls, path: JsonPath, what: str, *, at_key: bool = False) -> Mistake:
         """Return the mistake that `what` is wrong at `path`."""
-        return cls(path, f"{place(path)}: {what}" if path else what, at_key)
+        return cls(path, f"{format_path(path)}: {what}" if path else what, at_key)
 
     def told(self, where: str) -> str:
         """Return its message, which begins as compilers' do, ``mine.json:14:9: ...``: terminals link that."""
@@ -104,7 +104,7 @@ class OutputError(RobocovError):
     """A result cannot be written: no permission, no space, a folder that is in use."""
 
 
-def shown(value: object) -> str:
+def quote(value: object) -> str:
     """Return `value` as it is quoted in messages: its repr on one line, cut where it is long."""
     try:
         text = repr(value)
@@ -113,25 +113,25 @@ def shown(value: object) -> str:
     return _cut(" ".join(text.split()))
 
 
-def shown_json(value: object) -> str:
+def quote_json(value: object) -> str:
     """Return `value` as it is quoted in messages about JSON."""
     return _cut(json.dumps(value, default=repr))
 
 
-def one_line(text: object) -> str:
+def to_one_line(text: object) -> str:
     """Return `text` as one line of a message, with escapes for line breaks and other control characters."""
     return escape_controls(str(text), single_line=True)
 
 
-def reason(error: Exception) -> str:
+def describe_error(error: Exception) -> str:
     """Return why the system refused something, on one line."""
-    return one_line((isinstance(error, OSError) and error.strerror) or error)
+    return to_one_line((isinstance(error, OSError) and error.strerror) or error)
 
 
-def place(path: Sequence[str | int]) -> str:
+def format_path(path: Sequence[str | int]) -> str:
     """Return `path` as messages show it; very long keys are cut.
 
-    >>> place(("obstacles", 2, "the lobby", "radius"))
+    >>> format_path(("obstacles", 2, "the lobby", "radius"))
     'obstacles[2]["the lobby"].radius'
     """
     text = ""
@@ -149,22 +149,22 @@ def is_number(value: object, kind: type = Real) -> TypeGuard[Any]:
     return isinstance(value, kind) and not isinstance(value, bool)
 
 
-def checked(
+def require_number(
     name: str, value: Any, least: float, most: float, unit: str = "", *, whole: bool = False
 ) -> float:
     """Return a number in its range; raise ParameterError when it is none, or out of it."""
     if not is_number(value, Integral if whole else Real) or not least <= value <= most:
         wanted = f"a {'whole ' if whole else ''}number from {least:g} to {most:g} {unit}".rstrip()
-        raise ParameterError(f"{name}: {shown(value)}, but {wanted} was wanted")
+        raise ParameterError(f"{name}: {quote(value)}, but {wanted} was wanted")
     return float(value)
 
 
-def numeric(
+def to_floats(
     name: str, values: Any, wanted: str, kind: type[InputError] = ParameterError
 ) -> NDArray[np.float64]:
     """Return numbers as a new array of floats; raise an error of some kind where they are none.
 
-    >>> numeric("starts", "abc", "[x, y] of each robot")
+    >>> to_floats("starts", "abc", "[x, y] of each robot")
     Traceback (most recent call last):
     robocov.errors.ParameterError: starts: 'abc', but [x, y] of each robot was wanted
     """
@@ -173,36 +173,38 @@ def numeric(
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
-        raise kind(f"{name}: {shown(values)}, but {wanted} was wanted") from None
+        raise kind(f"{name}: {quote(values)}, but {wanted} was wanted") from None
 
 
-def required(name: str, value: object, kind: type, wanted: str) -> None:
+def require_type(name: str, value: object, kind: type, wanted: str) -> None:
     """Raise a ParameterError unless a value is of a kind."""
     if not isinstance(value, kind):
-        raise ParameterError(f"{name}: {shown(value)}, but {wanted} was wanted")
+        raise ParameterError(f"{name}: {quote(value)}, but {wanted} was wanted")
 
 
-def listed(names: Sequence[str]) -> str:
+def summarize_names(names: Sequence[str]) -> str:
     """Return the first three of some names, and how many more there are: a, b, c and 1 more."""
     more = len(names) - 3
     return ", ".join(names[:3]) + (f" and {more} more" if more > 0 else "")
 
 
-def counted(count: int, thing: str) -> str:
+def format_count(count: int, thing: str) -> str:
     """Return how many things there are, in words: 1 robot, 6 robots."""
     return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
-def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
+def describe_unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     """Return the message for a name that is not among `known`, with the nearest one.
 
-    >>> unknown_name("controller", "rapff", ["lloyd", "rapf", "rpf"])
+    >>> describe_unknown_name("controller", "rapff", ["lloyd", "rapf", "rpf"])
     "unknown controller 'rapff': did you mean 'rapf'? (known: lloyd, rapf, rpf)"
     """
     names = sorted(known)
     near = get_close_matches(name.lower(), names, n=1, cutoff=0.5)
-    hint = f": did you mean {shown(near[0])}?" if near else ""
-    return f"unknown {kind} {shown(name)}{hint} (known: {', '.join(_cut(one_line(each)) for each in names)})"
+    hint = f": did you mean {quote(near[0])}?" if near else ""
+    return (
+        f"unknown {kind} {quote(name)}{hint} (known: {', '.join(_cut(to_one_line(each)) for each in names)})"
+    )
 
 
 def _cut(text: str) -> str:

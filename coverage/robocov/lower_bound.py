@@ -35,7 +35,7 @@ from robocov.arrays import Array, IntArray, frozen
 from robocov.compiled import kernel
 from robocov.cost import CoverageCost
 from robocov.environment import GRID, Environment
-from robocov.errors import ParameterError, checked
+from robocov.errors import ParameterError, require_number
 from robocov.geodesic import BINS, seen_corners
 from robocov.geodesic.visibility import AngularWallIndex, enter_walls, sees
 from robocov.geodesic.walls import Walls
@@ -101,8 +101,8 @@ def lower_bound(
     >>> bound.gap < 0.001
     True
     """
-    checked("radius", radius, GRID, math.inf, "m")
-    checked("precision", precision, FINEST, 1.0)
+    require_number("radius", radius, GRID, math.inf, "m")
+    require_number("precision", precision, FINEST, 1.0)
     tell = progress or (lambda part: None)
     cost = CoverageCost(environment, lattice, progress=lambda part: tell(_BUILT / 2.0 * part))
     dual = _Dual(cost, np.asarray(positions, dtype=float), radius)

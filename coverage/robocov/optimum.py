@@ -24,7 +24,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.environment import START_GAP, Environment
-from robocov.errors import ParameterError, checked, is_number, shown
+from robocov.errors import ParameterError, is_number, quote, require_number
 from robocov.k_median import Beat, best_swaps, lloyd_iterations, seeded
 from robocov.robots import DEFAULT_RADIUS
 
@@ -97,12 +97,12 @@ def optimum(
     >>> best.positions.round(3)
     array([[1., 1.]])
     """
-    checked("robots", robots, 1, MOST_ROBOTS, whole=True)
-    checked("restarts", restarts, 1, MOST_RESTARTS, whole=True)
+    require_number("robots", robots, 1, MOST_ROBOTS, whole=True)
+    require_number("restarts", restarts, 1, MOST_RESTARTS, whole=True)
     if not (is_number(seed, Integral) and seed >= 0):
-        raise ParameterError(f"seed: {shown(seed)}, but a whole number of at least 0 was wanted")
+        raise ParameterError(f"seed: {quote(seed)}, but a whole number of at least 0 was wanted")
     if not (is_number(radius) and 0.0 < radius < math.inf):
-        raise ParameterError(f"radius: {shown(radius)} m, but a number above 0 was wanted")
+        raise ParameterError(f"radius: {quote(radius)} m, but a number above 0 was wanted")
     tell = progress or (lambda part: None)
     cost = CoverageCost(environment, lattice, progress=lambda part: tell(_BUILT * part))
     search = _Search(environment, cost, robots, float(radius))

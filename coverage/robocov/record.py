@@ -21,7 +21,15 @@ from robocov.controllers import Controller, gain_values, short_name
 from robocov.controllers.gains import Value
 from robocov.drawing import Drawable
 from robocov.environment import Environment
-from robocov.errors import InputError, OutputError, ParameterError, counted, one_line, reason, shown
+from robocov.errors import (
+    InputError,
+    OutputError,
+    ParameterError,
+    describe_error,
+    format_count,
+    quote,
+    to_one_line,
+)
 from robocov.extras import extra
 from robocov.files.array_files import read_arrays
 from robocov.files.atomic import written
@@ -231,7 +239,7 @@ class Record(Drawable):
         return len(self.time)
 
     def __repr__(self) -> str:
-        robots = counted(len(self.team), "robot")
+        robots = format_count(len(self.team), "robot")
         return f"<Record {self.controller} on {self.environment.name}, {robots}, {self.time[-1]:.1f} s>"
 
     @property
@@ -272,20 +280,20 @@ class Record(Drawable):
         first, last = float(self.time[0]), float(self.time[-1])
         if not first - self.dt <= time <= last + self.dt:
             wanted = f"a number from {first:g} to {last:g} s"
-            raise ParameterError(f"time: {shown(time)} s, but {wanted} was wanted")
+            raise ParameterError(f"time: {quote(time)} s, but {wanted} was wanted")
         return self.snapshot(int(np.abs(self.time - time).argmin()))
 
     def until(self, time: float) -> Record:
         """Return the run up to `time`, s, inclusive; raise ParameterError when that is before it."""
         # half a microsecond forgives the rounding of sums of steps
         if not time >= self.time[0] - 5e-7:
-            raise ParameterError(f"time: {shown(time)} s, but a number from {self.time[0]:g} s was wanted")
+            raise ParameterError(f"time: {quote(time)} s, but a number from {self.time[0]:g} s was wanted")
         return self._only(slice(int(np.searchsorted(self.time, time + 5e-7, side="right"))))
 
     def thinned(self, rate: float) -> Record:
         """Return the `nearest_moments` at a rate, Hz (0: the ends); raise ParameterError when negative."""
         if not 0.0 <= rate < np.inf:
-            raise ParameterError(f"rate: {shown(rate)} Hz, but a finite number from 0 was wanted")
+            raise ParameterError(f"rate: {quote(rate)} Hz, but a finite number from 0 was wanted")
         return self._only(nearest_moments(self.time, rate))
 
     def _only(self, moments: slice | IntArray) -> Record:
@@ -342,7 +350,7 @@ class Record(Drawable):
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise OutputError(f"{folder}: cannot be made: {reason(error)}") from error
+            raise OutputError(f"{folder}: cannot be made: {describe_error(error)}") from error
         with written(folder / "record.npz") as part, part.open("wb") as file:
             # compressing gains 10 % and takes 20 times as long
             np.savez(file, **{name: getattr(self, name) for name in self.arrays})
@@ -420,7 +428,7 @@ class Recorder:
             number = isinstance(value, int | float) and abs(value) <= sys.float_info.max
             if not (value is None or isinstance(value, str) or number):
                 wanted = "a finite number was wanted, for the record"
-                raise ParameterError(f"controller {self.name!r}: {gain}: {shown(value)}, but {wanted}")
+                raise ParameterError(f"controller {self.name!r}: {gain}: {quote(value)}, but {wanted}")
         self._moments: list[tuple[float | Array, ...]] = []
 
     def add(self, snapshot: Snapshot) -> None:
@@ -436,7 +444,7 @@ class Recorder:
         names = (*ARRAYS, TURNING) if self.team.turns.any() else ARRAYS
         columns = zip(*self._moments, strict=True) if self._moments else [()] * len(names)
         arrays: dict[str, Any] = {name: np.array(rows) for name, rows in zip(names, columns, strict=True)}
-        law = str(self.name), one_line(self.controller.label), self._gains
+        law = str(self.name), to_one_line(self.controller.label), self._gains
         origin = self.start, self.seed, self.dt
         arrays |= {"conditions": self.conditions, "joined": joined}
         return Record(self.environment, self.team, *law, *origin, **arrays)

@@ -26,14 +26,14 @@ from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.errors import (
     InputError,
     ParameterError,
-    counted,
+    describe_unknown_name,
+    format_count,
+    format_path,
     is_number,
-    numeric,
-    one_line,
-    place,
-    shown,
-    shown_json,
-    unknown_name,
+    quote,
+    quote_json,
+    to_floats,
+    to_one_line,
 )
 from robocov.files.strictjson import parse, parse_toml, read_bytes
 
@@ -114,7 +114,7 @@ class Team:
         size = np.atleast_1d(np.asarray(self.radius)).shape[0]
         for name, (low, high, infinite) in LIMITS.items():
             values = frozen(
-                np.atleast_1d(numeric(f"team.{name}", getattr(self, name), "a number for each robot"))
+                np.atleast_1d(to_floats(f"team.{name}", getattr(self, name), "a number for each robot"))
             )
             if name in _OF_UNICYCLES and not len(values):
                 values = frozen(np.full(size, _OF_UNICYCLES[name]))
@@ -123,7 +123,7 @@ class Team:
                 raise ParameterError(f"team.{name}: {what}")
             good = (values >= low) & (values <= high) | (infinite & (values == np.inf))
             if not good.all():
-                found = f"{shown(float(values[~good][0]))} {UNITS[name]}"
+                found = f"{quote(float(values[~good][0]))} {UNITS[name]}"
                 wanted = f"a number from {low:g} to {high:g}{' or null for no limit' if infinite else ''}"
                 raise ParameterError(f"team.{name}: {found}, but {wanted} was wanted")
             object.__setattr__(self, name, values)
@@ -153,17 +153,17 @@ class Team:
         `kinematics`: "unicycle" is a track width of 1.6 radii unless one is given, "point" is none.
         """
         if kinematics not in (None, *KINEMATICS):
-            raise ParameterError(f"team.{unknown_name('kinematics', str(kinematics), KINEMATICS)}")
+            raise ParameterError(f"team.{describe_unknown_name('kinematics', str(kinematics), KINEMATICS)}")
         if kinematics == "unicycle":
             track_width = track_width or TRACK_PER_RADIUS * radius
         elif kinematics == "point":
             track_width = 0.0
         if not is_number(n, Integral) or n < 1:
-            raise ParameterError(f"robots: {shown(n)}, but a whole number of at least 1 was wanted")
+            raise ParameterError(f"robots: {quote(n)}, but a whole number of at least 1 was wanted")
         limits = radius, mass, max_speed, max_acceleration, viscosity, sensing_range, communication_range
         values = *limits, track_width, turning_rate
         each = zip(LIMITS, values, strict=True)
-        return cls(*(np.full(n, numeric(f"team.{name}", value, "a number")) for name, value in each))
+        return cls(*(np.full(n, to_floats(f"team.{name}", value, "a number")) for name, value in each))
 
     @classmethod
     def joined(cls, teams: Sequence[Team]) -> Team:
@@ -201,7 +201,7 @@ class Team:
             low, high = float(values.min()), float(values.max())
             span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
             parts.append(f"{name} {span} {unit}")
-        return f"<Team of {counted(len(self), 'robot')}: {', '.join(parts)}>"
+        return f"<Team of {format_count(len(self), 'robot')}: {', '.join(parts)}>"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the team as plain JSON: None is no limit, and a value that all share is written once."""
@@ -230,7 +230,7 @@ class Team:
 
 
 def _unusable(plain: Mapping[str, Any], key: str, wanted: str) -> ParameterError:
-    found = shown_json(plain[key]) if key in plain else "missing"
+    found = quote_json(plain[key]) if key in plain else "missing"
     return ParameterError(f"team.{key}: {found}, but {wanted} was wanted")
 
 
@@ -241,13 +241,13 @@ def read_team(path: Path | str, defaults: Mapping[str, float | str | None] | Non
     Raises InputError with the file, the key, the value and what was wanted.
     """
     path = Path(path)
-    where, content = one_line(path), read_bytes(path)
+    where, content = to_one_line(path), read_bytes(path)
     document = parse(content, where) if path.suffix.lower() == ".json" else parse_toml(content, where)
     if not isinstance(document, dict):
-        raise InputError(f"{where}: {shown(document)}, but an object with a list group was wanted")
+        raise InputError(f"{where}: {quote(document)}, but an object with a list group was wanted")
     for key in document:
         if key != "group":
-            raise InputError(f"{where}: {unknown_name('key', key, ['group'])}")
+            raise InputError(f"{where}: {describe_unknown_name('key', key, ['group'])}")
     try:
         return team_of_groups(document.get("group"), ("group",), defaults)
     except InputError as error:
@@ -259,32 +259,34 @@ def team_of_groups(
 ) -> Team:
     """Return the team of groups as they stand in a file at a path of keys, with which errors begin."""
     if not isinstance(groups, list) or not groups:
-        found = "missing" if groups is None else shown(groups)
-        raise InputError(f"{place(path)}: {found}, but at least one table [[{place(path)}]] was wanted")
+        found = "missing" if groups is None else quote(groups)
+        raise InputError(
+            f"{format_path(path)}: {found}, but at least one table [[{format_path(path)}]] was wanted"
+        )
     parts = [_group(group, (*path, k), dict(defaults or {})) for k, group in enumerate(groups)]
     robots = sum(map(len, parts))
     if robots > MOST_ROBOTS:
-        raise InputError(f"{place(path)}: {robots} robots, but at most {MOST_ROBOTS} were wanted")
+        raise InputError(f"{format_path(path)}: {robots} robots, but at most {MOST_ROBOTS} were wanted")
     return Team.joined(parts)
 
 
 def _group(group: object, path: tuple[str | int, ...], values: dict[str, Any]) -> Team:
     if not isinstance(group, dict):
-        raise InputError(f"{place(path)}: {shown(group)}, but a table was wanted")
+        raise InputError(f"{format_path(path)}: {quote(group)}, but a table was wanted")
     for key in group:
         if key not in _KEYS:
-            raise InputError(f"{place(path)}: {unknown_name('key', str(key), _KEYS)}")
+            raise InputError(f"{format_path(path)}: {describe_unknown_name('key', str(key), _KEYS)}")
     count = group.get("count")
     if not is_number(count, int) or not 1 <= count <= MOST_ROBOTS:
-        found = f"{place((*path, 'count'))}: {'missing' if count is None else shown(count)}"
+        found = f"{format_path((*path, 'count'))}: {'missing' if count is None else quote(count)}"
         raise InputError(f"{found}, but a whole number from 1 to {MOST_ROBOTS} was wanted")
-    values |= {key: _value(key, group[key], place((*path, key))) for key in LIMITS if key in group}
+    values |= {key: _value(key, group[key], format_path((*path, key))) for key in LIMITS if key in group}
     if "track_width" in group:  # that of the rest is not this one's kind
         values.pop("kinematics", None)
     if (kind := group.get("kinematics")) is not None:
         if kind not in KINEMATICS:
             wanted = " or ".join(KINEMATICS)
-            raise InputError(f"{place((*path, 'kinematics'))}: {shown(kind)}, but {wanted} was wanted")
+            raise InputError(f"{format_path((*path, 'kinematics'))}: {quote(kind)}, but {wanted} was wanted")
         values["kinematics"] = kind
     known: dict[str, Any] = {name: np.inf if value is None else value for name, value in values.items()}
     return Team.homogeneous(count, **known)
@@ -294,7 +296,7 @@ def _value(name: str, value: object, where: str) -> float | None:
     if LIMITS[name][2] and value in (None, NO_LIMIT):
         return None
     if not is_number(value):
-        raise InputError(f"{where}: {shown(value)}, but a number was wanted")
+        raise InputError(f"{where}: {quote(value)}, but a number was wanted")
     try:
         one: dict[str, Any] = {name: float(value)}
         Team.homogeneous(1, **one)

@@ -24,11 +24,11 @@ from robocov.errors import (
     ParameterError,
     RobocovError,
     StartError,
-    counted,
+    format_count,
     is_number,
-    numeric,
-    required,
-    shown,
+    quote,
+    require_type,
+    to_floats,
 )
 from robocov.observation import (
     Decision,
@@ -113,12 +113,12 @@ class Simulation:
         runs: int = 1,
     ) -> None:
         require_environment(environment)
-        positions = numeric("starts", starts, "[x, y] of each robot in metres", StartError)
+        positions = to_floats("starts", starts, "[x, y] of each robot in metres", StartError)
         if positions.ndim != 2 or positions.shape[1] != 2 or len(positions) < 1:
             wanted = "(n, 2) with n of at least 1 was wanted"
             raise StartError(f"starts: an array of shape {positions.shape}, but {wanted}")
         self.team = Team.homogeneous(len(positions)) if team is None else team
-        required("team", self.team, Team, "a Team")
+        require_type("team", self.team, Team, "a Team")
         if len(self.team) != len(positions):
             raise ParameterError(f"team: {len(self.team)} robots, but {len(positions)} starts")
         each, rest = divmod(len(positions), runs)
@@ -130,19 +130,19 @@ class Simulation:
         controller = for_team(controller)
         if isinstance(controller, type) or not isinstance(controller, Controller):
             wanted = "a controller, as in Rapf(), with a method decide or force, was wanted"
-            raise ParameterError(f"controller: {shown(controller)}, but {wanted}")
+            raise ParameterError(f"controller: {quote(controller)}, but {wanted}")
         if velocities is not None:
-            velocities = numeric("velocities", velocities, "[x, y] of each robot in m/s", StartError)
+            velocities = to_floats("velocities", velocities, "[x, y] of each robot in m/s", StartError)
             if velocities.shape != positions.shape or not np.isfinite(velocities).all():
                 wanted = "finite [x, y] for each robot were wanted"
-                raise StartError(f"velocities: {shown(velocities.tolist())}, but {wanted}")
+                raise StartError(f"velocities: {quote(velocities.tolist())}, but {wanted}")
         if steering is not None:
-            steering = numeric("steering", steering, "[heading, turning rate] of each robot", StartError)
+            steering = to_floats("steering", steering, "[heading, turning rate] of each robot", StartError)
             if steering.shape != positions.shape or not np.isfinite(steering).all():
                 wanted = "finite [heading, turning rate] for each robot were wanted"
-                raise StartError(f"steering: {shown(steering.tolist())}, but {wanted}")
+                raise StartError(f"steering: {quote(steering.tolist())}, but {wanted}")
         if conditions is not None:
-            required("conditions", conditions, Conditions, "Conditions")
+            require_type("conditions", conditions, Conditions, "Conditions")
             conditions.check_team(len(positions))
             conditions = None if conditions.ideal else conditions
             if not resumed:
@@ -179,7 +179,7 @@ class Simulation:
         self._scanning: Scanning | None = self._asked(getattr, controller, "scanning", None)
         if not isinstance(self._scanning, Scanning | None):
             found = f"controller {controller.name!r}: scanning: expected a Scanning"
-            raise ParameterError(f"{found}, got {shown(self._scanning)}")
+            raise ParameterError(f"{found}, got {quote(self._scanning)}")
         self._begin_step()
 
     def _begin_step(self) -> None:
@@ -191,7 +191,7 @@ class Simulation:
 
     def __repr__(self) -> str:
         where = f"{self.controller.name} on {self.environment.name}"
-        return f"<Simulation {where}, {counted(len(self.team), 'robot')}, at {self.time:.2f} s>"
+        return f"<Simulation {where}, {format_count(len(self.team), 'robot')}, at {self.time:.2f} s>"
 
     @property
     def time(self) -> float:
@@ -338,7 +338,7 @@ class Simulation:
     def snapshots(self, duration: float) -> Iterator[Snapshot]:
         """Yield the present snapshot and one after every step, until `duration` seconds have passed."""
         if not is_number(duration) or not 0.0 <= duration < np.inf:
-            raise ParameterError(f"duration: {shown(duration)} s, but a finite number from 0 was wanted")
+            raise ParameterError(f"duration: {quote(duration)} s, but a finite number from 0 was wanted")
         yield self.snapshot
         for _ in range(round(duration / self.dt)):
             self.step()
@@ -514,4 +514,4 @@ def check_joins(environment: Environment, conditions: Conditions | None) -> None
 def check_dt(dt: float) -> None:
     """Check a control period; raises ParameterError when it is out of range."""
     if not is_number(dt) or not 1e-4 <= dt <= 1.0:
-        raise ParameterError(f"dt: {shown(dt)} s, but a number from 0.0001 to 1 s was wanted")
+        raise ParameterError(f"dt: {quote(dt)} s, but a number from 0.0001 to 1 s was wanted")

@@ -8,7 +8,7 @@ import pytest
 import robocov as rc
 from robocov import errors
 from robocov.controllers import controller_kinds
-from robocov.errors import InputError, MapError, Mistake, place
+from robocov.errors import InputError, MapError, Mistake, format_path
 
 
 def test_the_tree_of_errors() -> None:
@@ -28,19 +28,19 @@ def test_the_tree_of_errors() -> None:
     ],
 )
 def test_unknown_names_get_the_nearest(name: str, message: str) -> None:
-    assert errors.unknown_name("controller", name, ["rapf", "rpf", "lloyd"]) == message
+    assert errors.describe_unknown_name("controller", name, ["rapf", "rpf", "lloyd"]) == message
 
 
 def test_long_values_are_cut_in_messages() -> None:
-    assert errors.shown([1.0] * 1000).endswith("...")
-    assert len(errors.shown("x" * 1000)) == 60
+    assert errors.quote([1.0] * 1000).endswith("...")
+    assert len(errors.quote("x" * 1000)) == 60
 
 
 def test_strange_names_leave_messages_readable() -> None:
-    message = errors.unknown_name("controller", "x" * 1000, ["x" * 2000, "rapf"])
+    message = errors.describe_unknown_name("controller", "x" * 1000, ["x" * 2000, "rapf"])
     assert len(message) < 250
     assert message.endswith("(known: rapf, " + "x" * 57 + "...)")
-    assert errors.unknown_name("start", "b", ["a\nb"]).endswith("(known: a\\nb)")
+    assert errors.describe_unknown_name("start", "b", ["a\nb"]).endswith("(known: a\\nb)")
 
 
 def test_one_is_told_and_the_others_are_counted() -> None:
@@ -69,12 +69,12 @@ def test_the_whole_document_needs_no_place() -> None:
 
 
 def test_keys_that_are_no_names_are_quoted() -> None:
-    assert place(("a b", "$schema", "x-y", 3, "")) == '["a b"].$schema.x-y[3][""]'
+    assert format_path(("a b", "$schema", "x-y", 3, "")) == '["a b"].$schema.x-y[3][""]'
 
 
 def test_keys_of_any_length_leave_messages_readable() -> None:
-    assert place(("a", "x" * 60, 1)) == f"a.{'x' * 60}[1]"
-    assert place(("a", "x" * 61, 1)) == f'a["{"x" * 57}..."][1]'
+    assert format_path(("a", "x" * 60, 1)) == f"a.{'x' * 60}[1]"
+    assert format_path(("a", "x" * 61, 1)) == f'a["{"x" * 57}..."][1]'
 
 
 ROOMS = rc.load_map("rooms")

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.errors import one_line
+from robocov.errors import to_one_line
 from robocov.text import escape_controls
 
 HOSTILE = [
@@ -39,4 +39,4 @@ def test_no_control_is_left_and_all_else_is_kept(text: str) -> None:
 def test_names_in_any_script_stay_as_they_are() -> None:
     for name in ("naïve café", "дом", "部屋", "می‌خواهم", "غرفة", "👩‍🚀", "a\tb\nc"):
         assert escape_controls(name) == name
-    assert one_line("a\tb\nc") == "a\\tb\\nc"
+    assert to_one_line("a\tb\nc") == "a\\tb\\nc"

@@ -10,7 +10,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from robocov import __version__
 from robocov.arrays import Array
-from robocov.errors import ParameterError, counted
+from robocov.errors import ParameterError, format_count
 from robocov.text import escape_controls
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.ratings import Rating, number
@@ -95,8 +95,8 @@ def _section(
     track, some = suite.TRACKS[name], own[0]
     maps = len({row["map"] for rating in own for row in rating.rows})
     head, families = ratings.family_rows(own)
-    runs = f"{counted(len(some.rows) + some.failed, 'run')} on {counted(maps, 'map')}"
-    team = f"{counted(track.robots, 'robot')}, {track.duration:g} s"
+    runs = f"{format_count(len(some.rows) + some.failed, 'run')} on {format_count(maps, 'map')}"
+    team = f"{format_count(track.robots, 'robot')}, {track.duration:g} s"
     rows, plots = [ratings.rating_row(each, knows[each.label]) for each in own], []
     for axis, (title, label, of) in AXES.items():
         points = []

@@ -15,7 +15,7 @@ import numpy as np
 from robocov.controllers import information_of, make_controller
 from robocov.controllers.gains import Value
 from robocov.environment import Environment
-from robocov.errors import InputError, OutputError, ParameterError, shown
+from robocov.errors import InputError, OutputError, ParameterError, quote
 from robocov.files.atomic import written
 from robocov.files.strictjson import parse, read_bytes
 from robocov_app.benchmark import suite
@@ -233,7 +233,7 @@ def _require(given: Any, kinds: Mapping[str, Any], where: object) -> None:
         if not isinstance(given, dict) or name not in given:
             raise InputError(f"{where}: {name}: missing, but a whole result was wanted")
         if not isinstance(given[name], kind):
-            raise InputError(f"{where}: {name}: {shown(given[name])}, but another kind of value was wanted")
+            raise InputError(f"{where}: {name}: {quote(given[name])}, but another kind of value was wanted")
 
 
 def verify(

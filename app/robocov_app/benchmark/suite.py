@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from robocov.environment import Environment
-from robocov.errors import InputError, ParameterError, unknown_name
+from robocov.errors import InputError, ParameterError, describe_unknown_name
 from robocov.generator import GENERATORS, generated_map
 from robocov.mapfile import load_map, to_json
 from robocov_app.benchmark.drawn import KINDS, drawn_map
@@ -98,7 +98,7 @@ def heading(track: str) -> str:
 def made_map(name: str) -> Environment:
     """Return the map of a name as it is made here and now; raises ParameterError for an unknown one."""
     if name not in FAMILY_OF:
-        raise ParameterError(f"--maps: {unknown_name('map of the benchmark', name, FAMILY_OF)}")
+        raise ParameterError(f"--maps: {describe_unknown_name('map of the benchmark', name, FAMILY_OF)}")
     kind, _, seed = name.removeprefix("dense-").removeprefix("large-").rpartition("-")
     if name.startswith("dense-"):
         return with_hot_spots(StudyMap(name, made_map(f"{kind}-{seed}")), int(seed)).environment
@@ -132,7 +132,7 @@ def suite_map(name: str) -> Environment:
 def chosen(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> dict[str, tuple[str, ...]]:
     """Return the maps of each track that are wanted, by default all; raises ParameterError."""
     if unknown := [name for name in tracks if name not in TRACKS]:
-        raise ParameterError(f"--track: {unknown_name('track', unknown[0], TRACKS)}")
+        raise ParameterError(f"--track: {describe_unknown_name('track', unknown[0], TRACKS)}")
     for name in maps:
         made_map(name)
     found = {}

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from robocov.errors import InputError, ParameterError, checked, counted
+from robocov.errors import InputError, ParameterError, format_count, require_number
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.arguments import parsed_gains
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
@@ -69,9 +69,9 @@ class Arguments(JsonOption):
 
     def __post_init__(self) -> None:
         if self.workers is not None:
-            checked("--workers", self.workers, 1, 1024, whole=True)
-        checked("--sample", self.sample, 0, 1_000_000, whole=True)
-        checked("--seed", self.seed, 0, 2**63 - 1, whole=True)
+            require_number("--workers", self.workers, 1, 1024, whole=True)
+        require_number("--sample", self.sample, 0, 1_000_000, whole=True)
+        require_number("--seed", self.seed, 0, 2**63 - 1, whole=True)
         for names in _USED.values():
             for name in names:
                 default = type(self).__dataclass_fields__[name].default
@@ -80,7 +80,7 @@ class Arguments(JsonOption):
                     raise ParameterError(f"{option}: robocov benchmark {self.action} has no such option")
         if self.action == "run" and self.controller is None:
             raise ParameterError("--controller: none, but the name of one, or FILE.py:CLASS, was wanted")
-        verify, paths = self.action == "verify", counted(len(self.paths), "path")
+        verify, paths = self.action == "verify", format_count(len(self.paths), "path")
         if (verify and len(self.paths) != 1) or (self.action == "page" and self.alone and not self.paths):
             wanted = "one result" if verify else "results"
             raise ParameterError(f"DIR: {paths}, but {wanted} of a benchmark was wanted")
@@ -109,7 +109,7 @@ def _run(options: Arguments) -> int:
 
         (first, *others), rows = summary_rows(result)
         print_table([(first, BOLD), *((name, RIGHT) for name in others)], rows)
-    words = f"{counted(runs, 'run')}, {failed} failed; written to {out / RESULT}"
+    words = f"{format_count(runs, 'run')}, {failed} failed; written to {out / RESULT}"
     tell(options, {"out": str(out), "runs": runs, "failed": failed}, words)
     return FAILED if failed else 0
 
@@ -143,9 +143,9 @@ def _verify(options: Arguments) -> int:
         count, found = verify(options.paths[0], **how)
         if stop.requested:
             return INTERRUPTED
-    verdict = counted(len(found), "difference") if found else "all alike, bit for bit"
+    verdict = format_count(len(found), "difference") if found else "all alike, bit for bit"
     answer = {"path": str(options.paths[0]), "runs": count, "differences": found}
-    tell(options, answer, *found, f"{counted(count, 'run')} done again: {verdict}")
+    tell(options, answer, *found, f"{format_count(count, 'run')} done again: {verdict}")
     return FAILED if found else 0
 
 

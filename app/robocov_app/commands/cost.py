@@ -9,7 +9,7 @@ import numpy as np
 import tyro
 
 from robocov.arrays import Array
-from robocov.errors import InputError, ParameterError, checked, is_number, reason, shown
+from robocov.errors import InputError, ParameterError, describe_error, is_number, quote, require_number
 from robocov.files.atomic import writable, written
 from robocov.mapfile import load_map
 from robocov_app.render.density import density_kind, density_lines, mean_label
@@ -38,7 +38,7 @@ class Arguments(PlotOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        checked("--lattice", self.lattice, 2, 2048, whole=True)
+        require_number("--lattice", self.lattice, 2, 2048, whole=True)
         if self.sites is not None:
             writable(self.sites)
 
@@ -94,14 +94,14 @@ def read_positions(path: Path) -> Array:
     try:
         content = json.loads(path.read_bytes())
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {reason(error)}") from error
+        raise InputError(f"{path}: cannot be read: {describe_error(error)}") from error
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not JSON: {error}") from error
     if not isinstance(content, list) or not content:
-        raise InputError(f"{path}: {shown(content)}, but a list of [x, y] in metres was wanted")
+        raise InputError(f"{path}: {quote(content)}, but a list of [x, y] in metres was wanted")
     for k, pair in enumerate(content):
         fits = isinstance(pair, list) and len(pair) == 2
         if not fits or not all(is_number(value) and abs(value) < 1e300 for value in pair):
             wanted = "[x, y], two finite numbers in metres, was wanted"
-            raise InputError(f"{path}: [{k}]: {shown(pair)}, but {wanted}")
+            raise InputError(f"{path}: [{k}]: {quote(pair)}, but {wanted}")
     return np.array(content, dtype=float)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from robocov.errors import ParameterError, checked
+from robocov.errors import ParameterError, require_number
 from robocov_app.runs.options import LayerOptions, ScenarioOptions, WindowOptions, robots_of
 from robocov_app.terminal.arguments import parsed_gains, window_size
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
@@ -55,12 +55,12 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        checked("--robots", self.robots, 1, 1000)
-        checked("--seed", self.seed, 0, 2**63 - 1)
-        checked("--lattice", self.lattice, 2, 1024)
-        checked("--speed", self.speed, 0.01, 1000.0)
+        require_number("--robots", self.robots, 1, 1000)
+        require_number("--seed", self.seed, 0, 2**63 - 1)
+        require_number("--lattice", self.lattice, 2, 1024)
+        require_number("--speed", self.speed, 0.01, 1000.0)
         if self.frames is not None:
-            checked("--frames", self.frames, 1, 1_000_000)
+            require_number("--frames", self.frames, 1, 1_000_000)
         if not 1 <= len(self.controllers) <= 4:
             raise ParameterError(f"--controllers: {len(self.controllers)}, but 1 to 4 were wanted")
         if self.out is not None and self.frames is None:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import tyro
 
-from robocov.errors import checked
+from robocov.errors import require_number
 from robocov_app.runs.options import PlotOptions
 from robocov_app.terminal.output import BOLD, RIGHT, print_table, tell, write_csv
 from robocov_app.terminal.progress import counting, progress
@@ -31,7 +31,7 @@ class Arguments(PlotOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        checked("--rate", self.rate, 0.0, 1e4, "Hz")
+        require_number("--rate", self.rate, 0.0, 1e4, "Hz")
 
 
 def command(options: Arguments) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from robocov.errors import InputError, ParameterError, checked, counted
+from robocov.errors import InputError, ParameterError, format_count, require_number
 from robocov.files.atomic import written
 from robocov.lower_bound import FINEST, LowerBound, lower_bound
 from robocov.mapfile import load_map
@@ -66,10 +66,12 @@ class Arguments(PlotOptions):
         for name, value in (("--robots", self.robots), ("--radius", self.radius)):
             if self.run is not None and value is not None:
                 raise InputError(f"{name}: {value}, but with --run it is that of the run")
-        checked("--robots", _ROBOTS if self.robots is None else self.robots, 1, MOST_ROBOTS, whole=True)
-        checked("--restarts", self.restarts, 1, MOST_RESTARTS, whole=True)
-        checked("--lattice", self.lattice, 2, 2048, whole=True)
-        checked("--precision", self.precision, FINEST, 1.0)
+        require_number(
+            "--robots", _ROBOTS if self.robots is None else self.robots, 1, MOST_ROBOTS, whole=True
+        )
+        require_number("--restarts", self.restarts, 1, MOST_RESTARTS, whole=True)
+        require_number("--lattice", self.lattice, 2, 2048, whole=True)
+        require_number("--precision", self.precision, FINEST, 1.0)
         if self.seed < 0:
             raise ParameterError(f"--seed: {self.seed}, but a whole number of at least 0 was wanted")
         if self.positions is not None:
@@ -130,7 +132,7 @@ def command(options: Arguments) -> None:
         proved = {"mean_distance_m": bound.mean_distance, "cost_m3": bound.value, "gap": bound.gap}
         answer["lower_bound"], better = proved, f"no placement is more than {bound.gap:.2%} better"
         lines += [f"lower bound     {bound.mean_distance:.4f} m, {better}"]
-    lines += [f"{counted(robots, 'robot')}, {count} restarts in {seconds:.1f} s, of these"]
+    lines += [f"{format_count(robots, 'robot')}, {count} restarts in {seconds:.1f} s, of these"]
     for within, agreeing in agreement.items():
         lines += [f"  within {within:.1%} of the best  {round(agreeing * count):>4}"]
     lines += [f"the median restart ends {best.gap(float(np.median(best.costs))):.2%} above the best"]

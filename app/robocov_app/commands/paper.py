@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import tyro
 
-from robocov.errors import InputError, checked, counted
+from robocov.errors import InputError, format_count, require_number
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
 from robocov_app.terminal.output import BOLD, RIGHT, echo, print_table, tell
@@ -44,7 +44,7 @@ class Arguments(JsonOption):
 
     def __post_init__(self) -> None:
         if self.workers is not None:
-            checked("--workers", self.workers, 1, 1024)
+            require_number("--workers", self.workers, 1, 1024)
         if len(self.parts) > 1:
             raise InputError(f"{self.parts[0]} and {self.parts[1]}: one of them was wanted")
 
@@ -113,7 +113,7 @@ def command(options: Arguments) -> int:
     written = ["index.html", *["beyond.html"] * with_beyond, *["claims.json"] * bool(verdicts)]
     lines = [f"saved in {out}/: {', '.join(written)}, figures/, studies/"]
     if failed:
-        lines += [f"{counted(failed, 'run')} failed: the column error in studies/*/results.csv says why"]
+        lines += [f"{format_count(failed, 'run')} failed: the column error in studies/*/results.csv says why"]
     answer = {"out": str(out), "plan": plan.name, "interrupted": False}
     answer["runs"] = (paper.runs if paper else len(runs)) + (beyond.runs if beyond else 0)
     answer |= {"failed": failed, "page": str(out / "index.html")}

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from robocov.errors import InputError, OutputError, ParameterError, counted
+from robocov.errors import InputError, OutputError, ParameterError, format_count
 from robocov.files.atomic import writable, written
 from robocov.files.result_folder import REPORT, extended, is_report
 from robocov_app.runs.options import JsonOption
@@ -109,7 +109,7 @@ def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: 
         runs, failed, lost = len(result.fine), len(result.failed), [each._asdict() for each in result.damaged]
         count = {"folder": called(folder), "kind": result.kind, "runs": runs, "failed": failed}
         counts.append(count | {"damaged": lost, "missing": result.missing, "shown": shown})
-        words = [f"{called(result.folder)}: {result.kind} of {counted(runs, 'run')}"]
+        words = [f"{called(result.folder)}: {result.kind} of {format_count(runs, 'run')}"]
         words += [f"{failed} failed"] * bool(failed) + [f"{len(lost)} cannot be read"] * bool(lost)
         words += [f"{result.missing} of {result.wanted} missing"] * bool(result.missing)
         lines.append(", ".join(words))

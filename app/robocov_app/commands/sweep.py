@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import tyro
 
-from robocov.errors import ParameterError, checked, counted
+from robocov.errors import ParameterError, format_count, require_number
 from robocov.extras import extra
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
@@ -49,7 +49,7 @@ class Arguments(JsonOption):
 
     def __post_init__(self) -> None:
         if self.workers is not None:
-            checked("--workers", self.workers, 1, 1024)
+            require_number("--workers", self.workers, 1, 1024)
             if self.scheduler is not None:
                 raise ParameterError("--workers: those of a cluster are its own, so one of both was wanted")
 
@@ -77,7 +77,7 @@ def command(options: Arguments) -> int:
             lines += [f"the run that was tried, {rehearsal.run}, failed: {rehearsal.error}"]
         each, all_ = rehearsal.bytes_a_run / 1e3, rehearsal.bytes / 1e6
         lines += [f"a run takes {rehearsal.seconds_a_run:.2f} s and {each:.0f} kB"]
-        words = f"{duration(rehearsal.seconds)} on {counted(workers, 'worker')}; {all_:.0f} MB in all"
+        words = f"{duration(rehearsal.seconds)} on {format_count(workers, 'worker')}; {all_:.0f} MB in all"
         lines += [f"all that is left: about {words}"]
         tell(options, {"out": str(out), "workers": workers, **asdict(rehearsal)}, *lines)
         return 0

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from robocov.errors import OutputError, ParameterError, shown
+from robocov.errors import OutputError, ParameterError, quote
 from robocov.files.atomic import writable, written
 from robocov.text import escape_controls
 
@@ -89,5 +89,5 @@ def figure_kind(path: Path) -> str:
     """Return ``png``, ``svg`` or ``pdf``, by a path's suffix; raises ParameterError when that is another."""
     kind = path.suffix.lower().lstrip(".")
     if kind not in _METADATA:
-        raise ParameterError(f"{path}: suffix {shown(path.suffix)}, but .png, .svg or .pdf was wanted")
+        raise ParameterError(f"{path}: suffix {quote(path.suffix)}, but .png, .svg or .pdf was wanted")
     return kind

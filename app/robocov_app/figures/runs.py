@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from robocov.arrays import Array
 from robocov.environment import Environment
-from robocov.errors import ParameterError, counted, shown
+from robocov.errors import ParameterError, format_count, quote
 from robocov.metrics.run_metrics import RunMetrics
 from robocov.record import Record
 from robocov_app.figures.arena import draw_map, draw_run, label_of, map_handles, run_handles, ticks_in_metres
@@ -62,7 +62,7 @@ def plot_trajectories(
     `mean_distance`, m, and `mean_time`, s, of the final positions are for the title.
     """
     if colours not in ("paper", "robots"):
-        raise ParameterError(f"colours: {shown(colours)}, but 'paper' or 'robots' was wanted")
+        raise ParameterError(f"colours: {quote(colours)}, but 'paper' or 'robots' was wanted")
     theme = theme_named(theme)
     if axes is None:
         facts = _line(*_facts(record, mean_distance, mean_time))
@@ -146,7 +146,7 @@ def plot_cost(
     for label, _, time, values in curves:
         if len(time) != len(values) or not np.isfinite(values).any():
             raise ParameterError(
-                f"curve {shown(label)}: {len(time)} times, {int(np.isfinite(values).sum())} finite values, "
+                f"curve {quote(label)}: {len(time)} times, {int(np.isfinite(values).sum())} finite values, "
                 f"but a value for each time and a finite one was wanted"
             )
     theme = theme_named(theme)
@@ -216,7 +216,7 @@ def _facts(record: Record, mean_distance: float | None, mean_time: float | None)
     """Return the cost (empty where it is not known), the time, and the number of robots in words."""
     mean = mean_label(record.environment)
     cost = "" if mean_distance is None else cost_label(mean, mean_distance, mean_time)
-    return cost, f"t = {record.time[-1]:.1f} s", counted(len(record.team), "robot")
+    return cost, f"t = {record.time[-1]:.1f} s", format_count(len(record.team), "robot")
 
 
 @plain_style()

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from robocov.environment import Environment
-from robocov.errors import MapError, ParameterError, counted, one_line, unknown_name
+from robocov.errors import MapError, ParameterError, describe_unknown_name, format_count, to_one_line
 from robocov_app.formats import (
     argos,
     dxf,
@@ -111,7 +111,7 @@ EXPORTERS: dict[str, Exporter] = {each.name: each for each in (
 
 def importer(name: str) -> Importer:
     if name not in IMPORTERS:
-        raise ParameterError(unknown_name("format", name, IMPORTERS))
+        raise ParameterError(describe_unknown_name("format", name, IMPORTERS))
     return IMPORTERS[name]
 
 
@@ -122,7 +122,7 @@ def detect(path: str | Path) -> Importer:
         return IMPORTERS["imdf"]
     head = files.head(path)
     if (kind := named_kind(path, head)) is not None:
-        raise MapError(f"{one_line(path)}: {one_line(kind)}")
+        raise MapError(f"{to_one_line(path)}: {to_one_line(kind)}")
     for candidate in IMPORTERS.values():
         if candidate.sniff(path, head):
             return candidate
@@ -130,7 +130,7 @@ def detect(path: str | Path) -> Importer:
     if len(named) == 1:  # its reader says best what is missing
         return named[0]
     wanted = f"one of {', '.join(IMPORTERS)} was wanted"
-    raise MapError(f"{one_line(path)}: unknown format ({described(head)}), but {wanted}")
+    raise MapError(f"{to_one_line(path)}: unknown format ({described(head)}), but {wanted}")
 
 
 def import_map(
@@ -146,7 +146,7 @@ def import_map(
     driven in; ParameterError when the format is unknown, or does not have an option that is given.
     """
     foreign = read_map(path, format=format, options=options)
-    environment, report = shaped(foreign, shaping, one_line(path))
+    environment, report = shaped(foreign, shaping, to_one_line(path))
     return environment, report, foreign
 
 
@@ -165,13 +165,15 @@ def read_map(
 
 def exporter(path: str | Path, name: str | None = None) -> Exporter:
     if name is not None and name not in EXPORTERS:
-        raise ParameterError(unknown_name("format", name, EXPORTERS))
+        raise ParameterError(describe_unknown_name("format", name, EXPORTERS))
     suffix = Path(path).suffix.lower()
     for candidate in EXPORTERS.values():
         if candidate.name == name or (name is None and suffix in candidate.suffixes):
             return candidate
     known = ", ".join(suffix for candidate in EXPORTERS.values() for suffix in candidate.suffixes)
-    raise ParameterError(f"{one_line(path)}: unknown format, but a file ending in one of {known} was wanted")
+    raise ParameterError(
+        f"{to_one_line(path)}: unknown format, but a file ending in one of {known} was wanted"
+    )
 
 
 def export_map(
@@ -195,5 +197,7 @@ def export_map(
         dropped.append(f"the density ({environment.density.kind})")
     if environment.moves:
         count = sum(shape.path is not None for shape in environment.obstacles)
-        dropped.append(f"the {counted(count, 'path')} of obstacles, which stand where they are at time zero")
+        dropped.append(
+            f"the {format_count(count, 'path')} of obstacles, which stand where they are at time zero"
+        )
     return replace(report, dropped=tuple(dropped))

@@ -16,7 +16,7 @@ import shapely
 from shapely import MultiPolygon
 
 from robocov.arrays import Array
-from robocov.errors import one_line, shown
+from robocov.errors import quote, to_one_line
 from robocov.mapfile.models import LARGEST
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
@@ -54,7 +54,7 @@ def _distribute(element: Element, shapes: Shapes) -> None:
     thing = entity.children[0]
     methods = [part.attributes.get("method", "") for part in (position, orientation)]
     if methods[0] not in ("grid", "constant") or methods[1] != "constant":
-        shapes.leave_out(one_line(thing.tag)[:30], "that ARGoS places at random", max(quantity, 0))
+        shapes.leave_out(to_one_line(thing.tag)[:30], "that ARGoS places at random", max(quantity, 0))
         return
     if not 0 <= quantity <= MOST_PLACED:
         entity.refuse(f"quantity {quantity}, but a number from 0 to {MOST_PLACED} was wanted")
@@ -96,5 +96,5 @@ def _place(element: Element, position: Array, turn: Array, shapes: Shapes) -> No
 def _lengths(element: Element, name: str, count: int = 3) -> Array:
     values = element.numbers(name, count=count)
     if not (values[:2].min() >= 1e-6 and values[:2].max() <= LARGEST):
-        element.refuse(f"{name} {shown(element.attributes[name])}, but lengths above 0 were wanted")
+        element.refuse(f"{name} {quote(element.attributes[name])}, but lengths above 0 were wanted")
     return values

@@ -14,7 +14,7 @@ from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import CircleObstacle, Environment, WallObstacle
-from robocov.errors import ParameterError, checked, counted, shown
+from robocov.errors import ParameterError, format_count, quote, require_number
 from robocov_app.formats.colours import ROLES, Colour, ColourKey
 
 Primitive: TypeAlias = CircleObstacle | WallObstacle
@@ -138,7 +138,7 @@ class ImportReport(_Report):
         return [
             f"{self.format}: {self.vertices_read} vertices read, {self.vertices_kept} kept; "
             f"free area {square_metres(self.area_read)} read, {square_metres(self.area_kept)} kept",
-            f"{self.size[0]:.4g} x {self.size[1]:.4g} m, {counted(self.obstacles, 'obstacle')}",
+            f"{self.size[0]:.4g} x {self.size[1]:.4g} m, {format_count(self.obstacles, 'obstacle')}",
             *self._told("repaired", "dropped", "changed", "notes"),
         ]
 
@@ -154,9 +154,9 @@ class Options:
             kinds = (hint, *get_args(hint))
             words = [word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
             if value is not None and name in ranges:
-                checked(name, value, *ranges[name])
+                require_number(name, value, *ranges[name])
             if value is not None and words and value not in words:
-                raise ParameterError(f"{name}: {shown(value)}, but one of {', '.join(words)} was wanted")
+                raise ParameterError(f"{name}: {quote(value)}, but one of {', '.join(words)} was wanted")
 
     def require_known(self, chosen: Importer | Exporter) -> None:
         """Raise ParameterError where something is given that means nothing to a format."""
@@ -266,11 +266,11 @@ class ReadOptions(Options):
         match = _STROKE.fullmatch(self.min_stroke.strip())
         if match is None:
             wanted = "a width in metres, as in 0.1, or in pixels, as in 3px"
-            raise ParameterError(f"min_stroke: expected {wanted}, got {shown(self.min_stroke)}")
+            raise ParameterError(f"min_stroke: expected {wanted}, got {quote(self.min_stroke)}")
         width = float(match[1])
         if match[2] == "px":
             return width * pixel
-        checked("min_stroke", width, 0.0, _LENGTH[1], "m")
+        require_number("min_stroke", width, 0.0, _LENGTH[1], "m")
         return width
 
 
@@ -315,7 +315,7 @@ class WriteOptions(Options):
         self.require(cell=_LENGTH, scale=_LENGTH, digits=(0, 12, ""))
         if self.origin is not None and not (abs(self.origin[0]) <= 180.0 and abs(self.origin[1]) <= 89.0):
             wanted = "a longitude from -180 to 180 and a latitude from -89 to 89 were wanted"
-            raise ParameterError(f"origin: {shown(self.origin)}, but {wanted}")
+            raise ParameterError(f"origin: {quote(self.origin)}, but {wanted}")
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from robocov.errors import ParameterError, counted, shown
+from robocov.errors import ParameterError, format_count, quote
 
 Colour: TypeAlias = tuple[int, int, int]
 Role: TypeAlias = Literal["free", "solid", "ignore"]
@@ -57,7 +57,7 @@ class ColourKey:
                 colour = parse_colour(text, f"{role}_colour")
                 if entries.setdefault(colour, role) != role:
                     other = f"{entries[colour]}_colour"
-                    raise ParameterError(f"{role}_colour: {shown(text)} is a colour of {other} as well")
+                    raise ParameterError(f"{role}_colour: {quote(text)} is a colour of {other} as well")
         if len(entries) > _MAX_COLOURS:
             raise ParameterError(f"free_colour: expected at most {_MAX_COLOURS} colours, got {len(entries)}")
         return cls(tuple(entries.items()), tolerance)
@@ -125,7 +125,7 @@ def parse_colour(text: str, option: str) -> Colour:
     colour = None if text.strip().casefold() == "transparent" else read_colour(text)
     if colour is None:
         wanted = "a colour name or #rrggbb, as in lightblue or '#add8e6'"
-        raise ParameterError(f"{option}: expected {wanted}, got {shown(text)}")
+        raise ParameterError(f"{option}: expected {wanted}, got {quote(text)}")
     return colour
 
 
@@ -183,7 +183,7 @@ def count_colours(colours: Iterable[Colour | None]) -> str:
     counts = Counter(name_colour(colour) for colour in colours if colour is not None)
     words = [f"{name} ({count})" for name, count in counts.most_common(_MAX_NAMED)]
     if more := len(counts) - len(words):
-        words.append(f"and {counted(more, 'other colour')}")
+        words.append(f"and {format_count(more, 'other colour')}")
     return ", ".join(words)
 
 

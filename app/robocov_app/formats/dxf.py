@@ -20,7 +20,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from robocov.arrays import Array
-from robocov.errors import MapError, RobocovError, one_line, shown
+from robocov.errors import MapError, RobocovError, quote, to_one_line
 from robocov.extras import extra
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
@@ -121,7 +121,7 @@ class DxfDrawing:
             name = str(insert.dxf.get("name", "")).casefold()
             if name in inside:
                 what = "is inserted within itself, but an end was wanted"
-                raise MapError(f"{where}: block {shown(name)} {what}")
+                raise MapError(f"{where}: block {quote(name)} {what}")
             if len(inside) >= deepest:
                 raise MapError(f"{where}: blocks nested deeper than {deepest}, but less was wanted")
             if name not in counted:
@@ -150,12 +150,12 @@ class DxfDrawing:
             except RobocovError:
                 raise
             except Exception as error:  # of ezdxf, which raises what it likes on nonsense
-                kind = one_line(entity.dxftype())[:20]
+                kind = to_one_line(entity.dxftype())[:20]
                 self.shapes.leave_out("damaged shape", f"({kind}: {type(error).__name__})")
 
     def _one(self, entity: Any, layer: str, blocks: tuple[str, ...]) -> None:
         shapes, kind, labels = self.shapes, entity.dxftype(), (layer, *reversed(blocks))
-        at = one_line(f"{kind} {entity.dxf.handle}" if entity.dxf.get("handle") else kind)[:60]
+        at = to_one_line(f"{kind} {entity.dxf.handle}" if entity.dxf.get("handle") else kind)[:60]
         if layer.casefold() in self._hidden or entity.dxf.get("invisible", 0):
             shapes.leave_out("shape", "hidden, or on layers that are off")
         elif kind == "INSERT":
@@ -191,7 +191,7 @@ class DxfDrawing:
             self._require_near(curve)
             self._line(curve * self.scale, labels, at)
         else:
-            shapes.leave_out(one_line(kind)[:40])
+            shapes.leave_out(to_one_line(kind)[:40])
 
     def _metres(self, points: Sequence[Any]) -> Array:
         """Return points of the drawing as (k, 2) m; third coordinates are told of."""
@@ -276,7 +276,7 @@ class DxfDrawing:
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
-    where = one_line(path)
+    where = to_one_line(path)
     document = _document(path, where)
     code = document.header.get("$INSUNITS", 0)
     if options.scale is not None:
@@ -317,5 +317,5 @@ def _document(path: Path, where: str) -> Any:
         except OSError as error:
             raise MapError(f"{where}: cannot be read: {error.strerror or error}") from None
         except Exception as error:  # it raises what it likes on nonsense
-            reason = one_line(error) or type(error).__name__
+            reason = to_one_line(error) or type(error).__name__
     raise MapError(f"{where}: no DXF that can be read: {reason[:200]}")

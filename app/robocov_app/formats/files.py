@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array
 from robocov.errors import JsonPath as Steps
-from robocov.errors import MapError, Mistake, one_line, reason, shown, shown_json
+from robocov.errors import MapError, Mistake, describe_error, quote, quote_json, to_one_line
 from robocov.files.strictjson import located, parse
 from robocov.mapfile.models import FARTHEST, LARGEST
 
@@ -42,7 +42,7 @@ _MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codec
 
 def head(path: Path, most: int = HEAD) -> bytes:
     """Return the first bytes of the file at `path`; a MapError where there is no ordinary one."""
-    where = one_line(path)
+    where = to_one_line(path)
     try:
         mode = path.stat().st_mode
         if stat.S_ISDIR(mode):
@@ -54,14 +54,14 @@ def head(path: Path, most: int = HEAD) -> bytes:
     except FileNotFoundError:
         raise MapError(f"{where}: no such file") from None
     except (OSError, ValueError) as error:
-        raise MapError(f"{where}: cannot be read: {reason(error)}") from None
+        raise MapError(f"{where}: cannot be read: {describe_error(error)}") from None
 
 
 def content(path: Path, most: int = MAX_BYTES) -> bytes:
     """Return the content of a file; a MapError where it is larger than `most` bytes, or as `head`."""
     head(path, 0)
     if path.stat().st_size > most or len(data := head(path, most + 1)) > most:
-        raise MapError(f"{one_line(path)}: larger than {most / 1e6:g} MB, but a smaller file was wanted")
+        raise MapError(f"{to_one_line(path)}: larger than {most / 1e6:g} MB, but a smaller file was wanted")
     return data
 
 
@@ -130,7 +130,7 @@ def require_shapes(count: int, where: str) -> None:
 def require_length(value: float, where: str, smallest: float = 1e-6, largest: float = LARGEST) -> None:
     if not smallest <= value <= largest:
         wanted = f"a number from {smallest:.10g} to {largest:.10g} (m) was wanted"
-        raise MapError(f"{where}: {shown(value)}, but {wanted}")
+        raise MapError(f"{where}: {quote(value)}, but {wanted}")
 
 
 def require_coordinate(value: float, where: str) -> None:
@@ -139,7 +139,7 @@ def require_coordinate(value: float, where: str) -> None:
 
 def read_text(path: Path, separator: bytes) -> tuple[str, str]:
     """Return the text of a file, and what messages call it; `separator` is what stands between vertices."""
-    where = one_line(path)
+    where = to_one_line(path)
     data = content(path, MAX_TEXT_BYTES)
     require_vertices(data.count(separator), where)
     mark, encoding = next((both for both in _MARKS if data.startswith(both[0])), (b"", "utf-8"))
@@ -150,7 +150,7 @@ def read_text(path: Path, separator: bytes) -> tuple[str, str]:
 
 
 def name_of_map(path: Path) -> str:
-    return one_line(path.stem)[:60] or "map"
+    return to_one_line(path.stem)[:60] or "map"
 
 
 def named_file(path: Path, name: str, what: str, at: str, notes: list[str], anywhere: bool) -> Path:
@@ -162,22 +162,22 @@ def named_file(path: Path, name: str, what: str, at: str, notes: list[str], anyw
     if not name:
         raise MapError(f"{at}: empty, but the name of a {what} was wanted")
     if len(name) > _LONG:
-        raise MapError(f"{at}: {shown(name)}: {len(name)} characters, but a shorter name was wanted")
+        raise MapError(f"{at}: {quote(name)}: {len(name)} characters, but a shorter name was wanted")
     named = path.parent / name
     beside = path.parent / PureWindowsPath(name).name
     try:
         allowed = anywhere or _inside(named, path.parent)
         if not (allowed and _exists(named)) and beside.is_file() and _inside(beside, path.parent):
             key = at.rpartition(": ")[2]
-            note = f"{key}: {shown(name)} is not there, {shown(beside.name)} beside the file taken"
+            note = f"{key}: {quote(name)} is not there, {quote(beside.name)} beside the file taken"
             notes += [] if note in notes else [note]
             return beside
     except (OSError, ValueError, RuntimeError) as error:
         why = error.strerror if isinstance(error, OSError) and error.strerror else "no name of a file"
-        raise MapError(f"{at}: {shown(name)}: {why}") from None
+        raise MapError(f"{at}: {quote(name)}: {why}") from None
     if not allowed:
         wanted = f"a {what} in it was wanted (--anywhere allows it)"
-        raise MapError(f"{at}: {shown(name)} is outside of the file's folder, but {wanted}")
+        raise MapError(f"{at}: {quote(name)} is outside of the file's folder, but {wanted}")
     return named
 
 
@@ -225,7 +225,7 @@ class JsonFile:
     """
 
     def __init__(self, path: Path, text: bytes | None = None) -> None:
-        self.where = one_line(path)
+        self.where = to_one_line(path)
         self._content = content(path, MAX_TEXT_BYTES) if text is None else text
         # each point is a list of two or three: to count takes a moment, to parse minutes
         require_vertices(max(self._content.count(b"["), self._content.count(b",") // 3), self.where)
@@ -233,7 +233,7 @@ class JsonFile:
 
     def refused(self, at: Steps, value: object, wanted: str) -> MapError:
         """Return the error of a value at a place: what is there, what was wanted."""
-        mistake = Mistake.at(at, f"{shown_json(value)}, but {wanted} wanted")
+        mistake = Mistake.at(at, f"{quote_json(value)}, but {wanted} wanted")
         return located(MapError.of(self.where, [mistake]), self._content, self.where)
 
     def positions(self, value: Any, at: Steps, least: int, fewest: int, most: int) -> Array:
@@ -283,9 +283,9 @@ def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
         return _YamlReader(decoded, where).read()
     except yaml.MarkedYAMLError as error:
         line = f"line {error.problem_mark.line + 1}: " if error.problem_mark is not None else ""
-        raise MapError(f"{where}: {line}not YAML: {one_line(error.problem or error.context)}") from None
+        raise MapError(f"{where}: {line}not YAML: {to_one_line(error.problem or error.context)}") from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:
-        raise MapError(f"{where}: not YAML: {one_line(error)[:200]}") from None
+        raise MapError(f"{where}: not YAML: {to_one_line(error)[:200]}") from None
 
 
 class _Counted(NamedTuple):
@@ -311,7 +311,7 @@ class _YamlReader:
             if isinstance(event, yaml.DocumentStartEvent) and result:
                 raise MapError(f"{self._line(event)}: a second document, but one was wanted")
             if isinstance(event, yaml.SequenceStartEvent | yaml.ScalarEvent):
-                found = shown(event.value) if isinstance(event, yaml.ScalarEvent) else "a list"
+                found = quote(event.value) if isinstance(event, yaml.ScalarEvent) else "a list"
                 raise MapError(f"{self._line(event)}: {found}, but a mapping (name: value) was wanted")
             if isinstance(event, yaml.NodeEvent):
                 value = self._build(event, depth=1).value
@@ -328,11 +328,11 @@ class _YamlReader:
             found = self.anchors.get(str(event.anchor))
             if found is None:
                 known = "expected the name of an anchor before it"
-                raise MapError(f"{self._line(event)}: {known}, got the alias {shown(event.anchor)}")
+                raise MapError(f"{self._line(event)}: {known}, got the alias {quote(event.anchor)}")
             self._require_few(event, found.size, depth - 1 + found.depth)
             return found
         if event.tag is not None:
-            raise MapError(f"{self._line(event)}: the tag {shown(event.tag)}, but a plain value was wanted")
+            raise MapError(f"{self._line(event)}: the tag {quote(event.tag)}, but a plain value was wanted")
         before = self.count
         if isinstance(event, yaml.ScalarEvent):
             self._require_few(event, 1, 0)
@@ -381,7 +381,7 @@ class _YamlReader:
             if name == "<<" and event.style is None:
                 merged += self._merged(item.value, event)
             elif name in found:
-                raise MapError(f"{self._line(event)}: {one_line(name)}: given twice, but once was wanted")
+                raise MapError(f"{self._line(event)}: {to_one_line(name)}: given twice, but once was wanted")
             else:
                 found[name] = item.value
         for other in merged:

@@ -25,7 +25,7 @@ from shapely.geometry import mapping
 from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.errors import JsonPath as Steps
-from robocov.errors import ParameterError, RobocovError, one_line, place, shown
+from robocov.errors import ParameterError, RobocovError, format_path, quote, to_one_line
 from robocov.extras import extra
 from robocov.files.atomic import written
 from robocov_app.formats import files
@@ -70,8 +70,8 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     shapes.options = replace(options, units=options.units or units)
     shapes.add_all(in_metres(found.figures, shapes, found.crs, globe=True, origin=origin))
     named, text = document.get("name"), document.get("description")
-    name = one_line(named if isinstance(named, str) and named.strip() else path.stem)[:80]
-    text = one_line(text)[:1000] if isinstance(text, str) else "Imported from GeoJSON."
+    name = to_one_line(named if isinstance(named, str) and named.strip() else path.stem)[:80]
+    text = to_one_line(text)[:1000] if isinstance(text, str) else "Imported from GeoJSON."
     return shapes.foreign_map(name or "map", text, solid=False)
 
 
@@ -156,7 +156,7 @@ class FigureCollector:
         if not isinstance(properties, dict):
             raise self.file.refused((*at, "properties"), properties, "an object was")
         given = [*(properties.get(name) for name in _NAMES), feature.get("id")]
-        labels = [one_line(label).strip() for label in given if type(label) in (str, int)]
+        labels = [to_one_line(label).strip() for label in given if type(label) in (str, int)]
         kind = properties.get("kind")
         if isinstance(kind, str) and kind.casefold() != BOUNDARY:  # whatever it is called
             labels = [label for label in labels if label.casefold() != BOUNDARY]
@@ -189,18 +189,18 @@ class FigureCollector:
             if not isinstance(value, list):
                 raise self.file.refused(at, value, "a list was")
             for k, part in enumerate(value):
-                self._coordinates(_PLURAL[kind], part, (*at, k), labels, whole=place(at))
+                self._coordinates(_PLURAL[kind], part, (*at, k), labels, whole=format_path(at))
         elif value == []:
             self.shapes.leave_out("geometry", "without coordinates")
         elif kind == "Point":
-            self.figures.append(Figure("point", (self._points([value], at, 1),), labels, place(at)))
+            self.figures.append(Figure("point", (self._points([value], at, 1),), labels, format_path(at)))
         elif kind == "LineString":
-            self.figures.append(Figure("line", (self._points(value, at, 2),), labels, place(at)))
+            self.figures.append(Figure("line", (self._points(value, at, 2),), labels, format_path(at)))
         elif not isinstance(value, list):
             raise self.file.refused(at, value, "a list of rings was")
         else:
             rings = [self._points(ring, (*at, k), 1) for k, ring in enumerate(value)]
-            self.figures.append(self.shapes.polygon(rings, labels, place(at), whole))
+            self.figures.append(self.shapes.polygon(rings, labels, format_path(at), whole))
 
     def _points(self, value: Any, at: Steps, least: int) -> Array:
         return self.shapes.flat(self.file.positions(value, at, least, 2, 4))
@@ -269,5 +269,5 @@ def _plane(environment: Environment, origin: tuple[float, float]) -> LocalPlane:
         raise ParameterError(f"origin: degrees need more: {error}") from None
     if np.ptp(plane.degrees(np.array(environment.boundary, dtype=float))[:, 0]) >= 180.0:
         wanted = "a place farther from the pole was wanted"
-        raise ParameterError(f"origin: {shown(origin)}: longitudes run all around on the map, but {wanted}")
+        raise ParameterError(f"origin: {quote(origin)}: longitudes run all around on the map, but {wanted}")
     return plane

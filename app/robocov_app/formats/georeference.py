@@ -11,7 +11,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.environment import Point
-from robocov.errors import MapError, RobocovError, shown
+from robocov.errors import MapError, RobocovError, quote
 from robocov.extras import extra
 from robocov.mapfile.models import LARGEST
 from robocov_app.formats.files import require_shapes
@@ -80,7 +80,7 @@ def _authority(crs: str, where: str) -> str:
     match = _URN.fullmatch(crs.strip()) or _ADDRESS.fullmatch(crs.strip())
     if match is None or match[1].upper() not in _AUTHORITIES:
         wanted = f"a code as EPSG:25832 was wanted ({_AS_THEY_ARE})"
-        raise MapError(f"{where}: reference system {shown(crs)}, but {wanted}")
+        raise MapError(f"{where}: reference system {quote(crs)}, but {wanted}")
     return f"{match[1].upper()}:{match[2].upper()}"
 
 

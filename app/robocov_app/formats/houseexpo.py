@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from shapely import MultiPolygon, Polygon
 
-from robocov.errors import MapError, counted, one_line
+from robocov.errors import MapError, format_count, to_one_line
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.files import JsonFile
@@ -42,7 +42,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     repaired += [] if reason is None else [f"the outline met itself: {reason}"]
     holes = [[Polygon(hole) for hole in part.interiors] for part in area.geoms]
     small = [hole.area for some in holes for hole in some if hole.area < _MIN_HOLE]
-    dropped = [f"{counted(len(small), 'hole')} of {sum(small):.2g} m² together"] if small else []
+    dropped = [f"{format_count(len(small), 'hole')} of {sum(small):.2g} m² together"] if small else []
     parts = [
         Polygon(part.exterior, [hole.exterior for hole in some if hole.area >= _MIN_HOLE])
         for part, some in zip(area.geoms, holes, strict=True)
@@ -51,7 +51,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     name = called if isinstance(called, str) and called else path.stem
     many = f" of {rooms} rooms" if type(rooms) is int and rooms > 1 else ""
     return ForeignMap(
-        name=f"HouseExpo {one_line(name)[:60]}",
+        name=f"HouseExpo {to_one_line(name)[:60]}",
         description=f"A floor plan{many}, imported from HouseExpo.",
         free=MultiPolygon(parts),
         vertices_read=len(vertices),

@@ -12,7 +12,7 @@ import zipfile
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
-from robocov.errors import MapError, ParameterError, one_line, shown
+from robocov.errors import MapError, ParameterError, quote, to_one_line
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.files import JsonFile, is_number
@@ -48,7 +48,7 @@ class _Archive:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.where = one_line(path)
+        self.where = to_one_line(path)
         texts = _read_folder(path) if path.is_dir() else _read_zip(path)
         for name in _REQUIRED:
             if name not in texts:
@@ -127,7 +127,7 @@ def _read_folder(path: Path) -> dict[str, bytes]:
 
 
 def _read_zip(path: Path) -> dict[str, bytes]:
-    where = one_line(path)
+    where = to_one_line(path)
     data = files.content(path, files.MAX_TEXT_BYTES)
     if data.count(_ZIP_ENTRY) > MAX_ENTRIES:
         raise MapError(f"{where}: expected an archive of at most {MAX_ENTRIES} files, got more")
@@ -153,7 +153,7 @@ def _read_zip(path: Path) -> dict[str, bytes]:
         raise
     except Exception as error:  # of zipfile and its decompressors, which raise many kinds
         raise MapError(
-            f"{where}: expected a whole zip archive, got a broken one: {one_line(error)[:80]}"
+            f"{where}: expected a whole zip archive, got a broken one: {to_one_line(error)[:80]}"
         ) from None
     return texts
 
@@ -191,10 +191,10 @@ def _choose_floor(archive: _Archive, levels: dict[str, _Level], asked: str | Non
         if not names:
             raise
         known = f"{list_floors(floors)} or a name ({', '.join(names[:10])})"
-        raise ParameterError(f"{archive.where}: level: expected {known}, got {shown(asked)}") from None
+        raise ParameterError(f"{archive.where}: level: expected {known}, got {quote(asked)}") from None
     if len(floors) > 1:
         called = sorted(
-            {shown(level.names[1]) for level in levels.values() if level.ordinal == floor and level.names[1:]}
+            {quote(level.names[1]) for level in levels.values() if level.ordinal == floor and level.names[1:]}
         )
         words = f" ({', '.join(called[:3])})" if called else ""
         shapes.notes.append(f"level {floor:g}{words} of {list_floors(floors)} (--level)")
@@ -209,7 +209,7 @@ def _names(labels: Any) -> list[str]:
     """Return the names in all languages that a member holds."""
     if not isinstance(labels, dict):
         return []
-    names = [one_line(name).strip()[:80] for name in labels.values() if isinstance(name, str)]
+    names = [to_one_line(name).strip()[:80] for name in labels.values() if isinstance(name, str)]
     return [name for name in names if name]
 
 
@@ -227,7 +227,7 @@ def _level_id(feature: dict[str, Any]) -> str | None:
 
 def _category(feature: dict[str, Any]) -> str:
     category = feature["properties"].get("category")
-    return one_line(category).partition(".")[0] if isinstance(category, str) else ""
+    return to_one_line(category).partition(".")[0] if isinstance(category, str) else ""
 
 
 def _unit_role(category: str) -> Role:
@@ -242,7 +242,7 @@ def _collect(file: JsonFile, k: int, feature: dict[str, Any], shapes: Shapes) ->
     category = properties.get("category")
     labels = [*_names(properties.get("name")), *_names(properties.get("alt_name"))]
     if isinstance(category, str) and category.strip():
-        labels.append(one_line(category).strip()[:80])
+        labels.append(to_one_line(category).strip()[:80])
     if feature.get("geometry") is None:
         shapes.leave_out("feature", "without a geometry")
         return []

@@ -17,7 +17,7 @@ from shapely import MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
-from robocov.errors import MapError, ParameterError, counted, shown
+from robocov.errors import MapError, ParameterError, format_count, quote
 from robocov_app.formats.base import ForeignMap
 from robocov_app.formats.geometry.polygons import Crossings, enclosed, polygons_of, united
 from robocov_app.formats.geometry.shapes import Figure, Line, Shapes
@@ -73,7 +73,7 @@ def choose_floor(floors: dict[float, float], asked: str | None, where: str) -> f
         number = float("nan")
     if number not in floors:
         known = list_floors(floors)
-        raise ParameterError(f"{where}: level: expected one of {known}, got {shown(asked)}")
+        raise ParameterError(f"{where}: level: expected one of {known}, got {quote(asked)}")
     return number
 
 
@@ -127,7 +127,7 @@ def build_floor(shapes: Shapes, figures: Sequence[IndoorFigure], name: str, text
         shapes.add_line(Line(line, shapes.thickness, ("wall",)))
     shapes.join_lines()
     _add_obstacles(shapes, wanted, floor)
-    shapes.notes.append(f"{counted(len(spaces), 'space')}, {counted(len(openings), 'opening')}")
+    shapes.notes.append(f"{format_count(len(spaces), 'space')}, {format_count(len(openings), 'opening')}")
     foreign = shapes.foreign_map(name, text, solid=True, world=floor)
     if joined.number:
         return replace(foreign, repaired=(*foreign.repaired, joined.describe()))

@@ -22,7 +22,7 @@ import shapely
 from shapely import MultiPolygon
 
 from robocov.arrays import Array, BoolArray
-from robocov.errors import MapError, counted, one_line, shown
+from robocov.errors import MapError, format_count, quote, to_one_line
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
@@ -41,7 +41,7 @@ def sniff(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
-    where = one_line(path)
+    where = to_one_line(path)
     shapes = Shapes(where, options)
     root = _Node(files.parse_yaml(files.content(path, files.MAX_YAML_BYTES), where), f"{where}: ")
     world = root["world"]
@@ -82,7 +82,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
                     drawer.draw(figures[min(k, len(figures) - 1)], frame(x, y, turn), labels)
     if moving:
         words = "with kinematics taken as standing where the file has them"
-        shapes.notes.append(f"{counted(moving, 'obstacle')} {words}")
+        shapes.notes.append(f"{format_count(moving, 'obstacle')} {words}")
     name = world["name"].text() or path.stem
     return shapes.foreign_map(name, "A world of IR-SIM, imported.", solid=True, world=free)
 
@@ -92,15 +92,15 @@ def _picture(world: _Node, path: Path, shapes: Shapes) -> BoolArray:
     source, step = world["obstacle_map"], world["mdownsample"]
     if isinstance(source.value, dict):
         if source["name"].text() != "image":
-            name = shown(source["name"].value)
+            name = quote(source["name"].value)
             raise MapError(f"{source.at}: {name}, which IR-SIM generates, but a picture was wanted")
         source = source["path"]
     notes, anywhere = shapes.notes, shapes.options.anywhere
     file = files.named_file(path, source.text(), "picture", source.at, notes, anywhere)
     if not file.is_file():
         file = _find_bundled(source)
-        notes.append(f"{source.at.rpartition(': ')[2]}: {shown(file.name)} taken from the installed ir-sim")
-    picture = read_picture(file, one_line(file))
+        notes.append(f"{source.at.rpartition(': ')[2]}: {quote(file.name)} taken from the installed ir-sim")
+    picture = read_picture(file, to_one_line(file))
     every = int(step.number(1.0))
     if every < 1:
         step.refuse("a number from 1")
@@ -109,7 +109,7 @@ def _picture(world: _Node, path: Path, shapes: Shapes) -> BoolArray:
     if transparency := describe_transparency(picture):
         notes.append(f"{source.at.rpartition(': ')[2]}: {transparency}")
         if not light.any():
-            raise MapError(f"{one_line(file)}: no cell is free: {transparency}")
+            raise MapError(f"{to_one_line(file)}: no cell is free: {transparency}")
     return light[::-1][::every, ::every][::-1]
 
 
@@ -125,7 +125,7 @@ def _find_bundled(source: _Node) -> Path:
     """
     name = source.text()
     missing = (
-        f"{source.at}: expected a picture beside the file, or one that IR-SIM brings along, got {shown(name)}"
+        f"{source.at}: expected a picture beside the file, or one that IR-SIM brings along, got {quote(name)}"
     )
     package = importlib.util.find_spec("irsim")
     if package is None or not package.submodule_search_locations:
@@ -250,4 +250,4 @@ class _Node:
         return np.array([*values, *default[len(values) :]])
 
     def refuse(self, wanted: str) -> NoReturn:
-        raise MapError(f"{self.at}: {shown(self.value)}, but {wanted} was wanted")
+        raise MapError(f"{self.at}: {quote(self.value)}, but {wanted} was wanted")

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from robocov.environment import Environment
-from robocov.errors import MapError, one_line, shown
+from robocov.errors import MapError, quote, to_one_line
 from robocov.files.atomic import written
 from robocov_app.formats import files
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
@@ -31,7 +31,7 @@ def sniff(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
-    where = one_line(path)
+    where = to_one_line(path)
     data = files.content(path, files.MAX_CELLS + files.HEAD).removeprefix(b"\xef\xbb\xbf")
     columns, rows, body, line = _header(data, where)
     table = np.full(256, _BAD, np.uint8)
@@ -54,7 +54,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     if bad.any():
         row, column = (int(k) for k in np.argwhere(bad)[0])
         place = f"{where}: line {line + row}, column {column + 1}"
-        raise MapError(f"{place}: {shown(chr(letters[row, column]))}, but one of . G S @ O T W was wanted")
+        raise MapError(f"{place}: {quote(chr(letters[row, column]))}, but one of . G S @ O T W was wanted")
     cell = CELL if options.cell is None else options.cell
     notes = () if options.cell is not None else (f"no cell size was given: {CELL:g} m taken",)
     text = f"A grid of {cell:g} m a cell, imported from Moving AI's format."
@@ -81,14 +81,14 @@ def _header(data: bytes, where: str) -> tuple[int, int, bytes, int]:
             continue
         if key == "type" and len(words) == 2:
             if words[1].lower() not in ("octile", "tile"):
-                raise MapError(f"{place}: type {shown(words[1])}, but octile was wanted")
+                raise MapError(f"{place}: type {quote(words[1])}, but octile was wanted")
         elif key in ("height", "width") and len(words) == 2 and words[1].isascii() and words[1].isdigit():
             if len(words[1]) > 9:
-                raise MapError(f"{place}: {key} {shown(words[1])}, but a smaller one was wanted")
+                raise MapError(f"{place}: {key} {quote(words[1])}, but a smaller one was wanted")
             sizes[key] = int(words[1])
         else:
             wanted = "type octile, height N, width N or map was wanted"
-            raise MapError(f"{place}: {shown(' '.join(words))}, but {wanted}")
+            raise MapError(f"{place}: {quote(' '.join(words))}, but {wanted}")
     raise MapError(f"{where}: no line map, but one after type, height and width was wanted")
 
 

@@ -18,7 +18,7 @@ import numpy as np
 import shapely
 
 from robocov.arrays import Array
-from robocov.errors import ParameterError, counted, shown
+from robocov.errors import ParameterError, format_count, quote
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes
@@ -58,7 +58,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     floors = _measure_floors(data)
     if options.level is not None and not floors:
         raise ParameterError(
-            f"{data.where}: level: expected none, got {shown(options.level)}: no indoor spaces"
+            f"{data.where}: level: expected none, got {quote(options.level)}: no indoor spaces"
         )
     name = files.name_of_map(path)
     if floors and (options.level is not None or _is_indoor(data, floors)):
@@ -84,7 +84,7 @@ def _read_outdoors(data: OsmData, shapes: Shapes, name: str) -> ForeignMap:
     shapes.add_all(in_metres(figures, shapes, DEGREES, origin=origin))
     gates = sum(node.tags.get("barrier") in _GATES for node in data.nodes.values())
     if gates:
-        shapes.notes.append(f"{counted(gates, 'gate')} taken as closed")
+        shapes.notes.append(f"{format_count(gates, 'gate')} taken as closed")
     return shapes.foreign_map(name, _TEXT, solid=True)
 
 

@@ -18,7 +18,7 @@ from xml.parsers import expat
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.errors import JsonPath, MapError, one_line, shown
+from robocov.errors import JsonPath, MapError, quote, to_one_line
 from robocov_app.formats import files
 from robocov_app.formats.files import JsonFile, is_number
 
@@ -53,7 +53,7 @@ class OsmElement:
         values = [self.tags[key] for key in _LABEL_KEYS if key in self.tags]
         keys = [key for key in (*_LABEL_KEYS[1:], "waterway") if key in self.tags]
         return tuple(
-            dict.fromkeys(one_line(label) for label in (*values, *keys) if label not in ("yes", "no"))
+            dict.fromkeys(to_one_line(label) for label in (*values, *keys) if label not in ("yes", "no"))
         )
 
 
@@ -165,7 +165,7 @@ def read_osm(path: Path) -> OsmData:
     if files.begins_with(files.head(path), b"{"):
         return _read_json(path)
     content = files.content(path, files.MAX_TEXT_BYTES)
-    return _XmlReader(one_line(path), content).data
+    return _XmlReader(to_one_line(path), content).data
 
 
 class _XmlReader:
@@ -186,16 +186,16 @@ class _XmlReader:
             self.parser.Parse(content, True)
         except (expat.ExpatError, ValueError, LookupError) as error:
             line = self.parser.ErrorLineNumber
-            raise MapError(f"{where}:{line}: not XML: {one_line(error)[:80]}") from None
+            raise MapError(f"{where}:{line}: not XML: {to_one_line(error)[:80]}") from None
 
     def _start(self, name: str, given: dict[str, str]) -> None:
         self.depth += 1
         if self.depth == 1 and name != "osm":
-            self._refuse(f"expected <osm>, got <{one_line(name)[:40]}>")
+            self._refuse(f"expected <osm>, got <{to_one_line(name)[:40]}>")
         try:
             self._take(name, given)
         except (KeyError, ValueError) as error:
-            what = f"no {error.args[0]}" if isinstance(error, KeyError) else one_line(error)[:80]
+            what = f"no {error.args[0]}" if isinstance(error, KeyError) else to_one_line(error)[:80]
             self._refuse(f"<{name}>: {what}")
 
     def _take(self, name: str, given: dict[str, str]) -> None:
@@ -243,7 +243,7 @@ def _read_json(path: Path) -> OsmData:
                 ("bounds",), bounds, "minlat, minlon, maxlat and maxlon in degrees were"
             ) from None
     if isinstance(remark := document.get("remark"), str):
-        data.notes.append(f"Overpass says: {one_line(remark)[:200]}")
+        data.notes.append(f"Overpass says: {to_one_line(remark)[:200]}")
     for k, given in enumerate(elements):
         _add_json_element(data, file, given, ("elements", k))
     return data
@@ -343,5 +343,5 @@ def _degrees(given: Mapping[str, Any], key: str) -> float:
     value = float(given[key])
     limit = 90.0 if key.endswith("lat") else 360.0
     if not abs(value) <= limit:
-        raise ValueError(f"{key}: expected degrees, got {shown(given[key])}")
+        raise ValueError(f"{key}: expected degrees, got {quote(given[key])}")
     return value

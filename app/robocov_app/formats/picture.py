@@ -24,7 +24,7 @@ from scipy import ndimage
 
 from robocov.arrays import BoolArray
 from robocov.environment import Environment
-from robocov.errors import MapError, counted, one_line, shown
+from robocov.errors import MapError, format_count, quote, to_one_line
 from robocov.files.atomic import written
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
@@ -100,7 +100,7 @@ def read_picture(path: Path, where: str, key: ColourKey = _NO_KEY) -> Brightness
         if begin.match(data):
             return _decoded(data, name, where, key)
     wanted = "a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM"
-    raise MapError(f"{where}: begins with {shown(data[:8])}, but {wanted} was wanted")
+    raise MapError(f"{where}: begins with {quote(data[:8])}, but {wanted} was wanted")
 
 
 def _netpbm(data: bytes, where: str, key: ColourKey) -> Brightness:
@@ -110,7 +110,7 @@ def _netpbm(data: bytes, where: str, key: ColourKey) -> Brightness:
         blank = _BLANK.match(data, at)
         digits = _DIGITS.match(data, blank.end()) if blank else None
         if digits is None or len(digits[0]) > 9:
-            found = shown(data[blank.end() if blank else at :][:12])
+            found = quote(data[blank.end() if blank else at :][:12])
             raise MapError(f"{where}: {name}: {found}, but a whole number was wanted")
         numbers.append(int(digits[0]))
         at = digits.end()
@@ -210,7 +210,7 @@ def _decoded(data: bytes, name: str, where: str, key: ColourKey) -> Brightness:
         most = files.MAX_CELLS // 1_000_000
         raise MapError(f"{where}: too many pixels, but at most {most} million were wanted") from None
     except Exception as error:  # of Pillow, which raises what it likes on nonsense in any chunk
-        reason = one_line(error).partition(" <")[0][:100]
+        reason = to_one_line(error).partition(" <")[0][:100]
         raise MapError(f"{where}: broken, but a whole {name} was wanted: {reason}") from None
 
 
@@ -331,14 +331,14 @@ def _shrink(part: Image, step: int) -> NDArray[np.uint8]:
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
-    where = one_line(path)
+    where = to_one_line(path)
     key = options.colour_key(PICTURE_TOLERANCE)
     picture = read_picture(path, where, key)
     cell, origin = _place(picture)
     cell = options.cell if options.cell is not None else cell
     if cell is None:
         beside = path.with_suffix(".yaml")
-        hint = f" (or import {one_line(beside.name)} beside it)" if beside.is_file() else ""
+        hint = f" (or import {to_one_line(beside.name)} beside it)" if beside.is_file() else ""
         raise MapError(f"{where}: a picture has no scale, but --cell, the metres a pixel, was wanted{hint}")
     cells, notes = _classify(picture, options)
     unknown = options.unknown or "obstacle"
@@ -461,7 +461,7 @@ def _drop_strokes(cells: Cells, options: ReadOptions, cell: float, where: str) -
     pieces = ndimage.label(thin, structure=np.ones((3, 3)))[1]
     area = square_metres(count * cell * cell, 3)
     what = f"strokes thinner than {pixels * cell:.3g} m ({pixels} px)"
-    return (f"{what} in {counted(pieces, 'piece')}, {area} (--min-stroke)",)
+    return (f"{what} in {format_count(pieces, 'piece')}, {area} (--min-stroke)",)
 
 
 def _is_line_drawing(cells: Cells) -> bool:

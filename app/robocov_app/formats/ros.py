@@ -27,7 +27,7 @@ from scipy import ndimage
 
 from robocov.arrays import Array
 from robocov.environment import Environment
-from robocov.errors import MapError, OutputError, ParameterError, one_line, shown
+from robocov.errors import MapError, OutputError, ParameterError, quote, to_one_line
 from robocov.files.atomic import written
 from robocov_app.formats import files
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
@@ -49,22 +49,22 @@ def sniff(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
-    where = one_line(path)
+    where = to_one_line(path)
     given = files.parse_yaml(files.content(path, files.MAX_YAML_BYTES), where)
     mode = _text(given, "mode", where, "trinary").lower()
     if mode not in ("trinary", "scale", "raw"):
-        raise MapError(f"{where}: mode: {shown(mode)}, but one of trinary, scale, raw was wanted")
+        raise MapError(f"{where}: mode: {quote(mode)}, but one of trinary, scale, raw was wanted")
     cell = _number(_text(given, "resolution", where), f"{where}: resolution")
     files.require_length(cell, f"{where}: resolution", smallest=1e-4, largest=1000.0)
     corner = given.get("origin", ["0", "0", "0"])
     if not isinstance(corner, list) or not 2 <= len(corner) <= 3:
-        raise MapError(f"{where}: origin: {shown(corner)}, but [x, y, yaw] was wanted")
+        raise MapError(f"{where}: origin: {quote(corner)}, but [x, y, yaw] was wanted")
     x, y, yaw = (_number(text, f"{where}: origin[{k}]") for k, text in enumerate([*corner, "0"][:3]))
     files.require_coordinate(x, f"{where}: origin[0]")
     files.require_coordinate(y, f"{where}: origin[1]")
     negated = _text(given, "negate", where, "0").lower()
     if negated not in ("0", "1", "false", "true", "no", "yes", "off", "on"):
-        raise MapError(f"{where}: negate: {shown(negated)}, but 0 or 1 was wanted")
+        raise MapError(f"{where}: negate: {quote(negated)}, but 0 or 1 was wanted")
     negate = negated in ("1", "true", "yes", "on")
     occupied, free = (
         _number(_text(given, key, where, str(default)), f"{where}: {key}")
@@ -76,10 +76,10 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     repaired: list[str] = []
     name, at = _text(given, "image", where), f"{where}: image"
     image = files.named_file(path, name, "picture", at, repaired, options.anywhere)
-    picture = read_picture(image, one_line(image))
+    picture = read_picture(image, to_one_line(image))
     transparency = _describe_transparency(picture, mode)
     threshold = 0.5 if options.threshold is None else options.threshold
-    notes = [f"{one_line(key)}: no key of map_server, not looked at" for key in given if key not in _KNOWN]
+    notes = [f"{to_one_line(key)}: no key of map_server, not looked at" for key in given if key not in _KNOWN]
     if mode != "raw":
         taken = {key: default for key, default in _THRESHOLDS.items() if key not in given}
         repaired += [f"{key} is missing, {default:g} taken" for key, default in taken.items()]
@@ -190,13 +190,13 @@ def _text(given: dict[str, files.Value], key: str, where: str, default: str | No
     if value is None:
         raise MapError(f"{where}: {key}: missing, but it was wanted")
     if not isinstance(value, str):
-        raise MapError(f"{where}: {key}: {shown(value)}, but one value was wanted")
+        raise MapError(f"{where}: {key}: {quote(value)}, but one value was wanted")
     return value
 
 
 def _number(text: files.Value, where: str) -> float:
     if not isinstance(text, str) or not math.isfinite(value := files.number(text)):
-        raise MapError(f"{where}: {shown(text)}, but a number was wanted")
+        raise MapError(f"{where}: {quote(text)}, but a number was wanted")
     return value
 
 
@@ -209,11 +209,11 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     mode = options.mode or "trinary"
     _, image = files_of(path, options)
     if image == path:
-        raise OutputError(f"{one_line(path)}: the name of the picture, but one for the YAML was wanted")
+        raise OutputError(f"{to_one_line(path)}: the name of the picture, but one for the YAML was wanted")
     try:
         image.name.encode()
     except UnicodeEncodeError:
-        raise OutputError(f"{one_line(path)}: {shown(image.name)}: no name that UTF-8 can hold") from None
+        raise OutputError(f"{to_one_line(path)}: {quote(image.name)}: no name that UTF-8 can hold") from None
     plain = re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", image.name)
     text_name = image.name if plain else json.dumps(image.name)
     grid = grid_over(environment, options.cell)

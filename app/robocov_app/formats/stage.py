@@ -26,7 +26,7 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array
-from robocov.errors import MapError, one_line, shown
+from robocov.errors import MapError, quote, to_one_line
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
@@ -54,7 +54,7 @@ class _Token(NamedTuple):
     at: str
 
     def refuse(self, wanted: str) -> NoReturn:
-        raise MapError(f"{self.at}: {shown(self.text)}, but {wanted} was wanted")
+        raise MapError(f"{self.at}: {quote(self.text)}, but {wanted} was wanted")
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class _Entity:
         given = self.properties.get(name, [])[: len(default)]
         values = np.array([*map(files.number, given), *default[len(given) :]])
         if not (np.abs(values) <= FARTHEST).all():
-            raise MapError(f"{self.at}: {name} {shown(' '.join(given))}, but numbers within 1e7 were wanted")
+            raise MapError(f"{self.at}: {name} {quote(' '.join(given))}, but numbers within 1e7 were wanted")
         return values
 
     def number(self, name: str, default: float) -> float:
@@ -92,7 +92,7 @@ class _Room:
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
-    shapes = Shapes(one_line(path), options)
+    shapes = Shapes(to_one_line(path), options)
     world = _World(path, shapes)
     world.place(world.root.inside, np.eye(3))
     rooms = sorted(world.rooms, key=lambda room: -room.box.area)
@@ -139,7 +139,7 @@ class _World:
     def _split(self, path: Path, including: tuple[Path, ...]) -> None:
         """Append the tokens of a file and of those that it includes; `including` are the files above it."""
         world = files.content(path, MAX_BYTES).decode("utf-8", "replace")
-        line, name, include = 1, one_line(path), False
+        line, name, include = 1, to_one_line(path), False
         for found in _TOKEN.finditer(world):
             kind, text = str(found.lastgroup), found[found.lastgroup or 0]
             token = _Token(text if kind == "mark" else kind, text, f"{name}:{line}")
@@ -216,7 +216,7 @@ class _World:
                 continue
             here = frame @ self._pose(entity, "pose")
             if entity.type not in ("model", "position"):
-                self.shapes.leave_out(one_line(entity.type)[:30])
+                self.shapes.leave_out(to_one_line(entity.type)[:30])
             elif not self.shapes.wants(labels):
                 continue
             elif entity.type == "position":
@@ -235,7 +235,7 @@ class _World:
         while chain[-1].type in self.macros:
             chain.append(self.macros[chain[-1].type])
             if len(chain) > files.MAX_DEPTH:
-                raise MapError(f"{entity.at}: {shown(entity.type)} is made of itself, but a model was wanted")
+                raise MapError(f"{entity.at}: {quote(entity.type)} is made of itself, but a model was wanted")
         self.entities += 1 + sum(len(part.inside) for part in chain)
         if self.entities > MOST_ENTITIES:
             raise MapError(f"{entity.at}: more than {MOST_ENTITIES} models and blocks, but fewer were wanted")
@@ -289,7 +289,7 @@ class _World:
     def _bitmap(self, file: Path) -> tuple[MultiPolygon, int, int]:
         """Return what is light in the box around all dark pixels, of side 1, and its columns and rows."""
         if file not in self.bitmaps:
-            where = one_line(file)
+            where = to_one_line(file)
             picture = read_picture(file, where)
             self.pixels += picture.level.size
             if self.pixels > files.MAX_CELLS:
@@ -298,7 +298,7 @@ class _World:
             dark = picture.level <= _DARK * picture.full
             transparency = describe_transparency(picture)
             if transparency:
-                self.shapes.notes.append(f"{one_line(file.name)}: {transparency}")
+                self.shapes.notes.append(f"{to_one_line(file.name)}: {transparency}")
             if not dark.any() or (transparency and dark.all()):
                 what = "dark" if dark.any() else "light"
                 cause = f": {transparency}" if transparency else ""

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray
 from robocov.environment import CircleObstacle
-from robocov.errors import MapError, ParameterError, counted, listed, one_line, shown
+from robocov.errors import MapError, ParameterError, format_count, quote, summarize_names, to_one_line
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import frame, moved
@@ -84,7 +84,7 @@ class _Map:
         self.tiles_read = self.parts = 0
         orientation = root.attributes.get("orientation", "orthogonal")
         if orientation != "orthogonal":
-            root.refuse(f"{one_line(orientation)[:20]}, but an orthogonal map was wanted")
+            root.refuse(f"{to_one_line(orientation)[:20]}, but an orthogonal map was wanted")
         self.tile = np.array([_whole(root, name, 1) for name in ("tilewidth", "tileheight")], float)
         cell, scale = options.cell, options.scale
         if cell is not None and scale is not None:
@@ -106,7 +106,7 @@ class _Map:
         self._add_objects([layer for layer in layers if layer.element.tag != "layer"], anything=not grids)
         shapes.require_known_names()
         if not (solid.any() or shapes.outlines or shapes.lines or shapes.pillars):
-            names = listed([shown(layer.labels[0]) for layer in layers if layer.labels])
+            names = summarize_names([quote(layer.labels[0]) for layer in layers if layer.labels])
             nothing = "nothing is solid by properties, collision objects or names of layers"
             wanted = f"--only LAYER, with one of walls, was wanted then: {names or 'there is none'}"
             raise MapError(f"{where}: {nothing}, but {wanted}")
@@ -179,7 +179,7 @@ class _Map:
             self.root.refuse(f"a layer of another size, but one of {right} x {bottom} tiles was wanted")
         self.shape = bottom - top, right - left
         if math.prod(self.shape) > MOST_TILES or math.prod(self.shape) * len(given) > MOST_READ:
-            found = f"{right - left} x {bottom - top} tiles in {counted(len(given), 'layer')}"
+            found = f"{right - left} x {bottom - top} tiles in {format_count(len(given), 'layer')}"
             self.root.refuse(f"{found}, but fewer were wanted")
         grids = []
         for layer, some in given:
@@ -301,7 +301,7 @@ def _decoded(part: Element, data: Element, count: int) -> _IDs:
             if packing:  # not more than there should be, whatever is in it
                 raw = zlib.decompressobj(wbits=47).decompress(raw, 4 * count + 1)
         except (ValueError, zlib.error) as error:
-            part.refuse(f"not {packing or encoding}: {one_line(error)[:60]}")
+            part.refuse(f"not {packing or encoding}: {to_one_line(error)[:60]}")
         ids = np.frombuffer(raw, "<u4", min(count, len(raw) // 4)) if len(raw) <= 4 * count else None
     elif encoding == "csv":
         more = part.text.count(",") > count  # a comma may end it
@@ -313,7 +313,7 @@ def _decoded(part: Element, data: Element, count: int) -> _IDs:
         tiles = [child for child in part.children if child.tag == "tile"]
         ids = np.array([_whole(tile, "gid", 0, "0") for tile in tiles], np.uint32)
     else:
-        name = " ".join(filter(None, (one_line(encoding)[:20], one_line(packing)[:20])))
+        name = " ".join(filter(None, (to_one_line(encoding)[:20], to_one_line(packing)[:20])))
         part.refuse(f"{name}, but CSV, or base64 with zlib or gzip or neither, was wanted")
     if ids is None or len(ids) != count:
         part.refuse(f"{'more' if ids is None else len(ids)} tiles, but {count}, as it says, were wanted")
@@ -374,5 +374,5 @@ def _number(element: Element, name: str) -> float:
 def _whole(element: Element, name: str, least: int, default: str = "") -> int:
     text = element.attributes.get(name, default)
     if not re.fullmatch(r"-?[0-9]{1,10}", text) or not least <= int(text) < 2**32:
-        element.refuse(f"{name} {shown(text)}, but a whole number from {least} was wanted")
+        element.refuse(f"{name} {quote(text)}, but a whole number from {least} was wanted")
     return int(text)

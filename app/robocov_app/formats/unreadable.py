@@ -4,7 +4,7 @@ import re
 import shlex
 from pathlib import Path
 
-from robocov.errors import shown
+from robocov.errors import quote
 
 _XML = r"(?:\xef\xbb\xbf)?(?>\s+|<\?.*?\?>|<!--.*?-->|<![^>]*>)*+<(?:\w+:)?"
 _OGR = "ogr2ogr -f GeoJSON out.geojson {name}"
@@ -71,5 +71,5 @@ def described(head: bytes) -> str:
     """Return what is seen of a file of no known kind: how it begins."""
     text = head[:1000].decode(errors="replace")
     binary = "\0" in text or text.count("\ufffd") > 1
-    kind, begin = ("binary data", shown(head[:20])) if binary else ("text", shown(text[:20]))
+    kind, begin = ("binary data", quote(head[:20])) if binary else ("text", quote(text[:20]))
     return f"{kind} that begins with {begin}"

@@ -23,7 +23,7 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array
 from robocov.environment import Environment
-from robocov.errors import MapError, counted, shown
+from robocov.errors import MapError, format_count, quote
 from robocov.files.atomic import written
 from robocov.files.strictjson import line_and_column
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
@@ -204,12 +204,12 @@ class WktText:
 
     def _found(self) -> str:
         rest = self.text[self._skip_space() : self.at + 24].splitlines()
-        return shown(rest[0]) if rest else "the end"
+        return quote(rest[0]) if rest else "the end"
 
     def _refuse_point(self) -> NoReturn:
         point = self.text[self.at : self.at + 80].split(",")[0].split(")")[0]
         self._skip_space()
-        what = shown(" ".join(point.split())) if point.strip() else "nothing"
+        what = quote(" ".join(point.split())) if point.strip() else "nothing"
         self._refuse(f"{what}, but a point as 1.5 2, with as many numbers as the first, was wanted")
 
     def _refuse(self, what: str, at: int | None = None) -> NoReturn:
@@ -250,7 +250,8 @@ def _exclude_holes(figures: list[Figure], shapes: Shapes) -> list[Figure]:
     found = {k: polygons_of(shapely.difference(polygons[k], united(some))) for k, some in taken.items()}
     changed = {number: found[k] for k, number in enumerate(valid) if k in found}
     shapes.notes.append(
-        f"holes excluded from polygons that overlap them, as in JuPedSim: {counted(len(changed), 'polygon')}"
+        "holes excluded from polygons that overlap them, as in JuPedSim: "
+        + format_count(len(changed), "polygon")
     )
     result: list[Figure] = []
     for number, figure in enumerate(figures):

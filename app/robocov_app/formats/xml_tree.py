@@ -11,7 +11,7 @@ from xml.parsers import expat
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.errors import MapError, one_line, shown
+from robocov.errors import MapError, quote, to_one_line
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
 
@@ -53,14 +53,14 @@ class Element:
         text = self.attributes.get(name, default)
         values = np.array([files.number(part) for part in (text or "").replace(",", " ").split()])
         if text is None or count not in (None, len(values)) or not (np.abs(values) <= FARTHEST).all():
-            found = "missing" if text is None else shown(text)
+            found = "missing" if text is None else quote(text)
             many = "numbers within 1e7 were" if count is None else f"{count} numbers within 1e7 were"
             self.refuse(f"{name}: {found}, but {'a number within 1e7 was' if count == 1 else many} wanted")
         return values
 
     def refuse(self, what: str) -> NoReturn:
         name = self.attributes.get("id")
-        called = f"<{self.tag}>" if name is None else f"<{self.tag}> {shown(name)}"
+        called = f"<{self.tag}>" if name is None else f"<{self.tag}> {quote(name)}"
         raise MapError(f"{self.where}:{self.line}: {called}: {what}")
 
 
@@ -69,7 +69,7 @@ def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ())
 
     Refused are entities that stand for other files, other entities or too much.
     """
-    where = one_line(path)
+    where = to_one_line(path)
     content = files.content(path, files.MAX_TEXT_BYTES)
     if content.startswith(b"\x1f\x8b"):
         raise MapError(f"{where}: compressed, but plain {kind} was wanted (gunzip makes it)")
@@ -81,7 +81,7 @@ def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ())
     except (expat.ExpatError, ValueError, LookupError) as error:
         line = f":{error.lineno}" if isinstance(error, expat.ExpatError) else ""
         reason = expat.ErrorString(error.code) if isinstance(error, expat.ExpatError) else error
-        raise MapError(f"{where}{line}: not XML: {one_line(reason)[:60]}") from None
+        raise MapError(f"{where}{line}: not XML: {to_one_line(reason)[:60]}") from None
     first = reader.first
     if first is None or first.tag != root:
         found = "other XML" if first is None else f"<{first.tag}>"
@@ -141,9 +141,9 @@ class _Reader:
     def _entity(self, name: str, parameter: bool, value: str | None, *rest: object) -> None:
         """Check an entity: it may stand for a few words, which expat puts in where it is used."""
         self._declared()
-        stands = f"entity {shown(name)} stands"
+        stands = f"entity {quote(name)} stands"
         if value is None:
-            self._refuse(f"{stands} for another file ({shown(rest[1])}), which is not read")
+            self._refuse(f"{stands} for another file ({quote(rest[1])}), which is not read")
         if parameter or "&" in value or "%" in value:
             self._refuse(f"{stands} for other entities")
         if len(value) * self.references > _EXPANDED:

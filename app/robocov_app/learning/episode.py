@@ -11,7 +11,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray
 from robocov.cost import CoverageCost, CoverageResult, MomentaryCost
 from robocov.environment import Environment
-from robocov.errors import ParameterError, RobocovError, StartError, shown, unknown_name
+from robocov.errors import ParameterError, RobocovError, StartError, describe_unknown_name, quote
 from robocov.metrics import TOUCHING
 from robocov.observation import Decision, Observations, Scanning, Snapshot
 from robocov.observation.neighbours import close_pairs
@@ -89,7 +89,7 @@ def drawn_episode(
         try:
             positions = np.asarray(options["positions"], dtype=float)
         except (TypeError, ValueError):
-            raise StartError(f"positions: {shown(options['positions'])}, but (n, 2) were wanted") from None
+            raise StartError(f"positions: {quote(options['positions'])}, but (n, 2) were wanted") from None
         start = {"positions": positions, "start": None, "seed": None}
     more: dict[str, Any] = {"duration": task.duration, "dt": task.dt, "conditions": conditions}
     return Episode(task, RunSpec(environment, team=task.whole_team, **start, **more), cost, place)
@@ -292,7 +292,7 @@ def checked_actions(actions: Any, count: int) -> Array:
         raise ParameterError(f"actions of shape {array.shape}, but {(count, 2)} was wanted")
     if not np.isfinite(array).all():
         robot = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        told = f"{shown(array[robot].tolist())}, but finite numbers were wanted"
+        told = f"{quote(array[robot].tolist())}, but finite numbers were wanted"
         raise ParameterError(f"action of robot_{robot + 1}: {told}")
     return array
 
@@ -323,11 +323,13 @@ class EpisodeEnv:
     ) -> None:
         self.task = changed_task(task, changes)
         if render_mode is not None and render_mode not in RENDER_MODES:
-            raise ParameterError(f"render_mode: {unknown_name('mode', str(render_mode), RENDER_MODES)}")
+            raise ParameterError(
+                f"render_mode: {describe_unknown_name('mode', str(render_mode), RENDER_MODES)}"
+            )
         if len(size) != 2 or not all(64 <= side <= 8192 for side in size):
             raise ParameterError(f"size: {size}, but width and height from 64 to 8192 pixels were wanted")
         if theme not in ("light", "dark"):
-            raise ParameterError(f"theme: {unknown_name('theme', str(theme), ('light', 'dark'))}")
+            raise ParameterError(f"theme: {describe_unknown_name('theme', str(theme), ('light', 'dark'))}")
         self.render_mode, self._theme, self._size = render_mode, theme, (int(size[0]), int(size[1]))
         self._scenarios = Scenarios(self.task.maps, self.task.lattice) if scenarios is None else scenarios
         self.episode: Episode | None = None

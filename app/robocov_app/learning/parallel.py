@@ -10,7 +10,7 @@ from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, quote
 from robocov_app.learning.episode import EpisodeEnv, drawn_episode
 from robocov_app.learning.task import CoverageTask, Rows, action_limit
 
@@ -86,7 +86,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
             with suppress(TypeError, ValueError):
                 action = np.asarray(actions[agent], dtype=np.float64)
             if action.shape != (2,) or not np.isfinite(action).all():
-                found = shown(actions[agent])
+                found = quote(actions[agent])
                 raise ParameterError(f"action of {agent}: {found}, but two finite numbers were wanted")
             values[robot] = action
         acting, over = self.agents, episode.cycle + 1 >= self.max_cycles

@@ -11,7 +11,7 @@ from robocov.arrays import Array
 from robocov.controllers import informed
 from robocov.controllers.base import Controller
 from robocov.controllers.gains import gain, validate_gains
-from robocov.errors import ParameterError, required
+from robocov.errors import ParameterError, require_type
 from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.region import Region
 from robocov.robots import Team
@@ -75,7 +75,7 @@ class PolicyController:
 
     def __post_init__(self) -> None:
         tasks.checked_kind("action", self.action, tasks.ACTIONS)
-        required("layout", self.layout, ObservationLayout, "an ObservationLayout")
+        require_type("layout", self.layout, ObservationLayout, "an ObservationLayout")
         validate_gains(self)
 
     def __init_subclass__(cls) -> None:

@@ -16,7 +16,14 @@ from robocov.conditions import Conditions
 from robocov.controllers.base import cells_seen
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.environment import Environment
-from robocov.errors import ParameterError, checked, counted, required, shown, unknown_name
+from robocov.errors import (
+    ParameterError,
+    describe_unknown_name,
+    format_count,
+    quote,
+    require_number,
+    require_type,
+)
 from robocov.mapfile import load_map
 from robocov.observation import MOST_RAYS, Observations, Scans
 from robocov.observation.region import Region
@@ -42,7 +49,7 @@ MOST_ROBOTS = 10_000
 
 def checked_kind(what: str, given: str, known: Sequence[str]) -> None:
     if given not in known:
-        raise ParameterError(f"{what}: {unknown_name(f'kind of {what}', str(given), known)}")
+        raise ParameterError(f"{what}: {describe_unknown_name(f'kind of {what}', str(given), known)}")
 
 
 def action_limit(action: Action, team: Team) -> Array:
@@ -174,7 +181,7 @@ def map_of(given: object, seed: int) -> Environment:
     source = _source(given, "map")
     environment = source if isinstance(source, Environment) else source(seed)
     if not isinstance(environment, Environment):
-        raise ParameterError(f"maps: for seed {seed} {shown(environment)}, but an Environment was wanted")
+        raise ParameterError(f"maps: for seed {seed} {quote(environment)}, but an Environment was wanted")
     return environment
 
 
@@ -184,7 +191,7 @@ def _source(given: object, where: str) -> Environment | Callable[[int], Environm
     if isinstance(given, Environment) or callable(given):
         return given
     wanted = "a map, its name or path, or a function from a seed to one"
-    raise ParameterError(f"{where}: {shown(given)}, but {wanted} was wanted")
+    raise ParameterError(f"{where}: {quote(given)}, but {wanted} was wanted")
 
 
 @dataclass(frozen=True)
@@ -223,8 +230,8 @@ class ObservationLayout:
 
     def __post_init__(self) -> None:
         for name, most in (("neighbours", MOST_NEIGHBOURS), ("rays", MOST_RAYS)):
-            checked(f"observation.{name}", getattr(self, name), 0, most, whole=True)
-        required("observation.centroid", self.centroid, bool, "true or false")
+            require_number(f"observation.{name}", getattr(self, name), 0, most, whole=True)
+        require_type("observation.centroid", self.centroid, bool, "true or false")
 
     @cached_property
     def blocks(self) -> dict[str, slice]:
@@ -337,12 +344,12 @@ class CoverageTask:
     def __post_init__(self) -> None:
         check_dt(self.dt)
         for name, most in (("robots", MOST_ROBOTS), ("repeat", 100_000), ("reward_every", 100_000)):
-            checked(name, getattr(self, name), 1, most, whole=True)
+            require_number(name, getattr(self, name), 1, most, whole=True)
         if not np.isfinite(self.duration) or self.duration < self.period - 5e-7:
             wanted = f"at least the time of one action, {self.period:g} s, was wanted"
-            raise ParameterError(f"duration: {shown(self.duration)} s, but {wanted}")
+            raise ParameterError(f"duration: {quote(self.duration)} s, but {wanted}")
         if not 0.0 <= self.contact_penalty < np.inf:
-            found = shown(self.contact_penalty)
+            found = quote(self.contact_penalty)
             raise ParameterError(f"contact_penalty: {found}, but a finite number from 0 was wanted")
         checked_kind("reward", self.reward, REWARDS)
         checked_kind("action", self.action, ACTIONS)
@@ -351,7 +358,7 @@ class CoverageTask:
             raise ParameterError(f"dt: {self.dt:g} s, but {wanted}")
         for name, kind in (("team", Team), ("observation", ObservationLayout), ("conditions", Conditions)):
             if getattr(self, name) is not None or name == "observation":
-                required(name, getattr(self, name), kind, f"a {kind.__name__}")
+                require_type(name, getattr(self, name), kind, f"a {kind.__name__}")
         if self.conditions is not None:
             self.conditions.check_team(len(self.whole_team))
         object.__setattr__(self, "team", self.whole_team)
@@ -375,8 +382,9 @@ class CoverageTask:
         return [f"robot_{number}" for number in range(1, self.robots + 1)]
 
     def __repr__(self) -> str:
-        size = f"{counted(self.robots, 'robot')}, {self.duration:g} s, {counted(self.cycles, 'action')}"
-        return f"<CoverageTask {size}, {self.action}, reward {self.reward}>"
+        robots = format_count(self.robots, "robot")
+        actions = format_count(self.cycles, "action")
+        return f"<CoverageTask {robots}, {self.duration:g} s, {actions}, {self.action}, reward {self.reward}>"
 
 
 def changed_task(task: CoverageTask | None, changes: Mapping[str, Any]) -> CoverageTask:
@@ -384,7 +392,7 @@ def changed_task(task: CoverageTask | None, changes: Mapping[str, Any]) -> Cover
     known = [each.name for each in fields(CoverageTask)]
     for name in changes:
         if name not in known:
-            raise ParameterError(unknown_name("part of a task", name, known))
+            raise ParameterError(describe_unknown_name("part of a task", name, known))
     # the number of robots goes with the team, and would else be that of the old one
     team: dict[str, Any] = {"team": None} if "robots" in changes else {}
     return replace(task or CoverageTask(), **(team | dict(changes)))

@@ -10,7 +10,7 @@ import pygame
 from numpy.typing import NDArray
 
 from robocov.environment import Environment
-from robocov.errors import ParameterError, unknown_name
+from robocov.errors import ParameterError, describe_unknown_name
 from robocov_app.render import annotations, forces, heatmaps, knowledge, layers, marks
 from robocov_app.render.annotations import LEGEND_ROW, MARGIN, STRIP
 from robocov_app.render.camera import Camera
@@ -76,7 +76,7 @@ def checked_layers(option: str, names: Iterable[str]) -> frozenset[str]:
     known = [layer.name for layer in standard_layers()]
     wanted = [name.replace("-", "_") for name in names]
     if unknown := [name for name in wanted if name not in known]:
-        raise ParameterError(f"{option}: {unknown_name('layer', unknown[0], known)}")
+        raise ParameterError(f"{option}: {describe_unknown_name('layer', unknown[0], known)}")
     return frozenset(wanted)
 
 
@@ -124,7 +124,7 @@ class Painter:
     def show(self, names: Iterable[str]) -> None:
         wanted, known = set(names), {layer.name for layer in self.layers}
         if unknown := wanted - known:
-            raise ParameterError(unknown_name("layer", min(unknown), known))
+            raise ParameterError(describe_unknown_name("layer", min(unknown), known))
         self.visible = wanted
 
     def change(self, also: Iterable[str], without: Iterable[str]) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import IntArray
-from robocov.errors import ParameterError, unknown_name
+from robocov.errors import ParameterError, describe_unknown_name
 
 Colour: TypeAlias = tuple[int, int, int]  # red, green, blue, 0 to 255
 ONE_HUE_EACH = 9  # up to so many robots each have a hue of their own; no eye tells more hues apart
@@ -183,7 +183,7 @@ def theme_named(name: str | Theme) -> Theme:
     if isinstance(name, Theme):
         return name
     if name not in THEMES:
-        raise ParameterError(unknown_name("theme", name, THEMES))
+        raise ParameterError(describe_unknown_name("theme", name, THEMES))
     return THEMES[name]
 
 

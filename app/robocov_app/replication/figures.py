@@ -20,7 +20,7 @@ from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from robocov.arrays import Array
 from robocov.environment import Environment
-from robocov.errors import counted
+from robocov.errors import format_count
 from robocov.locational import Distance, Sensing, value
 from robocov.locational.best_points import best_points
 from robocov.metrics import CostHistory
@@ -339,7 +339,7 @@ def plot_degradations(found: Sequence[Degradation], theme: Theme | str = LIGHT) 
     place: Any = {"loc": "center right", "bbox_to_anchor": page.at(_SIZE[0] - page.margin, 26)}
     look: Any = {"frameon": False, "fontsize": SMALL, "labelcolor": tone(theme.ink)}
     page.figure.legend(handles, labels, ncols=len(handles), **place, **look)
-    pairs = counted(max(each.runs for each in found), "pair")
+    pairs = format_count(max(each.runs for each in found), "pair")
     words = f"medians of {pairs} of runs, and 95 % intervals; only robots that work count"
     page.text(words, page.margin, _SIZE[1] - 18, points=SMALL, colour=quiet)
     return page.figure

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from robocov.errors import counted
+from robocov.errors import format_count
 from robocov_app.render.density import density_label
 from robocov_app.report.groups import MOST_SAID, Comparison, gain_text, labels, setting_label
 from robocov_app.report.results import Entry, Result, printable
@@ -29,9 +29,9 @@ def lede(result: Result, comparisons: Sequence[Comparison]) -> list[str]:
         pairs = [each for each in comparisons if each.pairs > 1]
         words = [each.headline() for each in pairs[:MOST_SAID]]
         if len(pairs) > MOST_SAID:
-            words.append(f"{counted(len(pairs) - MOST_SAID, 'more comparison')} below.")
+            words.append(f"{format_count(len(pairs) - MOST_SAID, 'more comparison')} below.")
         median = np.median([entry.final for entry in fine])
-        return words or [f"{counted(len(fine), 'run')}, median final distance {median:.3f} m."]
+        return words or [f"{format_count(len(fine), 'run')}, median final distance {median:.3f} m."]
     if len(fine) == 1:
         (entry,) = fine
         at, gap = entry.figures.get("settled_at_s"), result.gap(entry)
@@ -105,14 +105,20 @@ def gaps(result: Result) -> list[str]:
         failed = Counter(entry.label for entry in result.failed)
         whose = ", ".join(f"{label} {count} of {total[label]}" for label, count in failed.most_common())
         why = _firsts([entry.error or "" for entry in result.failed])
-        words.append(f"{len(result.failed)} of {counted(len(result.entries), 'run')} failed ({whose}): {why}")
+        words.append(
+            f"{len(result.failed)} of {format_count(len(result.entries), 'run')} failed ({whose}): {why}"
+        )
     if result.damaged:
         reasons = [f"{each.folder} ({each.reason})" for each in result.damaged]
         be = "is" if len(reasons) == 1 else "are"
-        words.append(f"{counted(len(reasons), 'run')} cannot be read and {be} left out: {_firsts(reasons)}")
+        words.append(
+            f"{format_count(len(reasons), 'run')} cannot be read and {be} left out: {_firsts(reasons)}"
+        )
     if result.missing:
         verb = "is" if result.missing == 1 else "are"
-        words.append(f"Not finished: {result.missing} of {counted(result.wanted, 'run')} {verb} missing.")
+        words.append(
+            f"Not finished: {result.missing} of {format_count(result.wanted, 'run')} {verb} missing."
+        )
     return words
 
 
@@ -154,7 +160,7 @@ def run_facts(result: Result, entry: Entry) -> str:
     at = figures.get("settled_at_s")
     words.append("not settled" if at is None else f"settled at {at:.1f} s")
     if (contacts := figures.get("contacts")) is not None:
-        words.append(counted(int(contacts), "contact"))
+        words.append(format_count(int(contacts), "contact"))
     if (path := figures.get("path_length_m")) is not None:
         words.append(f"{path:.2f} m of path per robot")
     return f"{'; '.join(words)}."

@@ -11,7 +11,7 @@ from PIL import Image
 
 from robocov.arrays import Array
 from robocov.environment import Environment
-from robocov.errors import counted
+from robocov.errors import format_count
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.render.density import density_label, dots, shading
@@ -151,7 +151,7 @@ def map_sentence(environment: Environment) -> str:
 
 
 def run_sentence(record: Record, history: CostHistory | None) -> str:
-    robots, span = counted(len(record.team), "robot"), record.time[-1] - record.time[0]
+    robots, span = format_count(len(record.team), "robot"), record.time[-1] - record.time[0]
     start = f" from start {record.start}" if record.start else ""
     head = f"{record.label} on map {record.environment.name}: trajectories of"
     words = [f"{head} {robots}{start} over {span:.4g} s."]

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from robocov.arrays import Array
 from robocov.controllers.gains import Value, value_text
-from robocov.errors import counted
+from robocov.errors import format_count
 from robocov.metrics.run_metrics import RunMetrics, run_metrics
 from robocov_app.figures import results as drawing
 from robocov_app.figures.curves import DISTANCE, TIME
@@ -107,7 +107,7 @@ def final_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
         for label, _, found in samples:
             low, middle, high = np.percentile(found, [25, 50, 75])
             text = f"{label}: median {middle:.3f}{unit}, quartiles {low:.3f} to {high:.3f}"
-            words.append(f"{text}, {counted(len(found), 'run')}")
+            words.append(f"{text}, {format_count(len(found), 'run')}")
         yield _fitting(title, own, f"{what}. {'; '.join(words)}.", drawn)
 
 

@@ -16,7 +16,7 @@ from robocov import __version__
 from robocov.controllers import CONTROLLERS, gains_of
 from robocov.controllers.gains import Value
 from robocov.environment import Environment
-from robocov.errors import InputError, ParameterError, RobocovError, shown
+from robocov.errors import InputError, ParameterError, RobocovError, quote
 from robocov.files.array_files import ArrayCache
 from robocov.files.result_folder import settle
 from robocov.files.strictjson import read_document
@@ -375,5 +375,5 @@ def _json(path: Path) -> dict[str, Any]:
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
     if not isinstance(content, dict):
-        raise InputError(f"{path}: {shown(content)}, but an object was wanted")
+        raise InputError(f"{path}: {quote(content)}, but an object was wanted")
     return content

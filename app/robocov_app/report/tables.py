@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from robocov.controllers.gains import value_text
-from robocov.errors import counted
+from robocov.errors import format_count
 from robocov_app.report import groups as grouped
 from robocov_app.report.groups import Comparison, Group, gain_text, parted, ratio_text, setting_label
 from robocov_app.report.results import RESTARTS, Entry, Result
@@ -183,7 +183,7 @@ def failures_table(result: Result) -> Table | None:
     if not rows:
         return None
     left = len(rows) - MOST_ROWS
-    notes = (f"{counted(left, 'more run')}.",) if left > 0 else ()
+    notes = (f"{format_count(left, 'more run')}.",) if left > 0 else ()
     head = ("Controller or folder", "Map", "Start, seed", "Gains", "Error")
     return Table("Runs that failed or cannot be read", head, rows[:MOST_ROWS], frozenset({1, 2, 3, 4}), notes)
 

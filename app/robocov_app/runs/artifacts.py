@@ -10,7 +10,7 @@ import numpy as np
 
 from robocov.controllers import controller_kind, gains_of
 from robocov.cost import CoverageCost, MomentaryCost
-from robocov.errors import ParameterError, counted, unknown_name
+from robocov.errors import ParameterError, describe_unknown_name, format_count
 from robocov.files.result_folder import Kind, results
 from robocov.kernel_compilation import compile_kernels
 from robocov_app.runs.cost import built_cost, cost_for_pictures
@@ -69,11 +69,11 @@ def gains_for(names: Sequence[str], given: Mapping[str, Any]) -> list[dict[str, 
     for key, value in sorted(given.items(), key=lambda item: "." in item[0]):
         owner, dot, gain = key.rpartition(".")
         if dot and owner not in known:
-            raise ParameterError(f"--set {key}: {unknown_name('controller', owner, known)}")
+            raise ParameterError(f"--set {key}: {describe_unknown_name('controller', owner, known)}")
         takers = [k for k, name in enumerate(names) if gain in known[name] and (not dot or name == owner)]
         if not takers:
             every = known[owner] if dot else {gain for name in names for gain in known[name]}
-            raise ParameterError(f"--set {key}: {unknown_name('gain', gain, every)}")
+            raise ParameterError(f"--set {key}: {describe_unknown_name('gain', gain, every)}")
         for k in takers:
             chosen[k][gain] = value
     return chosen
@@ -146,7 +146,7 @@ def save_pictures(
             save(plot_comparison(records, *look, finals, times), "trajectories")
         else:
             save(plot_trajectories(records[0], None, *look, finals[0], times[0]), "trajectories")
-        robots = counted(len(records[0].team), "robot")
+        robots = format_count(len(records[0].team), "robot")
         title = f"Coverage cost  ·  {records[0].environment.name}  ·  {robots}"
         moments, timed = last_moments(runs, cost), curves("mean_time")
         save(plot_coverage(curves("mean_distance"), moments, theme, size, title, timed), "cost")

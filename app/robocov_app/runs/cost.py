@@ -5,7 +5,7 @@ from pathlib import Path
 from robocov.arrays import Array
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
-from robocov.errors import counted
+from robocov.errors import format_count
 from robocov.geodesic import Geodesics
 from robocov.mapfile.check import MANY_VERTICES, vertex_count
 from robocov.robots import DEFAULT_RADIUS, Team
@@ -48,6 +48,6 @@ def draw_distances(
     from robocov_app.render.distance_field import Field, FieldLattice
 
     team = Team.homogeneous(len(positions), radius=radius)
-    field, facts = Field(FieldLattice(cost.sites), cost(positions, speeds)), counted(len(team), "robot")
+    field, facts = Field(FieldLattice(cost.sites), cost(positions, speeds)), format_count(len(team), "robot")
     moment = Moment(cost.environment, team, field, cost.environment.name, f"{facts}, {mean}")
     save_figure(plot_coverage([], [moment], theme, title=title), path)

@@ -14,7 +14,7 @@ from typing import BinaryIO, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from robocov.errors import OutputError, ParameterError, reason, shown
+from robocov.errors import OutputError, ParameterError, describe_error, quote
 from robocov.files.atomic import written
 
 Frame: TypeAlias = NDArray[np.uint8]  # RGB, (height, width, 3), 0 to 255
@@ -45,7 +45,7 @@ def _kept(folder: Path, frames: Iterable[Frame]) -> Iterator[Frame]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OutputError(f"{folder}: cannot be written: {reason(error)}") from error
+        raise OutputError(f"{folder}: cannot be written: {describe_error(error)}") from error
     for number, frame in enumerate(frames):
         with written(folder / f"{number:06d}.png", durable=False) as part:
             part.write_bytes(png_bytes(frame))
@@ -61,11 +61,11 @@ def save_film(path: Path, frames: Iterable[Frame], *, fps: float = 30.0) -> None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OutputError(f"{path.parent}: cannot be made ({reason(error)})") from error
+        raise OutputError(f"{path.parent}: cannot be made ({describe_error(error)})") from error
     with written(path) as part, _encoder(part, path, _even(first), fps) as pipe:
         for frame in chain([first], source):
             if frame.shape != first.shape:
-                sizes = f"{shown(frame.shape)} after {shown(first.shape)}"
+                sizes = f"{quote(frame.shape)} after {quote(first.shape)}"
                 raise ParameterError(f"frames: {sizes}, but one size was wanted")
             pipe.write(np.ascontiguousarray(_even(frame)).data)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from robocov.errors import ParameterError, checked
+from robocov.errors import ParameterError, require_number
 from robocov_app.terminal.arguments import parsed_size, window_size
 
 if TYPE_CHECKING:
@@ -82,9 +82,9 @@ class WebOptions:
     """Minutes without a browser after which a window is ended; its work is kept as a draft (with --each)."""
 
     def __post_init__(self) -> None:
-        checked("--port", self.port, 0, 65535)
-        checked("--max-sessions", self.max_sessions, 1, 200)
-        checked("--idle-minutes", self.idle_minutes, 0.05, 10_000.0)
+        require_number("--port", self.port, 0, 65535)
+        require_number("--max-sessions", self.max_sessions, 1, 200)
+        require_number("--idle-minutes", self.idle_minutes, 0.05, 10_000.0)
         if self.each and not self.serve:
             raise ParameterError("--each: --serve was wanted beside it")
 
@@ -106,7 +106,7 @@ class WindowOptions(WebOptions):
         super().__post_init__()
         window_size(self.size)
         if self.scale is not None:
-            checked("--scale", self.scale, 0.5, 4.0)
+            require_number("--scale", self.scale, 0.5, 4.0)
 
 
 @dataclass
@@ -170,8 +170,8 @@ class FilmOptions(LayerOptions):
     """Size in pixels; by default 1280x720 for the film of a run, else what suits the map."""
 
     def __post_init__(self) -> None:
-        checked("--fps", self.fps, 1, 240)
-        checked("--film-speed", self.film_speed, 0.01, 1e4)
+        require_number("--fps", self.fps, 1, 240)
+        require_number("--film-speed", self.film_speed, 0.01, 1e4)
         self.picture_size()
         if self.video:  # rather than after the run
             from robocov_app.runs.encoding import encoder
@@ -251,16 +251,16 @@ class RunOptions(ScenarioOptions, JsonOption):
     def __post_init__(self) -> None:
         if self.team is not None:
             self.robots = robots_of(self.made_team(), self.robots, RunOptions.robots, self.team)
-        checked("--robots", self.robots, 1, 10_000)
-        checked("--seed", self.seed, 0, 2**63 - 1)
-        checked("--duration", self.duration, 0.0, 1e6, "s")
-        checked("--lattice", self.lattice, 2, 2048)
+        require_number("--robots", self.robots, 1, 10_000)
+        require_number("--seed", self.seed, 0, 2**63 - 1)
+        require_number("--duration", self.duration, 0.0, 1e6, "s")
+        require_number("--lattice", self.lattice, 2, 2048)
         from robocov.simulation import check_dt  # asking for help must not load the physics
         from robocov_app.runs.spec import MOST_ROWS
 
         check_dt(self.dt)
         if self.record_hz is not None:
-            checked("--record-hz", self.record_hz, 0.001, 1e4, "Hz")
+            require_number("--record-hz", self.record_hz, 0.001, 1e4, "Hz")
         rows = self.duration / self.dt * self.robots / self.record_every
         if rows > MOST_ROWS:
             size = f"{self.duration:g} s of {self.robots} robots are {rows:.3g} rows of the record"

@@ -12,7 +12,7 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from robocov.errors import InputError, OutputError, counted
+from robocov.errors import InputError, OutputError, format_count
 from robocov.files.atomic import locked, on_disk
 from robocov.files.result_folder import for_results
 from robocov_app.sweep.study import Task
@@ -58,14 +58,16 @@ class Survey:
         if self.damaged:
             count, rest = len(self.damaged), len(self.damaged) - _NAMED
             names = ", ".join(self.damaged[:_NAMED]) + (f" and {rest} more" if rest > 0 else "")
-            lines.append(f"{counted(count, 'damaged run')} will be done again: {names}")
+            lines.append(f"{format_count(count, 'damaged run')} will be done again: {names}")
         for difference, count in self.outdated.items():
             then = "will be used all the same" if keep_versions else "will be done again"
-            lines.append(f"{counted(count, 'run')} made with {difference} {then}")
+            lines.append(f"{format_count(count, 'run')} made with {difference} {then}")
         if self.outdated and not keep_versions:
             lines.append("--keep-versions uses them as they are")
         if self.unchecked:
-            runs = f"{counted(self.unchecked, 'run')} of an earlier version of robocov without check sums"
+            runs = (
+                f"{format_count(self.unchecked, 'run')} of an earlier version of robocov without check sums"
+            )
             damage = "damage to their cost curves and trajectories would not be noticed"
             lines.append(f"{runs} will be used; {damage}")
         return lines

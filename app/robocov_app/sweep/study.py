@@ -22,7 +22,15 @@ from robocov.controllers import controller_kind, gain_values, gains_of
 from robocov.controllers.gains import Gain, Option, Value, with_gains
 from robocov.controllers.user_modules import Source, own_modules
 from robocov.environment import Environment
-from robocov.errors import InputError, ParameterError, checked, place, required, shown, unknown_name
+from robocov.errors import (
+    InputError,
+    ParameterError,
+    describe_unknown_name,
+    format_path,
+    quote,
+    require_number,
+    require_type,
+)
 from robocov.mapfile import to_json
 from robocov.robots import DEFAULT_RADIUS, KINEMATICS, TURNING_RATE, Team, team_of_groups
 from robocov.robots import UNITS as TEAM_UNITS
@@ -68,9 +76,11 @@ class Sampling:
 
     def __post_init__(self) -> None:
         if self.method not in get_args(Method):
-            raise ParameterError(f"sampling.method: {unknown_name('method', self.method, get_args(Method))}")
-        checked("sampling.samples", self.samples, 1, MOST_SAMPLES, whole=True)
-        checked("sampling.seed", self.seed, 0, 2**63 - 1, whole=True)
+            raise ParameterError(
+                f"sampling.method: {describe_unknown_name('method', self.method, get_args(Method))}"
+            )
+        require_number("sampling.samples", self.samples, 1, MOST_SAMPLES, whole=True)
+        require_number("sampling.seed", self.seed, 0, 2**63 - 1, whole=True)
 
     def points(self, dimensions: int) -> Array:
         """Return as many points of the unit cube as there are samples, (samples, dimensions)."""
@@ -107,7 +117,7 @@ class Gains:
         if isinstance(wanted, Mapping):
             return _of_axes(kind, wanted, sampling, path)
         if not wanted:
-            raise ParameterError(f"{place(path)}: none, but at least one set of gains was wanted")
+            raise ParameterError(f"{format_path(path)}: none, but at least one set of gains was wanted")
         known = gains_of(kind)
         choices = []
         for k, given in enumerate(wanted):
@@ -132,7 +142,9 @@ def _of_axes(kind: type[Any], axes: Mapping[str, Any], sampling: Sampling | None
     if ranges:
         if sampling is None:
             at = (*path, next(iter(ranges)))
-            raise ParameterError(f"{place(at)}: a range, but sampling says neither a method nor how many")
+            raise ParameterError(
+                f"{format_path(at)}: a range, but sampling says neither a method nor how many"
+            )
         points = sampling.points(len(ranges))
         columns = [each.values(points[:, k]) for k, each in enumerate(ranges.values())]
         samples = list(zip(*columns, strict=True))
@@ -154,10 +166,10 @@ def _value(known: Mapping[str, Gain | Option], name: str, value: object, path: P
 
 def _known(known: Mapping[str, Gain | Option], name: str, path: Place) -> Gain | Option:
     if name not in known:
-        above = place(path[: len(path) - 1 - isinstance(path[-1], int)])
+        above = format_path(path[: len(path) - 1 - isinstance(path[-1], int)])
         if not known:
-            raise ParameterError(f"{above}: {shown(name)}, but the controller has no gains")
-        raise ParameterError(f"{above}: {unknown_name('gain', name, known)}")
+            raise ParameterError(f"{above}: {quote(name)}, but the controller has no gains")
+        raise ParameterError(f"{above}: {describe_unknown_name('gain', name, known)}")
     return known[name]
 
 
@@ -165,21 +177,23 @@ def _checked_range(known: Mapping[str, Gain | Option], name: str, given: Range, 
     gain = _known(known, name, path)
     if isinstance(gain, Option):
         wanted = f"one of {', '.join(gain.words)}, or a list of them,"
-        raise ParameterError(f"{place(path)}: a range, but {wanted} was wanted")
+        raise ParameterError(f"{format_path(path)}: a range, but {wanted} was wanted")
     ends = []
     for end, value in (("low", given.low), ("high", given.high)):
         if value is None:
-            raise ParameterError(f"{place((*path, end))}: {shown(None)}, but a number was wanted")
+            raise ParameterError(f"{format_path((*path, end))}: {quote(None)}, but a number was wanted")
         ends.append(placed((*path, end), partial(gain.validated, value, "")) or 0.0)
     low, high = ends
     if given.scale not in get_args(Scale):
-        unknown = unknown_name("scale", given.scale, get_args(Scale))
-        raise ParameterError(f"{place((*path, 'scale'))}: {unknown}")
+        unknown = describe_unknown_name("scale", given.scale, get_args(Scale))
+        raise ParameterError(f"{format_path((*path, 'scale'))}: {unknown}")
     if not low < high:
-        raise ParameterError(f"{place((*path, 'high'))}: {high:g}, but a number above {low:g} was wanted")
+        raise ParameterError(
+            f"{format_path((*path, 'high'))}: {high:g}, but a number above {low:g} was wanted"
+        )
     if given.scale == "log" and low <= 0.0:
         wanted = "a number above 0, as the scale is that of logarithms,"
-        raise ParameterError(f"{place((*path, 'low'))}: {low:g}, but {wanted} was wanted")
+        raise ParameterError(f"{format_path((*path, 'low'))}: {low:g}, but {wanted} was wanted")
     return Range(low, high, given.scale)
 
 
@@ -188,7 +202,7 @@ def placed(path: Place, check: Callable[[], T]) -> T:
     try:
         return check()
     except ParameterError as error:
-        raise ParameterError(f"{place(path)}: {str(error).partition(': ')[2]}") from None
+        raise ParameterError(f"{format_path(path)}: {str(error).partition(': ')[2]}") from None
 
 
 def axis(given: Any, path: Place, check: Callable[[Any, Place], T]) -> list[T]:
@@ -197,7 +211,7 @@ def axis(given: Any, path: Place, check: Callable[[Any, Place], T]) -> list[T]:
         return [check(given, path)]
     values = [check(value, (*path, k)) for k, value in enumerate(given)]
     if not values:
-        raise ParameterError(f"{place(path)}: none, but at least one value was wanted")
+        raise ParameterError(f"{format_path(path)}: none, but at least one value was wanted")
     once(values, path)
     return values
 
@@ -207,7 +221,9 @@ def once(values: Sequence[object], path: Place) -> None:
     for k, value in enumerate(values):
         first = seen.setdefault(tuple(value.items()) if isinstance(value, Mapping) else value, k)
         if first < k:
-            told = f"{place((*path, k))}: {shown(value)} is given already at {place((*path, first))}"
+            told = (
+                f"{format_path((*path, k))}: {quote(value)} is given already at {format_path((*path, first))}"
+            )
             raise ParameterError(f"{told}; each once was wanted")
 
 
@@ -252,7 +268,7 @@ def condition_axes(given: Mapping[str, Any]) -> dict[str, list[TeamValue]]:
     axes: dict[str, list[TeamValue]] = {}
     for name, values in given.items():
         if name not in CONDITIONS:
-            raise ParameterError(f"conditions: {unknown_name('condition', name, CONDITIONS)}")
+            raise ParameterError(f"conditions: {describe_unknown_name('condition', name, CONDITIONS)}")
         axes[name] = axis(values, ("conditions", name), partial(_value_of, name))
     return axes
 
@@ -330,7 +346,7 @@ class Study:
     teams: tuple[Mapping[str, TeamValue], ...] = field(init=False)  # combinations of team and conditions
 
     def __post_init__(self) -> None:
-        checked("max_runs", self.max_runs, 1, MAX_MAX_RUNS, whole=True)
+        require_number("max_runs", self.max_runs, 1, MAX_MAX_RUNS, whole=True)
         require_few_runs(self._count_values(), self.controllers, self.gains, self.sampling, self.max_runs)
         for name in ("maps", "controllers", "robots", "starts", "seeds"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
@@ -340,20 +356,20 @@ class Study:
                 raise ParameterError(f"robots: {list(self.robots)}, but the groups of the team have {size}")
             object.__setattr__(self, "robots", (size,))
         for k, controller in enumerate(self.controllers):
-            required(f"controllers[{k}]", controller, str, "a text")
+            require_type(f"controllers[{k}]", controller, str, "a text")
         for k, each in enumerate(self.maps):
             name = each.name
             if not isinstance(name, str) or not 1 <= len(name) <= _LONGEST_NAME or not name.isprintable():
                 wanted = f"a text of 1 to {_LONGEST_NAME} characters on one line"
-                raise ParameterError(f"maps[{k}]: name {shown(name)}, but {wanted} was wanted")
+                raise ParameterError(f"maps[{k}]: name {quote(name)}, but {wanted} was wanted")
         for name, low, high in (("robots", 1, 10_000), ("seeds", 0, 2**63 - 1)):
             for k, value in enumerate(getattr(self, name)):
-                checked(place((name, k)), value, low, high, whole=True)
-        checked("lattice", self.lattice, 2, 2048, whole=True)
+                require_number(format_path((name, k)), value, low, high, whole=True)
+        require_number("lattice", self.lattice, 2, 2048, whole=True)
         for name, most in (("duration", 1e6), ("dt", 1.0), ("cost_hz", 1e4), ("record_hz", 1e4)):
-            object.__setattr__(self, name, checked(name, getattr(self, name), 0.0, most))
+            object.__setattr__(self, name, require_number(name, getattr(self, name), 0.0, most))
         check_dt(self.dt)
-        required("metrics", self.metrics, bool, "true or false")
+        require_type("metrics", self.metrics, bool, "true or false")
         for name in ("maps", "controllers", "robots", "seeds"):
             if not getattr(self, name):
                 raise ParameterError(f"{name}: none, but at least one was wanted")
@@ -362,7 +378,7 @@ class Study:
         for (k, name), each in product(enumerate(self.starts if self.starts != (ALL,) else ()), self.maps):
             if name == ALL:
                 beside = "is all of them, so nothing beside it was wanted"
-                raise ParameterError(f"starts[{k}]: {shown(ALL)} {beside}")
+                raise ParameterError(f"starts[{k}]: {quote(ALL)} {beside}")
             try:
                 each.environment.start(name)
             except InputError as error:
@@ -441,8 +457,8 @@ class Study:
         """Return the sources of the users' controllers, and what is tried of each controller."""
         for name in self.gains:
             if name not in self.controllers:
-                known = unknown_name("controller of the study", name, self.controllers)
-                raise ParameterError(f"{place(('gains', name))}: {known}")
+                known = describe_unknown_name("controller of the study", name, self.controllers)
+                raise ParameterError(f"{format_path(('gains', name))}: {known}")
         sources, gains = {}, {}
         for k, name in enumerate(self.controllers):
             file, _, class_name = name.rpartition(":")
@@ -452,7 +468,7 @@ class Study:
                     sources[name] = Source(str(path), path.read_text(encoding="utf-8"))
                 except (OSError, ValueError) as error:
                     reason = error.strerror if isinstance(error, OSError) else "not UTF-8"
-                    raise ParameterError(f"controllers[{k}]: {shown(name)}: {path}: {reason}") from None
+                    raise ParameterError(f"controllers[{k}]: {quote(name)}: {path}: {reason}") from None
             try:
                 kind = controller_kind(name, source=sources.get(name))
             except ParameterError as error:
@@ -534,21 +550,23 @@ def source_json(source: Source | None) -> dict[str, Any]:
 def _value_of(name: str, value: object, path: Place) -> TeamValue:
     if name == "kinematics":
         if value not in KINEMATICS:
-            raise ParameterError(f"{place(path)}: {shown(value)}, but {' or '.join(KINEMATICS)} was wanted")
+            raise ParameterError(
+                f"{format_path(path)}: {quote(value)}, but {' or '.join(KINEMATICS)} was wanted"
+            )
         return str(value)
     if name in EVENTS:
-        required(place(path), value, str, 'a text, as in "3@20",')
+        require_type(format_path(path), value, str, 'a text, as in "3@20",')
         try:
             return " ".join(str(parsed_entry(EVENTS[name], word)) for word in str(value).split())
         except ParameterError as error:
-            raise ParameterError(f"{place(path)}: {error}") from None
+            raise ParameterError(f"{format_path(path)}: {error}") from None
     if value in _UNLIMITED.get(name, ()):
         return None
     if name in LIMITS:
         given: dict[str, Any] = {"forget_after": 1e6, name: value}
         return getattr(placed(path, lambda: Conditions(**given)), name)  # type: ignore[no-any-return]
     if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > _HUGE:
-        raise ParameterError(f"{place(path)}: {shown(value)}, but a number was wanted")
+        raise ParameterError(f"{format_path(path)}: {quote(value)}, but a number was wanted")
     one: dict[str, Any] = {name: float(value)}
     placed(path, lambda: Team.homogeneous(1, **one))
     return float(value)

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias, get_args
 
-from robocov.errors import InputError, one_line, place, shown, unknown_name
+from robocov.errors import InputError, describe_unknown_name, format_path, quote, to_one_line
 from robocov.files.strictjson import parse_toml, read_bytes
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.sweep import study
@@ -94,9 +94,9 @@ def _read(given: Any, wanted: _Value | _Table, path: Place, unknown: list[str], 
     one, item, table = wanted[1:] if isinstance(wanted, _Value) else (None, None, wanted)
     if table is not None and isinstance(given, dict):
         keys = table.keys if "*" not in table.keys else dict.fromkeys(given, table.keys["*"])
-        above = f"{place(path)}: " if path else ""
-        unknown += [above + unknown_name("key", key, keys) for key in given if key not in keys]
-        missing = {place((*path, key)): keys[key].wanted for key in table.required if key not in given}
+        above = f"{format_path(path)}: " if path else ""
+        unknown += [above + describe_unknown_name("key", key, keys) for key in given if key not in keys]
+        missing = {format_path((*path, key)): keys[key].wanted for key in table.required if key not in given}
         mistakes += [f"{at}: missing, but {what} was wanted" for at, what in missing.items()]
         there = [key for key in keys if key in given]
         return {key: _read(given[key], keys[key], (*path, key), unknown, mistakes) for key in there}
@@ -105,14 +105,14 @@ def _read(given: Any, wanted: _Value | _Table, path: Place, unknown: list[str], 
     with suppress(ValueError, OverflowError):
         if one is not None:
             return one(given)
-    mistakes.append(f"{place(path)}: {shown(given)}, but {wanted.wanted} was wanted")
+    mistakes.append(f"{format_path(path)}: {quote(given)}, but {wanted.wanted} was wanted")
     return None
 
 
 def read_study(path: Path | str) -> Study:
     """Return the study in a TOML file; raises InputError: the file, the key, the value, what was wanted."""
     path = Path(path)
-    where = one_line(path)
+    where = to_one_line(path)
     return study_of(parse_toml(read_bytes(path), where), path.parent, where)
 
 
@@ -128,7 +128,7 @@ def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
         if isinstance(given.get("seeds"), int):
             count = given["seeds"]
             if count < 1:
-                raise InputError(f"seeds: expected a whole number from 1, got {shown(count)}")
+                raise InputError(f"seeds: expected a whole number from 1, got {quote(count)}")
             given["seeds"] = range(count)
         for name in ("maps", "controllers", "robots", "starts"):
             if name in given and not isinstance(given[name], list):
@@ -152,13 +152,13 @@ def _maps(entries: list[str], folder: Path) -> list[StudyMap]:
     for k, entry in enumerate(entries):
         try:
             if entry not in known and not entry.endswith(".json"):
-                raise InputError(unknown_name("map", entry, known))
+                raise InputError(describe_unknown_name("map", entry, known))
             name = entry if entry in known else (folder / entry).stem
             environment = load_map(known.get(entry, folder / entry))
         except InputError as error:
             raise InputError(f"maps[{k}]: {error}") from error
         if name in maps:
             wanted = f"maps whose names differ, and there is a {name!r} already,"
-            raise InputError(f"maps[{k}]: {shown(entry)}, but {wanted} were wanted")
+            raise InputError(f"maps[{k}]: {quote(entry)}, but {wanted} were wanted")
         maps[name] = StudyMap(name, environment)
     return list(maps.values())

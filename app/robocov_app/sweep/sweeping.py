@@ -12,7 +12,7 @@ from itertools import compress, takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robocov.errors import OutputError, RobocovError, checked, counted
+from robocov.errors import OutputError, RobocovError, format_count, require_number
 from robocov.kernel_compilation import compile_kernels
 from robocov.text import escape_controls
 from robocov_app.sweep.executors import Cluster, Executor, LocalPool, processors
@@ -71,7 +71,7 @@ class Count:
         words = [f"{self.over} of {self.total} runs"]
         words += [f"{self.failed} failed"] * (self.failed > 0)
         words += [f"{self.reused} were there"] * (self.reused > 0)
-        words += [f"{counted(self.lost, 'worker')} lost"] * (self.lost > 0)
+        words += [f"{format_count(self.lost, 'worker')} lost"] * (self.lost > 0)
         if self.rate > 0:
             words.append(f"{self.rate:.0f} a second" if self.rate >= 10 else f"{self.rate:.2g} a second")
         return ", ".join(words)
@@ -168,7 +168,7 @@ def sweep(
     cannot be written; what is done is kept.
     """
     if workers is not None:
-        checked("workers", workers, 1, 1024, whole=True)
+        require_number("workers", workers, 1, 1024, whole=True)
     folder = Path(folder)
     with ExitStack() as stack:
         stopped = stack.enter_context(Interruption()) if stop is None else stop

@@ -11,7 +11,7 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import tyro
 
-from robocov.errors import InputError, ParameterError, checked, shown
+from robocov.errors import InputError, ParameterError, quote, require_number
 
 T = TypeVar("T")
 
@@ -72,7 +72,7 @@ def _with_hint(problem: str, kind: Any, command: str) -> str:
     options = [f"--{name}" for name in _option_names(kind)]
     if found := re.match(r"unexpected argument (\S+)", problem):
         word = found[1]
-        text = f"unexpected argument {shown(word)}"
+        text = f"unexpected argument {quote(word)}"
         meant = [f"{option} {word}" for option in options if option in ("--controller", "--controllers")]
         near = get_close_matches(f"--{word}", options, n=1, cutoff=0.8)
         if meant and _is_controller(word):
@@ -213,10 +213,10 @@ def parsed_size(option: str, text: str, least: tuple[int, int], most: tuple[int,
     match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", text)
     if not match:
         wanted = "WIDTHxHEIGHT in pixels, as in 1280x720, was wanted"
-        raise ParameterError(f"{option}: {shown(text)}, but {wanted}")
+        raise ParameterError(f"{option}: {quote(text)}, but {wanted}")
     width, height = int(match[1]), int(match[2])
-    checked(option, width, least[0], most[0], "pixels wide")
-    checked(option, height, least[1], most[1], "pixels high")
+    require_number(option, width, least[0], most[0], "pixels wide")
+    require_number(option, height, least[1], most[1], "pixels high")
     return width, height
 
 
@@ -230,7 +230,7 @@ def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
     for text in texts:
         name, equals, value = text.partition("=")
         if not equals or not re.fullmatch(r"[^\W\d][\w.:/-]*", name):
-            raise ParameterError(f"--set: {shown(text)}, but GAIN=VALUE, as in k_rep=0.3, was wanted")
+            raise ParameterError(f"--set: {quote(text)}, but GAIN=VALUE, as in k_rep=0.3, was wanted")
         if name in gains:
             raise ParameterError(f"--set: {name} is given twice")
         if re.fullmatch(_WORD, value) and value not in _JSON_WORDS:
@@ -240,5 +240,5 @@ def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
             gains[name] = json.loads(value)
         except (ValueError, RecursionError) as error:  # also of thousands of digits, or brackets
             wanted = "a number (or null), or a word, was wanted"
-            raise ParameterError(f"--set {name}: {shown(value)}, but {wanted}") from error
+            raise ParameterError(f"--set {name}: {quote(value)}, but {wanted}") from error
     return gains

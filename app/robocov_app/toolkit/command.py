@@ -8,7 +8,7 @@ from functools import partial
 import pygame
 from pygame import Rect, Surface
 
-from robocov.errors import InputError, unknown_name
+from robocov.errors import InputError, describe_unknown_name
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.theme import Theme, mix
 from robocov_app.toolkit.dialogs import Choice, Dialog, Option
@@ -86,7 +86,7 @@ class Commands:
         word, rest = parted(text)
         known = self._typable()
         if word not in known:
-            raise InputError(unknown_name("command", word, list(known)))
+            raise InputError(describe_unknown_name("command", word, list(known)))
         return _done(known[word], rest)
 
     def offered(self, text: str, most: int = 9) -> list[Option]:

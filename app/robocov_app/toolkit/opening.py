@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from robocov.errors import MapError, one_line, reason
+from robocov.errors import MapError, describe_error, to_one_line
 
 
 def require_regular_file(path: Path) -> None:
@@ -15,8 +15,8 @@ def require_regular_file(path: Path) -> None:
         is_broken_link = path.is_symlink() and not exists
         is_file = path.is_file() or path.is_dir()
     except (OSError, ValueError) as error:
-        raise MapError(f"{one_line(path)}: cannot be read: {reason(error)}") from None
+        raise MapError(f"{to_one_line(path)}: cannot be read: {describe_error(error)}") from None
     if is_broken_link:
-        raise MapError(f"{one_line(path)}: expected a file, got a link to nothing")
+        raise MapError(f"{to_one_line(path)}: expected a file, got a link to nothing")
     if exists and not is_file:
-        raise MapError(f"{one_line(path)}: expected a file, got a pipe or a device")
+        raise MapError(f"{to_one_line(path)}: expected a file, got a pipe or a device")

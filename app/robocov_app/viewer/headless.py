@@ -16,7 +16,7 @@ import pygame
 
 from robocov.controllers import remembers
 from robocov.environment import CircleObstacle
-from robocov.errors import InputError, one_line
+from robocov.errors import InputError, to_one_line
 from robocov.files.result_folder import ResultFolder
 from robocov.metrics import CostHistory, summarise
 from robocov.record import Record, Recorder
@@ -140,11 +140,11 @@ def story_folders(folder: Path) -> list[tuple[Path, str]]:
         if content["format"] != "robocov-story":
             return [(folder, "")]
         told = "{from_s:.1f} to {to_s:.1f} s, {words}"
-        return [(folder / one_line(part["folder"]), told.format(**part)) for part in content["parts"]]
+        return [(folder / to_one_line(part["folder"]), told.format(**part)) for part in content["parts"]]
     except OSError:  # no story; if it cannot be read either, who reads it says why
         return [(folder, "")]
     except (ValueError, LookupError, TypeError) as error:
-        raise InputError(f"{folder / STORY}: cannot be read: {one_line(error)}") from None
+        raise InputError(f"{folder / STORY}: cannot be read: {to_one_line(error)}") from None
 
 
 def save_story(

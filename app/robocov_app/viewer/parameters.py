@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from robocov.controllers.gains import Option
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, quote
 from robocov.robots import KINEMATICS, TRACK_PER_RADIUS, UNITS
 from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 
@@ -67,7 +67,7 @@ class Parameter:
             return float(plain)
         except ValueError:
             also = ", or none," if self.optional else ""
-            raise ParameterError(f"{self.label}: {shown(text)}, but a number{also} was wanted") from None
+            raise ParameterError(f"{self.label}: {quote(text)}, but a number{also} was wanted") from None
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Pick:
         found = [word for word in begun if word.lower() == plain] or begun
         if len(found) != 1:
             wanted = f"one of {', '.join(self.offered)} was wanted"
-            raise ParameterError(f"{self.label}: {shown(text)}, but {wanted}")
+            raise ParameterError(f"{self.label}: {quote(text)}, but {wanted}")
         return found[0]
 
 

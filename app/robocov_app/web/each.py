@@ -22,7 +22,7 @@ from time import monotonic, time
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, unquote, urlencode, urlsplit
 
-from robocov.errors import InputError, OutputError, RobocovError, reason
+from robocov.errors import InputError, OutputError, RobocovError, describe_error
 from robocov_app.terminal.interruption import interruptible
 from robocov_app.web.access import cookies_of, link_to, query_of, same, token_in
 from robocov_app.web.connections import (
@@ -316,7 +316,7 @@ class Sessions:
                 folder = self._folders.create()
                 self._folders.assign(visitor, folder)
         except OSError as error:
-            text = f"{self._options.folder}: cannot be written to: {reason(error)}"
+            text = f"{self._options.folder}: cannot be written to: {describe_error(error)}"
             raise OutputError(text) from error
         return await self._open(folder)
 

@@ -8,7 +8,7 @@ from itertools import islice
 from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile
 
-from robocov.errors import InputError, OutputError, RobocovError, reason
+from robocov.errors import InputError, OutputError, RobocovError, describe_error
 from robocov.files.atomic import written
 from robocov.files.result_folder import MANIFEST
 from robocov_app.terminal.output import free_name
@@ -43,7 +43,7 @@ def prepare_folder(folder: Path) -> None:
         raise InputError(f"--folder: {folder}: not a folder; choose another --folder") from None
     except OSError as error:
         raise InputError(
-            f"--folder: {folder}: cannot be written to: {reason(error)}; choose another --folder"
+            f"--folder: {folder}: cannot be written to: {describe_error(error)}; choose another --folder"
         ) from None
 
 
@@ -87,9 +87,11 @@ class Upload:
             with written(path) as part:
                 part.write_bytes(b"".join(self._pieces))
         except OSError as error:
-            raise TransferError(f"{self.name}: cannot be saved on the server: {reason(error)}") from error
+            raise TransferError(
+                f"{self.name}: cannot be saved on the server: {describe_error(error)}"
+            ) from error
         except OutputError as error:
-            why = reason(error.__cause__) if isinstance(error.__cause__, OSError) else str(error)
+            why = describe_error(error.__cause__) if isinstance(error.__cause__, OSError) else str(error)
             raise TransferError(f"{self.name}: cannot be saved on the server: {why}") from error
         return path
 
@@ -146,7 +148,7 @@ def read_saved(path: Path) -> tuple[str, bytes]:
             return f"{path.name}.zip", _zip_files(members, path.parent)
         return path.name, path.read_bytes()
     except OSError as error:
-        raise TransferError(f"{path.name}: cannot be read: {reason(error)}") from error
+        raise TransferError(f"{path.name}: cannot be read: {describe_error(error)}") from error
 
 
 def _zip_files(members: list[Path], root: Path) -> bytes:

@@ -18,7 +18,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.conditions.random_streams import Draws
-from robocov.errors import ParameterError, checked, is_number, shown
+from robocov.errors import ParameterError, is_number, quote, require_number
 
 LOSS, POSITION, SENSING, SCANNING, FAILING = range(5)
 """The independent streams of random numbers of a run."""
@@ -114,11 +114,11 @@ class Conditions:
             value, null = getattr(self, name), name == "message_rate"
             if value is not None or not null:
                 unit += " or null" * null
-                object.__setattr__(self, name, checked(f"conditions.{name}", value, low, high, unit))
+                object.__setattr__(self, name, require_number(f"conditions.{name}", value, low, high, unit))
         object.__setattr__(self, "failures", _entries("failures", Failure, self.failures))
         object.__setattr__(self, "joins", _entries("joins", Join, self.joins))
         if not is_number(self.seed, Integral) or self.seed < 0:
-            raise ParameterError(f"conditions.seed: {shown(self.seed)}, but a whole number from 0 was wanted")
+            raise ParameterError(f"conditions.seed: {quote(self.seed)}, but a whole number from 0 was wanted")
         if self.message_rate is not None and self.forget_after * self.message_rate < 1.0:
             wanted = f"at least the {1.0 / self.message_rate:g} s between two messages was wanted"
             raise ParameterError(f"conditions.forget_after: {self.forget_after:g} s, but {wanted}")
@@ -222,7 +222,7 @@ def parsed_entry(kind: type[Entry], text: str) -> Entry:
     found = _ENTRY.fullmatch(text)
     if found is None or (kind is Failure and found[3] is not None):
         wanted = "ROBOT@SECONDS, as in 3@20," if kind is Failure else "ROBOT@SECONDS or ROBOT@SECONDS:X,Y"
-        raise ParameterError(f"{shown(text)}, but {wanted} was wanted")
+        raise ParameterError(f"{quote(text)}, but {wanted} was wanted")
     place = () if found[3] is None else ((float(found[3]), float(found[4])),)
     return kind(int(found[1]), float(found[2]), *place)
 
@@ -236,14 +236,14 @@ def _entries(name: str, kind: type[Entry], given: Iterable[Any]) -> tuple[Entry,
             robot, time, *rest = each
             kind(robot, time, *rest)
         except (TypeError, ValueError):
-            raise ParameterError(f"{at}: {shown(each)}, but a robot and a time were wanted") from None
+            raise ParameterError(f"{at}: {quote(each)}, but a robot and a time were wanted") from None
         if not is_number(robot, Integral) or robot < 1:
-            raise ParameterError(f"{at}: robot {shown(robot)}, but a whole number from 1 was wanted")
+            raise ParameterError(f"{at}: robot {quote(robot)}, but a whole number from 1 was wanted")
         if robot in found:
             raise ParameterError(f"{at}: robot {robot} is given twice")
         if not is_number(time) or not 0.0 <= time <= _LONGEST:
             wanted = f"a number from 0 to {_LONGEST:g} s"
-            raise ParameterError(f"{at}: time {shown(time)}, but {wanted} was wanted")
+            raise ParameterError(f"{at}: time {quote(time)}, but {wanted} was wanted")
         places = [None if place is None else _place(at, place) for place in rest]
         found[int(robot)] = kind(int(robot), float(time), *places)
     return tuple(found[robot] for robot in sorted(found))
@@ -254,4 +254,4 @@ def _place(at: str, given: Any) -> tuple[float, float]:
         x, y = given
         if all(is_number(value) and math.isfinite(value) for value in (x, y)):
             return float(x), float(y)
-    raise ParameterError(f"{at}: place {shown(given)}, but [x, y] in metres was wanted")
+    raise ParameterError(f"{at}: place {quote(given)}, but [x, y] in metres was wanted")

@@ -37,7 +37,7 @@ from robocov.controllers.tangentbug import TangentBug
 from robocov.controllers.user_modules import Source, class_in_file, fault_of
 from robocov.controllers.visibility import Visibility
 from robocov.controllers.voronoi_graph import VoronoiGraphCoverage
-from robocov.errors import ParameterError, required, unknown_name
+from robocov.errors import ParameterError, describe_unknown_name, require_type
 
 __all__ = [
     "CONTROLLERS", "FLAGSHIP", "Adaptive", "Atlas", "AtlasShared", "Barrier", "Boosting", "Controller",
@@ -122,14 +122,14 @@ def controller_kind(name: str, *, source: Source | None = None) -> type[Any]:
     `source` is the file with the modules that it imports, which then need not be there. A ParameterError
     gives the nearest name, or what is wrong with the file.
     """
-    required("controller", name, str, "a name, as in 'rapf' or 'mine.py:MyController',")
+    require_type("controller", name, str, "a name, as in 'rapf' or 'mine.py:MyController',")
     if ".py:" in name or name.endswith(".py"):
         return _named(class_in_file(name, source), name.rpartition(":")[2])
     if name in CONTROLLERS:
         return CONTROLLERS[name]
     offered = _offered(name)
     if name not in offered:
-        raise ParameterError(unknown_name("controller", name, controller_kinds()))
+        raise ParameterError(describe_unknown_name("controller", name, controller_kinds()))
     return offered[name]
 
 

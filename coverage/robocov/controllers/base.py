@@ -11,7 +11,7 @@ from robocov.arrays import Array
 from robocov.controllers.gains import choice, validate_gains
 from robocov.controllers.user_modules import location_of
 from robocov.environment import Environment
-from robocov.errors import ParameterError, shown, unknown_name
+from robocov.errors import ParameterError, describe_unknown_name, quote
 from robocov.observation import Decision, Observations, to_numbers
 from robocov.observation.region import Region
 from robocov.robots import Team
@@ -64,7 +64,7 @@ def information_of(controller: Any) -> Information:
     stated: Information = getattr(getattr(controller, "law", controller), "information", "own")
     if stated not in get_args(Information):
         name, words = getattr(controller, "name", "?"), ", ".join(get_args(Information))
-        told = f"information: {shown(stated)}, but one of {words} was wanted"
+        told = f"information: {quote(stated)}, but one of {words} was wanted"
         raise ParameterError(f"controller {name!r}: {told}")
     return stated
 
@@ -79,7 +79,7 @@ def informed(controller: Controller, environment: Environment) -> Controller:
         raise ParameterError(f"controller {controller.name!r}: {told}; 'whole map' was wanted")
     known: Controller = tell(environment)
     if isinstance(known, type) or not isinstance(known, Controller):
-        got = f"returned {shown(known)}{location_of(tell)}, expected a controller"
+        got = f"returned {quote(known)}{location_of(tell)}, expected a controller"
         raise ParameterError(f"controller {controller.name!r}: informed(environment) {got}")
     return known
 
@@ -107,7 +107,7 @@ class Law:
         known = [each.name for each in fields(cls) if each.init] if is_dataclass(cls) else gains
         for name in gains:
             if name not in known:
-                raise ParameterError(f"{cls.name}: {unknown_name('gain', name, known)}")
+                raise ParameterError(f"{cls.name}: {describe_unknown_name('gain', name, known)}")
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
@@ -243,6 +243,6 @@ class Individually:
             return force
         missing = " (is a return statement missing?)" if returned is None else ""
         raise ParameterError(
-            f"controller {self.name!r}: force(own) returned {shown(returned)}{missing} for robot {robot + 1} "
+            f"controller {self.name!r}: force(own) returned {quote(returned)}{missing} for robot {robot + 1} "
             f"at {time:.3f} s{location_of(self.law.force)}, expected two finite numbers in newtons"
         )

@@ -6,7 +6,7 @@ from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from typing import Any, ClassVar, TypeAlias
 
 from robocov.controllers.user_modules import fault_of
-from robocov.errors import ParameterError, RobocovError, is_number, shown, unknown_name
+from robocov.errors import ParameterError, RobocovError, describe_unknown_name, is_number, quote
 
 Value: TypeAlias = float | str | None
 """Value of a gain: a number, None for no limit, or one of the words of an `Option`."""
@@ -45,7 +45,7 @@ class Gain:
             return float(value)
         what = f"a {'whole ' if self.whole else ''}number from {self.low:g} to {self.high:g} {self.unit}"
         also = ", or null for no limit," if self.optional else ""
-        raise ParameterError(f"{where}.{self.name}: {shown(value)}, but {what.rstrip()}{also} was wanted")
+        raise ParameterError(f"{where}.{self.name}: {quote(value)}, but {what.rstrip()}{also} was wanted")
 
 
 @dataclass(frozen=True)
@@ -63,9 +63,9 @@ class Option:
         """Return `value` when it is one of the words, or raise a ParameterError that names `where`."""
         if isinstance(value, str) and value in self.words:
             return value
-        told = f"{shown(value)}, but one of {', '.join(self.words)} was wanted"
+        told = f"{quote(value)}, but one of {', '.join(self.words)} was wanted"
         if isinstance(value, str):
-            told = unknown_name("word", value, self.words)
+            told = describe_unknown_name("word", value, self.words)
         raise ParameterError(f"{where}.{self.name}: {told}")
 
 
@@ -136,7 +136,9 @@ def with_gains(kind: type[Any], values: Mapping[str, object]) -> Any:
     for name in values:
         if name not in known:
             nothing = f"{where}.{name}: controller {where!r} has no gains"
-            raise ParameterError(f"{where}: {unknown_name('gain', name, known)}" if known else nothing)
+            raise ParameterError(
+                f"{where}: {describe_unknown_name('gain', name, known)}" if known else nothing
+            )
     given = {name: known[name].validated(value, where) for name, value in values.items()}
     try:
         return kind(**given)

@@ -19,7 +19,7 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from robocov.errors import ControllerEndedError, ParameterError, RobocovError, shown, unknown_name
+from robocov.errors import ControllerEndedError, ParameterError, RobocovError, describe_unknown_name, quote
 
 _MODULE = "robocov_user_"  # prefix of the names of modules loaded from files of users
 _OURS = str(Path(__file__).parents[1])
@@ -98,7 +98,7 @@ def _frames(error: BaseException) -> list[tuple[str, str, int]]:
 def class_in_file(name: str, source: Source | None) -> type[Any]:
     """Return the controller class ``file.py:ClassName``; this runs the file, or its text in `source`."""
     file, _, class_name = name.rpartition(":")
-    where = f"controller {shown(name)}"
+    where = f"controller {quote(name)}"
     if not class_name or not file.endswith(".py"):
         raise ParameterError(f"{where}: a file and a class, as in mine.py:MyController, was wanted")
     path = os.path.realpath(file) if source is None else source.path
@@ -121,7 +121,7 @@ def class_in_file(name: str, source: Source | None) -> type[Any]:
     if kind is None:
         classes = {key: each for key, each in vars(module).items() if isinstance(each, type)}
         kinds = [key for key, each in classes.items() if each.__module__ == module_name]
-        raise ParameterError(f"controller {file}: {unknown_name('class', class_name, kinds)}")
+        raise ParameterError(f"controller {file}: {describe_unknown_name('class', class_name, kinds)}")
     if not (isinstance(kind, type) and (hasattr(kind, "decide") or hasattr(kind, "force"))):
         wrong = "has neither a method decide(seen, memory) nor force(own)"
     elif not getattr(getattr(kind, "__dataclass_params__", None), "frozen", False):

@@ -17,7 +17,7 @@ from robocov.cost.site_paths import GROUP, TILE, CornerViews, CostMap, Tiles, Wo
 from robocov.density.base import means_over_squares
 from robocov.drawing import Drawable
 from robocov.environment import Environment, require_environment
-from robocov.errors import InputError, ParameterError, checked, counted, numeric, shown
+from robocov.errors import InputError, ParameterError, format_count, quote, require_number, to_floats
 from robocov.geodesic import BINS, Geodesics
 from robocov.geodesic.visibility import AngularWallIndex
 from robocov.geodesic.walls import along_z_curve, box_tree
@@ -99,7 +99,7 @@ class CoverageResult(Drawable):
     """Mean time, s, with `speeds`, until the first robot is at a site."""
 
     def __repr__(self) -> str:
-        robots = counted(len(self.positions), "robot")
+        robots = format_count(len(self.positions), "robot")
         uncovered = f", {self.uncovered_area:.3f} m² uncovered" if self.uncovered_area else ""
         time = "" if self.mean_time is None else f", mean time {self.mean_time:.3f} s"
         return f"<CoverageResult {robots}, mean distance {self.mean_distance:.3f} m{time}{uncovered}>"
@@ -190,7 +190,7 @@ class CoverageCost:
         geodesics: Geodesics | None = None,
     ) -> None:
         require_environment(environment)
-        self.lattice = int(checked("lattice", lattice, 1, MAX_LATTICE, whole=True))
+        self.lattice = int(require_number("lattice", lattice, 1, MAX_LATTICE, whole=True))
         self.environment = environment
         beat = None if progress is None else partial(progress, 0.0)
         self.geodesics = geodesics = Geodesics(environment, beat) if geodesics is None else geodesics
@@ -227,7 +227,7 @@ class CoverageCost:
         in seconds. Raises InputError when there is no robot, or one is outside the free space, or speeds are
         not positive numbers, one for each robot; the message names it.
         """
-        positions = numeric("positions", positions, "[x, y] of each robot in metres", InputError)
+        positions = to_floats("positions", positions, "[x, y] of each robot in metres", InputError)
         if not positions.size:
             raise InputError("positions: none, but at least one robot was wanted")
         places, holds = self.geodesics.place(positions)
@@ -414,8 +414,8 @@ def _checked_speeds(speeds: object, robots: int) -> Array:
     except (TypeError, ValueError):
         values = np.empty(0)
     if values.shape != (robots,):
-        raise InputError(f"speeds: {shown(speeds)}, but a number for each of {robots} robots was wanted")
+        raise InputError(f"speeds: {quote(speeds)}, but a number for each of {robots} robots was wanted")
     for k, value in enumerate(values.tolist()):
         if not 0.0 < value < np.inf:
-            raise InputError(f"speeds[{k}]: {shown(value)} m/s, but a number above 0 was wanted")
+            raise InputError(f"speeds[{k}]: {quote(value)} m/s, but a number above 0 was wanted")
     return values

@@ -11,7 +11,7 @@ import shapely
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, quote
 
 REGION = -1
 """Neighbour of an edge of a cell that is a piece of the region's boundary."""
@@ -141,7 +141,7 @@ def check_weight(name: str, value: float, *, above: bool = False) -> None:
     """Raise a ParameterError when a weight is out of range."""
     if not ((value > 0.0 if above else value >= 0.0) and value <= HEAVIEST):
         wanted = f"a number {'above' if above else 'from'} 0 to {HEAVIEST:.0f}"
-        raise ParameterError(f"{name}: {shown(value)}, but {wanted} was wanted")
+        raise ParameterError(f"{name}: {quote(value)}, but {wanted} was wanted")
 
 
 @dataclass(frozen=True)

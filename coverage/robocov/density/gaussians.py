@@ -18,7 +18,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.density.base import CellEdges, Density, check_weight
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, quote
 
 Point: TypeAlias = tuple[float, float]
 Matrix: TypeAlias = tuple[Point, Point]
@@ -41,10 +41,10 @@ class Gaussian:
         if (self.sigma is None) == (self.covariance is None):
             raise ParameterError("sigma and covariance: either one of them was wanted")
         if self.sigma is not None and not 0.0 < self.sigma < math.inf:
-            raise ParameterError(f"sigma: {shown(self.sigma)} m, but a number above 0 was wanted")
+            raise ParameterError(f"sigma: {quote(self.sigma)} m, but a number above 0 was wanted")
         if self.covariance is not None and not _definite(self.covariance):
             wanted = "a symmetric, positive definite 2 x 2 matrix was wanted"
-            raise ParameterError(f"covariance: {shown(self.covariance)} m², but {wanted}")
+            raise ParameterError(f"covariance: {quote(self.covariance)} m², but {wanted}")
 
     @property
     def matrix(self) -> Matrix:

@@ -12,7 +12,7 @@ import numpy as np
 from robocov.arrays import Array, IntArray, frozen
 from robocov.compiled import kernel
 from robocov.density.base import HEAVIEST, CellEdges, Density
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, quote
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -52,10 +52,10 @@ class Raster(Density):
         x_min, y_min, x_max, y_max = self.extent
         if not (-math.inf < x_min < x_max < math.inf and -math.inf < y_min < y_max < math.inf):
             wanted = "[x_min, y_min, x_max, y_max] with a width and a height was wanted"
-            raise ParameterError(f"extent: {shown(self.extent)}, but {wanted}")
+            raise ParameterError(f"extent: {quote(self.extent)}, but {wanted}")
         if self.interpolation not in ("bilinear", "cells"):
             wanted = "bilinear or cells was wanted"
-            raise ParameterError(f"interpolation: {shown(self.interpolation)}, but {wanted}")
+            raise ParameterError(f"interpolation: {quote(self.interpolation)}, but {wanted}")
         object.__setattr__(self, "values", values)
 
     def __eq__(self, other: object) -> bool:

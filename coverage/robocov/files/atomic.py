@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from robocov.errors import OutputError, reason, shown
+from robocov.errors import OutputError, describe_error, quote
 
 _KINDS = {"d": "a folder", "p": "a named pipe", "s": "a socket", "c": "a device", "b": "a device"}
 """Kinds of files that are no regular ones, by the first character of the mode."""
@@ -34,7 +34,7 @@ def written(target: Path, *, durable: bool = True) -> Iterator[Path]:
             part.chmod(stat.S_IMODE(real.stat().st_mode))
         part.replace(real)
     except OSError as error:
-        raise _refused(target, f"cannot be written: {reason(error)}") from error
+        raise _refused(target, f"cannot be written: {describe_error(error)}") from error
     finally:
         with suppress(OSError):  # it is gone, or where the folder is none, there never was one
             part.unlink()
@@ -53,7 +53,7 @@ def writable(target: Path) -> Path:
             raise _refused(target, "is a link to nothing, but a file was wanted") from error
         return target
     except (OSError, RuntimeError, ValueError) as error:  # a circle of links was a RuntimeError before 3.13
-        raise _refused(target, f"cannot be written: {reason(error)}") from error
+        raise _refused(target, f"cannot be written: {describe_error(error)}") from error
     if not stat.S_ISREG(mode):
         kind = _KINDS.get(stat.filemode(mode)[0], "something else")
         raise _refused(target, f"is {kind}, but a file was wanted")
@@ -62,7 +62,7 @@ def writable(target: Path) -> Path:
 
 def _refused(target: Path, what: str) -> OutputError:
     name = str(target)
-    return OutputError(f"{name if name.isprintable() else shown(name)}: {what}")
+    return OutputError(f"{name if name.isprintable() else quote(name)}: {what}")
 
 
 def on_disk(paths: Iterable[Path]) -> None:
@@ -98,7 +98,7 @@ def locked(folder: Path, name: str = ".lock", *, remove: bool = False) -> Iterat
             # not inherited by processes that are started: their lives are their own
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
         except OSError as error:
-            raise OutputError(f"{folder}: cannot be written to: {reason(error)}") from error
+            raise OutputError(f"{folder}: cannot be written to: {describe_error(error)}") from error
         try:
             if not _taken(descriptor):
                 what = "another process is at work in this folder; wait until it has ended"

@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import Literal, TypeAlias
 
-from robocov.errors import InputError, OutputError, reason, shown
+from robocov.errors import InputError, OutputError, describe_error, quote
 from robocov.files.atomic import locked, on_disk, written
 
 Kind: TypeAlias = Literal["run", "comparison", "replay", "story"]
@@ -159,15 +159,15 @@ def _listing(path: Path) -> tuple[set[str], set[str]] | None:
             raise ValueError("it is no regular file")
         content = json.loads(path.read_bytes())
         if {key: content[key] for key in _HEAD} != _HEAD:
-            raise ValueError(f"{shown(content['format'])}, version {shown(content['version'])}")
+            raise ValueError(f"{quote(content['format'])}, version {quote(content['version'])}")
         files, removed = set(content["files"]), set(content.get("removed", ()))
         for name in files | removed:
             *_, own = steps = name.split("/")
             if not all(re.fullmatch(r"(?!\.{1,2}$)[^/\\:\0]+", step) for step in steps):
-                raise ValueError(f"{shown(name)}, but a file in the folder was wanted")
+                raise ValueError(f"{quote(name)}, but a file in the folder was wanted")
             # or whoever sends a folder might have any file replaced or removed
             if own not in _NAMES and not _FRAME.fullmatch(own):
-                raise ValueError(f"{shown(name)}, but a file of a result was wanted")
+                raise ValueError(f"{quote(name)}, but a file of a result was wanted")
         return files, removed
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path}: cannot be used: {error}") from error
@@ -323,4 +323,4 @@ def for_results(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise OutputError(f"{folder}: cannot be used for results: {reason(error)}") from error
+        raise OutputError(f"{folder}: cannot be used for results: {describe_error(error)}") from error

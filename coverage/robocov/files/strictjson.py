@@ -22,7 +22,17 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError, WrapValidator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from robocov.errors import InputError, JsonPath, MapError, Mistake, one_line, place, reason, shown, shown_json
+from robocov.errors import (
+    InputError,
+    JsonPath,
+    MapError,
+    Mistake,
+    describe_error,
+    format_path,
+    quote,
+    quote_json,
+    to_one_line,
+)
 
 MAX_BYTES = 50_000_000
 MAX_DEPTH = 32
@@ -60,7 +70,7 @@ class _Object(dict[str, Any]):
 
 def read_bytes(path: Path) -> bytes:
     """Return the content of a file; raise `MapError` when it cannot be read, or larger than `MAX_BYTES`."""
-    where = one_line(path)
+    where = to_one_line(path)
     try:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
@@ -69,7 +79,7 @@ def read_bytes(path: Path) -> bytes:
     except IsADirectoryError:
         raise MapError(f"{where}: is a folder, but a file was wanted") from None
     except (OSError, ValueError) as error:
-        raise MapError(f"{where}: cannot be read: {reason(error)}") from None
+        raise MapError(f"{where}: cannot be read: {describe_error(error)}") from None
     _require_size(content, where)
     return content
 
@@ -80,7 +90,7 @@ def parse(text: str | bytes, where: str) -> Any:
     Raises `MapError` with line and column when the text is not UTF-8 (a byte order mark may be) or not JSON,
     or has a number that is not finite, a key twice in one object, or lists nested deeper than `MAX_DEPTH`.
     """
-    where = one_line(where)
+    where = to_one_line(where)
     _require_size(text, where)
     text = _decoded(text, where)
     if not text.strip():
@@ -125,7 +135,7 @@ def parse_toml(content: bytes, where: str) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise InputError(f"{where}: byte at offset {error.start}: not UTF-8, but TOML was wanted") from None
     except ValueError as error:  # of TOML, or of a whole number with thousands of digits
-        text = one_line(error)
+        text = to_one_line(error)
         raise InputError(f"{where}: not TOML: {text[:1].lower()}{text[1:]}") from None
     except RecursionError:
         raise InputError(f"{where}: nested too deeply, expected at most {MAX_DEPTH} levels") from None
@@ -159,7 +169,7 @@ def located(error: MapError, text: str | bytes, where: str) -> MapError:
         ]
     except RecursionError:  # beside the place, something is nested as deep as parsing goes
         return error
-    return MapError.of(one_line(where), found, error.unlisted)
+    return MapError.of(to_one_line(where), found, error.unlisted)
 
 
 def require_json(value: object, where: str) -> None:
@@ -173,12 +183,12 @@ def _first_mistake(value: Any, path: JsonPath) -> Mistake | None:
         what = _wrong(value)
         return None if what is None else Mistake.at(path, what)
     if len(path) >= MAX_DEPTH:
-        return Mistake(path, f"{place(path[:4])}...: {_TOO_DEEP}")
+        return Mistake(path, f"{format_path(path[:4])}...: {_TOO_DEEP}")
     if isinstance(value, dict):
         for key in value:
             if not isinstance(key, str) or not _is_text(key):
-                at = f"{place(path)}: " if path else ""
-                text = f"{at}key {shown(key)}, but text that UTF-8 can hold was wanted"
+                at = f"{format_path(path)}: " if path else ""
+                text = f"{at}key {quote(key)}, but text that UTF-8 can hold was wanted"
                 return Mistake((*path, key), text, at_key=True)
         if isinstance(value, _Object) and value.twice is not None:
             return Mistake.at((*path, value.twice), "given twice, but once was wanted", at_key=True)
@@ -196,7 +206,7 @@ def _wrong(item: object) -> str | None:
     if isinstance(item, float):
         return None if math.isfinite(item) else f"{item}, but a finite number was wanted"
     if isinstance(item, str):
-        return None if _is_text(item) else f"{shown(item)}, but text that UTF-8 can hold was wanted"
+        return None if _is_text(item) else f"{quote(item)}, but text that UTF-8 can hold was wanted"
     if isinstance(item, int):
         bits = item.bit_length()
         return None if bits <= _MOST_BITS else f"{bits} bits long, but a smaller number was wanted"
@@ -290,7 +300,7 @@ def _syntax(text: str, error: json.JSONDecodeError) -> tuple[int, str]:
     if text[at : at + 1] in ("}", "]") and before.endswith(","):
         at = len(before) - 1  # later versions complain about the comma itself
     rest = text[at : at + 12]
-    found = shown(rest.splitlines()[0] or rest) if rest else "end of file"
+    found = quote(rest.splitlines()[0] or rest) if rest else "end of file"
     if rest[:1] == "," and text[at + 1 :].lstrip(" \t\n\r")[:1] in ("}", "]"):
         why = "a comma that nothing follows"
     elif rest.startswith(("//", "/*", "#")):
@@ -350,14 +360,14 @@ def check_header(document: object, where: str, form: str, version: int) -> None:
     """Raise `MapError` on what is not of a format, or of another version, before its content is looked at."""
     if not isinstance(document, dict):
         kind = f"a JSON object with a {form.removeprefix('robocov-')}"
-        raise MapError.of(where, [Mistake((), f"{shown_json(document)}, but {kind} was wanted")])
+        raise MapError.of(where, [Mistake((), f"{quote_json(document)}, but {kind} was wanted")])
     for key, right in (("format", form), ("version", version)):
         found = document.get(key)
         if type(found) is type(right) and found == right:
             continue
-        state = shown_json(found) if key in document else "missing"
+        state = quote_json(found) if key in document else "missing"
         newer = type(found) is int and key == "version" and found > version
-        what = f"{state}, but {shown_json(right)} was wanted"
+        what = f"{state}, but {quote_json(right)} was wanted"
         what += "; it was written by a newer robocov" if newer else ""
         raise MapError.of(where, [Mistake.at((key,), what)])
 
@@ -376,4 +386,4 @@ def _mistake(detail: ErrorDetails) -> Mistake:
     if detail["type"] == "missing":
         return Mistake.at(path, "missing")
     words = detail["msg"] if detail["type"] == "wanted" else _WORDS.get(detail["type"], "another value")
-    return Mistake.at(path, f"{shown_json(detail['input'])}, but {words} was wanted")
+    return Mistake.at(path, f"{quote_json(detail['input'])}, but {words} was wanted")

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from robocov.environment import DiscStart, Environment, Obstacle, StartSpec, UniformStart, narrowest_gap
-from robocov.errors import MapError, ParameterError, checked, is_number, shown, unknown_name
+from robocov.errors import MapError, ParameterError, describe_unknown_name, is_number, quote, require_number
 from robocov.generator.blocks import city
 from robocov.generator.caves import cave
 from robocov.generator.mazes import maze
@@ -85,11 +85,11 @@ def generated_map(
     Raises ParameterError when a parameter is out of range, or no layout is found that fulfils all of them.
     """
     if not is_number(seed, Integral) or seed < 0:
-        raise ParameterError(f"seed: {shown(seed)}, but a whole number of at least 0 was wanted")
+        raise ParameterError(f"seed: {quote(seed)}, but a whole number of at least 0 was wanted")
     if not isinstance(kind, str) or kind not in GENERATORS:
-        raise ParameterError(unknown_name("kind of map", str(kind), GENERATORS))
+        raise ParameterError(describe_unknown_name("kind of map", str(kind), GENERATORS))
     of_kind = GENERATORS[kind]
-    side = checked("side", side, *SIDES)
+    side = require_number("side", side, *SIDES)
     request = Request(
         of_kind.obstacles if obstacles is None else obstacles,
         of_kind.area if area is None else area,

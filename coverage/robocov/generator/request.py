@@ -7,7 +7,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.environment import START_GAP, Ring
-from robocov.errors import checked
+from robocov.errors import require_number
 from robocov.robots import DEFAULT_RADIUS
 
 LEAST_GAP = 0.21  # m; robots of the usual size pass it
@@ -31,11 +31,11 @@ class Request:
     height: float
 
     def __post_init__(self) -> None:
-        checked("obstacles", self.obstacles, 1, MOST_OBSTACLES, whole=True)
-        checked("area", self.area, 0.01, 0.9)
-        checked("width", self.width, *SIDES)
-        checked("height", self.height, *SIDES)
-        checked("gap", self.gap, LEAST_GAP, min(self.width, self.height) / 3.0)
+        require_number("obstacles", self.obstacles, 1, MOST_OBSTACLES, whole=True)
+        require_number("area", self.area, 0.01, 0.9)
+        require_number("width", self.width, *SIDES)
+        require_number("height", self.height, *SIDES)
+        require_number("gap", self.gap, LEAST_GAP, min(self.width, self.height) / 3.0)
 
     @property
     def size(self) -> Array:

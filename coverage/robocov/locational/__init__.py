@@ -22,7 +22,7 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.density.base import CellEdges
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, quote
 
 _RULE = np.stack(np.polynomial.legendre.leggauss(16))  # nodes and weights
 
@@ -66,7 +66,7 @@ class Sensing:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.height < np.inf:
-            raise ParameterError(f"height: {shown(self.height)}, but a number above 0 m was wanted")
+            raise ParameterError(f"height: {quote(self.height)}, but a number above 0 m was wanted")
 
 
 Performance: TypeAlias = SquaredDistance | Distance | Sensing

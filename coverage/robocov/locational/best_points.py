@@ -18,7 +18,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
 from robocov.density import Density
-from robocov.errors import ParameterError, unknown_name
+from robocov.errors import ParameterError, describe_unknown_name
 from robocov.locational import Distance, Performance, Sensing, SquaredDistance, derivatives
 from robocov.observation import Cells
 
@@ -53,7 +53,7 @@ def targets(cells: Cells, density: Density | None, target: str, height: float) -
     if target == "centroid":
         return cells.centroid
     if target not in TARGETS:
-        raise ParameterError(f"target: {unknown_name('target', target, TARGETS)}")
+        raise ParameterError(f"target: {describe_unknown_name('target', target, TARGETS)}")
     return best_points(cells, Distance() if target == "median" else Sensing(height), density)
 
 

@@ -19,11 +19,11 @@ from robocov.errors import (
     MapError,
     Mistake,
     ParameterError,
-    one_line,
-    reason,
-    shown,
-    shown_json,
-    unknown_name,
+    describe_error,
+    describe_unknown_name,
+    quote,
+    quote_json,
+    to_one_line,
 )
 from robocov.files.atomic import written
 from robocov.files.strictjson import located, parse, read_bytes, require_json
@@ -58,7 +58,7 @@ def load_map(source: str | Path) -> Environment:
 def map_file(source: str | Path) -> Path:
     """Return the file of the map of `load_map`, which may be missing; raise MapError for unknown names."""
     if not isinstance(source, str | PathLike):
-        raise ParameterError(f"map: {shown(source)}, but a path, or the name of a bundled map, was wanted")
+        raise ParameterError(f"map: {quote(source)}, but a path, or the name of a bundled map, was wanted")
     if not isinstance(source, str) or any(char in source for char in "./\\\0"):
         return Path(source)
     known = bundled_maps()
@@ -67,7 +67,7 @@ def map_file(source: str | Path) -> Path:
     with suppress(OSError):  # as of a name that is longer than any file's
         if Path(source).is_file():
             return Path(source)
-    raise MapError(unknown_name("map", source, known))
+    raise MapError(describe_unknown_name("map", source, known))
 
 
 def bundled_maps() -> dict[str, Path]:
@@ -81,14 +81,14 @@ def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Envi
     """Return the map in the JSON `text`, called `where`, with pictures in `folder`; raises as `load_map`."""
     document = parse(text, where)
     try:
-        return _environment(document, one_line(where), folder)
+        return _environment(document, to_one_line(where), folder)
     except MapError as error:
         raise located(error, text, where) from None
 
 
 def from_json(document: dict[str, Any], where: str = "map", folder: Path | None = None) -> Environment:
     """Return the map in a parsed JSON `document`; see `parse_map`."""
-    where = one_line(where)
+    where = to_one_line(where)
     require_json(document, where)
     return _environment(document, where, folder)
 
@@ -223,7 +223,7 @@ def _density(model: DensityModel, boundary: Ring, folder: Path | None, where: st
         try:
             greys = _greys(_content(str(model.picture), folder))
         except InputError as error:
-            raise MapError.of(where, [Mistake.at(at, f"{shown_json(model.picture)}: {error}")]) from None
+            raise MapError.of(where, [Mistake.at(at, f"{quote_json(model.picture)}: {error}")]) from None
         values = np.round(low + (high - low) * greys, _GREY_DIGITS)
         if not values.max() > 0.0:
             raise MapError.of(where, [Mistake.at(at, NOTHING)])
@@ -262,7 +262,7 @@ def _content(name: str, folder: Path | None) -> bytes:
         with path.open("rb") as file:
             content = file.read(MOST_BYTES + 1)
     except (OSError, ValueError) as error:
-        raise InputError(f"cannot be read: {reason(error)}") from None
+        raise InputError(f"cannot be read: {describe_error(error)}") from None
     if len(content) > MOST_BYTES:
         raise InputError(f"larger than {MOST_BYTES / 1e6:g} MB, but a smaller file was wanted")
     return content
@@ -284,5 +284,5 @@ def _greys(content: bytes) -> Array:
     except InputError:
         raise
     except Exception as error:  # whatever a damaged picture makes of a decoder
-        why = one_line(error) or type(error).__name__
+        why = to_one_line(error) or type(error).__name__
         raise InputError(f"cannot be read as PNG or PGM: {why}") from None

@@ -25,7 +25,7 @@ from robocov.environment import (
     narrowest_gap,
     swept_area,
 )
-from robocov.errors import JsonPath, MapError, Mistake, StartError, counted, listed, place
+from robocov.errors import JsonPath, MapError, Mistake, StartError, format_count, format_path, summarize_names
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 
@@ -64,7 +64,7 @@ def _ring_mistakes(at: JsonPath, ring: Ring) -> Iterator[Mistake]:
     size, flat = f"{extent[0]:g} x {extent[1]:g} m", _FLAT * float(extent.max()) ** 2
     count = len(set(map(tuple, ring)))
     if count < 3:
-        yield Mistake.at(at, f"{counted(count, 'different point')}, but at least 3 were wanted")
+        yield Mistake.at(at, f"{format_count(count, 'different point')}, but at least 3 were wanted")
     elif extent.max() > LARGEST:
         yield Mistake.at(at, f"{size}, but at most {LARGEST / 1000:g} km was wanted")
     elif extent.min() < SMALLEST:
@@ -102,7 +102,9 @@ def _crossing(at: JsonPath, points: Array, polygon: Polygon) -> Mistake:
     apart = (k for k in nearest if (k - nearest[0]) % len(points) not in (0, 1, len(points) - 1))
     other = next((k for k in apart if distance[k] <= 1e-6), nearest[1])
     first, second = sorted((nearest[0], other))
-    found = f"the edge from here meets the edge from {place((*at, second))} near [{spot[0]:g}, {spot[1]:g}]"
+    found = (
+        f"the edge from here meets the edge from {format_path((*at, second))} near [{spot[0]:g}, {spot[1]:g}]"
+    )
     return Mistake.at((*at, first), f"{found}, but a ring that does not meet itself was wanted")
 
 
@@ -119,7 +121,9 @@ def _polygon_mistakes(at: JsonPath, shape: PolygonObstacle | WeightedArea) -> It
     for k, hole in enumerate(shape.holes):
         path = (*at, "holes", k)
         if not shell.covers(Polygon(hole)):
-            yield Mistake.at(path, f"sticks out of {place((*at, 'vertices'))}, but a hole inside was wanted")
+            yield Mistake.at(
+                path, f"sticks out of {format_path((*at, 'vertices'))}, but a hole inside was wanted"
+            )
         elif not Polygon(shape.vertices, [*good, hole]).is_valid:
             yield Mistake.at(path, "meets the outline or another hole, but a hole apart from them was wanted")
         else:
@@ -300,7 +304,7 @@ def _rings(environment: Environment) -> Iterator[tuple[str, Ring]]:
     """Yield the lists of vertices of the file, with their places."""
     yield "boundary", environment.boundary
     for k, obstacle in enumerate(environment.obstacles):
-        at = place(("obstacles", k))
+        at = format_path(("obstacles", k))
         if isinstance(obstacle, PolygonObstacle):
             yield f"{at}.vertices", obstacle.vertices
             for hole, ring in enumerate(obstacle.holes):
@@ -334,11 +338,11 @@ def _path_warnings(environment: Environment) -> Iterator[str]:
         names = [_called(other, environment.obstacles[other].name) for other in met]
         names += ["the boundary"] if beyond is not None else []
         if names:
-            yield f"{_called(k, obstacle.name)} moves through {listed(names)}"
+            yield f"{_called(k, obstacle.name)} moves through {summarize_names(names)}"
 
 
 def _called(k: int, name: str | None) -> str:
-    return place(("obstacles", k)) + (f" ({name})" if name else "")
+    return format_path(("obstacles", k)) + (f" ({name})" if name else "")
 
 
 def _room_warnings(environment: Environment, radius: float) -> Iterator[str]:
@@ -352,7 +356,7 @@ def _room_warnings(environment: Environment, radius: float) -> Iterator[str]:
         spot = part.representative_point()
         yield f"sealed room of {part.area:.3g} m² around [{spot.x:.4g}, {spot.y:.4g}]"
     if slivers:
-        pockets = counted(len(slivers), "sealed pocket")
+        pockets = format_count(len(slivers), "sealed pocket")
         yield f"{pockets} smaller than a robot, {sum(slivers):.2g} m² together"
 
 

@@ -16,7 +16,7 @@ from pydantic_core import ErrorDetails
 from robocov import density, environment
 from robocov.density import FINEST, HEAVIEST, Interpolation
 from robocov.environment import Repeat
-from robocov.errors import JsonPath, MapError, Mistake, place, shown_json, unknown_name
+from robocov.errors import JsonPath, MapError, Mistake, describe_unknown_name, format_path, quote_json
 from robocov.files.strictjson import check_header, refused
 
 FORMAT = "robocov-map"
@@ -321,7 +321,7 @@ def _mistake(detail: ErrorDetails) -> Mistake:
     """Return one structural error in the project's words: place, value, what was wanted."""
     loc, value = list(detail["loc"]), detail["input"]
     if loc[0] == "starts" and loc[2:] == ["[key]"]:
-        text = f"starts: name {shown_json(value)}, but {_LABEL} was wanted"
+        text = f"starts: name {quote_json(value)}, but {_LABEL} was wanted"
         return Mistake(tuple(loc[:-1]), text, at_key=True)
     kinds = _CHOICES.get(str(loc[0]), {})
     model: type[Model] = MapModel
@@ -335,9 +335,9 @@ def _mistake(detail: ErrorDetails) -> Mistake:
         *parent, key = loc
         model = _PARTS.get(str(parent[inside]), model) if len(parent) > inside else model
         known = [field.alias or name for name, field in model.model_fields.items()]
-        at = f"{place(parent)}: " if parent else ""
-        return Mistake(tuple(loc), f"{at}{unknown_name('key', str(key), known)}", at_key=True)
-    found = "missing" if detail["type"] == "missing" else shown_json(value)
+        at = f"{format_path(parent)}: " if parent else ""
+        return Mistake(tuple(loc), f"{at}{describe_unknown_name('key', str(key), known)}", at_key=True)
+    found = "missing" if detail["type"] == "missing" else quote_json(value)
     steps = [k for k, step in enumerate(loc) if isinstance(step, str)]
     wanted = _WANTED[str(loc[steps[-1]])][len(loc) - 1 - steps[-1]]
     return Mistake.at(tuple(loc), f"{found}, but {wanted} was wanted")
@@ -347,13 +347,13 @@ def _kind_mistake(path: tuple[str | int, ...], value: object, kinds: list[str]) 
     """Return what is wrong with an obstacle, a start or a density whose kind is not known."""
     wanted = f"one of {', '.join(kinds)}"
     if not isinstance(value, dict):
-        return Mistake.at(path, f"{shown_json(value)}, but an object whose kind is {wanted} was wanted")
+        return Mistake.at(path, f"{quote_json(value)}, but an object whose kind is {wanted} was wanted")
     path = (*path, "kind")
     if "kind" not in value:
         return Mistake.at(path, f"missing, but {wanted} was wanted")
     near = get_close_matches(str(value["kind"]).lower(), kinds, n=1, cutoff=0.5)
     hint = f" (did you mean {near[0]!r}?)" if near else ""
-    return Mistake.at(path, f"{shown_json(value['kind'])}, but {wanted} was wanted{hint}")
+    return Mistake.at(path, f"{quote_json(value['kind'])}, but {wanted} was wanted{hint}")
 
 
 def _not_one_of(model: Model, one: str, other: str) -> str | None:
@@ -375,7 +375,7 @@ def _weight_mistakes(model: DensityModel) -> Iterator[Mistake]:
             smaller_eigenvalue = 0.5 * (a + d) - math.hypot(0.5 * (a - d), b)
             if b != c or not smaller_eigenvalue >= SMALLEST**2 or a * d - b * c <= 1e-9 * a * d:
                 wanted = f"positive definite matrix of at least ({SMALLEST * 1000:g} mm)² each way"
-                what = f"{shown_json(peak.covariance)}, but a symmetric, {wanted} was wanted"
+                what = f"{quote_json(peak.covariance)}, but a symmetric, {wanted} was wanted"
                 yield Mistake.at((*at, "covariance"), what)
     if not getattr(model, _BASES[model.kind]) and not any(part.weight for part in (*peaks, *areas)):
         yield Mistake.at(("density", "weight") if model.kind == "uniform" else ("density",), NOTHING)
@@ -390,7 +390,7 @@ def _raster_mistakes(model: RasterModel) -> Iterator[Mistake]:
         sides = x_max - x_min, y_max - y_min
         if not (min(sides) >= SMALLEST and max(sides) <= LARGEST):
             wanted = f"[x_min, y_min, x_max, y_max] with sides from {SMALLEST:g} to {LARGEST:.0f} m"
-            yield Mistake.at(("density", "extent"), f"{shown_json(model.extent)}, but {wanted} was wanted")
+            yield Mistake.at(("density", "extent"), f"{quote_json(model.extent)}, but {wanted} was wanted")
     if model.rows is not None:
         for name in ("black", "white"):
             if getattr(model, name) is not None:

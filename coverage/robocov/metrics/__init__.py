@@ -11,7 +11,7 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.cost import CoverageCost, MomentaryCost
 from robocov.drawing import Drawable
-from robocov.errors import counted, required
+from robocov.errors import format_count, require_type
 from robocov.metrics.advice import advise
 from robocov.record import Record, nearest_moments
 from robocov.sensor import RangeSensor
@@ -51,7 +51,7 @@ class CostHistory(Drawable):
 
     def __repr__(self) -> str:
         first, last = self.mean_distance[[0, -1]].tolist()
-        moments = counted(len(self.time), "moment")
+        moments = format_count(len(self.time), "moment")
         return f"<CostHistory {moments}, {self.time[-1]:.1f} s, mean distance {first:.3f} to {last:.3f} m>"
 
 
@@ -63,8 +63,8 @@ def cost_history(
     Robots count while they work, and obstacles that move stand where they are at each moment. `rate` is in
     samples per simulated second, see `sample_moments`; `on_sample` is called after every evaluation.
     """
-    required("record", record, Record, 'a Record, as Simulation.run and Record.load("run") return,')
-    required("cost", cost, CoverageCost, "a CoverageCost")
+    require_type("record", record, Record, 'a Record, as Simulation.run and Record.load("run") return,')
+    require_type("cost", cost, CoverageCost, "a CoverageCost")
     moments = sample_moments(record, rate)
     rows = np.empty((len(moments), 3))
     speeds = record.team.max_speed if record.team.mixed_speeds else None

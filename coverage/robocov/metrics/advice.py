@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.errors import counted, listed
+from robocov.errors import format_count, summarize_names
 from robocov.record import Record
 
 TREMBLE_WINDOW_S = 5.0
@@ -134,6 +134,6 @@ def _describe_zigzags(record: Record, zigzags: IntArray) -> str:
 def _name(record: Record, robots: IntArray) -> str:
     numbers = record.session.get("robots") or range(1, len(record.team) + 1)
     if len(robots) == len(record.team) > 1:
-        return f"all {counted(len(robots), 'robot')}"
+        return f"all {format_count(len(robots), 'robot')}"
     names = [str(numbers[robot]) for robot in robots.tolist()]
-    return f"robot{'s' if len(names) > 1 else ''} {listed(names)}"
+    return f"robot{'s' if len(names) > 1 else ''} {summarize_names(names)}"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.errors import InputError, counted, shown, unknown_name
+from robocov.errors import InputError, describe_unknown_name, format_count, quote
 from robocov.extras import extra
 from robocov.files.csv_cells import unquote_cell
 from robocov.metrics import CostHistory
@@ -56,7 +56,7 @@ class Results:
         return sum(1 for _ in _lines(self._table)) - 1
 
     def __repr__(self) -> str:
-        return f"<Results {self.folder}, {counted(len(self), 'run')}>"
+        return f"<Results {self.folder}, {format_count(len(self), 'run')}>"
 
     @property
     def study(self) -> dict[str, Any]:
@@ -74,7 +74,7 @@ class Results:
         """
         for name in columns or ():
             if name not in self.columns:
-                raise InputError(f"{self.folder}: {unknown_name('column', name, self.columns)}")
+                raise InputError(f"{self.folder}: {describe_unknown_name('column', name, self.columns)}")
         return read_rows(self._table, self._kinds(), columns)
 
     def to_pandas(self, columns: Sequence[str] | None = None) -> DataFrame:
@@ -111,13 +111,13 @@ class Results:
         if isinstance(run, int | np.integer):
             number, count = int(run), len(self)
             if not -count <= number < count:
-                raise InputError(f"{self.folder}: row {number}, but there are {counted(count, 'row')}")
+                raise InputError(f"{self.folder}: row {number}, but there are {format_count(count, 'row')}")
             run = str(next(islice(self.rows(["run"]), number % count, None))["run"])
         elif not isinstance(run, str):
             run = str(run["run"])
         folder = self.folder / "runs" / run
         if not run or Path(run).name != run or not folder.is_dir():
-            raise InputError(f"{self.folder}: there is no run {shown(run)}")
+            raise InputError(f"{self.folder}: there is no run {quote(run)}")
         error = folder / "error.json"
         if error.is_file():
             raise InputError(f"{folder}: the run failed: {_reason(error)}")
@@ -129,7 +129,7 @@ class Results:
         cells = [[f"<th>{escape(name)}</th>" for name in self.columns]]
         cells += [[f"<td>{escape(_cell(row[name]))}</td>" for name in self.columns] for row in head]
         rows = [f"<tr>{''.join(row)}</tr>" for row in cells]
-        caption = f"{counted(count, 'run')} of {escape(str(self.folder))}"
+        caption = f"{format_count(count, 'run')} of {escape(str(self.folder))}"
         if count > len(head):
             caption += f"; the first {len(head)}"
         return escape_controls(
@@ -190,7 +190,7 @@ def read_history(path: Path) -> CostHistory:
             rows[k] = [float(cells[column]) for column in range(max(len(cells), len(names)))]
         except (ValueError, IndexError):
             wanted = f"{len(names)} numbers were wanted"
-            raise InputError(f"{path}: line {k + 2}: {shown(line)}, but {wanted}") from None
+            raise InputError(f"{path}: line {k + 2}: {quote(line)}, but {wanted}") from None
     return CostHistory(*rows.T)
 
 

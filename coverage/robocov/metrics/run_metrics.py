@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from robocov.arrays import Array, IntArray
-from robocov.errors import ParameterError, counted, shown
+from robocov.errors import ParameterError, format_count, quote
 from robocov.metrics import CostHistory, clearances, robot_gaps
 from robocov.metrics.sight import covered
 from robocov.observation.neighbours import Neighbours
@@ -68,7 +68,7 @@ class RunMetrics:
 
     def __repr__(self) -> str:
         share = f"{self.sensed_area[-1] / self.free_area:.0%} of the free area sensed at the end"
-        return f"<RunMetrics {counted(len(self.time), 'moment')}, {self.time[-1]:.1f} s, {share}>"
+        return f"<RunMetrics {format_count(len(self.time), 'moment')}, {self.time[-1]:.1f} s, {share}>"
 
     def rows(self) -> list[tuple[float, ...]]:
         """Return the rows of ``metrics.csv``, under `COLUMNS`."""
@@ -97,7 +97,7 @@ def run_metrics(
     negative or not finite.
     """
     if not 0.0 <= rate < np.inf:
-        raise ParameterError(f"rate: {shown(rate)} Hz, but a finite number from 0 was wanted")
+        raise ParameterError(f"rate: {quote(rate)} Hz, but a finite number from 0 was wanted")
     moments = nearest_moments(record.time, rate)
     team, working = record.team, record.working
     since = np.concatenate([[0], moments[:-1] + 1])

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.density.base import CellEdges, Density, Uniform
-from robocov.errors import ParameterError, checked, counted, shown
+from robocov.errors import ParameterError, format_count, quote, require_number
 from robocov.observation.neighbours import Neighbours, close_pairs
 from robocov.observation.region import Region
 
@@ -44,8 +44,8 @@ class Scanning:
     period: float = 0.5
 
     def __post_init__(self) -> None:
-        checked("scanning.rays", self.rays, 1, MOST_RAYS, whole=True)
-        checked("scanning.period", self.period, 0.0, 1e6, "s")
+        require_number("scanning.rays", self.rays, 1, MOST_RAYS, whole=True)
+        require_number("scanning.period", self.period, 0.0, 1e6, "s")
 
     def every(self, dt: float) -> int:
         """Return after how many control periods of `dt` seconds each scan follows the one before.
@@ -171,7 +171,7 @@ class Snapshot:
     """The messages that the robots then have; None where they know the others as they are."""
 
     def __repr__(self) -> str:
-        return f"<Snapshot at {self.time:.2f} s, {counted(len(self.positions), 'robot')}>"
+        return f"<Snapshot at {self.time:.2f} s, {format_count(len(self.positions), 'robot')}>"
 
     @property
     def time(self) -> float:
@@ -264,7 +264,7 @@ def checked_decision(made: Any, count: int, controller: str, time: float, source
     when = f" at {time:.3f} s{source}"
     if not isinstance(made, Decision):
         missing = " (is a return statement missing?)" if made is None else ""
-        raise ParameterError(f"{where} returned {shown(made)}{missing}{when}, expected a Decision")
+        raise ParameterError(f"{where} returned {quote(made)}{missing}{when}, expected a Decision")
     decision: Decision = made
     forces = _rows(decision.forces, count, f"{where} returned forces", when)
     goals = decision.goals
@@ -287,14 +287,14 @@ def detached(decision: Decision, controller: str, source: str = "") -> Decision:
     """
     where = f"controller {controller!r}: decide(seen, memory) returned"
     if not isinstance(decision.terms, Mapping):
-        raise ParameterError(f"{where} terms {shown(decision.terms)}{source}, expected a dict of forces")
+        raise ParameterError(f"{where} terms {quote(decision.terms)}{source}, expected a dict of forces")
     count = len(decision.forces)
     terms = {
-        name: _rows(term, count, f"{where} the term {shown(name)}", source).copy()
+        name: _rows(term, count, f"{where} the term {quote(name)}", source).copy()
         for name, term in decision.terms.items()
     }
     if decision.cells is not None and not isinstance(decision.cells, Cells):
-        got = f"{shown(decision.cells)}{source}"
+        got = f"{quote(decision.cells)}{source}"
         raise ParameterError(f"{where} cells {got}, expected what robocov.partition returns, or None")
     goals = None if decision.goals is None else decision.goals.copy()
     return replace(decision, forces=decision.forces.copy(), goals=goals, terms=terms)
@@ -304,7 +304,7 @@ def given_forces(values: Any, count: int, what: str) -> Array:
     """Return forces from outside, N; a ParameterError when they are not finite and (n, 2)."""
     forces = _rows(values, count, what)
     if not _finite(forces):
-        raise ParameterError(f"{what}: expected finite newtons, got {shown(forces.tolist())}")
+        raise ParameterError(f"{what}: expected finite newtons, got {quote(forces.tolist())}")
     return forces
 
 
@@ -331,7 +331,7 @@ def _rows(values: Any, count: int, what: str, when: str = "") -> Array:
     """Return two numbers for each robot as an array, the same one where it is one already."""
     array = to_numbers(values)
     if array is None:
-        raise ParameterError(f"{what} {shown(values)}{when}, expected numbers of shape {(count, 2)}")
+        raise ParameterError(f"{what} {quote(values)}{when}, expected numbers of shape {(count, 2)}")
     if array.shape != (count, 2):
         raise ParameterError(f"{what} of shape {array.shape}{when}, expected {(count, 2)}")
     return array

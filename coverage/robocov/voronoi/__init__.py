@@ -16,7 +16,7 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.density.base import REGION, CellEdges, Density
-from robocov.errors import InputError, shown
+from robocov.errors import InputError, quote
 from robocov.observation import Cells
 from robocov.observation.neighbours import NOBODY, Neighbours
 from robocov.observation.region import Region
@@ -113,7 +113,7 @@ def partition(
     count = cells_of(points, region.sides, known, indptr, indices, n, mesh, mass, centroid, _NO_EDGES)
     if count < 0:
         bad = -1 - count
-        raise InputError(f"generators[{bad}]: {shown(points[bad].tolist())}, but finite numbers were wanted")
+        raise InputError(f"generators[{bad}]: {quote(points[bad].tolist())}, but finite numbers were wanted")
     if mesh.shape[1] > 0 and mesh[0, 0] < 0:
         mesh = np.empty((2, 0), dtype=np.int32)  # the triangulation failed
     mesh.setflags(write=False)

@@ -40,7 +40,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.density.base import CellEdges, Density
-from robocov.errors import InputError, shown
+from robocov.errors import InputError, quote
 from robocov.observation import Cells
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
@@ -149,7 +149,7 @@ def weighted_partition(
     points = generators_of(generators)
     speeds = np.array(speeds, dtype=np.float64)
     if speeds.shape != points.shape[:1] or not ((speeds > 0.0) & (speeds < np.inf)).all():
-        raise InputError(f"speeds: {shown(speeds.tolist())}, but {len(points)} positive numbers were wanted")
+        raise InputError(f"speeds: {quote(speeds.tolist())}, but {len(points)} positive numbers were wanted")
     neighbours = Neighbours(len(points)) if neighbours is None else neighbours
     if (speeds == speeds[:1]).all():
         return partition(points, region, neighbours, warm, heard=heard, density=density)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from reported_results import entry, result_of
 
-from robocov.errors import counted
+from robocov.errors import format_count
 from robocov_app.report.facts import facts, gaps, lede, meanings, run_facts, run_title, title_of, troubles
 from robocov_app.report.groups import compared_groups, comparisons, styles
 from robocov_app.report.results import Damaged, Reference
@@ -243,5 +243,5 @@ def test_runs_are_called_by_what_tells_them_apart() -> None:
     assert run_title(result_of([entry()], kind="run"), entry(), "RAPF") == "RAPF · rooms"
     one = entry(gains=(("k", 1.0),), settled_at_s=3.0, path_length_m=1.5)
     assert run_facts(result, one) == "Gains: k 1; settled at 3.0 s; 0 contacts; 1.50 m of path per robot."
-    assert counted(1, "contact") in run_facts(result, entry(contacts=1))
+    assert format_count(1, "contact") in run_facts(result, entry(contacts=1))
     assert np.isnan(entry(error="no").final)

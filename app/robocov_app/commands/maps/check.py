@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import tyro
 from rich.console import Console
 
-from robocov.errors import InputError, MapError, place
+from robocov.errors import InputError, MapError, format_path
 from robocov.mapfile import load_map, map_file
 from robocov.mapfile.check import MapReport, check_map
 from robocov_app.runs.options import JsonOption
@@ -110,7 +110,7 @@ def _row(name: str, outcome: MapReport | InputError) -> dict[str, Any]:
     if isinstance(outcome, MapError):
         row |= {"line": outcome.line, "column": outcome.column}
         row["mistakes"] = [
-            {"path": place(each.path), "text": each.text, "line": each.line, "column": each.column}
+            {"path": format_path(each.path), "text": each.text, "line": each.line, "column": each.column}
             for each in outcome.mistakes
         ]
         row["mistakes_not_listed"] = outcome.unlisted

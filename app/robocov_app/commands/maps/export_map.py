@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from robocov.errors import InputError, one_line
+from robocov.errors import InputError, to_one_line
 from robocov.mapfile import load_map
 from robocov_app.formats import EXPORTERS, WriteOptions, export_map, exporter
 from robocov_app.runs.options import JsonOption
@@ -43,7 +43,7 @@ class Arguments(JsonOption):
 def command(options: Arguments) -> None:
     if options.format is not None and options.format not in EXPORTERS:
         known = ", ".join(EXPORTERS)
-        raise InputError(f"--format: {one_line(options.format)!r}, but one of {known} was wanted")
+        raise InputError(f"--format: {to_one_line(options.format)!r}, but one of {known} was wanted")
     for file in exporter(options.out, options.format).files(options.out, options.write):
         require_fresh(file, "another -o", overwrite=options.overwrite, source=Path(options.map), read="map")
     report = export_map(load_map(options.map), options.out, format=options.format, options=options.write)

@@ -9,7 +9,15 @@ from typing import Annotated, Any, Literal, TypeAlias
 import tyro
 
 from robocov.environment import Environment
-from robocov.errors import InputError, MapError, OutputError, ParameterError, checked, counted, reason
+from robocov.errors import (
+    InputError,
+    MapError,
+    OutputError,
+    ParameterError,
+    describe_error,
+    format_count,
+    require_number,
+)
 from robocov.files.atomic import writable
 from robocov.mapfile import bundled_maps, dump_map, load_map, save_map
 from robocov.mapfile.check import check_map
@@ -70,7 +78,7 @@ class Arguments(PlotOptions):
             if field.name in _SETTLED and value != field.default:
                 raise InputError(f"--{field.name}: {value}, but --study says what its maps are like")
         if self.count is not None:
-            checked("--count", self.count, 1, MOST)
+            require_number("--count", self.count, 1, MOST)
         if (self.width is None) != (self.height is None):
             given, missing = ("width", "height") if self.height is None else ("height", "width")
             raise InputError(f"--{given}: {getattr(self, given):g}, but --{missing} was wanted with it")
@@ -114,7 +122,7 @@ def _facts(row: dict[str, Any]) -> str:
     gap = row["narrowest_gap_m"]
     facts = [f"{row['file']}: {row['free_area_m2']:.4g} of {row['area_m2']:.4g} m² free"]
     facts += ["no passage" if gap is None else f"narrowest gap {gap:.3f} m"]
-    return ", ".join([*facts, counted(row["obstacles"], "obstacle"), f"{row['vertices']} vertices"])
+    return ", ".join([*facts, format_count(row["obstacles"], "obstacle"), f"{row['vertices']} vertices"])
 
 
 def check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
@@ -125,7 +133,7 @@ def check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
             out.mkdir(parents=True, exist_ok=True)
             used = any(out.iterdir())
         except OSError as error:
-            raise OutputError(f"{out}: cannot be used for maps: {reason(error)}") from error
+            raise OutputError(f"{out}: cannot be used for maps: {describe_error(error)}") from error
         if used and not overwrite:
             raise InputError(f"{out}: the folder is not empty; another --out, or --overwrite, was wanted")
     elif out is not None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import tyro
 
-from robocov.errors import InputError, one_line
+from robocov.errors import InputError, to_one_line
 from robocov.mapfile import save_map
 from robocov_app.figures.files import check_figure_path
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, import_map
@@ -60,7 +60,7 @@ class Arguments(JsonOption):
 def command(options: Arguments) -> None:
     if options.format is not None and options.format not in IMPORTERS:
         known = ", ".join(IMPORTERS)
-        raise InputError(f"--format: {one_line(options.format)!r}, but one of {known} was wanted")
+        raise InputError(f"--format: {to_one_line(options.format)!r}, but one of {known} was wanted")
     out = Path(f"{options.file.stem}.json") if options.out is None else options.out
     require_fresh(out, "another -o", overwrite=options.overwrite, source=options.file)
     if options.preview is not None:

@@ -10,7 +10,7 @@ import shapely
 from pygame import Rect, Surface
 
 from robocov.environment import Point
-from robocov.errors import counted
+from robocov.errors import format_count
 from robocov_app.editor.canvas import overlay
 from robocov_app.editor.canvas.map_layers import Sheet, View, beyond
 from robocov_app.editor.canvas.overlay import legend_entries
@@ -36,11 +36,11 @@ from robocov_app.toolkit.layout import Layout, inside
 def map_words(editor: Editor) -> str:
     sketch, measurement = editor.sketch, editor.measurement
     unsaved = "● " if editor.document.history.unsaved else ""
-    said = [f"{unsaved}{editor.document.title}", counted(len(sketch.obstacles), "obstacle")]
+    said = [f"{unsaved}{editor.document.title}", format_count(len(sketch.obstacles), "obstacle")]
     if measurement is not None:
         said.append(f"{measurement.free_area:.2f} m² free")
         if grave := sum(problem.grave for problem in measurement.problems):
-            said.append(f"draft: {counted(grave, 'problem')}")
+            said.append(f"draft: {format_count(grave, 'problem')}")
     return "   ·   ".join(said)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import shapely
 
 from robocov.environment import GRID, CircleObstacle, Obstacle, PolygonObstacle
-from robocov.errors import MapError, counted
+from robocov.errors import MapError, format_count
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import outlines, tenths
@@ -21,7 +21,7 @@ _intersection = partial(shapely.intersection, grid_size=GRID)
 
 def united(sketch: Sketch, selection: Selection) -> Change:
     items = _chosen(sketch, selection, "unite")
-    return _in_place(sketch, items, [_union(items)], f"{counted(len(items), 'obstacle')} united")
+    return _in_place(sketch, items, [_union(items)], f"{format_count(len(items), 'obstacle')} united")
 
 
 def subtracted(sketch: Sketch, selection: Selection) -> Change:
@@ -29,14 +29,14 @@ def subtracted(sketch: Sketch, selection: Selection) -> Change:
     lowest, *uppers = items = _chosen(sketch, selection, "subtract")
     left = _difference(lowest.geometry, _union(uppers))
     what = sketch.display_name(lowest.key)
-    words = f"{counted(len(uppers), 'obstacle')} cut out of {what}"
+    words = f"{format_count(len(uppers), 'obstacle')} cut out of {what}"
     return _in_place(sketch, items, [left], words, f"nothing is left of {what}")
 
 
 def intersected(sketch: Sketch, selection: Selection) -> Change:
     items = _chosen(sketch, selection, "intersect")
     common = reduce(_intersection, (item.geometry for item in items))
-    words = f"{counted(len(items), 'obstacle')} intersected"
+    words = f"{format_count(len(items), 'obstacle')} intersected"
     return _in_place(sketch, items, [common], words, "they have nothing in common")
 
 
@@ -77,7 +77,9 @@ def clipped(sketch: Sketch, selection: Selection) -> Change:
         if (not selection.items or item.key in selection.items) and not inside.covers(item.geometry)
     }
     require(shapes, "nothing sticks out of the boundary")
-    return replace_obstacles(sketch, shapes, f"{counted(len(shapes), 'obstacle')} cut off at the boundary")
+    return replace_obstacles(
+        sketch, shapes, f"{format_count(len(shapes), 'obstacle')} cut off at the boundary"
+    )
 
 
 def repaired(sketch: Sketch, selection: Selection) -> Change:
@@ -97,7 +99,7 @@ def repaired(sketch: Sketch, selection: Selection) -> Change:
         boundary = parts[0].vertices if parts else None
     redrawn = boundary is not sketch.boundary
     require(shapes or redrawn, "there is nothing to repair: no outline crosses itself")
-    words = f"{counted(len(shapes) + redrawn, 'outline')} repaired"
+    words = f"{format_count(len(shapes) + redrawn, 'outline')} repaired"
     change = replace_obstacles(replace(sketch, boundary=boundary), shapes, words)
     return replace(change, selection=replace(change.selection, boundary=redrawn and boundary is not None))
 

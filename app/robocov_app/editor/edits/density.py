@@ -8,7 +8,7 @@ import shapely
 
 from robocov.density import HEAVIEST, Density, Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
 from robocov.environment import Point, PolygonObstacle
-from robocov.errors import MapError, counted
+from robocov.errors import MapError, format_count
 from robocov.mapfile.models import LARGEST
 from robocov_app.editor.edits import create, transform
 from robocov_app.editor.model import require
@@ -58,7 +58,7 @@ def areas_made(sketch: Sketch, selection: Selection, weight: float) -> Change:
     for shape in shapes:
         area = WeightedArea(shape.vertices, weight, shape.holes, shape.name)
         after = area_added(after, area).sketch
-    return Change(after, Selection(), f"{counted(len(shapes), 'polygon')} made an area of the density")
+    return Change(after, Selection(), f"{format_count(len(shapes), 'polygon')} made an area of the density")
 
 
 def removed(sketch: Sketch, number: int) -> Change:
@@ -122,11 +122,11 @@ def density_label(density: Density | None) -> str:
     if density is None:
         return "none: every place counts the same"
     if isinstance(density, Gaussians):
-        return f"{counted(len(density.peaks), 'hot spot')}, floor {density.floor:g}"
+        return f"{format_count(len(density.peaks), 'hot spot')}, floor {density.floor:g}"
     if isinstance(density, Raster):
         rows, columns = density.values.shape
         return f"picture, {columns} x {rows}"
-    kind = counted(len(density.areas), "area") if isinstance(density, WeightedPolygons) else density.kind
+    kind = format_count(len(density.areas), "area") if isinstance(density, WeightedPolygons) else density.kind
     return f"{kind}, {density.lowest:g} to {density.highest:g}"
 
 

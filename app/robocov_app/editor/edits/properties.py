@@ -6,7 +6,7 @@ from itertools import count
 from typing import Any
 
 from robocov.environment import PolygonObstacle
-from robocov.errors import MapError, one_line
+from robocov.errors import MapError, to_one_line
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits import create, vertices
 from robocov_app.editor.model import require
@@ -120,9 +120,9 @@ def raised(sketch: Sketch, selection: Selection, where: str) -> Change:
 
 
 def start_first(sketch: Sketch, name: str) -> Change:
-    require(name in dict(sketch.starts), f"there is no start “{one_line(name)}”")
+    require(name in dict(sketch.starts), f"there is no start “{to_one_line(name)}”")
     starts = tuple(sorted(sketch.starts, key=lambda pair: pair[0] != name))
-    words = f"start “{one_line(name)}” made the default"
+    words = f"start “{to_one_line(name)}” made the default"
     return Change(replace(sketch, starts=starts), Selection.of(name), words)
 
 

@@ -17,7 +17,7 @@ from shapely import LineString, Polygon
 from robocov import environment as env
 from robocov.arrays import Array
 from robocov.environment import Point, Ring
-from robocov.errors import MapError, counted
+from robocov.errors import MapError, format_count
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import as_array, distinct, point_near, ring_near, tenths
@@ -242,7 +242,9 @@ def straightened(sketch: Sketch, selection: Selection, degrees: float = 5.0) -> 
         sketch, selection, lambda rings, closed: tuple(_straight(ring, degrees, closed) for ring in rings)
     )
     require(changed, f"no edge is within {degrees:g} degrees of level or upright, and not so already")
-    return Change(after, selection.without_vertices(), f"{counted(len(changed), 'outline')} straightened")
+    return Change(
+        after, selection.without_vertices(), f"{format_count(len(changed), 'outline')} straightened"
+    )
 
 
 def _redrawn(sketch: Sketch, selection: Selection, redraw: _Redraw) -> tuple[Sketch, list[tuple[Ring, Ring]]]:

@@ -7,7 +7,7 @@ import math
 import re
 
 from robocov.environment import Point
-from robocov.errors import MapError, shown
+from robocov.errors import MapError, quote
 from robocov.mapfile.models import FARTHEST, LARGEST
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import cos_sin
@@ -29,7 +29,7 @@ def length_of(text: str, *, now: float | None = None) -> float:
     sign = typed[:1]
     if now is not None and sign and sign in "*/×÷":
         factor = _wanted(_number(typed[1:]), text, _LENGTHS)
-        require(sign not in "/÷" or factor != 0.0, f"{shown(text)}: nothing can be divided by 0")
+        require(sign not in "/÷" or factor != 0.0, f"{quote(text)}: nothing can be divided by 0")
         return _limited(now * factor if sign in "*×" else now / factor, text)
     if now is not None and typed.endswith("%"):
         return _limited(now * _wanted(_number(typed[:-1]), text, _LENGTHS) / 100.0, text)
@@ -41,7 +41,7 @@ def point_of(text: str, *, last: Point | None = None) -> Point:
     """Return a place, m: ``3,2 1,5``, ``320 cm; 1.5 m``, ``2<45``; from `last` ``@2<45``, ``+0.5 0``."""
     typed = _clean(text)
     relative = typed[:1] in ("@", "+")
-    require(last or not relative, f"{shown(text)}: there is no point before that it could be relative to")
+    require(last or not relative, f"{quote(text)}: there is no point before that it could be relative to")
     length, sign, angle = typed.removeprefix("@").strip().partition("<")
     if sign:
         x, y = _polar(_length(length.strip()), _angle(angle), text)
@@ -50,7 +50,7 @@ def point_of(text: str, *, last: Point | None = None) -> Point:
     if relative and last is not None:
         x, y = last[0] + x, last[1] + y
     if max(abs(x), abs(y)) > FARTHEST:
-        raise MapError(f"{shown(text)}: maps reach {FARTHEST / 1000:.0f} km from their origin")
+        raise MapError(f"{quote(text)}: maps reach {FARTHEST / 1000:.0f} km from their origin")
     return _exact(x), _exact(y)
 
 
@@ -65,7 +65,7 @@ def next_point_of(text: str, last: Point | None, towards: Point | None) -> Point
             return _exact(last[0] + x), _exact(last[1] + y)
         if not math.isnan(length):
             length = _limited(length, text)
-            require(away != 0.0, f"{shown(text)}: point the cursor where the line is to go")
+            require(away != 0.0, f"{quote(text)}: point the cursor where the line is to go")
             return _exact(last[0] + dx / away * length), _exact(last[1] + dy / away * length)
     return point_of(text, last=last)
 
@@ -76,7 +76,7 @@ def size_of(text: str) -> tuple[float, float]:
     both = _length(typed)
     pair = _pair(typed, "x×*") if math.isnan(both) else (both, both)
     width, height = (_wanted(value, text, _SIZES) for value in pair)
-    require(min(width, height) > 0.0, f"{shown(text)}: width and height must be above 0 m")
+    require(min(width, height) > 0.0, f"{quote(text)}: width and height must be above 0 m")
     return _limited(width, text), _limited(height, text)
 
 
@@ -90,7 +90,7 @@ def _clean(text: str) -> str:
 
 
 def _wanted(value: float, text: str, wanted: str) -> float:
-    require(not math.isnan(value), f"{shown(text)}: {wanted}")
+    require(not math.isnan(value), f"{quote(text)}: {wanted}")
     return value
 
 
@@ -138,5 +138,5 @@ def _exact(value: float) -> float:
 
 
 def _limited(length: float, text: str) -> float:
-    require(abs(length) <= LARGEST, f"{shown(text)}: at most {LARGEST / 1000:g} km was wanted")
+    require(abs(length) <= LARGEST, f"{quote(text)}: at most {LARGEST / 1000:g} km was wanted")
     return _exact(length)

@@ -11,7 +11,7 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any, Literal, Self, TypeAlias
 
-from robocov.errors import MapError, OutputError, counted, one_line
+from robocov.errors import MapError, OutputError, format_count, to_one_line
 from robocov.files.atomic import writable, written
 from robocov.files.strictjson import read_bytes
 from robocov.mapfile import bundled_maps, load_map
@@ -142,7 +142,7 @@ class Autosave:
         now = now or datetime.now().astimezone()
         day = {0: "today", 1: "yesterday"}.get((now.date() - self.when.date()).days, f"{self.when:%Y-%m-%d}")
         where = "never saved" if self.path is None else f"not saved to {self.path.name}"
-        what = f"“{one_line(self.name)}”, {counted(self.obstacles, 'obstacle')}"
+        what = f"“{to_one_line(self.name)}”, {format_count(self.obstacles, 'obstacle')}"
         return f"{what}, {day} {self.when:%H:%M}, {where}"
 
 
@@ -193,10 +193,10 @@ def write_sketch(sketch: Sketch, path: Path, before: OnDisk | None = None, *, ov
     writable(path)
     ours = before if before is not None and before.path == path else None
     if not over and ours is None and _stamp(path) is not None:
-        raise ChangedError(f"{one_line(path)}: there is such a file already")
+        raise ChangedError(f"{to_one_line(path)}: there is such a file already")
     if not over and ours is not None and state_of(ours) == "changed":
         what = "has been changed by something else since it was opened or saved here"
-        raise ChangedError(f"{one_line(path)}: {what}")
+        raise ChangedError(f"{to_one_line(path)}: {what}")
     with written(path) as part:
         part.write_bytes(text)
     return OnDisk(path, sha256(text).hexdigest(), _stamp(path) or (-1, 0))

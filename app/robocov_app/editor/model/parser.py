@@ -8,7 +8,15 @@ from typing import Any, NoReturn, TypeVar
 
 from robocov import environment as env
 from robocov.environment import Obstacle, Point, Ring
-from robocov.errors import JsonPath, MapError, Mistake, one_line, place, shown_json, unknown_name
+from robocov.errors import (
+    JsonPath,
+    MapError,
+    Mistake,
+    describe_unknown_name,
+    format_path,
+    quote_json,
+    to_one_line,
+)
 from robocov.files.strictjson import check_header, located, parse, require_json
 from robocov.mapfile import density_of
 from robocov.mapfile.models import FORMAT, VERSION, MapModel
@@ -38,7 +46,7 @@ def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> S
 
 def sketch_of(document: Any, where: str = "map", folder: Path | None = None) -> Sketch:
     """Return the sketch in a parsed document, whatever rule it breaks; MapError where it is no map at all."""
-    where = one_line(where)
+    where = to_one_line(where)
     require_json(document, where)
     check_header(document, where, FORMAT, VERSION)
     reader = _Reader(where)
@@ -70,18 +78,18 @@ class _Reader:
         self._where = where
 
     def refuse(self, path: JsonPath, what: str, *, at_key: bool = False) -> NoReturn:
-        at = f"{place(path[:-1] if at_key else path)}: " if path[: -1 if at_key else None] else ""
+        at = f"{format_path(path[:-1] if at_key else path)}: " if path[: -1 if at_key else None] else ""
         raise MapError.of(self._where, [Mistake(path, at + what, at_key)])
 
     def typed(self, kind: type[_Read], value: Any, path: JsonPath, wanted: str) -> _Read:
         if not isinstance(value, kind):
-            self.refuse(path, f"{shown_json(value)}, but {wanted} was wanted")
+            self.refuse(path, f"{quote_json(value)}, but {wanted} was wanted")
         return value
 
     def members(self, value: Any, path: JsonPath, known: Sequence[str]) -> dict[str, Any]:
         for key in self.typed(dict, value, path, "an object"):
             if key not in known:
-                self.refuse((*path, key), unknown_name("key", str(key), known), at_key=True)
+                self.refuse((*path, key), describe_unknown_name("key", str(key), known), at_key=True)
         return value  # type: ignore[no-any-return]
 
     def text(self, value: Any, path: JsonPath) -> str:
@@ -89,12 +97,12 @@ class _Reader:
 
     def number(self, value: Any, path: JsonPath) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            self.refuse(path, f"{shown_json(value)}, but a number was wanted")
+            self.refuse(path, f"{quote_json(value)}, but a number was wanted")
         return float(value)
 
     def point(self, value: Any, path: JsonPath) -> Point:
         if not isinstance(value, list | tuple) or len(value) != 2:
-            self.refuse(path, f"{shown_json(value)}, but a point [x, y] in metres was wanted")
+            self.refuse(path, f"{quote_json(value)}, but a point [x, y] in metres was wanted")
         x, y = value
         if type(x) is float and type(y) is float:  # most of a large file: no path for each
             return x, y
@@ -110,7 +118,7 @@ class _Reader:
 
     def repeat(self, value: Any, path: JsonPath) -> env.Repeat:
         if value not in env.REPEATS:
-            self.refuse(path, f"{shown_json(value)}, but one of {', '.join(env.REPEATS)} was wanted")
+            self.refuse(path, f"{quote_json(value)}, but one of {', '.join(env.REPEATS)} was wanted")
         return value  # type: ignore[no-any-return]
 
     def way(self, value: Any, path: JsonPath) -> env.ObstaclePath:
@@ -122,7 +130,7 @@ class _Reader:
             self.refuse((*path, "kind"), "missing, but it was wanted")
         kind = value["kind"]
         if kind not in tuple(classes):
-            self.refuse((*path, "kind"), f"{shown_json(kind)}, but {wanted} was wanted")
+            self.refuse((*path, "kind"), f"{quote_json(kind)}, but {wanted} was wanted")
         return self.built(classes[kind], value, path, "kind")
 
     def built(self, of: type[_Read], value: Any, path: JsonPath, *more: str) -> _Read:

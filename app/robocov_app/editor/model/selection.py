@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from robocov.environment import Obstacle, Point
-from robocov.errors import counted
+from robocov.errors import format_count
 from robocov_app.editor.model import require
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
 
@@ -92,7 +92,7 @@ class Selection:
         if vertices:
             return f"{vertices} vertices" if vertices > 1 else "vertex"
         if len(owners) > 1:
-            return counted(len(owners), "obstacle" if self.items else "start")
+            return format_count(len(owners), "obstacle" if self.items else "start")
         return sketch.display_name(next(iter(owners))) if owners else "nothing"
 
 

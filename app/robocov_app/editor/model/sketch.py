@@ -11,7 +11,7 @@ import shapely
 from robocov import environment as env
 from robocov.density import Density
 from robocov.environment import Obstacle, Point, Ring, StartSpec
-from robocov.errors import one_line
+from robocov.errors import to_one_line
 from robocov.mapfile import dump_document, from_json, to_json
 from robocov.mapfile.models import FARTHEST, LARGEST
 from robocov_app.editor.model.background import MARKS, Background, annotated, taken_apart
@@ -116,10 +116,10 @@ class Sketch:
     def display_name(self, owner: Owner) -> str:
         """Return what people call something: "polygon “desk”", "start “corner”", "boundary"."""
         if isinstance(owner, str):
-            return one_line(f"start “{owner}”")
+            return to_one_line(f"start “{owner}”")
         shape = None if owner == BOUNDARY else self.item(owner).shape
         kind = "boundary" if shape is None else KINDS[type(shape)]
-        return one_line(f"{kind} “{shape.name}”") if shape and shape.name else kind
+        return to_one_line(f"{kind} “{shape.name}”") if shape and shape.name else kind
 
     def ring_points(self, owner: Owner) -> tuple[Ring, ...]:
         """Return where the vertices of something are, m, ring by ring; empty where there is no such thing."""

@@ -14,7 +14,7 @@ from shapely import LineString, MultiPoint, MultiPolygon, Polygon
 from robocov import environment as env
 from robocov.arrays import Array
 from robocov.environment import Obstacle, Point, Ring, StartSpec
-from robocov.errors import MapError, StartError, counted, listed
+from robocov.errors import MapError, StartError, format_count, summarize_names
 from robocov.mapfile.check import check_rules
 from robocov.mapfile.models import FARTHEST, LARGEST, LONGEST_LABEL, SMALLEST, validate
 from robocov.robots import DEFAULT_RADIUS
@@ -339,7 +339,7 @@ def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
         names = [numbered_name(sketch, key) for key in met] + ([] if beyond is None else ["the boundary"])
         if names:
             where = shapely.union_all([*met.values(), beyond])
-            yield Problem(f" moves through {listed(names)}", where, item.key, False)
+            yield Problem(f" moves through {summarize_names(names)}", where, item.key, False)
 
 
 def _sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:
@@ -351,6 +351,6 @@ def _sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:
         yield Problem(words, part, None, False, "sealed")
     if slivers:
         area = sum(part.area for part in slivers)
-        what = counted(len(slivers), "sealed pocket")
+        what = format_count(len(slivers), "sealed pocket")
         words = f"{what} {'are' if len(slivers) > 1 else 'is'} smaller than a robot, {area:.2g} m² together"
         yield Problem(words, MultiPolygon(slivers), None, False, "sealed")

@@ -7,7 +7,7 @@ from math import copysign
 import shapely
 
 from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, PolygonObstacle, WallObstacle
-from robocov.errors import MapError, counted
+from robocov.errors import MapError, format_count
 from robocov_app.editor.edits import create
 from robocov_app.editor.model import require
 from robocov_app.editor.model.coordinates import length_of, next_point_of, size_of
@@ -189,7 +189,7 @@ class PlacesTool(DrawTool):
     make = staticmethod(create.points_start_drawn)
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
-        words = f"{counted(len(points) - 1, 'robot')}; Enter ends it"
+        words = f"{format_count(len(points) - 1, 'robot')}; Enter ends it"
         return Preview(start=PointsStart(points[:-1]), words=words)
 
 

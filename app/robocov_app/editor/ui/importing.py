@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args, get_origin, get_type_hints
 
 from robocov.environment import Environment
-from robocov.errors import ParameterError, one_line, shown
+from robocov.errors import ParameterError, quote, to_one_line
 from robocov_app.editor.ui.import_sheet import Sheet, make_sheet
 from robocov_app.formats import ForeignMap, Importer, ImportReport, ReadOptions, Shaping, read_map, shaped
 from robocov_app.formats.geometry.conversion import Comparison, compare
@@ -42,7 +42,7 @@ class Option:
             numbers = ()
         if len(numbers) != (2 if self.kind == "place" else 1):
             wanted = "x and y" if self.kind == "place" else "a number"
-            raise ParameterError(f"{self.name}: {shown(text)}, but {wanted} was wanted")
+            raise ParameterError(f"{self.name}: {quote(text)}, but {wanted} was wanted")
         return numbers if self.kind == "place" else numbers[0]
 
 
@@ -104,7 +104,7 @@ class Importing:
             self._read = key, read_map(path, format=name, options=options)
         foreign = self._read[1]
         sheet = self._make_sheet(path, name, options, foreign)
-        environment, report = shaped(foreign, shaping, one_line(path.name))
+        environment, report = shaped(foreign, shaping, to_one_line(path.name))
         return Imported(environment, report, compare(foreign, environment, report), sheet)
 
     def _make_sheet(self, path: Path, name: str, options: ReadOptions, foreign: ForeignMap) -> Sheet | None:

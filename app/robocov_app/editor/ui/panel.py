@@ -9,7 +9,7 @@ from typing import NamedTuple
 import pygame
 
 from robocov.environment import CircleObstacle, DiscStart
-from robocov.errors import MapError, counted
+from robocov.errors import MapError, format_count
 from robocov_app.editor.canvas.overlay import draw_badge
 from robocov_app.editor.edits import density, fixes, properties, transform
 from robocov_app.editor.model import require
@@ -422,7 +422,7 @@ def facts(editor: Editor) -> tuple[tuple[str, str, str], ...]:
         gap, diameter = measurement.gap, 2 * measurement.radius
         free = f"{measurement.free_area:.2f} m²"
         parts = f"{count}" if count == reached else f"{count}; {reached} for a robot"
-        holds = f"{counted(len(sketch.obstacles), 'obstacle')}, {measurement.vertices} vertices"
+        holds = f"{format_count(len(sketch.obstacles), 'obstacle')}, {measurement.vertices} vertices"
         sign = "≥" if gap is not None and gap.width >= diameter else "<"
         narrowest = "none" if gap is None else f"{gap.width:.3f} m {sign} {diameter:.2f} m"
     counts = "How much each place counts: the tool Density; floor 0.5 and density none are commands"

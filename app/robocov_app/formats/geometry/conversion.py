@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov import environment as env
 from robocov.arrays import Array
 from robocov.environment import Environment, Ring
-from robocov.errors import MapError, ParameterError, counted, one_line, shown
+from robocov.errors import MapError, ParameterError, format_count, quote, to_one_line
 from robocov.mapfile import from_json, to_json
 from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
 from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST
@@ -97,7 +97,7 @@ class Shaping(Options):
             return
         if len(self.inside) != 2 or not all(abs(value) <= FARTHEST for value in self.inside):
             wanted = f"two numbers from {-FARTHEST:.0f} to {FARTHEST:.0f} (m) were wanted"
-            raise ParameterError(f"inside: {shown(self.inside)}, but {wanted}")
+            raise ParameterError(f"inside: {quote(self.inside)}, but {wanted}")
         if self.keep == "all":
             raise ParameterError("inside: keeps one part of the free space, but keep is all")
 
@@ -185,7 +185,7 @@ class _Shaper:
         grid = 10.0**-self.digits
         cleaned = remove_hairs(free, 2 * grid, max(self._tolerance(), 2 * grid))
         if cleaned.number:
-            what = f"{counted(cleaned.number, 'hair')} (slits, spurs) thinner than {2000 * grid:g} mm"
+            what = f"{format_count(cleaned.number, 'hair')} (slits, spurs) thinner than {2000 * grid:g} mm"
             self.changed.append(f"removed {what}, {square_metres(cleaned.area, 2)}")
         return cleaned
 
@@ -272,7 +272,7 @@ class _Shaper:
 
     def _to_environment(self, plan: _Plan, free: MultiPolygon) -> Environment:
         environment = Environment(
-            name=one_line(self.foreign.name)[:100].strip() or "map",
+            name=to_one_line(self.foreign.name)[:100].strip() or "map",
             boundary=self._ring(plan.boundary.exterior),
             obstacles=(*self._obstacles(plan.solid), *plan.primitives),
             starts=self._starts(free),
@@ -293,7 +293,7 @@ class _Shaper:
             return
         reached = sorted((place.area for place in rooms(environment.free, self.radius)), reverse=True)
         if len(reached) > 1:
-            what = f"{counted(len(reached) - 1, 'place')} of {square_metres(sum(reached[1:]), 3)}"
+            what = f"{format_count(len(reached) - 1, 'place')} of {square_metres(sum(reached[1:]), 3)}"
             self.notes.append(f"{what} no robot of radius {self.radius:g} m reaches from the largest one")
 
     def _valid_boundary(self) -> MultiPolygon | None:
@@ -360,7 +360,7 @@ class _Shaper:
             raise MapError(f"{self.where}: {found}, but one of at least {self.specks:g} m² was wanted")
         if left:
             largest = f" (the largest {square_metres(left[0].area, 3)})" if len(left) > 1 else ""
-            drop(f"{counted(len(left), 'separate part')} of the free space, {_squared(left)}{largest}")
+            drop(f"{format_count(len(left), 'separate part')} of the free space, {_squared(left)}{largest}")
             share = area[stays].sum() / area.sum()
             if share < _LITTLE or left[0].area / area.sum() > _CONSIDERABLE:
                 self.others = [_place_in(part) for part in left[:_OFFERED]]
@@ -416,10 +416,10 @@ class _Shaper:
             rings = shapely.get_exterior_ring(holes[stays]).tolist()
             result.append(part if stays.all() else Polygon(part.exterior, rings))
         if specks:
-            few = f"{counted(len(specks), 'obstacle')} smaller than {least:.3g} m²"
+            few = f"{format_count(len(specks), 'obstacle')} smaller than {least:.3g} m²"
             drop(f"{few}, {_squared(specks)} (--specks 0 keeps them)")
         if crumbs:
-            drop(f"{counted(len(crumbs), 'hole')} of {_squared(crumbs)}, which come of rounding")
+            drop(f"{format_count(len(crumbs), 'hole')} of {_squared(crumbs)}, which come of rounding")
         if tiny >= _MANY and least < _TINY:
             note(f"{tiny} obstacles are smaller than {_TINY:g} m² (--specks {_TINY:g} drops them)")
         return result
@@ -456,7 +456,7 @@ class _Shaper:
         """Return `solid` as obstacles, the largest first, without what is too small for a map."""
         kept = [part for part in solid if min(np.subtract(part.bounds[2:], part.bounds[:2])) >= SMALLEST]
         if len(kept) < len(solid):
-            thin = counted(len(solid) - len(kept), "obstacle")
+            thin = format_count(len(solid) - len(kept), "obstacle")
             self.dropped.append(f"{thin} thinner than {SMALLEST * 1000:g} mm")
         kept.sort(key=lambda part: (-round(part.area, 6), part.bounds))
         ring = self._ring
@@ -492,7 +492,7 @@ class _Shaper:
             if fits.any():
                 starts["robots"] = env.PointsStart(tuple((x, y) for x, y in given[fits].tolist()))
             rest = "" if fits.sum() == len(robots) else "; there is no room at the others"
-            many = f"{int(fits.sum())} of {counted(len(robots), 'place')}"
+            many = f"{int(fits.sum())} of {format_count(len(robots), 'place')}"
             self.notes.append(f'start "robots": {many} of robots in the file{rest}')
         return starts
 

@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle, WallObstacle
-from robocov.errors import one_line
+from robocov.errors import to_one_line
 from robocov.mapfile.models import LONGEST_LABEL
 from robocov_app.formats.colours import Colour, Role
 from robocov_app.formats.geometry.painting import Coat
@@ -171,5 +171,5 @@ class Line:
 
 def name_of(labels: Sequence[str]) -> str | None:
     """Return what an obstacle with these labels is called in a map; layer 0 of a drawing is no name."""
-    names = (one_line(label)[:LONGEST_LABEL].strip() for label in labels[:1] if label != "0")
+    names = (to_one_line(label)[:LONGEST_LABEL].strip() for label in labels[:1] if label != "0")
     return next(names, None) or None

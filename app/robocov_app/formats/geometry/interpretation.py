@@ -34,7 +34,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import GRID, CircleObstacle
-from robocov.errors import MapError, counted, shown
+from robocov.errors import MapError, format_count, quote
 from robocov.mapfile.models import LARGEST
 from robocov_app.formats.base import Primitive, ReadOptions, square_metres
 from robocov_app.formats.colours import WHITE, count_colours
@@ -272,10 +272,10 @@ def _find_named(drawing: Drawing) -> Boundary | None:
     areas = [outline.area for outline in drawing.outlines if outline in outlines]
     area = _unite([*areas, shapely.union_all(rooms)])
     if not area.is_empty:
-        return Boundary(area, f"what is called {shown(wanted or BOUNDARY)}", outlines, lines, is_named=True)
+        return Boundary(area, f"what is called {quote(wanted or BOUNDARY)}", outlines, lines, is_named=True)
     if wanted is not None:
         found = "encloses no area, but a closed outline was wanted"
-        raise MapError(f"{drawing.where}: boundary {shown(wanted)}: {found}")
+        raise MapError(f"{drawing.where}: boundary {quote(wanted)}: {found}")
     return None
 
 
@@ -362,7 +362,7 @@ def _find_outermost(drawing: Drawing) -> Boundary | None:
 def _join_outlines(drawing: Drawing, largest: Outline, members: set[Outline]) -> Boundary:
     """Return a boundary of several outlines, one of which is the largest, or of that one alone."""
     if len(members) == 1:
-        called = f", {shown(largest.labels[0])}," if largest.labels else ""
+        called = f", {quote(largest.labels[0])}," if largest.labels else ""
         source = f"the largest closed outline{called} of {largest.filled_area:.4g} m²"
         if len(drawing.outlines) == 1:
             source = "the only closed outline"
@@ -661,16 +661,16 @@ class _Report:
         # where the format says what all of it is, outlines need no word
         is_found = boundary is None or boundary.source != ""
         if is_found and obstacles.count:
-            many = counted(obstacles.count, "closed outline")
+            many = format_count(obstacles.count, "closed outline")
             self.notes.append(f"{many} taken as solid (--outlines free: as free space)")
         elif not are_solid and len(drawing.outlines) > 1:
-            many = counted(len(drawing.outlines), "closed outline")
+            many = format_count(len(drawing.outlines), "closed outline")
             self.notes.append(f"{many} taken as free space (--outlines solid: as obstacles)")
         if obstacles.walls:
             widths = [width for line in obstacles.walls for width in line.measure_widths()]
             narrow, wide = f"{min(widths):.3g}", f"{max(widths):.3g}"
             span = narrow if narrow == wide else f"{narrow} to {wide}"
-            many = counted(len(obstacles.walls), "line")
+            many = format_count(len(obstacles.walls), "line")
             self.notes.append(f"{many} taken as walls, {span} m wide (--thickness)")
         if obstacles.pillars:
-            self.notes.append(f"{counted(len(obstacles.pillars), 'point')} taken as pillars")
+            self.notes.append(f"{format_count(len(obstacles.pillars), 'point')} taken as pillars")

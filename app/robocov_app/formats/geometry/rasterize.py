@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, BoolArray, IntArray, ranges
 from robocov.environment import Environment
-from robocov.errors import ParameterError, counted
+from robocov.errors import ParameterError, format_count
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.formats.base import ExportReport
 from robocov_app.formats.files import MAX_CELLS
@@ -146,7 +146,7 @@ def _lost(environment: Environment, grid: Grid, free: BoolArray) -> str:
     if (pieces == 0).any():
         gone = int((pieces == 0).sum())
         are = "is" if gone == 1 else "are"
-        words.append(f"{counted(gone, 'separate part')} of the free space {are} lost")
+        words.append(f"{format_count(gone, 'separate part')} of the free space {are} lost")
     if (pieces > 1).any():
         words.append(f"gaps close: the free space falls into {len(large)} parts, not {len(parts)}")
     return "; ".join(words)

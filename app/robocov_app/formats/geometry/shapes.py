@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle
-from robocov.errors import MapError, ParameterError, counted, unknown_name
+from robocov.errors import MapError, ParameterError, describe_unknown_name, format_count
 from robocov.mapfile.models import FARTHEST, SMALLEST
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, Painted, ReadOptions
@@ -212,7 +212,9 @@ class Shapes:
 
     @property
     def repaired(self) -> tuple[str, ...]:
-        told = [f"{counted(count, thing)} {what}" for (thing, what), count in sorted(self.mended.items())]
+        told = [
+            f"{format_count(count, thing)} {what}" for (thing, what), count in sorted(self.mended.items())
+        ]
         if len(self._met) == 1:
             told.append(f"the outline met itself: {self._met[0]}")
         elif self._met:
@@ -226,7 +228,7 @@ class Shapes:
         heights = np.concatenate([*self._heights, np.empty(0)])
         if len(heights):
             span = f"z from {heights.min():.4g} to {heights.max():.4g}"
-            told.append(f"{counted(len(heights), 'third coordinate')}, {span}")
+            told.append(f"{format_count(len(heights), 'third coordinate')}, {span}")
         return tuple(told)
 
     def require_known_names(self) -> None:
@@ -237,7 +239,7 @@ class Shapes:
             for label in labels or ():
                 if label.casefold() not in self.labels:
                     known = list(self.labels.values())[:_SHOWN]
-                    what = unknown_name("name", label, known) if known else "no shape has a name"
+                    what = describe_unknown_name("name", label, known) if known else "no shape has a name"
                     raise ParameterError(f"{self.where}: {name}: {what}")
 
     def count(self, vertices: int) -> None:
@@ -336,4 +338,4 @@ def _many(count: int, thing: str) -> str:
     """Return how many things there are, also of nouns in y and x."""
     if count != 1 and thing.endswith(("y", "x")):
         return f"{count} {thing[:-1]}ies" if thing[-1] == "y" else f"{count} {thing}es"
-    return counted(count, thing)
+    return format_count(count, thing)

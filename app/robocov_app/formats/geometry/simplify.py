@@ -24,7 +24,7 @@ from shapely import MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, BoolArray, IntArray, beginnings, ranges
-from robocov.errors import counted
+from robocov.errors import format_count
 from robocov_app.formats.geometry.vectorize import NECK
 
 KEPT_OUTLINE, KEPT_AREA = 0.1, 0.02  # parts of an outline's area, and of all that is free, that may change
@@ -343,7 +343,7 @@ def _told(found: Counter[str], radius: float) -> tuple[str, ...]:
         "outline": f"whose area would have changed by more than {100 * KEPT_OUTLINE:g} %",
         "place": "where walls would have met",
     }
-    told = [f"simplified less at {counted(found[k], k)}, {why}" for k, why in less.items() if found[k]]
+    told = [f"simplified less at {format_count(found[k], k)}, {why}" for k, why in less.items() if found[k]]
     if found["area"]:
         told.append(f"simplified less, so that the free area changes by less than {100 * KEPT_AREA:g} %")
     return tuple(told)

@@ -21,7 +21,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import GRID
-from robocov.errors import counted
+from robocov.errors import format_count
 from robocov.mapfile.models import SMALLEST
 from robocov_app.formats.geometry.polygons import polygons_of, united
 
@@ -45,7 +45,7 @@ class ClosedGaps(NamedTuple):
         """Return a line for the report of an import."""
         width = f"{1000 * self.widest:.2g} mm"
         size = f"{width} wide" if self.number == 1 else f"the widest {width}"
-        return f"{counted(self.number, 'gap')} between outlines closed, {size} (--snap 0 keeps them)"
+        return f"{format_count(self.number, 'gap')} between outlines closed, {size} (--snap 0 keeps them)"
 
 
 def default_snap(areas: Sequence[BaseGeometry]) -> float:

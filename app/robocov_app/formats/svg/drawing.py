@@ -25,7 +25,7 @@ from shapely import Polygon
 
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle, Environment, Obstacle, Ring, WallObstacle
-from robocov.errors import MapError, one_line
+from robocov.errors import MapError, to_one_line
 from robocov.files.atomic import written
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
@@ -80,7 +80,9 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     own = "at its own scale" if options.scale is None else f"a unit is {options.scale:g} m"
     shapes.notes = [own, *drawing.notes()]
     shapes.note_colours(drawing.key)
-    texts = {each.tag: one_line(" ".join(each.text.split())) for each in root.children if each.text.strip()}
+    texts = {
+        each.tag: to_one_line(" ".join(each.text.split())) for each in root.children if each.text.strip()
+    }
     name = texts.get("title", "")[:80] or name_of_map(path)
     return shapes.foreign_map(name, texts.get("desc", "")[:1000] or "Imported from SVG.", solid=True)
 

@@ -17,7 +17,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, 
 from pydantic_core import PydanticCustomError
 
 from robocov.environment import Environment
-from robocov.errors import MapError, Mistake, shown_json
+from robocov.errors import MapError, Mistake, quote_json
 from robocov.files.atomic import written
 from robocov.files.strictjson import check_header, located, parse, read_bytes, refused
 from robocov.mapfile import bundled_maps, from_json, load_map, to_json
@@ -262,7 +262,7 @@ def _node(touch: TouchModel, nodes: list[Node], refuse: Callable[..., None]) -> 
 
 
 def _refuse(where: str, *path: str | int, value: object, wanted: str) -> None:
-    raise MapError.of(where, [Mistake.at(path, f"{shown_json(value)}, but {wanted} was wanted")])
+    raise MapError.of(where, [Mistake.at(path, f"{quote_json(value)}, but {wanted} was wanted")])
 
 
 class _Maps:
@@ -324,11 +324,11 @@ def _mistake(detail: Any) -> Mistake:
     if detail["type"] == "extra_forbidden":
         return Mistake.at(path, "unknown key", at_key=True)
     if detail["type"] in ("model_type", "dataclass_type"):
-        return Mistake.at(path, f"{shown_json(detail['input'])}, but an object was wanted")
+        return Mistake.at(path, f"{quote_json(detail['input'])}, but an object was wanted")
     if (tag := _TAG.match(str(detail["msg"]))) is not None:
         wanted = f"one of {tag['known']} was wanted"
-        return Mistake.at((*path, tag["key"]), f"{shown_json(tag['found'])}, but {wanted}")
+        return Mistake.at((*path, tag["key"]), f"{quote_json(tag['found'])}, but {wanted}")
     words = str(detail["msg"]).removeprefix("Input should be ").replace("a valid integer", "an integer")
     words = words.replace("a valid ", "a ")
     words = re.sub(r".* should have (.*?)( after validation)?, not \d+", r"\1", words)
-    return Mistake.at(path, f"{shown_json(detail['input'])}, but {words} was wanted")
+    return Mistake.at(path, f"{quote_json(detail['input'])}, but {words} was wanted")

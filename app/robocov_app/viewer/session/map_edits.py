@@ -10,7 +10,7 @@ import shapely
 
 from robocov.density import Raster, sampled
 from robocov.environment import CircleObstacle, Environment, Obstacle, Point, PolygonObstacle, WallObstacle
-from robocov.errors import MapError, place
+from robocov.errors import MapError, format_path
 from robocov.mapfile import from_json, to_json
 
 SHORTEST = 0.02  # metres below which what is drawn is taken for a slip of the hand
@@ -35,7 +35,7 @@ def with_replaced(
         except MapError as error:
             # an obstacle on a start takes that start away, nothing else
             message = str(error).removeprefix("map: ")
-            told = {name: re.escape(place(("starts", name))) for name in starts}
+            told = {name: re.escape(format_path(("starts", name))) for name in starts}
             blocked = [name for name, at in told.items() if re.match(rf"{at}[:.\[]", message)]
             if not blocked:
                 raise MapError(message) from None

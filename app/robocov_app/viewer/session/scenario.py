@@ -15,7 +15,7 @@ from robocov.controllers import CONTROLLERS, controller_kind, gains_of, make_con
 from robocov.controllers.base import Controller
 from robocov.controllers.gains import Gain, Option, Value, value_text
 from robocov.environment import Environment
-from robocov.errors import ParameterError, RobocovError, shown
+from robocov.errors import ParameterError, RobocovError, quote
 from robocov.robots import TURNING_RATE, UNITS, Team
 from robocov.simulation import DEFAULT_DT
 
@@ -209,7 +209,7 @@ class Scenario:
     def __post_init__(self) -> None:
         if not 1 <= self.robots <= MOST_ROBOTS:
             wanted = f"a whole number from 1 to {MOST_ROBOTS} was wanted"
-            raise ParameterError(f"robots: {shown(self.robots)}, but {wanted}")
+            raise ParameterError(f"robots: {quote(self.robots)}, but {wanted}")
         if self.conditions is not None and self.conditions.talks and self.robots > MOST_THAT_TALK:
             why = "where messages may be lost or late: the window remembers all of them, of all moments"
             raise ParameterError(f"robots: {self.robots}, but at most {MOST_THAT_TALK} were wanted {why}")
