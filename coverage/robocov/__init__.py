@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # isort: off
         Rpf, make_controller,
     )
     from robocov.controllers.gains import choice, gain
-    from robocov.cost import CoverageCost, CoverageResult, MomentaryCost
+    from robocov.cost import CoverageCost, CoverageResult, TimeVaryingCost
     from robocov.density import Density, Gaussian, Gaussians, Raster, Uniform, WeightedArea, WeightedPolygons
     from robocov.drawing import show
     from robocov.environment import (
@@ -35,6 +35,7 @@ if TYPE_CHECKING:  # isort: off
     from robocov.errors import InputError, MapError, OutputError, ParameterError, RobocovError, StartError
     from robocov.files.array_files import ArrayCache
     from robocov.generator import GENERATORS, generated_map
+    from robocov.lower_bound import LowerBound, compute_lower_bound
     from robocov.mapfile import bundled_maps, load_map, map_schema, save_map
     from robocov.mapfile.check import check_map
     from robocov.metrics import cost_history, settled_at, summarise
@@ -43,7 +44,7 @@ if TYPE_CHECKING:  # isort: off
     from robocov.observation import Decision, Observations, Snapshot
     from robocov.observation.neighbours import Neighbours
     from robocov.observation.region import Region
-    from robocov.optimum import Optimum
+    from robocov.optimum import Optimum, find_optimum
     from robocov.record import Record
     from robocov.robots import Team, read_team
     from robocov.sensor import RangeSensor
@@ -59,7 +60,7 @@ _NAMES = {
     "controllers": "Atlas AtlasShared CONTROLLERS Controller IndividualController Individually "
     "Lloyd OwnView Rapf Rpf make_controller",
     "controllers.gains": "choice gain",
-    "cost": "CoverageCost CoverageResult MomentaryCost",
+    "cost": "CoverageCost CoverageResult TimeVaryingCost",
     "density": "Density Gaussian Gaussians Raster Uniform WeightedArea WeightedPolygons",
     "drawing": "show",
     "environment": "CircleObstacle DiscStart Environment ObstaclePath PointsStart PolygonObstacle "
@@ -67,6 +68,7 @@ _NAMES = {
     "errors": "InputError MapError OutputError ParameterError RobocovError StartError",
     "files.array_files": "ArrayCache",
     "generator": "GENERATORS generated_map",
+    "lower_bound": "LowerBound compute_lower_bound",
     "mapfile": "bundled_maps load_map map_schema save_map",
     "mapfile.check": "check_map",
     "metrics": "cost_history settled_at summarise",
@@ -75,7 +77,7 @@ _NAMES = {
     "observation": "Decision Observations Snapshot",
     "observation.neighbours": "Neighbours",
     "observation.region": "Region",
-    "optimum": "Optimum",
+    "optimum": "Optimum find_optimum",
     "record": "Record",
     "robots": "Team read_team",
     "sensor": "RangeSensor",
@@ -92,13 +94,14 @@ __all__ = [
     "CONTROLLERS", "GENERATORS", "ArrayCache", "Atlas", "AtlasShared", "CircleObstacle", "Conditions",
     "Controller", "CoverageCost", "CoverageResult", "Decision", "Density", "DiscStart", "Environment",
     "Failure", "Gaussian", "Gaussians", "IndividualController", "Individually", "InputError", "Join", "Lloyd",
-    "MapError", "MomentaryCost", "Neighbours", "Observations", "ObstaclePath", "Optimum", "OutputError",
+    "LowerBound", "MapError", "Neighbours", "Observations", "ObstaclePath", "Optimum", "OutputError",
     "OwnView", "ParameterError", "PointsStart", "PolygonObstacle", "RangeSensor", "Rapf", "Raster", "Record",
     "Region", "Results", "RobocovError", "Rpf", "RunMetrics", "Simulation", "Snapshot", "StartError", "Team",
-    "Uniform", "UniformStart", "VoronoiPartition", "WallObstacle", "WeightedArea", "WeightedCells",
-    "WeightedPolygons", "World", "bundled_maps", "check_map", "choice", "cost_history", "gain",
-    "generated_map", "load_map", "make_controller", "map_schema", "partition", "read_results", "read_team",
-    "run_metrics", "save_map", "settled_at", "show", "simulate_many", "summarise", "weighted_partition",
+    "TimeVaryingCost", "Uniform", "UniformStart", "VoronoiPartition", "WallObstacle", "WeightedArea",
+    "WeightedCells", "WeightedPolygons", "World", "bundled_maps", "check_map", "choice",
+    "compute_lower_bound", "cost_history", "find_optimum", "gain", "generated_map", "load_map",
+    "make_controller", "map_schema", "partition", "read_results", "read_team", "run_metrics", "save_map",
+    "settled_at", "show", "simulate_many", "summarise", "weighted_partition",
 ]
 # fmt: on
 

@@ -37,12 +37,12 @@ from robocov.cost import CoverageCost
 from robocov.environment import GRID, Environment
 from robocov.errors import ParameterError, require_number
 from robocov.geodesic import BINS, seen_corners
-from robocov.geodesic.visibility import AngularWallIndex, enter_walls, sees
+from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_visible
 from robocov.geodesic.walls import Walls
 from robocov.k_median import Beat
 from robocov.robots import DEFAULT_RADIUS
 
-FINEST = 1e-5
+MIN_PRECISION = 1e-5
 """The best precision that may be asked for."""
 
 _ROUGH = 0.02, 0.007  # parts of the cost over which the largest worth is smoothed at first,
@@ -73,7 +73,7 @@ class LowerBound:
         return 1.0 - self.mean_distance / self.reached if self.reached else 0.0
 
 
-def lower_bound(
+def compute_lower_bound(
     environment: Environment,
     positions: Array,
     *,
@@ -97,12 +97,13 @@ def lower_bound(
     is no room; an InputError which position is not in the free space.
 
     >>> from robocov.environment import Environment
-    >>> bound = lower_bound(Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2))), [[1, 1]], lattice=16)
+    >>> square = Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2)))
+    >>> bound = compute_lower_bound(square, [[1, 1]], lattice=16)
     >>> bound.gap < 0.001
     True
     """
     require_number("radius", radius, GRID, math.inf, "m")
-    require_number("precision", precision, FINEST, 1.0)
+    require_number("precision", precision, MIN_PRECISION, 1.0)
     tell = progress or (lambda part: None)
     cost = CoverageCost(environment, lattice, progress=lambda part: tell(_BUILT / 2.0 * part))
     dual = _Dual(cost, np.asarray(positions, dtype=float), radius)
@@ -172,7 +173,7 @@ def _bounds(
     corners, least = known.walls.corners, work.least
     for t in range(len(triangles)):
         x, y, r, worth = places[t, 0], places[t, 1], 0.0, 0.0
-        if enter_walls(known.walls, index, 0, x, y, np.inf, 0) < 0:
+        if add_walls(known.walls, index, 0, x, y, np.inf, 0) < 0:
             return -1
         for k in range(3):
             work.vertices[k, 0], work.vertices[k, 1] = triangles[t, k, 0] - x, triangles[t, k, 1] - y
@@ -188,7 +189,7 @@ def _bounds(
                 continue
             for k in range(3):
                 least[k] = price
-            if sees(known.walls, index, 0, site_x, site_y):
+            if is_visible(known.walls, index, 0, site_x, site_y):
                 distance = away
                 _tangent(work, away, x - site_x, y - site_y, away)
             for j in range(count):
@@ -241,7 +242,7 @@ class _Dual:
         self._geodesics = geodesics = cost.geodesics
         self._grid = geodesics.grid
         result = cost(positions)
-        self.covered = geodesics.place(positions)[1].any(axis=0)
+        self.covered = geodesics.snap_to_free_space(positions)[1].any(axis=0)
         self.sites = np.flatnonzero(result.owner >= 0)
         weights = np.ones(len(cost.points)) if cost.weights is None else cost.weights
         weights, self._robots = weights[self.sites], len(positions)
@@ -251,8 +252,8 @@ class _Dual:
         self.reached = float(weights @ result.distances[self.sites])
 
         points, corners = cost.points[self.sites], np.ascontiguousarray(geodesics.walls.corners[:, :2])
-        sites, _ = geodesics.place(points)
-        from_corners = np.ascontiguousarray(geodesics.between(corners, sites).T)
+        sites, _ = geodesics.snap_to_free_space(points)
+        from_corners = np.ascontiguousarray(geodesics.compute_grid_distances(corners, sites).T)
         self._known = _Known(geodesics.walls, sites, weights, from_corners)
 
         parts = np.array(cost.environment.free.geoms)[self.covered]
@@ -264,9 +265,11 @@ class _Dual:
         assert math.isclose(shapely.area(triangles).sum(), room.area, rel_tol=1e-9)
         self._triangles = self._grid.snap(shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3])
 
-        robots, _ = geodesics.place(positions)
+        robots, _ = geodesics.snap_to_free_space(positions)
         none = np.full((_SERVING, len(sites)), np.inf)
-        reach = np.sort(np.concatenate([geodesics.between(robots, sites) * self._grid.unit, none]), axis=0)
+        reach = np.sort(
+            np.concatenate([geodesics.compute_grid_distances(robots, sites) * self._grid.unit, none]), axis=0
+        )
         self._caps = reach[_SERVING - 1]
         # the price of a site lies between its nearest robot and the next; if there is none, beyond all places
         beyond = reach[0] + reach[0].max()
@@ -289,7 +292,7 @@ class _Dual:
         table = [self._table]
         for begin in range(0, len(places), _BLOCK):
             block = places[begin : begin + _BLOCK]
-            rows = self._geodesics.between(block, self._known.sites) * self._grid.unit
+            rows = self._geodesics.compute_grid_distances(block, self._known.sites) * self._grid.unit
             place, site = np.nonzero((rows < self._caps) & np.isfinite(rows))
             first = table[-1].first[-1] + np.cumsum(np.bincount(place, minlength=len(rows)))
             table.append(_Table(first, site.astype(np.int32), rows[place, site].astype(np.float32)))
@@ -325,14 +328,14 @@ class _Dual:
     def bounds(self, prices: Array, triangles: Array) -> tuple[Array, Array, Array]:
         """Return a place in each triangle, (t, 2), what it is worth, (t,), and any place there at most."""
         unit, k, out = self._grid.unit, len(self._geodesics.corners), np.empty((2, len(triangles)))
-        places, _ = self._geodesics.place(self._grid.metres(triangles.mean(axis=1)))
+        places, _ = self._geodesics.snap_to_free_space(self._grid.to_metres(triangles.mean(axis=1)))
         work = _Work(np.empty(k, np.int64), np.empty(k), np.empty((3, 2)), np.empty(3), np.empty(3))
         steps = prices / unit
 
         def fill(index: AngularWallIndex, *_: object) -> int:
             return int(_bounds(self._known, index, steps, triangles, places, work, out))
 
-        self._geodesics.with_room(1, BINS, fill)
+        self._geodesics.run_with_index(1, BINS, fill)
         return places, *(out * unit)
 
     def proved(self, prices: Array, part: float, beat: Beat) -> tuple[float, Array]:

@@ -28,8 +28,8 @@ from robocov.errors import ParameterError, is_number, quote, require_number
 from robocov.k_median import Beat, best_swaps, lloyd_iterations, seeded
 from robocov.robots import DEFAULT_RADIUS
 
-MOST_ROBOTS = 500
-MOST_RESTARTS = 100_000
+MAX_ROBOTS = 500
+MAX_RESTARTS = 100_000
 
 _SOURCES, _SOURCES_A_ROBOT = 600, 20  # about so many places for robots are in the table, more for large teams
 _TARGETS = 1000  # at most about so many groups of sites are in the table
@@ -60,16 +60,16 @@ class Optimum:
     undescended: Array  # (r,) m, and that before the descent of the exact cost
     restart: int  # the one that gave the positions, the first of equals
 
-    def agreement(self, within: float = 0.005) -> float:
+    def compute_agreement(self, within: float = 0.005) -> float:
         """Return the share of the restarts whose mean distance is at most that part above the best."""
         return float((self.costs <= self.mean_distance * (1.0 + within)).mean())
 
-    def gap(self, mean_distance: float) -> float:
+    def compute_gap(self, mean_distance: float) -> float:
         """Return how far a mean distance (m) is above the best, as a part of it: J / J_ref - 1."""
         return mean_distance / self.mean_distance - 1.0
 
 
-def optimum(
+def find_optimum(
     environment: Environment,
     robots: int,
     *,
@@ -93,12 +93,12 @@ def optimum(
     is out of range, or that the robots do not fit.
 
     >>> from robocov.environment import Environment
-    >>> best = optimum(Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2))), 1, restarts=2)
+    >>> best = find_optimum(Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2))), 1, restarts=2)
     >>> best.positions.round(3)
     array([[1., 1.]])
     """
-    require_number("robots", robots, 1, MOST_ROBOTS, whole=True)
-    require_number("restarts", restarts, 1, MOST_RESTARTS, whole=True)
+    require_number("robots", robots, 1, MAX_ROBOTS, whole=True)
+    require_number("restarts", restarts, 1, MAX_RESTARTS, whole=True)
     if not (is_number(seed, Integral) and seed >= 0):
         raise ParameterError(f"seed: {quote(seed)}, but a whole number of at least 0 was wanted")
     if not (is_number(radius) and 0.0 < radius < math.inf):
@@ -118,7 +118,7 @@ def optimum(
         # many restarts end in the same places: one descent tells where these lead
         if key not in known:
             places = search.places[sources]
-            after = descended(cost, search.room, places, search.component[sources], beat)
+            after = descend(cost, search.room, places, search.component[sources], beat)
             known[key] = cost(places).mean_distance, after.mean_distance
             if best is None or _rank(after) < _rank(best):
                 best, best_restart = after, restart
@@ -141,8 +141,8 @@ class _Search:
 
     def __init__(self, environment: Environment, cost: CoverageCost, robots: int, radius: float) -> None:
         self.cost, self.robots = cost, robots
-        self.room = Room(environment.free, radius)
-        site_component = cost.geodesics.place(cost.points)[1].argmax(axis=1)
+        self.room = ConfigurationSpace(environment.free, radius)
+        site_component = cost.geodesics.snap_to_free_space(cost.points)[1].argmax(axis=1)
         sites = np.bincount(site_component, minlength=len(self.room.parts))
         fit = [k for k, part in enumerate(self.room.parts) if not part.is_empty and sites[k]]
         # components are in the order of their areas
@@ -173,7 +173,7 @@ class _Search:
         site = site[np.lexsort((chance[site], off[site], square[site]))]
         _, first, count = np.unique(square[site], return_index=True, return_counts=True)
         weight = count if cost.weights is None else np.add.reduceat(cost.weights[site], first)
-        table = cost.geodesics.distances(self.places, cost.points[site[first]])
+        table = cost.geodesics.compute_distances(self.places, cost.points[site[first]])
         table[np.isinf(table)] = _UNREACHED * cost.geodesics.size
         return np.ascontiguousarray((table * weight).T)
 
@@ -211,7 +211,7 @@ def _spread(part: BaseGeometry, spacing: float) -> Array:
     return np.array(chosen)
 
 
-class Room:
+class ConfigurationSpace:
     """Free configuration space of robots of some radius (m), a part for each component of the free space.
 
     They keep from walls (`clearance`), and from each other (`spacing`, m), the distance that starts leave as
@@ -227,12 +227,12 @@ class Room:
     def nearest(self, positions: Array, component: IntArray) -> Array | None:
         """Return (n, 2) positions near the given ones where all fit, each in its component, or else None."""
         parts = np.array(self.parts, dtype=object)[component]
-        positions = nearest_inside(parts, positions)
+        positions = find_nearest_inside(parts, positions)
         for _ in range(_PUSHES):
             pairs = cKDTree(positions).query_pairs(self.spacing * (1.0 - 1e-9), output_type="ndarray")
             if not len(pairs):
                 return positions
-            positions = nearest_inside(parts, self._apart(positions, pairs[np.lexsort(pairs.T)]))
+            positions = find_nearest_inside(parts, self._apart(positions, pairs[np.lexsort(pairs.T)]))
         return None
 
     def _apart(self, positions: Array, pairs: IntArray) -> Array:
@@ -252,7 +252,7 @@ class Room:
         return positions
 
 
-def nearest_inside(area: Any, positions: Array) -> Array:
+def find_nearest_inside(area: Any, positions: Array) -> Array:
     """Return the nearest place in a geometry, or each in its own of (n,), for (n, 2) positions."""
     points = shapely.points(positions)
     away = np.flatnonzero(~shapely.intersects(area, points))
@@ -264,17 +264,21 @@ def nearest_inside(area: Any, positions: Array) -> Array:
     return positions
 
 
-def descended(
-    cost: CoverageCost, room: Room, positions: Array, component: IntArray, beat: Beat = lambda: None
+def descend(
+    cost: CoverageCost,
+    room: ConfigurationSpace,
+    positions: Array,
+    component: IntArray,
+    beat: Beat = lambda: None,
 ) -> CoverageResult:
     """Return the coverage cost of a local minimum near the given positions, which is never higher.
 
     Projected quasi-Newton steps: L-BFGS (Nocedal and Wright, *Numerical Optimization*, algorithm 7.4),
-    scaled by the curvature that Weiszfeld's iteration for the geometric median uses, from `Room.nearest`
-    back into the room, halved until the cost falls enough (Armijo). The cost is only piecewise smooth,
-    as sites change owners and ways, and a wall may stop a robot: where the learnt direction does not lead
-    down, the scaled slope alone is followed and the curvature learnt anew. No robot leaves its `component`
-    of the free space.
+    scaled by the curvature that Weiszfeld's iteration for the geometric median uses, from
+    `ConfigurationSpace.nearest` back into the room, halved until the cost falls enough (Armijo). The cost
+    is only piecewise smooth, as sites change owners and ways, and a wall may stop a robot: where the learnt
+    direction does not lead down, the scaled slope alone is followed and the curvature learnt anew. No robot
+    leaves its `component` of the free space.
     """
     result = cost(positions)
     slope = _slope(result)
@@ -324,7 +328,7 @@ def _curvature(result: CoverageResult, least: float) -> Array:
     """Return the mean over the sites, by weight, of the inverse distances to first way-points, (n,) 1/m."""
     site = np.nonzero(result.owner >= 0)[0]
     owner = result.owner[site]
-    toward = result.first[site] - result.positions[owner]
+    toward = result.first_waypoints[site] - result.positions[owner]
     # a site under the robot would hold it fast
     length = np.maximum(np.hypot(toward[:, 0], toward[:, 1]), least)
     pull, total = 1.0 / length, float(max(len(site), 1))

@@ -42,7 +42,7 @@ def compared(environment, lattice, robots):
     """Return the largest error of any distance, as a part of the map's size, having checked the rest."""
     cost = CoverageCost(environment, lattice)
     result = cost(robots)
-    everything = cost.geodesics.distances(robots, cost.points)
+    everything = cost.geodesics.compute_distances(robots, cost.points)
     nearest = everything.min(axis=0)
     size = cost.geodesics.size
     reached = np.isfinite(nearest)
@@ -53,15 +53,15 @@ def compared(environment, lattice, robots):
     own = everything[result.owner[site], site]
     assert np.abs(own - nearest[site]).max(initial=0.0) < 1e-12 * size
     # the first way-point is on a shortest way, and so is the last
-    straight = np.hypot(*(result.first[site] - robots[result.owner[site]]).T)
+    straight = np.hypot(*(result.first_waypoints[site] - robots[result.owner[site]]).T)
     assert (straight <= nearest[site] * (1 + 1e-12) + 1e-12 * size).all()
-    bent = site[result.corner[site] >= 0]
-    corners, number = np.unique(result.corner[bent], return_inverse=True)
+    bent = site[result.first_corner[site] >= 0]
+    corners, number = np.unique(result.first_corner[bent], return_inverse=True)
     if len(bent):
-        rest = cost.geodesics.distances(cost.corners[corners], cost.points[bent])[
+        rest = cost.geodesics.compute_distances(cost.corners[corners], cost.points[bent])[
             number, np.arange(len(bent))
         ]
-        total = np.hypot(*(result.first[bent] - robots[result.owner[bent]]).T) + rest
+        total = np.hypot(*(result.first_waypoints[bent] - robots[result.owner[bent]]).T) + rest
         # a corner at a pinch belongs to both sides at once, and would be a short cut
         assert (total <= nearest[bent] + 1e-12 * size).all()
     last = (

@@ -14,9 +14,9 @@ from robocov.density.gaussians import Gaussian, Gaussians
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import InputError, ParameterError
 from robocov.k_median import best_swaps, lloyd_iterations
-from robocov.lower_bound import _Dual, _halves, lower_bound
+from robocov.lower_bound import _Dual, _halves, compute_lower_bound
 from robocov.mapfile import load_map
-from robocov.optimum import optimum
+from robocov.optimum import find_optimum
 
 
 def room(width, height, *obstacles, name="room"):
@@ -33,7 +33,7 @@ PILLARS = room(5, 4, box(1, 1, 2, 3), box(3, 0.8, 3.6, 2.2), name="pillars")
 
 @pytest.mark.slow
 def test_one_robot_in_a_square_is_known_exactly():
-    bound = lower_bound(room(4, 4), [[1.2, 3.1]], precision=2e-4)
+    bound = compute_lower_bound(room(4, 4), [[1.2, 3.1]], precision=2e-4)
     # the mean distance in a square from its middle
     least = CoverageCost(room(4, 4), 64)([[2.0, 2.0]]).mean_distance
     assert least * (1.0 - 4e-4) < bound.mean_distance < least
@@ -45,7 +45,7 @@ def test_one_robot_in_a_square_is_known_exactly():
 
 def test_two_robots_in_a_corridor():
     corridor, places = room(20, 0.5), [[5.0, 0.25], [15.0, 0.25]]
-    bound = lower_bound(corridor, places, lattice=200)
+    bound = compute_lower_bound(corridor, places, lattice=200)
     # libraries of linear algebra round the last bit differently
     assert bound.reached == pytest.approx(CoverageCost(corridor, 200)(places).mean_distance, rel=1e-14)
     assert 0.0 < bound.gap < 0.001
@@ -55,12 +55,12 @@ def test_two_robots_in_a_corridor():
 @pytest.mark.parametrize("robots", [1, 2, 3])
 def test_it_is_below_the_best_of_all_teams_on_sites_and_not_far(where, robots):
     cost = CoverageCost(where, 9)
-    table = cost.geodesics.distances(cost.points, cost.points)
+    table = cost.geodesics.compute_distances(cost.points, cost.points)
     teams = np.array(list(combinations_with_replacement(range(len(table)), robots)))
     means = np.concatenate([table[some].min(axis=1).mean(axis=1) for some in np.array_split(teams, 60)])
-    bound = lower_bound(where, cost.points[teams[means.argmin()]], lattice=9, radius=1e-3)
+    bound = compute_lower_bound(where, cost.points[teams[means.argmin()]], lattice=9, radius=1e-3)
     assert bound.reached == pytest.approx(means.min())
-    best = optimum(where, robots, lattice=9, radius=0.02)
+    best = find_optimum(where, robots, lattice=9, radius=0.02)
     assert bound.mean_distance <= min(best.mean_distance, means.min())
     # what is left is what the dual cannot tell, more on so few sites than on many
     assert bound.mean_distance > best.mean_distance * 0.93
@@ -70,8 +70,8 @@ def test_it_is_below_the_best_of_all_teams_on_sites_and_not_far(where, robots):
 @pytest.mark.parametrize(("name", "robots"), [("blocks-a", 5), ("rooms", 8), ("trap", 12)])
 def test_it_is_close_to_the_optimum_on_bundled_maps(name, robots):
     where = load_map(name)
-    best = optimum(where, robots, lattice=32, restarts=8)
-    bound = lower_bound(where, best.positions, lattice=32)
+    best = find_optimum(where, robots, lattice=32, restarts=8)
+    bound = compute_lower_bound(where, best.positions, lattice=32)
     assert bound.reached == pytest.approx(best.mean_distance, rel=1e-12)
     assert 0.0 < bound.gap < 0.008
 
@@ -94,8 +94,8 @@ def test_no_place_in_a_triangle_is_worth_more_than_is_proved(kind, seed, halving
     _, worth, bound = dual.bounds(prices, triangles)
     part = rng.dirichlet([0.5, 0.5, 0.5], (len(triangles), 12))
     part[:, :3] = np.eye(3)
-    places = cost.geodesics.grid.metres(np.einsum("tpk,tkd->tpd", part, triangles).reshape(-1, 2))
-    distances = cost.geodesics.distances(places, cost.points[dual.sites])
+    places = cost.geodesics.grid.to_metres(np.einsum("tpk,tkd->tpd", part, triangles).reshape(-1, 2))
+    distances = cost.geodesics.compute_distances(places, cost.points[dual.sites])
     worths = np.maximum(prices - distances, 0.0).sum(axis=1).reshape(len(triangles), 12)
     slack = 1e-9 * dual.total
     assert (worths.max(axis=1) <= bound + slack).all()
@@ -115,9 +115,9 @@ def test_no_team_costs_less(kind, seed, robots):
     inside = cost.points[away >= 0.05]
     if not len(inside):
         return
-    bound = lower_bound(where, rng.choice(inside, robots), lattice=12, radius=0.05, precision=0.01)
+    bound = compute_lower_bound(where, rng.choice(inside, robots), lattice=12, radius=0.05, precision=0.01)
     counted = ~np.isnan(bound.prices)
-    table = np.ascontiguousarray(cost.geodesics.distances(inside, cost.points[counted]).T)
+    table = np.ascontiguousarray(cost.geodesics.compute_distances(inside, cost.points[counted]).T)
     teams = [rng.choice(len(inside), robots) for _ in range(200)]
     finite = np.where(np.isinf(table), 1e6, table)
     teams += [best_swaps(finite, lloyd_iterations(finite, team)) for team in teams[:5]]
@@ -129,7 +129,7 @@ def test_places_near_walls_count_where_the_robot_fits():
     where = load_map("cave")
     cost, radius = CoverageCost(where, 16), 0.3
     triangles = _Dual(cost, cost.points[[0]], radius)._triangles
-    polygons = shapely.polygons(cost.geodesics.grid.metres(triangles))
+    polygons = shapely.polygons(cost.geodesics.grid.to_metres(triangles))
     low_x, low_y, high_x, high_y = where.free.bounds
     places = shapely.points(np.random.default_rng(0).uniform((low_x, low_y), (high_x, high_y), (20_000, 2)))
     fit = shapely.contains(where.free, places) & (shapely.distance(where.free.boundary, places) >= radius)
@@ -140,8 +140,8 @@ def test_places_near_walls_count_where_the_robot_fits():
 @pytest.mark.slow
 def test_a_density_weighs_the_sites():
     where = L_ROOM.with_density(Gaussians((Gaussian((1.0, 3.0), weight=5.0, sigma=0.4),), floor=0.1))
-    best = optimum(where, 2, lattice=32, restarts=4)
-    bound = lower_bound(where, best.positions, lattice=32)
+    best = find_optimum(where, 2, lattice=32, restarts=4)
+    bound = compute_lower_bound(where, best.positions, lattice=32)
     assert bound.reached == pytest.approx(best.mean_distance, rel=1e-12)
     assert bound.value == pytest.approx(bound.mean_distance * best.value / best.mean_distance)
     assert 0.0 < bound.gap < 0.02
@@ -151,8 +151,8 @@ def test_a_density_weighs_the_sites():
 def test_several_components_are_bounded_together():
     halves = room(12, 4, box(7, 0, 7.2, 4), box(9.4, 0, 9.6, 4), name="three")
     for robots in (1, 2, 3, 4):
-        best = optimum(halves, robots, lattice=48, restarts=4)
-        bound = lower_bound(halves, best.positions, lattice=48, precision=0.003)
+        best = find_optimum(halves, robots, lattice=48, restarts=4)
+        bound = compute_lower_bound(halves, best.positions, lattice=48, precision=0.003)
         assert bound.value == pytest.approx(bound.mean_distance * best.value / best.mean_distance)
         assert 0.0 < bound.gap < 0.01
         counted = CoverageCost(halves, 48).points[~np.isnan(bound.prices)]
@@ -161,14 +161,14 @@ def test_several_components_are_bounded_together():
 
 def test_a_robot_on_each_site_costs_nothing():
     tiny = room(2, 2)
-    bound = lower_bound(tiny, CoverageCost(tiny, 2).points, lattice=2)
+    bound = compute_lower_bound(tiny, CoverageCost(tiny, 2).points, lattice=2)
     assert (bound.mean_distance, bound.reached, bound.gap) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.slow
 def test_the_same_call_gives_the_same_bits():
     places = [[1.0, 1.0], [3.0, 0.5]]
-    one, other = (lower_bound(L_ROOM, places, lattice=16) for _ in range(2))
+    one, other = (compute_lower_bound(L_ROOM, places, lattice=16) for _ in range(2))
     assert one.mean_distance == other.mean_distance
     np.testing.assert_array_equal(one.prices, other.prices)
 
@@ -186,14 +186,14 @@ def test_the_same_call_gives_the_same_bits():
 )
 def test_what_is_wrong_is_named(words, error, message):
     with pytest.raises(error) as caught:
-        lower_bound(L_ROOM, **{"positions": [[1.0, 1.0]], "lattice": 8, **words})
+        compute_lower_bound(L_ROOM, **{"positions": [[1.0, 1.0]], "lattice": 8, **words})
     assert str(caught.value).startswith(message)
 
 
 @pytest.mark.slow
 def test_progress_goes_from_nothing_to_all_and_may_give_up():
     parts = []
-    lower_bound(L_ROOM, [[1.0, 1.0], [3.0, 0.5]], lattice=8, progress=parts.append)
+    compute_lower_bound(L_ROOM, [[1.0, 1.0], [3.0, 0.5]], lattice=8, progress=parts.append)
     assert parts == sorted(parts)
     assert parts[0] < 0.1
     assert parts[-1] == 1.0
@@ -203,4 +203,4 @@ def test_progress_goes_from_nothing_to_all_and_may_give_up():
             raise InterruptedError
 
     with pytest.raises(InterruptedError):
-        lower_bound(L_ROOM, [[1.0, 1.0], [3.0, 0.5]], lattice=8, precision=1e-4, progress=stop)
+        compute_lower_bound(L_ROOM, [[1.0, 1.0], [3.0, 0.5]], lattice=8, precision=1e-4, progress=stop)

@@ -8,7 +8,7 @@ from time import perf_counter
 
 import pygame
 
-from robocov.cost import LATTICE
+from robocov.cost import DEFAULT_LATTICE
 from robocov.mapfile import load_map
 from robocov_app.bench.measure import Call, Case, Row, in_turn
 from robocov_app.bench.render import SIZE, cleared
@@ -36,7 +36,7 @@ def _used(n: int, seconds: float) -> Iterator[Row]:
     session = Session(Scenario(load_map("rooms"), (ControllerChoice("rapf"),), n, start, limits=limits))
     with display(headless=True):
         shown = {layer.name for layer in standard_layers() if layer.default}
-        viewer = Presenter(session, Costs(LATTICE), shown, Path(), "rooms")
+        viewer = Presenter(session, Costs(DEFAULT_LATTICE), shown, Path(), "rooms")
         window = Window(viewer, SIZE, 1.0)
         try:
             with undisturbed():

@@ -23,7 +23,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.region import Region
-from robocov.optimum import nearest_inside
+from robocov.optimum import find_nearest_inside
 from robocov.robots import Team
 
 _COARSE = 8  # lattice of the plan, which is asked for ways only
@@ -84,8 +84,8 @@ class Oracle(Law):
         if stage != memory.stage or seen.time >= memory.planned + self.period - 1e-9:
             # also for robots on their way: who stands in another one's takes over its goal
             robots = np.array(stages[stage][1], dtype=np.intp)
-            inside = nearest_inside(plan.room, seen.positions)
-            goals = nearest_inside(plan.room, np.array(stages[stage][2], dtype=float))
+            inside = find_nearest_inside(plan.room, seen.positions)
+            goals = find_nearest_inside(plan.room, np.array(stages[stage][2], dtype=float))
             places = inside.copy()
             places[robots] = goals[assigned(plan, inside[robots], goals)]
             routes = tuple(way(plan, at, goal) for at, goal in zip(inside, places, strict=True))
@@ -100,14 +100,14 @@ class Oracle(Law):
 
 def assigned(plan: Plan, places: Array, goals: Array) -> IntArray:
     """Return which goal each robot at (n, 2) places walks to: the sum of the squared ways is least."""
-    ways = plan.paths.distances(places, goals)
+    ways = plan.paths.compute_distances(places, goals)
     ways = np.where(np.isfinite(ways), ways, 1e6)
     return np.asarray(linear_sum_assignment(ways**2)[1])
 
 
 def way(plan: Plan, place: Array, goal: Array) -> Array:
     """Return the way-points to a goal, (w, 2) m; the place alone where no way leads."""
-    path = plan.paths.path(place, goal)
+    path = plan.paths.find_path(place, goal)
     return path[1:] if len(path) > 1 else place[None]
 
 

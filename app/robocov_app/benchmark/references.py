@@ -88,11 +88,11 @@ class Bounding:
 
     def __call__(self, questions: list[tuple[dict[str, Any], list[list[float]]]], line: Line) -> float:
         """Return the least mean distance that any placement may have, m; takes up to some minutes."""
-        from robocov.lower_bound import lower_bound
+        from robocov.lower_bound import compute_lower_bound
 
         document, positions = questions[-1]
         how: Any = {"radius": suite.RADIUS, "lattice": suite.LATTICE, "precision": PRECISION}
-        return lower_bound(from_json(document), np.array(positions), **how).mean_distance
+        return compute_lower_bound(from_json(document), np.array(positions), **how).mean_distance
 
 
 def _save(path: Path, maps: Mapping[str, Any]) -> None:

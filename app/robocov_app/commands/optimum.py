@@ -11,9 +11,9 @@ import tyro
 
 from robocov.errors import InputError, ParameterError, format_count, require_number
 from robocov.files.atomic import written
-from robocov.lower_bound import FINEST, LowerBound, lower_bound
+from robocov.lower_bound import MIN_PRECISION, LowerBound, compute_lower_bound
 from robocov.mapfile import load_map
-from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, optimum
+from robocov.optimum import MAX_RESTARTS, MAX_ROBOTS, find_optimum
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.render.density import density_kind, density_lines, mean_label
 from robocov_app.runs.cost import PICTURE_LATTICE, built_cost, draw_distances
@@ -66,12 +66,10 @@ class Arguments(PlotOptions):
         for name, value in (("--robots", self.robots), ("--radius", self.radius)):
             if self.run is not None and value is not None:
                 raise InputError(f"{name}: {value}, but with --run it is that of the run")
-        require_number(
-            "--robots", _ROBOTS if self.robots is None else self.robots, 1, MOST_ROBOTS, whole=True
-        )
-        require_number("--restarts", self.restarts, 1, MOST_RESTARTS, whole=True)
+        require_number("--robots", _ROBOTS if self.robots is None else self.robots, 1, MAX_ROBOTS, whole=True)
+        require_number("--restarts", self.restarts, 1, MAX_RESTARTS, whole=True)
         require_number("--lattice", self.lattice, 2, 2048, whole=True)
-        require_number("--precision", self.precision, FINEST, 1.0)
+        require_number("--precision", self.precision, MIN_PRECISION, 1.0)
         if self.seed < 0:
             raise ParameterError(f"--seed: {self.seed}, but a whole number of at least 0 was wanted")
         if self.positions is not None:
@@ -93,13 +91,13 @@ def command(options: Arguments) -> None:
     lattice, began = options.lattice, time.perf_counter()
     search: dict[str, Any] = {"lattice": lattice, "restarts": options.restarts, "seed": options.seed}
     with late_progress("searching", quiet=options.json) as update:
-        best = optimum(environment, robots, radius=radius, progress=update, **search)
+        best = find_optimum(environment, robots, radius=radius, progress=update, **search)
     seconds = time.perf_counter() - began
     bound: LowerBound | None = None
     if options.bound:
         with late_progress("proving the bound", quiet=options.json) as update:
             how: dict[str, Any] = {"lattice": lattice, "precision": options.precision, "progress": update}
-            bound = lower_bound(environment, best.positions, radius=radius, **how)
+            bound = compute_lower_bound(environment, best.positions, radius=radius, **how)
     gaps = []
     if saved:
         lattice_cost = built_cost(environment, lattice, quiet=options.json)
@@ -108,7 +106,7 @@ def command(options: Arguments) -> None:
                 raise InputError(f"{each.folder}: another number of robots than in {saved[0].folder}")
             result = lattice_cost(each.record.positions[-1])
             alike = abs(result.uncovered_area - best.uncovered_area) < 1e-6  # the same components are covered
-            gap = best.gap(result.mean_distance) if alike else None
+            gap = best.compute_gap(result.mean_distance) if alike else None
             gaps.append({"run": each.folder.name, "mean_distance_m": result.mean_distance, "gap": gap})
     if options.positions is not None:
         rows = ",\n ".join(json.dumps(place) for place in best.positions.tolist())
@@ -119,7 +117,7 @@ def command(options: Arguments) -> None:
         mean = f"{mean_label(environment)} {best.mean_distance:.3f} m"
         title, theme = "Best positions found", options.theme
         draw_distances(options.plot, cost, best.positions, mean, title=title, theme=theme, radius=radius)
-    agreement, count = {within: best.agreement(within) for within in _WITHIN}, len(best.costs)
+    agreement, count = {within: best.compute_agreement(within) for within in _WITHIN}, len(best.costs)
     answer: dict[str, Any] = {"mean_distance_m": best.mean_distance, "cost_m3": best.value}
     answer |= {"uncovered_area_m2": best.uncovered_area, "density": density_kind(environment)}
     answer |= {"robots": robots, "positions_m": best.positions.tolist(), "restarts": count}
@@ -135,8 +133,8 @@ def command(options: Arguments) -> None:
     lines += [f"{format_count(robots, 'robot')}, {count} restarts in {seconds:.1f} s, of these"]
     for within, agreeing in agreement.items():
         lines += [f"  within {within:.1%} of the best  {round(agreeing * count):>4}"]
-    lines += [f"the median restart ends {best.gap(float(np.median(best.costs))):.2%} above the best"]
-    lines += [f"descent of the exact cost gained {best.gap(float(best.undescended.min())):.2%}"]
+    lines += [f"the median restart ends {best.compute_gap(float(np.median(best.costs))):.2%} above the best"]
+    lines += [f"descent of the exact cost gained {best.compute_gap(float(best.undescended.min())):.2%}"]
     for row in gaps:
         above = "other rooms than the best covers"
         above = above if row["gap"] is None else f"{row['gap']:.1%} above the best"

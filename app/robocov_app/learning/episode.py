@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
-from robocov.cost import CoverageCost, CoverageResult, MomentaryCost
+from robocov.cost import CoverageCost, CoverageResult, TimeVaryingCost
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, StartError, describe_unknown_name, quote
 from robocov.metrics import TOUCHING
@@ -120,7 +120,7 @@ class SharedSimulation:
         results: dict[int, CoverageResult] = {}
         if due:
             positions = self._simulation.positions.reshape(actions.shape)[due]
-            results = dict(zip(due, episodes[due[0]].cost.of_teams(positions), strict=True))
+            results = dict(zip(due, episodes[due[0]].cost.evaluate_teams(positions), strict=True))
         each = episodes.items()
         return {run: one.moved(contact[run], run in results, results.get(run)) for run, one in each}
 
@@ -158,9 +158,9 @@ class Episode:
             self.shared, self._rows = None, slice(n)
             self.simulation = spec.simulation(Learner.of(task))
         self.working = self.simulation.working[self._rows]
-        self.cost, self._cost = cost, MomentaryCost(cost)
+        self.cost, self._cost = cost, TimeVaryingCost(cost)
         self._all_count = spec.conditions is None and not environment.moves
-        self._counted = self._cost.counted(0.0, self.positions, self.working)
+        self._counted = self._cost.find_counted_robots(0.0, self.positions, self.working)
         result = self._cost(0.0, self.positions, self.working)
         if result is None or not result.mean_distance > 0.0:
             wanted = f"a finer one was wanted for map {environment.name!r}"
@@ -230,20 +230,20 @@ class Episode:
         positions, earlier = self.trail[-1], self.trail[self._rewarded]
         changed = False
         if not self._all_count:
-            counted = self._cost.counted(now, positions, self.working)
+            counted = self._cost.find_counted_robots(now, positions, self.working)
             changed = not np.array_equal(counted, self._counted)
             stayed, self._counted = counted & self._counted, counted
         if not (rewarded or changed):
             return gained
         self._rewarded = self.cycle
         if self._counted.any():
-            self.result = result or self._cost.at(now)(positions[self._counted])
+            self.result = result or self._cost.get_cost(now)(positions[self._counted])
         after = self.result
         if not stayed.any():
             return gained
         if changed:
-            before = self._cost.at(now - since * task.period)(earlier[stayed])
-            after = self._cost.at(now)(positions[stayed])
+            before = self._cost.get_cost(now - since * task.period)(earlier[stayed])
+            after = self._cost.get_cost(now)(positions[stayed])
         gained[stayed] = tasks.shares(task.reward, before, after, since / task.cycles)
         return gained
 

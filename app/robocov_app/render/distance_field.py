@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.cost import CoverageCost, CoverageResult, MomentaryCost, Sites
+from robocov.cost import CoverageCost, CoverageResult, Sites, TimeVaryingCost
 from robocov_app.render.theme import Theme
 
 _SHALLOW = 0.05  # least angle, rad, at which two distances are taken to grow apart: borders stay thin
@@ -24,7 +24,7 @@ class FieldLattice:
     def __init__(self, sites: Sites) -> None:
         side = sites.lattice
         self.spacing = sites.spacing
-        number = sites.grid(np.arange(len(sites.points)))
+        number = sites.to_grid(np.arange(len(sites.points)))
         self.origin = sites.points[0] - np.array(np.divmod(sites.cells[0], side)[::-1]) * sites.spacing
         # squares between four cells' middles, low left, low right, high left, high right; the rim's stick out
         rows = np.clip(np.arange(-1, side + 1), 0, side - 1)
@@ -192,7 +192,7 @@ class Fields:
 
     def __init__(self, cost: CoverageCost, limit: float) -> None:
         self.limit = limit
-        self._momentary = MomentaryCost(cost)
+        self._momentary = TimeVaryingCost(cost)
         self._lattices = cost, FieldLattice(cost.sites)
 
     def at(self, positions: Array, time: float = 0.0) -> Field | None:
@@ -200,10 +200,10 @@ class Fields:
 
         None where all are. Raises InputError when a robot is in an obstacle that stands, or outside the map.
         """
-        result = self._momentary.of_all(time, positions)
+        result = self._momentary.evaluate_all_robots(time, positions)
         if result is None:
             return None
-        cost = self._momentary.at(time)
+        cost = self._momentary.get_cost(time)
         if cost is not self._lattices[0]:
             self._lattices = cost, FieldLattice(cost.sites)
         return Field(self._lattices[1], result)

@@ -61,12 +61,12 @@ class Searching:
     failing = "the search failed"
 
     def __call__(self, questions: list[Question], line: worker.Line) -> Reference:
-        from robocov.optimum import optimum
+        from robocov.optimum import find_optimum
 
         asked = asdict(questions[-1])
-        best = optimum(from_json(asked.pop("document")), asked.pop("robots"), **asked)
+        best = find_optimum(from_json(asked.pop("document")), asked.pop("robots"), **asked)
         positions = tuple((x, y) for x, y in best.positions.tolist())
-        return Reference(float(best.mean_distance), positions, float(best.agreement()))
+        return Reference(float(best.mean_distance), positions, float(best.compute_agreement()))
 
 
 def find_references(

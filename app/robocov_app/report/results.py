@@ -23,7 +23,7 @@ from robocov.files.strictjson import read_document
 from robocov.mapfile import from_json, to_json
 from robocov.metrics import CostHistory, mean_over_run
 from robocov.metrics.results import read_history, read_results
-from robocov.optimum import optimum
+from robocov.optimum import find_optimum
 from robocov.record import Record
 from robocov_app.runs.saved import ComparisonDocument, Saved, load_saved, roster_of
 from robocov_app.sweep.study import UNITS, parameter_column
@@ -188,7 +188,7 @@ def _reference(record: Record, lattice: int, *, search: bool) -> Reference | Non
     if not search:
         return None
     try:
-        best = optimum(environment, robots, radius=radius, lattice=lattice, restarts=RESTARTS)
+        best = find_optimum(environment, robots, radius=radius, lattice=lattice, restarts=RESTARTS)
     except ParameterError:
         return None  # more robots than have room at rest
     reference = Reference(best.mean_distance, best.uncovered_area)

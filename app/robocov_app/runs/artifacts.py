@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.controllers import controller_kind, gains_of
-from robocov.cost import CoverageCost, MomentaryCost
+from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.errors import ParameterError, describe_unknown_name, format_count
 from robocov.files.result_folder import Kind, results
 from robocov.kernel_compilation import compile_kernels
@@ -164,10 +164,10 @@ def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
         if record.environment != drawn:
             drawn = record.environment
             cost = built_cost(drawn, cost.lattice, quiet=True)
-        momentary, time = MomentaryCost(cost), float(record.time[-1])
-        working = momentary.counted(time, record.positions[-1], record.working[-1])
+        momentary, time = TimeVaryingCost(cost), float(record.time[-1])
+        working = momentary.find_counted_robots(time, record.positions[-1], record.working[-1])
         if working.any():
-            now, rows = momentary.at(time), np.flatnonzero(working)
+            now, rows = momentary.get_cost(time), np.flatnonzero(working)
             field = Field(FieldLattice(now.sites), now(record.positions[-1][rows]))
             mean = float(run.history.mean_distance[-1])
             moments.append(Moment.last_of(record, field, mean, rows, run.final_time))

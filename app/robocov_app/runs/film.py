@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.cost import CoverageCost, MomentaryCost
+from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.render.annotations import LEGEND_ROW, MARGIN, STRIP, legend_picture
@@ -181,7 +181,7 @@ def film_fields(
     environment = runs[0].record.environment
     cost = cost or built_cost(environment, FILM_LATTICE, quiet=quiet)
     cost = cost_for_pictures(environment, cost, FILM_LATTICE)
-    momentary, farthest = MomentaryCost(cost), 0.0
+    momentary, farthest = TimeVaryingCost(cost), 0.0
     for record in (run.record for run in runs):
         result = momentary(float(record.time[-1]), record.positions[-1], record.working[-1])
         if result is not None:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.cost import LATTICE, CoverageCost, CoverageResult, MomentaryCost, Sites
+from robocov.cost import DEFAULT_LATTICE, CoverageCost, CoverageResult, Sites, TimeVaryingCost
 from robocov.environment import Environment
 from robocov.errors import InputError, RobocovError
 from robocov.kernel_compilation import call_cost_kernels, compile_kernels
@@ -19,7 +19,7 @@ from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, W
 
 _PAUSE = 0.05  # seconds between two words on how far a map is
 _Sites: TypeAlias = tuple[Sites, Array, Array | None]  # with corners and weights: what all results share
-_INDICES = ("owner", "corner", "last_corner")
+_INDICES = ("owner", "first_corner", "last_corner")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Known:
 class Costs:
     """Costs for a window, computed in another process, or `direct` where pictures must not depend on it."""
 
-    def __init__(self, lattice: int = LATTICE, *, direct: bool = False) -> None:
+    def __init__(self, lattice: int = DEFAULT_LATTICE, *, direct: bool = False) -> None:
         self.known: dict[int, Known] = {}  # by pane, of the map as it is
         self.state = ""  # how far a new map is, or why there is no cost
         self.lattice = lattice  # sites along a side
@@ -188,7 +188,7 @@ class CostService:
         compile_kernels([call_cost_kernels])
         self._cost: CoverageCost | None = None
         self._told: CoverageCost | None = None
-        self._momentary: MomentaryCost | None = None
+        self._momentary: TimeVaryingCost | None = None
 
     def __call__(self, questions: list[CostQuestion], line: Line) -> _Answer:
         maps = [question for question in questions if question.environment is not None]
@@ -199,7 +199,7 @@ class CostService:
             raise InputError("the map has no cost")
         answer = _Answer(None)
         if question.positions is not None:
-            answer, cost = _evaluated(momentary, question), momentary.at(question.time)
+            answer, cost = _evaluated(momentary, question), momentary.get_cost(question.time)
         sites = None if cost is self._told else (cost.sites, cost.corners, cost.weights)
         self._told = cost
         return answer._replace(sites=sites)
@@ -225,13 +225,13 @@ class CostService:
             self._cost = before.with_density(environment)
         else:
             self._cost = CoverageCost(environment, asked.lattice, progress=tell)
-        self._momentary = MomentaryCost(self._cost, progress=give_up)
+        self._momentary = TimeVaryingCost(self._cost, progress=give_up)
 
 
-def _evaluated(momentary: MomentaryCost, question: CostQuestion) -> _Answer:
+def _evaluated(momentary: TimeVaryingCost, question: CostQuestion) -> _Answer:
     now, positions = question.time, question.positions
     assert positions is not None
-    result = momentary.of_all(now, positions)
+    result = momentary.evaluate_all_robots(now, positions)
     if result is None:
         raise InputError("positions: none is free, but at least one robot was wanted")
     path = travel_time = None
@@ -240,7 +240,9 @@ def _evaluated(momentary: MomentaryCost, question: CostQuestion) -> _Answer:
         travel_time = None if first is None else first.mean_time
     if question.point is not None:
         with suppress(RobocovError):  # the point is not free
-            path = momentary.at(now).path(positions[momentary.counted(now, positions)], question.point)
+            path = momentary.get_cost(now).find_path(
+                positions[momentary.find_counted_robots(now, positions)], question.point
+            )
     indices = {name: getattr(result, name).astype(np.int32) for name in _INDICES}  # half as long on the way
     same: dict[str, Any] = dict.fromkeys(["weights", "environment", "sites"])
     same |= dict.fromkeys(["points", "corners"], np.empty((0, 2)))

@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from robocov.cost import LATTICE
+from robocov.cost import DEFAULT_LATTICE
 from robocov_app.render.picture import standard_layers
 from robocov_app.terminal.output import echo
 from robocov_app.toolkit.autosave import autosave_folder
@@ -61,7 +61,7 @@ class Launcher:
     headless: bool = False  # draw without a display, in steps of 1 / `HEADLESS_FPS`, whatever that takes
     served: bool = False  # draw without a display, but live; no settings are kept, drafts below `folder`
     laws: tuple[str, ...] = ()  # names of controllers to choose from beside the built-in ones
-    lattice: int = LATTICE
+    lattice: int = DEFAULT_LATTICE
     file: Path | None = None
     offers_lesson: bool = False
     _usual: set[str] = field(default_factory=set, init=False)  # layers that are shown without these options

@@ -20,7 +20,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
-from robocov.optimum import nearest_inside
+from robocov.optimum import find_nearest_inside
 from robocov.robots import Team
 from robocov.voronoi.sampled_cells import centroids, own_samples
 
@@ -153,7 +153,7 @@ class Chart:
 
     def at(self, positions: Array) -> tuple[Array, Array]:
         """Return F at the nearest places in the room, (n, 2) m, and its Jacobian there, (n, 2, 2)."""
-        return self._there.at(nearest_inside(self.room, positions))
+        return self._there.at(find_nearest_inside(self.room, positions))
 
     def back(self, images: Array) -> Array:
         """Return the places of which these are the images, (n, 2) m."""

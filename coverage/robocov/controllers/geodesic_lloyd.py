@@ -19,7 +19,7 @@ from robocov.errors import ParameterError
 from robocov.geodesic import Geodesics
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
-from robocov.optimum import nearest_inside
+from robocov.optimum import find_nearest_inside
 from robocov.robots import Team
 
 _SEGMENTS = 2  # edges of a quarter circle around corners of walls: they cut 8 % of the clearance off it
@@ -121,18 +121,18 @@ class Plan:
 
     def ways(self, seen: Observations, exponent: float) -> tuple[Array, Array, Array]:
         """Return each robot's goal and the first way-point to it, (n, 2) m, and the way left, (n,) m."""
-        places = nearest_inside(self.room, seen.positions)
+        places = find_nearest_inside(self.room, seen.positions)
         if seen.neighbours.complete:
             goals = self._goals(places, exponent)
         else:
             goals = np.empty_like(places)
             for i in range(len(places)):
-                heard = nearest_inside(self.room, seen.neighbour_positions(i))
+                heard = find_nearest_inside(self.room, seen.neighbour_positions(i))
                 goals[i] = self._goals(np.vstack([places[i], heard]), exponent)[0]
         way, beyond = goals.copy(), np.zeros(len(goals))
         lines = shapely.linestrings(np.stack([places, goals], axis=1))
         for i in np.flatnonzero(~shapely.covers(self.room, lines)).tolist():
-            path = self.paths.path(places[i], goals[i])
+            path = self.paths.find_path(places[i], goals[i])
             if len(path) < 2:
                 goals[i] = way[i] = places[i]  # in another room
                 continue
@@ -144,7 +144,7 @@ class Plan:
         """Return the goals of robots at (k, 2) places."""
         result = self.cost(places)
         site = np.flatnonzero(result.owner >= 0)
-        owner, first, distance = result.owner[site], result.first[site], result.distances[site]
+        owner, first, distance = result.owner[site], result.first_waypoints[site], result.distances[site]
         # a site under the robot would hold it fast
         step = np.maximum(np.hypot(*(first - places[owner]).T), 0.25 * self.cost.spacing)
         weight = np.maximum(distance, step) ** (exponent - 1.0) / step
@@ -155,7 +155,7 @@ class Plan:
         goals = np.column_stack([np.bincount(owner, weight * part, minlength=n) for part in first.T])
         held = total > 0.0
         goals = np.where(held[:, None], goals / np.where(held, total, 1.0)[:, None], places)
-        return nearest_inside(self.room, np.asarray(goals))
+        return find_nearest_inside(self.room, np.asarray(goals))
 
 
 def _obstacle(part: Polygon) -> PolygonObstacle:

@@ -19,10 +19,10 @@ from robocov.drawing import Drawable
 from robocov.environment import Environment, require_environment
 from robocov.errors import InputError, ParameterError, format_count, quote, require_number, to_floats
 from robocov.geodesic import BINS, Geodesics
-from robocov.geodesic.visibility import AngularWallIndex
-from robocov.geodesic.walls import along_z_curve, box_tree
+from robocov.geodesic.angular_index import AngularWallIndex
+from robocov.geodesic.walls import build_box_tree, compute_z_order
 
-LATTICE = 128
+DEFAULT_LATTICE = 128
 """Cells along a side, unless something else is said."""
 
 MAX_LATTICE = 4096
@@ -48,7 +48,7 @@ class Sites:
     cells: IntArray
     """(m,) Their numbers among all cells, ``row * lattice + column``."""
 
-    def grid(self, values: NDArray[Any]) -> NDArray[Any]:
+    def to_grid(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return (m,) values of the sites as a picture of the whole lattice, (n, n), the lowest row first.
 
         Cells that are not free hold nan, or -1 where the values are whole numbers.
@@ -77,7 +77,7 @@ class CoverageResult(Drawable):
     """(m,) m, to the nearest robot, or with `speeds` to the one that is there first; inf for none."""
     owner: IntArray
     """(m,) That robot (the geodesic Voronoi partition), of equals the first, -1 where none can come."""
-    corner: IntArray
+    first_corner: IntArray
     """(m,) The row in `corners` where the way from the owner to the site bends first, -1 for nowhere,"""
     last_corner: IntArray
     """(m,) and where it bends last."""
@@ -113,11 +113,11 @@ class CoverageResult(Drawable):
         return np.asarray(self.distances / self.speeds[self.owner])
 
     @cached_property
-    def first(self) -> Array:
+    def first_waypoints(self) -> Array:
         """The first way-point from the owner to the site, (m, 2) m: a corner, or the site itself."""
         first = self.points.copy()
-        bent = np.nonzero(self.corner >= 0)[0]
-        first[bent] = self.corners[self.corner[bent]]
+        bent = np.nonzero(self.first_corner >= 0)[0]
+        first[bent] = self.corners[self.first_corner[bent]]
         return first
 
     @cached_property
@@ -131,7 +131,7 @@ class CoverageResult(Drawable):
         count = len(self.positions)
         site = np.nonzero(self.owner >= 0)[0]
         owner = self.owner[site]
-        toward = self.first[site] - self.positions[owner]
+        toward = self.first_waypoints[site] - self.positions[owner]
         length = np.hypot(toward[:, 0], toward[:, 1])
         toward /= np.where(length > 0.0, length, 1.0)[:, None]
         total = float(len(site))
@@ -184,7 +184,7 @@ class CoverageCost:
     def __init__(
         self,
         environment: Environment,
-        lattice: int = LATTICE,
+        lattice: int = DEFAULT_LATTICE,
         *,
         progress: Callable[[float], None] | None = None,
         geodesics: Geodesics | None = None,
@@ -198,7 +198,7 @@ class CoverageCost:
         self.corners = frozen(geodesics.corners)
         self.sites, tiles = _lattice_of(geodesics, self.lattice)
         self.points, self.cells, self.spacing = self.sites.points, self.sites.cells, self.sites.spacing
-        rows, spans = geodesics.of_corners(partial(corner_views, geodesics.walls, tiles), progress)
+        rows, spans = geodesics.run_for_corners(partial(corner_views, geodesics.walls, tiles), progress)
         order = np.argsort(rows[:, 1], kind="stable")
         first = np.searchsorted(rows[order, 1], np.arange(len(tiles.boxes) + 1))
         views = CornerViews(first, rows[order][:, [0, 2]], spans[order])
@@ -230,7 +230,7 @@ class CoverageCost:
         positions = to_floats("positions", positions, "[x, y] of each robot in metres", InputError)
         if not positions.size:
             raise InputError("positions: none, but at least one robot was wanted")
-        places, holds = self.geodesics.place(positions)
+        places, holds = self.geodesics.snap_to_free_space(positions)
         if speeds is None:
             distances, ways = self._nearest(places[None], holds[None])
             return self._result(positions, holds, distances[0], ways[0], None)
@@ -247,9 +247,9 @@ class CoverageCost:
             ways[:, sooner] = their[:, sooner]
         return self._result(positions, holds, distances, ways, speeds)
 
-    def of_teams(self, positions: Array) -> list[CoverageResult]:
+    def evaluate_teams(self, positions: Array) -> list[CoverageResult]:
         """Return the coverage cost of each of some teams, (r, n, 2) m: as one by one, but quicker."""
-        places, holds = self.geodesics.place(positions.reshape(-1, 2))
+        places, holds = self.geodesics.snap_to_free_space(positions.reshape(-1, 2))
         holds = holds.reshape(*positions.shape[:2], -1)
         found = self._nearest(places.reshape(positions.shape), holds)
         return [self._result(*each, None) for each in zip(positions, holds, *found, strict=True)]
@@ -264,7 +264,7 @@ class CoverageCost:
         found = np.empty((teams, m)), np.empty((teams, 3, m), np.int64)
         covered = np.asarray(holds.any(axis=1))
         while True:
-            sight = AngularWallIndex.room(n, BINS, self._room * n + 2 * BINS)
+            sight = AngularWallIndex.allocate(n, BINS, self._room * n + 2 * BINS)
             work = Work(sight, lists, queue, hidden, *to_corners, *to_sites)
             if site_paths(self._map, work, places, covered, self.geodesics.grid.unit, *found):
                 return found
@@ -285,16 +285,16 @@ class CoverageCost:
         time = None if speeds is None else weighted_mean(reached / speeds[whose], weights)
         return CoverageResult(
             mean_distance=mean, value=(mean if time is None else time) * mass, uncovered_area=uncovered,
-            distances=distances, owner=owner, corner=corner, last_corner=last_corner, positions=positions,
-            points=self.points, corners=self.corners, environment=self.environment, sites=self.sites,
-            weights=self.weights, speeds=speeds, mean_time=time,
+            distances=distances, owner=owner, first_corner=corner, last_corner=last_corner,
+            positions=positions, points=self.points, corners=self.corners, environment=self.environment,
+            sites=self.sites, weights=self.weights, speeds=speeds, mean_time=time,
         )  # fmt: skip
 
-    def grid(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return (m,) values of the sites as a picture; see `Sites.grid`."""
-        return self.sites.grid(values)
+    def to_grid(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return (m,) values of the sites as a picture; see `Sites.to_grid`."""
+        return self.sites.to_grid(values)
 
-    def path(self, positions: Array, point: Array) -> Array:
+    def find_path(self, positions: Array, point: Array) -> Array:
         """Return the shortest path from a point to the nearest of (n, 2) robots, (w, 2) way-points in metres.
 
         Both ends are included; (0, 2) where no robot can come. Raises InputError when the point or a robot is
@@ -302,11 +302,11 @@ class CoverageCost:
         """
         positions = np.asarray(positions, dtype=float)
         point = np.asarray(point, dtype=float)
-        distances = self.geodesics.distances(point[None], positions)[0]
-        return self.geodesics.path(point, positions[int(distances.argmin())])
+        distances = self.geodesics.compute_distances(point[None], positions)[0]
+        return self.geodesics.find_path(point, positions[int(distances.argmin())])
 
 
-class MomentaryCost:
+class TimeVaryingCost:
     """The coverage cost (22) of a map at any time.
 
     Only robots count that work: one that has failed goes nowhere. Nor does one that a moving obstacle has
@@ -318,7 +318,7 @@ class MomentaryCost:
         self._cost, self._progress = cost, progress
         self._known: dict[bytes, CoverageCost] = {}
 
-    def at(self, time: float) -> CoverageCost:
+    def get_cost(self, time: float) -> CoverageCost:
         """Return the coverage cost of the map as it is at a time, s; the given one where nothing moves."""
         environment = self._cost.environment
         if not environment.moves:
@@ -331,11 +331,15 @@ class MomentaryCost:
             self._known[key] = CoverageCost(now, self._cost.lattice, progress=self._progress)
         return self._known[key]
 
-    def counted(self, time: float, positions: Array, working: BoolArray | None = None) -> BoolArray:
+    def find_counted_robots(
+        self, time: float, positions: Array, working: BoolArray | None = None
+    ) -> BoolArray:
         """Return which robots at (n, 2) m count at a time, s, (n,); all work if `working`, (n,), is None."""
         counted = np.ones(len(positions), dtype=bool) if working is None else working.copy()
         if self._cost.environment.moves:
-            counted &= shapely.contains_properly(self.at(time).environment.free, shapely.points(positions))
+            counted &= shapely.contains_properly(
+                self.get_cost(time).environment.free, shapely.points(positions)
+            )
         return counted
 
     def __call__(
@@ -346,29 +350,29 @@ class MomentaryCost:
         The parameters are those of `counted`, and `speeds` (n,) m/s those of `CoverageCost`; the rows of the
         result are those of the robots that count.
         """
-        counted = self.counted(time, positions, working)
+        counted = self.find_counted_robots(time, positions, working)
         if not counted.any():
             return None
-        return self.at(time)(positions[counted], None if speeds is None else speeds[counted])
+        return self.get_cost(time)(positions[counted], None if speeds is None else speeds[counted])
 
-    def of_all(
+    def evaluate_all_robots(
         self, time: float, positions: Array, working: BoolArray | None = None
     ) -> CoverageResult | None:
         """Return the same with a row for every robot; one that does not count is nearest to nothing."""
         result = self(time, positions, working)
         if result is None or len(result.positions) == len(positions):
             return result
-        rows = np.flatnonzero(self.counted(time, positions, working))
+        rows = np.flatnonzero(self.find_counted_robots(time, positions, working))
         owner = np.where(result.owner >= 0, rows[result.owner], -1)
         return replace(result, positions=np.array(positions), owner=owner)
 
-    def figures(
+    def compute_figures(
         self, time: float, positions: Array, working: BoolArray | None = None
     ) -> tuple[float, float, float]:
         """Return mean distance, m, cost (22), m³, and uncovered area, m²; nan, nan, all where none counts."""
         result = self(time, positions, working)
         if result is None:
-            return np.nan, np.nan, self.at(time).environment.free_area
+            return np.nan, np.nan, self.get_cost(time).environment.free_area
         return result.mean_distance, result.value, result.uncovered_area
 
 
@@ -382,7 +386,7 @@ def _lattice_of(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     free, components = [], []
     for block in range(0, side * side, _BLOCK):
         cells = np.arange(block, min(block + _BLOCK, side * side))
-        inside = geodesics.winding(grid.snap(middles(cells))) == 1
+        inside = geodesics.count_windings(grid.snap(middles(cells))) == 1
         some = inside.any(axis=1)
         free.append(cells[some])
         components.append(inside[some].argmax(axis=1))
@@ -392,7 +396,7 @@ def _lattice_of(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     cells.setflags(write=False)
     sites = Sites(side, spacing, frozen(middles(cells)), cells)
 
-    tile = along_z_curve(cells % side // TILE, cells // side // TILE)
+    tile = compute_z_order(cells % side // TILE, cells // side // TILE)
     order = np.argsort(tile, kind="stable")
     begin = beginnings(tile[order])
     slots = np.arange(TILE**2)
@@ -404,7 +408,7 @@ def _lattice_of(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     groups = np.arange(0, len(low), GROUP)
     around = np.hstack([np.minimum.reduceat(low, groups), np.maximum.reduceat(high, groups)])
     facts = np.stack([np.where(empty, -1, chosen), component[chosen]])
-    return sites, Tiles(places, facts, boxes, around, box_tree(low, high))
+    return sites, Tiles(places, facts, boxes, around, build_box_tree(low, high))
 
 
 def _checked_speeds(speeds: object, robots: int) -> Array:

@@ -12,8 +12,14 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.geodesic import Graph, relax
-from robocov.geodesic.visibility import AngularWallIndex, beyond_horizon, enter_walls, sees
-from robocov.geodesic.walls import LEAF, Walls, near2, skipped, useful
+from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_box_hidden, is_visible
+from robocov.geodesic.walls import (
+    LEAF_SIZE,
+    Walls,
+    can_bend_at_corner,
+    compute_squared_box_distance,
+    skip_subtree,
+)
 
 GROUP = 16
 """Tiles that are looked at together first."""
@@ -39,7 +45,7 @@ class Tiles(NamedTuple):
     groups: Array
     """around each `GROUP` tiles,"""
     tree: Array
-    """and the `box_tree` of the first."""
+    """and the `build_box_tree` of the first."""
 
 
 class CornerViews(NamedTuple):
@@ -94,25 +100,25 @@ def corner_views(
     """
     corners, tree, used, leaves = walls.corners, tiles.tree, 0, len(tiles.tree) // 2
     for k in range(begin, end):
-        if enter_walls(walls, index, 0, corners[k, 0], corners[k, 1], np.inf, 0) < 0:
+        if add_walls(walls, index, 0, corners[k, 0], corners[k, 1], np.inf, 0) < 0:
             return -1
         node = 1
         while node:
-            if tree[node, 0] == np.inf or beyond_horizon(tree, node, index, 0):
-                node = skipped(node)
+            if tree[node, 0] == np.inf or is_box_hidden(tree, node, index, 0):
+                node = skip_subtree(node)
                 continue
             if node < leaves:
                 node *= 2
                 continue
-            leaf = (node - leaves) * LEAF
-            for tile in range(leaf, min(leaf + LEAF, len(tiles.boxes))):
+            leaf = (node - leaves) * LEAF_SIZE
+            for tile in range(leaf, min(leaf + LEAF_SIZE, len(tiles.boxes))):
                 if used == len(rows):
                     return -1
-                if not beyond_horizon(tiles.boxes, tile, index, 0):
+                if not is_box_hidden(tiles.boxes, tile, index, 0):
                     rows[used, 0], rows[used, 1] = k, tile
                     rows[used, 2] = _seen_sites(walls, index, tiles, k, tile, spans[used])
                     used += rows[used, 2] != 0
-            node = skipped(node)
+            node = skip_subtree(node)
     return used
 
 
@@ -122,7 +128,11 @@ def _seen_sites(walls: Walls, index: AngularWallIndex, tiles: Tiles, k: int, til
     mask, least, most = 0, np.inf, 0.0
     for s in range(SLOTS):
         x, y = tiles.places[0, tile, s], tiles.places[1, tile, s]
-        if tiles.facts[0, tile, s] >= 0 and useful(walls.corners, k, x, y) and sees(walls, index, 0, x, y):
+        if (
+            tiles.facts[0, tile, s] >= 0
+            and can_bend_at_corner(walls.corners, k, x, y)
+            and is_visible(walls, index, 0, x, y)
+        ):
             mask |= 1 << s
             dx, dy = x - walls.corners[k, 0], y - walls.corners[k, 1]
             length = np.sqrt(dx * dx + dy * dy)
@@ -152,7 +162,7 @@ def _within(
     found = 0
     for j in range(count):
         i = given[j]
-        if near2(boxes, k, index.sources[i, 0], index.sources[i, 1]) <= bound2:
+        if compute_squared_box_distance(boxes, k, index.sources[i, 0], index.sources[i, 1]) <= bound2:
             out[found] = i
             found += 1
     return found
@@ -165,8 +175,8 @@ def _paths_to_corners(known: CostMap, work: Work) -> None:
     everyone, some, leaves, waiting = work.lists[0], work.lists[1], len(boxes) // 2, 0
     index, queue, distance, ways = work.sight, work.queue, work.to_corners, work.corner_ways
     for k in range(len(corners)):
-        if k % LEAF == 0:
-            near = _perhaps_nearest(boxes, leaves + k // LEAF, index, everyone, n, some)
+        if k % LEAF_SIZE == 0:
+            near = _perhaps_nearest(boxes, leaves + k // LEAF_SIZE, index, everyone, n, some)
         best, nearest = np.inf, -1
         for j in range(near):
             dx, dy = corners[k, 0] - index.sources[some[j], 0], corners[k, 1] - index.sources[some[j], 1]
@@ -178,11 +188,11 @@ def _paths_to_corners(known: CostMap, work: Work) -> None:
     relax(known.graph, distance, ways, queue, waiting)
     waiting = 0
     for k in range(len(corners)):
-        if k % LEAF == 0:
+        if k % LEAF_SIZE == 0:
             bound = 0.0
-            for j in range(k, min(k + LEAF, len(corners))):
+            for j in range(k, min(k + LEAF_SIZE, len(corners))):
                 bound = max(bound, distance[j])
-            near = _within(boxes, leaves + k // LEAF, index, bound * bound, everyone, n, some)
+            near = _within(boxes, leaves + k // LEAF_SIZE, index, bound * bound, everyone, n, some)
         for j in range(near):
             waiting = _straight_to_corner(known.walls, work, k, some[j], waiting)
     relax(known.graph, distance, ways, queue, waiting)
@@ -196,8 +206,8 @@ def _straight_to_corner(walls: Walls, work: Work, k: int, i: int, waiting: int) 
     away = np.sqrt((x - from_x) * (x - from_x) + (y - from_y) * (y - from_y))
     if (
         (away < distance[k] or (away == distance[k] and i < ways[k, 0]))
-        and useful(walls.corners, k, from_x, from_y)
-        and sees(walls, work.sight, i, x, y)
+        and can_bend_at_corner(walls.corners, k, from_x, from_y)
+        and is_visible(walls, work.sight, i, x, y)
     ):
         distance[k], ways[k, 0], ways[k, 1], ways[k, 2] = away, i, k, -1
         if not work.queue[1, k]:
@@ -234,7 +244,7 @@ def _hide(known: CostMap, work: Work, tile: int, covered: BoolArray) -> bool:
         i, x, y = ways[2, tile, s], known.tiles.places[0, tile, s], known.tiles.places[1, tile, s]
         if not covered[facts[1, tile, s]]:
             to_sites[tile, s], ways[0, tile, s] = np.inf, -1
-        elif facts[0, tile, s] >= 0 and not sees(known.walls, work.sight, i, x, y):
+        elif facts[0, tile, s] >= 0 and not is_visible(known.walls, work.sight, i, x, y):
             to_sites[tile, s] = np.inf
             mask |= 1 << s
     work.hidden[tile] = mask
@@ -286,7 +296,7 @@ def _from_another(known: CostMap, work: Work, tile: int, i: int) -> None:
             if (
                 (away < best or (away == best and i < ways[0, tile, s]))
                 and i != ways[2, tile, s]
-                and sees(known.walls, index, i, x, y)
+                and is_visible(known.walls, index, i, x, y)
             ):
                 to_sites[tile, s], ways[0, tile, s], ways[1, tile, s] = away, i, -1
 
@@ -310,7 +320,7 @@ def _unhide(known: CostMap, work: Work) -> None:
                 bound = _farthest(work, tile)
                 some = _within(tiles.boxes, tile, index, bound * bound, lists[1], near, lists[2])
                 for j in range(some):
-                    if not beyond_horizon(tiles.boxes, tile, index, lists[2, j]):
+                    if not is_box_hidden(tiles.boxes, tile, index, lists[2, j]):
                         _from_another(known, work, tile, lists[2, j])
 
 
@@ -330,7 +340,7 @@ def _team_paths(known: CostMap, work: Work, robots: Array, covered: BoolArray) -
     used, any_hidden = 0, False
     for i in range(n):
         reach = index.sources[i, 2] * (1.0 + 1e-9) if n > _FEW else np.inf
-        used = enter_walls(known.walls, index, i, robots[i, 0], robots[i, 1], reach * reach, used)
+        used = add_walls(known.walls, index, i, robots[i, 0], robots[i, 1], reach * reach, used)
         if used < 0:
             return False
     for tile in range(len(tiles.boxes)):

@@ -17,8 +17,16 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.environment import GRID, Environment
 from robocov.errors import InputError
-from robocov.geodesic.visibility import AngularWallIndex, beyond_horizon, enter_walls, sees
-from robocov.geodesic.walls import LEAF, Grid, Walls, locate, skipped, useful, walls_of
+from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_box_hidden, is_visible
+from robocov.geodesic.walls import (
+    LEAF_SIZE,
+    Grid,
+    Walls,
+    build_walls,
+    can_bend_at_corner,
+    count_windings,
+    skip_subtree,
+)
 
 BINS, CORNER_BINS = 128, 256
 """Angular bins of a source; a corner looks at many targets."""
@@ -50,20 +58,20 @@ def seen_corners(walls: Walls, index: AngularWallIndex, i: int, least: int, out:
     corners, boxes = walls.corners, walls.corner_boxes
     leaves, found, node = len(boxes) // 2, 0, 1
     while node:
-        if boxes[node, 0] == np.inf or beyond_horizon(boxes, node, index, i):
-            node = skipped(node)
+        if boxes[node, 0] == np.inf or is_box_hidden(boxes, node, index, i):
+            node = skip_subtree(node)
             continue
         if node < leaves:
             node *= 2
             continue
-        begin = (node - leaves) * LEAF
-        for k in range(max(begin, least), min(begin + LEAF, len(corners))):
-            if useful(corners, k, index.sources[i, 0], index.sources[i, 1]) and sees(
+        begin = (node - leaves) * LEAF_SIZE
+        for k in range(max(begin, least), min(begin + LEAF_SIZE, len(corners))):
+            if can_bend_at_corner(corners, k, index.sources[i, 0], index.sources[i, 1]) and is_visible(
                 walls, index, i, corners[k, 0], corners[k, 1]
             ):
                 out[found] = k
                 found += 1
-        node = skipped(node)
+        node = skip_subtree(node)
     return found
 
 
@@ -78,7 +86,7 @@ def _corner_links(
     """
     corners, used = walls.corners, 0
     for i in range(begin, end):
-        if enter_walls(walls, index, 0, corners[i, 0], corners[i, 1], np.inf, 0) < 0:
+        if add_walls(walls, index, 0, corners[i, 0], corners[i, 1], np.inf, 0) < 0:
             return -1
         found = seen_corners(walls, index, 0, i + 1, seen)
         if used + found > len(links):
@@ -86,7 +94,7 @@ def _corner_links(
         for j in range(found):
             # each of the two must be useful to the other
             x, y = corners[seen[j], 0], corners[seen[j], 1]
-            if useful(corners, i, x, y):
+            if can_bend_at_corner(corners, i, x, y):
                 dx, dy = x - corners[i, 0], y - corners[i, 1]
                 links[used, 0], links[used, 1], lengths[used, 0] = i, seen[j], np.sqrt(dx * dx + dy * dy)
                 used += 1
@@ -130,7 +138,7 @@ def _corner_distances(
     """
     used = 0
     for i in range(len(points)):
-        used = enter_walls(walls, index, i, points[i, 0], points[i, 1], np.inf, used)
+        used = add_walls(walls, index, i, points[i, 0], points[i, 1], np.inf, used)
         if used < 0:
             return -1
         for k in range(len(walls.corners)):
@@ -163,7 +171,7 @@ def _shortest(
                 count += 1
         for i in range(len(reach)):
             best = np.inf
-            if sees(walls, index, i, points[j, 0], points[j, 1]):
+            if is_visible(walls, index, i, points[j, 0], points[j, 1]):
                 dx, dy = points[j, 0] - index.sources[i, 0], points[j, 1] - index.sources[i, 1]
                 best = np.sqrt(dx * dx + dy * dy)
             for k in range(count):
@@ -185,15 +193,15 @@ class Geodesics:
         low_x, low_y, high_x, high_y = environment.region.bounds
         self.size = max(high_x - low_x, high_y - low_y)
         self._name = environment.name
-        self.grid = Grid.over(np.array([low_x, low_y]), self.size)
+        self.grid = Grid.from_square(np.array([low_x, low_y]), self.size)
         self.free = shapely.transform(environment.free, self.grid.snap)
-        self.walls = walls_of(self.free)
-        self.corners = self.grid.metres(self.walls.corners[:, :2])
+        self.walls = build_walls(self.free)
+        self.corners = self.grid.to_metres(self.walls.corners[:, :2])
         # so many entries for each source were enough so far
         self._room = {BINS: 256, CORNER_BINS: 1 << 14}
         count = len(self.corners)
         seen = np.empty(count, np.int64)
-        links, lengths = self.of_corners(
+        links, lengths = self.run_for_corners(
             partial(_corner_links, self.walls, seen), beat and (lambda _: beat())
         )
         one, other = np.concatenate([links[:, :2], links[:, 1::-1]]).T
@@ -201,7 +209,7 @@ class Geodesics:
         first = np.searchsorted(one[order], np.arange(count + 1))
         self.graph = Graph(first, other[order], np.tile(lengths[:, 0], 2)[order])
 
-    def of_corners(
+    def run_for_corners(
         self, look: Callable[..., int], progress: Callable[[float], None] | None
     ) -> tuple[IntArray, Array]:
         """Return what `look` writes about the corners, some at a time; tell which part is done."""
@@ -210,11 +218,11 @@ class Geodesics:
             if progress is not None:
                 progress(begin / count)
             some = partial(look, begin, min(begin + _BLOCK, count))
-            pieces.append(self.with_room(1, CORNER_BINS, some)[1:])
+            pieces.append(self.run_with_index(1, CORNER_BINS, some)[1:])
         numbers, lengths = map(np.concatenate, zip(*pieces, strict=True))
         return numbers, lengths
 
-    def with_room(
+    def run_with_index(
         self, n: int, bins: int, fill: Callable[[AngularWallIndex, IntArray, Array], int]
     ) -> tuple[AngularWallIndex, IntArray, Array]:
         """Return an index of n sources, and what is written of numbers, (used, 3), and lengths, (used, 2).
@@ -223,14 +231,14 @@ class Geodesics:
         """
         while True:
             entries = self._room[bins] * n + 2 * bins
-            index = AngularWallIndex.room(n, bins, entries)
+            index = AngularWallIndex.allocate(n, bins, entries)
             numbers, lengths = np.empty((entries, 3), np.int64), np.empty((entries, 2))
             used = fill(index, numbers, lengths)
             if used >= 0:
                 return index, numbers[:used].copy(), lengths[:used].copy()
             self._room[bins] *= 2
 
-    def place(self, points: Array, what: str = "positions") -> tuple[Array, BoolArray]:
+    def snap_to_free_space(self, points: Array, what: str = "positions") -> tuple[Array, BoolArray]:
         """Return (n, 2) points in grid coordinates, and (n, c) which component's closure holds which.
 
         Those a hair outside the free space are moved into it. Raises InputError, which calls them `what`,
@@ -242,7 +250,7 @@ class Geodesics:
             raise InputError(f"{what}: an array of shape {points.shape}, but {wanted}")
         places = self.grid.snap(points)
         # what is not finite is right of, or above, all walls
-        holds = self.winding(places) > 0
+        holds = self.count_windings(places) > 0
         for i in np.flatnonzero(~holds.any(axis=1)):
             place = f"{what}[{i}] = [{points[i, 0]:.12g}, {points[i, 1]:.12g}]"
             if not np.isfinite(points[i]).all():
@@ -255,13 +263,13 @@ class Geodesics:
                     f"a point inside the boundary and outside every obstacle was wanted"
                 )
             places[i] = moved
-            holds[i] = self.winding(moved[None])[0] > 0
+            holds[i] = self.count_windings(moved[None])[0] > 0
         return places, holds
 
-    def winding(self, places: Array) -> IntArray:
+    def count_windings(self, places: Array) -> IntArray:
         """Return how often components wind round (n, 2) grid points, (n, c): once inside, more on them."""
         holds = np.empty((len(places), len(self.free.geoms)), dtype=np.int64)
-        locate(self.walls, np.ascontiguousarray(places), holds)
+        count_windings(self.walls, np.ascontiguousarray(places), holds)
         return holds
 
     def _nearest_free(self, place: Array) -> Array:
@@ -271,7 +279,7 @@ class Geodesics:
         # the foot on a slanted wall is no grid point: the nearest that is not behind the wall
         steps = np.arange(-2.0, 3.0)
         around = foot + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-        around = around[(self.winding(around) > 0).any(axis=1)]
+        around = around[(self.count_windings(around) > 0).any(axis=1)]
         around = around if len(around) else self.walls.vertices
         return np.asarray(around[np.hypot(*(around - place).T).argmin()])
 
@@ -284,15 +292,15 @@ class Geodesics:
         def fill(index: AngularWallIndex, *_: object) -> int:
             return int(_corner_distances(self.walls, index, self.graph, places, bends, distance, ways, queue))
 
-        return self.with_room(n, BINS, fill)[0], distance, ways
+        return self.run_with_index(n, BINS, fill)[0], distance, ways
 
-    def distances(self, sources: Array, targets: Array) -> Array:
+    def compute_distances(self, sources: Array, targets: Array) -> Array:
         """Return the geodesic distances from (n, 2) to (m, 2) points, (n, m) m, inf where no way leads."""
-        begins, _ = self.place(sources, "sources")
-        ends, _ = self.place(targets, "targets")
-        return self.between(begins, ends) * self.grid.unit
+        begins, _ = self.snap_to_free_space(sources, "sources")
+        ends, _ = self.snap_to_free_space(targets, "targets")
+        return self.compute_grid_distances(begins, ends) * self.grid.unit
 
-    def between(self, begins: Array, ends: Array) -> Array:
+    def compute_grid_distances(self, begins: Array, ends: Array) -> Array:
         """Return the same of free places in grid coordinates, in grid steps."""
         index, reach, _ = self._to_corners(begins, bends=True)
         table = np.empty((len(begins), len(ends)))
@@ -304,9 +312,9 @@ class Geodesics:
             table[:, k : k + _TARGETS] = part
         return table
 
-    def path(self, source: Array, target: Array) -> Array:
+    def find_path(self, source: Array, target: Array) -> Array:
         """Return the way-points of a shortest path, (w, 2) m, both ends included; (0, 2) where none leads."""
-        ends, _ = self.place(np.stack([source, target]), "ends of the path")
+        ends, _ = self.snap_to_free_space(np.stack([source, target]), "ends of the path")
         index, reach, ways = self._to_corners(ends[:1], bends=True)
         last, shortest = self._to_corners(ends[1:], bends=False)[1], np.empty((1, 1))
         _shortest(self.walls, index, reach, ends[1:], last, np.empty(last.shape[1], np.int64), shortest)
@@ -317,5 +325,5 @@ class Geodesics:
         while corner >= 0:
             chain.append(corner)
             corner = int(ways[corner, 2])
-        metres = self.grid.metres(ends)
+        metres = self.grid.to_metres(ends)
         return np.concatenate([metres[:1], self.corners[chain[::-1]], metres[1:]])

@@ -18,8 +18,8 @@ BITS = 48
 """The square that holds the map is 2**48 grid steps wide: 4e-15 of its side, below a double's rounding
 for a map that does not start at zero, yet few enough that `cross` can be exact."""
 
-LEAF = 8
-"""Boxes of a leaf of a `box_tree`."""
+LEAF_SIZE = 8
+"""Boxes of a leaf of a `build_box_tree`."""
 
 _DOUBT = 2.0**48
 """More than the roundings of a cross product of two differences, whose products are below 2**98."""
@@ -37,7 +37,7 @@ class Grid:
     unit: float
 
     @classmethod
-    def over(cls, low: Array, side: float) -> Grid:
+    def from_square(cls, low: Array, side: float) -> Grid:
         """Return the grid for points from `low` (2,) m to `side` metres right of and above it."""
         return cls(np.asarray(low, dtype=float), 2.0 ** (math.ceil(math.log2(side)) - BITS))
 
@@ -45,7 +45,7 @@ class Grid:
         """Return (..., 2) metres as grid coordinates, rounded to whole steps."""
         return np.rint((points - self.origin) / self.unit)
 
-    def metres(self, points: Array) -> Array:
+    def to_metres(self, points: Array) -> Array:
         """Return (..., 2) grid coordinates as metres."""
         return np.asarray(points * self.unit + self.origin)
 
@@ -65,7 +65,7 @@ class Walls(NamedTuple):
     """(e, 3) The wall that begins at b, -1 where several do; the component of the free space; whether
     anything can be behind the wall, which is not so on the convex hull of the map."""
     boxes: Array
-    """The `box_tree` of the walls."""
+    """The `build_box_tree` of the walls."""
     vertices: Array
     """(v, 2) By x, then y."""
     first: IntArray
@@ -75,10 +75,10 @@ class Walls(NamedTuple):
     corners: Array
     """(k, 6) The place, and along the incoming and the outgoing wall; neighbours together."""
     corner_boxes: Array
-    """The `box_tree` of the corners."""
+    """The `build_box_tree` of the corners."""
 
 
-def walls_of(free: MultiPolygon) -> Walls:
+def build_walls(free: MultiPolygon) -> Walls:
     """Return the walls of a free space (grid steps, shells counter-clockwise), one polygon a component."""
     rings, part = shapely.get_rings(free.geoms, return_index=True)
     points, ring = shapely.get_coordinates(rings, return_index=True)
@@ -108,12 +108,12 @@ def walls_of(free: MultiPolygon) -> Walls:
     return Walls(
         ends,
         np.column_stack([following, component, hides]),
-        box_tree(low, high),
+        build_box_tree(low, high),
         vertices,
         np.searchsorted(vertex, np.arange(len(vertices) + 1)),
         np.column_stack([into, out, wide]),
         corners,
-        box_tree(corners[:, :2], corners[:, :2]),
+        build_box_tree(corners[:, :2], corners[:, :2]),
     )
 
 
@@ -148,7 +148,7 @@ def _crosses(u: Array, v: Array) -> Array:
     return np.where(np.abs(value) < _DOUBT, u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], value)
 
 
-def along_z_curve(column: IntArray, row: IntArray) -> IntArray:
+def compute_z_order(column: IntArray, row: IntArray) -> IntArray:
     """Return numbers along a Z-curve, which keeps neighbours together, of whole numbers below 65536."""
     key = np.zeros(len(column), dtype=np.int64)
     for bit in range(16):
@@ -159,22 +159,22 @@ def along_z_curve(column: IntArray, row: IntArray) -> IntArray:
 def _neighbours_together(points: Array) -> IntArray:
     """Return an order of (n, 2) points."""
     column, row = (points * 2.0 ** (16 - BITS)).clip(0, 65535).astype(np.int64).T
-    return np.argsort(along_z_curve(column, row), kind="stable")
+    return np.argsort(compute_z_order(column, row), kind="stable")
 
 
-def box_tree(low: Array, high: Array) -> Array:
+def build_box_tree(low: Array, high: Array) -> Array:
     """Return a binary tree of boxes around (m, 2) and (m, 2): rows of low x, low y, high x, high y.
 
     Node k holds nodes 2k and 2k + 1, the root is 1. A leaf, of which there are as many as other nodes, holds
-    the next `LEAF` boxes.
+    the next `LEAF_SIZE` boxes.
     """
     leaves = 1
-    while leaves * LEAF < len(low):
+    while leaves * LEAF_SIZE < len(low):
         leaves *= 2
     # with the upper bounds negated all four are least values
-    level = np.full((leaves * LEAF, 4), np.inf)
+    level = np.full((leaves * LEAF_SIZE, 4), np.inf)
     level[: len(low)] = np.hstack([low, -high])
-    level = level.reshape(-1, LEAF, 4).min(axis=1)
+    level = level.reshape(-1, LEAF_SIZE, 4).min(axis=1)
     levels = [level]
     while len(level) > 1:
         level = level.reshape(-1, 2, 4).min(axis=1)
@@ -201,7 +201,7 @@ def cross(ux: float, uy: float, vx: float, vy: float) -> float:
 
 
 @kernel
-def skipped(node: int) -> int:
+def skip_subtree(node: int) -> int:
     """Return the node that follows all that is below a node of a tree, 0 at the end."""
     while node & 1:
         node >>= 1
@@ -209,7 +209,7 @@ def skipped(node: int) -> int:
 
 
 @kernel
-def near2(boxes: Array, node: int, x: float, y: float) -> float:
+def compute_squared_box_distance(boxes: Array, node: int, x: float, y: float) -> float:
     """Return the squared distance of a point to a box."""
     dx: float = max(boxes[node, 0] - x, x - boxes[node, 2], 0.0)
     dy: float = max(boxes[node, 1] - y, y - boxes[node, 3], 0.0)
@@ -217,7 +217,7 @@ def near2(boxes: Array, node: int, x: float, y: float) -> float:
 
 
 @kernel
-def useful(corners: Array, k: int, x: float, y: float) -> bool:
+def can_bend_at_corner(corners: Array, k: int, x: float, y: float) -> bool:
     """Return whether a shortest path that bends at a corner can come from, or go to, a point.
 
     The point must lie in the corner's sector, and not in front of both of its walls: from
@@ -230,7 +230,7 @@ def useful(corners: Array, k: int, x: float, y: float) -> bool:
 
 
 @kernel
-def vertex_at(vertices: Array, x: float, y: float) -> int:
+def find_vertex(vertices: Array, x: float, y: float) -> int:
     """Return the vertex that a point coincides with, -1 for none."""
     low, high = 0, len(vertices)
     while low < high:
@@ -245,7 +245,7 @@ def vertex_at(vertices: Array, x: float, y: float) -> int:
 
 
 @kernel
-def sectors_hold(first: IntArray, sectors: Array, vertex: int, dx: float, dy: float) -> bool:
+def contains_direction(first: IntArray, sectors: Array, vertex: int, dx: float, dy: float) -> bool:
     """Return whether a direction from a vertex runs into its free space."""
     for s in range(first[vertex], first[vertex + 1]):
         one = cross(sectors[s, 0], sectors[s, 1], dx, dy) >= 0.0
@@ -256,7 +256,7 @@ def sectors_hold(first: IntArray, sectors: Array, vertex: int, dx: float, dy: fl
 
 
 @kernel
-def locate(walls: Walls, points: Array, holds: IntArray) -> None:
+def count_windings(walls: Walls, points: Array, holds: IntArray) -> None:
     """Write which components hold which of (n, 2) points, (n, c): 1 inside, more than 1 on the boundary.
 
     The winding number: walls right of a point, those that run up less those that run down.
@@ -270,13 +270,13 @@ def locate(walls: Walls, points: Array, holds: IntArray) -> None:
         node = 1
         while node:
             if boxes[node, 1] > y or boxes[node, 3] < y or boxes[node, 2] < x:
-                node = skipped(node)
+                node = skip_subtree(node)
                 continue
             if node < leaves:
                 node *= 2
                 continue
-            begin = (node - leaves) * LEAF
-            for wall in range(begin, min(begin + LEAF, len(ends))):
+            begin = (node - leaves) * LEAF_SIZE
+            for wall in range(begin, min(begin + LEAF_SIZE, len(ends))):
                 ax, ay, bx, by = ends[wall, 0], ends[wall, 1], ends[wall, 2], ends[wall, 3]
                 if min(ay, by) > y or max(ay, by) < y or max(ax, bx) < x:
                     continue
@@ -287,4 +287,4 @@ def locate(walls: Walls, points: Array, holds: IntArray) -> None:
                     holds[i, facts[wall, 1]] += 1
                 elif by <= y < ay and side < 0.0:
                     holds[i, facts[wall, 1]] -= 1
-            node = skipped(node)
+            node = skip_subtree(node)

@@ -9,7 +9,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
-from robocov.cost import CoverageCost, MomentaryCost
+from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.drawing import Drawable
 from robocov.errors import format_count, require_type
 from robocov.metrics.advice import advise
@@ -69,11 +69,11 @@ def cost_history(
     rows = np.empty((len(moments), 3))
     speeds = record.team.max_speed if record.team.mixed_speeds else None
     times = None if speeds is None else np.full(len(moments), np.nan)
-    momentary = MomentaryCost(cost)
+    momentary = TimeVaryingCost(cost)
     for row, k in enumerate(moments):
         working = None if record.conditions is None else record.working[k]
         now = float(record.time[k]), record.positions[k], working
-        rows[row] = momentary.figures(*now)
+        rows[row] = momentary.compute_figures(*now)
         if times is not None and (first := momentary(*now, speeds)) is not None:
             times[row] = first.mean_time
         if on_sample is not None:

@@ -15,8 +15,8 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.geodesic.visibility import AngularWallIndex, enter_walls, pseudo_angle
-from robocov.geodesic.walls import Grid, walls_of
+from robocov.geodesic.angular_index import AngularWallIndex, add_walls, compute_pseudo_angle
+from robocov.geodesic.walls import Grid, build_walls
 
 _BINS = 512
 """Angular bins of a robot's view."""
@@ -35,15 +35,15 @@ def views(free: BaseGeometry, places: Array) -> Iterator[BaseGeometry]:
     2.5
     """
     low_x, low_y, high_x, high_y = free.bounds
-    grid = Grid.over(np.array([low_x, low_y]), max(high_x - low_x, high_y - low_y))
+    grid = Grid.from_square(np.array([low_x, low_y]), max(high_x - low_x, high_y - low_y))
     parts = shapely.orient_polygons(shapely.get_parts(free))
-    walls = walls_of(shapely.transform(shapely.multipolygons(parts), grid.snap))
+    walls = build_walls(shapely.transform(shapely.multipolygons(parts), grid.snap))
     # the hull of the map hides nothing, but is seen
     walls.facts[:, 2] = 1
-    index = AngularWallIndex.room(1, _BINS, 64 * _BINS)
+    index = AngularWallIndex.allocate(1, _BINS, 64 * _BINS)
     for place in grid.snap(places):
-        while (used := enter_walls(walls, index, 0, place[0], place[1], np.inf, 0)) < 0:
-            index = AngularWallIndex.room(1, _BINS, 2 * len(index.entries))
+        while (used := add_walls(walls, index, 0, place[0], place[1], np.inf, 0)) < 0:
+            index = AngularWallIndex.allocate(1, _BINS, 2 * len(index.entries))
         facing = walls.ends[np.unique(index.entries[:used, 0])].reshape(-1, 2) - place
         turns = np.unique(np.arctan2(facing[:, 1], facing[:, 0]))
         begin, end = turns, np.append(turns[1:], turns[0] + 2.0 * np.pi)
@@ -55,7 +55,7 @@ def views(free: BaseGeometry, places: Array) -> Iterator[BaseGeometry]:
         last = np.roll(first, -1) - 1
         walls_seen = walls.ends[wall[first]] - np.tile(place, 2)
         corners = [_meeting(walls_seen, angles) for angles in (begin[first], end[last])]
-        view = shapely.Polygon(grid.metres(place + np.stack(corners, axis=1).reshape(-1, 2)))
+        view = shapely.Polygon(grid.to_metres(place + np.stack(corners, axis=1).reshape(-1, 2)))
         # it may touch itself where corners are in line
         yield view if shapely.is_valid(view) else shapely.make_valid(view)
 
@@ -66,7 +66,7 @@ def _nearest_walls(ends: Array, index: AngularWallIndex, rays: Array, nearest: I
     for m in range(len(rays)):
         x, y = rays[m, 0], rays[m, 1]
         least, nearest[m] = np.inf, -1
-        entry = index.head[0, int(pseudo_angle(x, y) * (_BINS * 0.25)) & (_BINS - 1)]
+        entry = index.head[0, int(compute_pseudo_angle(x, y) * (_BINS * 0.25)) & (_BINS - 1)]
         while entry >= 0:
             wall = index.entries[entry, 0]
             ax, ay = ends[wall, 0] - index.sources[0, 0], ends[wall, 1] - index.sources[0, 1]

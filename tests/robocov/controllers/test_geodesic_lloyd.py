@@ -26,7 +26,7 @@ from robocov.generator import generated_map
 from robocov.mapfile import load_map
 from robocov.observation import Decision, Observations
 from robocov.observation.neighbours import Neighbours
-from robocov.optimum import nearest_inside
+from robocov.optimum import find_nearest_inside
 from robocov.robots import Team
 from robocov.simulation import Simulation
 
@@ -44,7 +44,7 @@ def test_a_step_to_the_goals_does_not_raise_the_cost(seed: int, kind: str, expon
     """The claim, for a step of robots without inertia: sum of d^s over the sites falls, or stays."""
     environment = generated_map(seed % 20, kind=kind)
     plan = Plan(environment, 0.13, 32)
-    places = nearest_inside(plan.room, environment.start("uniform").sample(4, seed=seed))
+    places = find_nearest_inside(plan.room, environment.start("uniform").sample(4, seed=seed))
     nothing = np.full((4, 2), np.nan)
     raised = []
     for _ in range(6):
@@ -116,7 +116,7 @@ def test_the_way_leads_through_the_door() -> None:
     goals, way, beyond = law._plan(Team.homogeneous(2)).ways(seen, 2.0)
     assert (goals[:, 0] < 4.9).all()
     assert (way == goals).all() and (beyond == 0.0).all()
-    path = law._plan(Team.homogeneous(2)).paths.path(np.array([2.0, 1.0]), np.array([8.0, 1.0]))
+    path = law._plan(Team.homogeneous(2)).paths.find_path(np.array([2.0, 1.0]), np.array([8.0, 1.0]))
     assert np.hypot(*(path[1] - [4.9, 8.0])) == pytest.approx(0.13, abs=0.02)
 
 

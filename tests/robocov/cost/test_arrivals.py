@@ -26,7 +26,7 @@ def test_times_are_the_least_over_all_robots_of_way_over_speed(seed: int, n: int
     robots, speed = somewhere(n, rng), rng.choice(speeds, n)
     result = COST(robots, speeds=speed)
     some = rng.choice(len(COST.points), 30, replace=False)
-    ways = COST.geodesics.distances(COST.points[some], robots)
+    ways = COST.geodesics.compute_distances(COST.points[some], robots)
     times = ways / speed
     np.testing.assert_allclose(result.times[some], times.min(axis=1), rtol=1e-6)
     owner = result.owner[some]
@@ -57,7 +57,7 @@ def test_the_gradient_is_that_of_the_value(seed: int) -> None:
     shift = np.zeros((4, 2))
     shift[i, axis] = step
     low, high = (COST(robots + sign * shift, speeds=speeds) for sign in (-1, 1))
-    if (low.owner == high.owner).all() and (low.corner == high.corner).all():
+    if (low.owner == high.owner).all() and (low.first_corner == high.first_corner).all():
         slope = (high.value - low.value) / (2 * step)
         assert slope == pytest.approx(result.gradient[i, axis], abs=1e-4)
 

@@ -77,7 +77,7 @@ def test_rooms_without_a_robot_are_reported_beside_the_cost():
     in_left = cost.points[:, 0] < 3.0
     np.testing.assert_array_equal(np.isfinite(left.distances), in_left)
     np.testing.assert_array_equal(left.owner, np.where(in_left, 0, -1))
-    assert (left.corner[~in_left] == -1).all()
+    assert (left.first_corner[~in_left] == -1).all()
     assert left.mean_distance == left.distances[in_left].mean()
     assert left.value == pytest.approx(left.mean_distance * 24.0)
     assert both.value == pytest.approx(both.distances.mean() * 56.0)
@@ -99,7 +99,7 @@ def test_owner_and_distance_agree_with_the_matrix_of_all_distances(n):
     cost = CoverageCost(OFFICE, lattice=24)
     robots = cost.points[np.random.default_rng(n).choice(len(cost.points), n)]
     result = cost(robots)
-    everything = cost.geodesics.distances(robots, cost.points)
+    everything = cost.geodesics.compute_distances(robots, cost.points)
     np.testing.assert_allclose(result.distances, everything.min(axis=0), rtol=0, atol=1e-12)
     own = everything[result.owner, np.arange(len(cost.points))]
     np.testing.assert_allclose(own, result.distances, rtol=0, atol=1e-12)
@@ -110,9 +110,9 @@ def test_the_first_way_point_is_that_of_the_shortest_path():
     robots = np.array([[1.0, 1.0], [11.0, 1.0]])
     result = cost(robots)
     for site in range(len(cost.points)):
-        way = cost.path(robots, cost.points[site])
+        way = cost.find_path(robots, cost.points[site])
         np.testing.assert_allclose(way[-1], robots[result.owner[site]], atol=1e-12)
-        np.testing.assert_allclose(way[-2], result.first[site], atol=1e-12)
+        np.testing.assert_allclose(way[-2], result.first_waypoints[site], atol=1e-12)
 
 
 def test_the_gradient_is_that_of_the_value():
@@ -161,7 +161,7 @@ def test_results_do_not_depend_on_earlier_calls():
     second = [other(robots) for robots in reversed(runs)][::-1]
     for a, b in zip(first, second, strict=True):
         assert a.value == b.value
-        for name in ("distances", "owner", "first", "gradient"):
+        for name in ("distances", "owner", "first_waypoints", "gradient"):
             np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
 
 

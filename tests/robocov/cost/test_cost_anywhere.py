@@ -51,7 +51,7 @@ def test_maps_of_any_size_and_place(kind, count, seed, scale, shift):
     size = SIDE * scale
     cost = CoverageCost(environment, 16)
     result = cost(robots)
-    nearest = cost.geodesics.distances(robots, cost.points).min(axis=0)
+    nearest = cost.geodesics.compute_distances(robots, cost.points).min(axis=0)
     reached = np.isfinite(nearest)
     error = np.abs(result.distances[reached] - nearest[reached]).max(initial=0.0)
     assert error < 1e-12 * size + 1e-15 * abs(shift)
@@ -106,7 +106,7 @@ def test_the_order_of_calls_and_of_robots_changes_no_bit(kind, count, seed):
     first = cost(robots)
     cost(others)
     again, fresh = cost(robots), CoverageCost(environment, 24)(robots)
-    for name in ("distances", "owner", "corner", "last_corner", "gradient"):
+    for name in ("distances", "owner", "first_corner", "last_corner", "gradient"):
         for result in (again, fresh):
             np.testing.assert_array_equal(getattr(result, name), getattr(first, name))
     turned = cost(robots[::-1])
@@ -137,7 +137,7 @@ def test_the_gradient_is_the_slope_of_the_value(kind, count, seed):
             if not all(
                 np.array_equal(getattr(there, name), getattr(here, name))
                 for there in (ahead, behind)
-                for name in ("owner", "corner")
+                for name in ("owner", "first_corner")
             ):
                 continue
             slope = (ahead.value - behind.value) / (2.0 * step)
@@ -173,7 +173,7 @@ def test_lattices_and_teams_of_every_size(lattice, robots):
     cost = CoverageCost(environment, lattice)
     result = cost(places)
     chosen = np.random.default_rng(0).choice(len(cost.points), min(len(cost.points), 400), replace=False)
-    exact = cost.geodesics.distances(places, cost.points[chosen]).min(axis=0)
+    exact = cost.geodesics.compute_distances(places, cost.points[chosen]).min(axis=0)
     np.testing.assert_allclose(result.distances[chosen], exact, rtol=0, atol=1e-12 * SIDE)
     reached = result.distances[np.isfinite(result.distances)]
     assert result.mean_distance == pytest.approx(reached.mean(), rel=1e-12)

@@ -51,5 +51,5 @@ def test_a_lattice_without_a_free_cell_is_refused():
 
 def test_a_picture_of_the_whole_lattice():
     cost = CoverageCost(lattice(4, CircleObstacle((4.5, 1.5), 0.4))[0], 4)
-    picture = cost.grid(cost([[2.5, 1.5]]).owner)
+    picture = cost.to_grid(cost([[2.5, 1.5]]).owner)
     assert picture.tolist() == [[0, 0, -1, 0], [0] * 4, [0] * 4, [-1] * 4]

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robocov.cost import CoverageCost, MomentaryCost
+from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 
 SQUARE = ((0, 0), (6, 0), (6, 4), (0, 4))
@@ -18,36 +18,38 @@ ROBOTS = np.array([[1.0, 1.0], [5.0, 3.0], [3.0, 1.0]])
 
 def test_where_nothing_moves_it_is_the_given_cost() -> None:
     cost = CoverageCost(STANDING, 24)
-    momentary = MomentaryCost(cost)
-    assert momentary.at(7.0) is cost
-    result = momentary.of_all(7.0, ROBOTS)
+    momentary = TimeVaryingCost(cost)
+    assert momentary.get_cost(7.0) is cost
+    result = momentary.evaluate_all_robots(7.0, ROBOTS)
     assert result is not None
     assert result.value == cost(ROBOTS).value
-    assert momentary.of_all(0.0, ROBOTS[:0]) is None
+    assert momentary.evaluate_all_robots(0.0, ROBOTS[:0]) is None
 
 
 def test_every_robot_has_a_row_whether_it_counts_or_not() -> None:
     cost = CoverageCost(CROSSED, 24)
-    momentary = MomentaryCost(cost)
+    momentary = TimeVaryingCost(cost)
     working = np.array([True, True, False])
-    result = momentary.of_all(0.0, ROBOTS, working)
+    result = momentary.evaluate_all_robots(0.0, ROBOTS, working)
     assert result is not None
     np.testing.assert_array_equal(result.positions, ROBOTS)
     # the first is run over at the time, the last has failed
     assert set(result.owner.tolist()) == {1}
     assert (
-        result.mean_distance == momentary.figures(0.0, ROBOTS, working)[0] == cost(ROBOTS[1:2]).mean_distance
+        result.mean_distance
+        == momentary.compute_figures(0.0, ROBOTS, working)[0]
+        == cost(ROBOTS[1:2]).mean_distance
     )
-    later = momentary.of_all(2.0, ROBOTS)
+    later = momentary.evaluate_all_robots(2.0, ROBOTS)
     assert later is not None
     assert set(later.owner.tolist()) == {0, 1}
-    assert momentary.of_all(0.0, ROBOTS[:1]) is None
+    assert momentary.evaluate_all_robots(0.0, ROBOTS[:1]) is None
 
 
 def test_a_map_of_a_moment_can_be_given_up() -> None:
     def stop(done: float) -> None:
         raise InterruptedError
 
-    momentary = MomentaryCost(CoverageCost(CROSSED, 24), progress=stop)
+    momentary = TimeVaryingCost(CoverageCost(CROSSED, 24), progress=stop)
     with pytest.raises(InterruptedError):
-        momentary.at(1.0)
+        momentary.get_cost(1.0)

@@ -83,8 +83,8 @@ def test_round_corners_too_the_first_of_equal_robots_counts():
     cost = CoverageCost(OFFICE, 24)
     places = cost.points[np.random.default_rng(3).choice(len(cost.points), 5)]
     alone, doubled = cost(places), cost(np.concatenate([places, places]))
-    assert (alone.corner >= 0).any()
-    for name in ("owner", "distances", "corner", "last_corner"):
+    assert (alone.first_corner >= 0).any()
+    for name in ("owner", "distances", "first_corner", "last_corner"):
         np.testing.assert_array_equal(getattr(doubled, name), getattr(alone, name))
 
 

@@ -12,7 +12,7 @@ from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians, Uniform, WeightedArea, WeightedPolygons
 from robocov.density.base import means_over_squares
 from robocov.environment import CircleObstacle, Environment, WallObstacle
-from robocov.optimum import optimum
+from robocov.optimum import find_optimum
 from robocov.simulation import Simulation
 
 RING = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
@@ -89,10 +89,10 @@ def test_where_all_that_is_covered_counts_nothing_there_is_no_mean():
 def test_the_optimum_goes_where_it_counts():
     spot = (6.2, 2.0)
     heavy = ROOMS.with_density(Gaussians((Gaussian(spot, 50.0, sigma=0.6),), 0.1))
-    best = optimum(heavy, 1, lattice=32, restarts=4)
+    best = find_optimum(heavy, 1, lattice=32, restarts=4)
     assert np.hypot(*(best.positions[0] - spot)) < 0.3
-    both = optimum(heavy, 3, lattice=32, restarts=4)
-    plain = optimum(ROOMS, 3, lattice=32, restarts=4)
+    both = find_optimum(heavy, 3, lattice=32, restarts=4)
+    plain = find_optimum(ROOMS, 3, lattice=32, restarts=4)
     cost = CoverageCost(heavy, 32)
     assert both.mean_distance == pytest.approx(cost(both.positions).mean_distance)
     assert both.mean_distance < 0.8 * cost(plain.positions).mean_distance

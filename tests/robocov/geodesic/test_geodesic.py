@@ -69,32 +69,32 @@ MAZE = environment(
 )
 def test_distances_known_in_closed_form(where, source, target, expected):
     distances = Geodesics(where)
-    assert distances.distances([source], [target])[0, 0] == pytest.approx(expected, abs=1e-12)
-    assert distances.distances([target], [source])[0, 0] == pytest.approx(expected, abs=1e-12)
+    assert distances.compute_distances([source], [target])[0, 0] == pytest.approx(expected, abs=1e-12)
+    assert distances.compute_distances([target], [source])[0, 0] == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_wall_with_a_touching_obstacle_in_line_is_passed():
     # the bottoms of both obstacles lie on one line and touch in a point; below it the way is free
     where = environment([(1, 1), (3, 1), (2, 3)], box(3, 1, 6, 4), boundary=((0, 0), (8, 0), (8, 8), (0, 8)))
-    assert Geodesics(where).distances([[0.5, 1]], [[7, 1]])[0, 0] == pytest.approx(6.5, abs=1e-12)
+    assert Geodesics(where).compute_distances([[0.5, 1]], [[7, 1]])[0, 0] == pytest.approx(6.5, abs=1e-12)
     # above, the pinch blocks: round the triangle's top or the box
-    above = Geodesics(where).distances([[2.75, 2]], [[2.5, 0.5]])[0, 0]
+    above = Geodesics(where).compute_distances([[2.75, 2]], [[2.5, 0.5]])[0, 0]
     expected = brute.distances(where.free, [(2.75, 2.0)], [(2.5, 0.5)])[0, 0]
     assert above == pytest.approx(expected, abs=1e-12)
     assert above > 3.0
 
 
 def test_a_robot_on_a_pinch_sees_both_sides():
-    distances = Geodesics(PINCH).distances([[1 / 2, 1 / 2]], [[3 / 8, 5 / 8], [5 / 8, 3 / 8]])
+    distances = Geodesics(PINCH).compute_distances([[1 / 2, 1 / 2]], [[3 / 8, 5 / 8], [5 / 8, 3 / 8]])
     assert distances[0] == pytest.approx([np.hypot(1 / 8, 1 / 8)] * 2, abs=1e-12)
 
 
 def test_sealed_rooms_are_infinitely_far():
     where = environment(box(3, 0, 5, 8), boundary=((0, 0), (8, 0), (8, 8), (0, 8)))
     assert len(where.free.geoms) == 2
-    distances = Geodesics(where).distances([[1, 1], [7, 7]], [[2, 2], [6, 6]])
+    distances = Geodesics(where).compute_distances([[1, 1], [7, 7]], [[2, 2], [6, 6]])
     assert np.isinf(distances).tolist() == [[False, True], [True, False]]
-    assert Geodesics(where).path(np.array([1.0, 1.0]), np.array([7.0, 7.0])).shape == (0, 2)
+    assert Geodesics(where).find_path(np.array([1.0, 1.0]), np.array([7.0, 7.0])).shape == (0, 2)
 
 
 cell = st.integers(0, 16).map(lambda k: k / 2)
@@ -129,7 +129,9 @@ def draw_points(data, where, count):
 def test_distances_agree_with_the_brute_force(where, data):
     sources, targets = draw_points(data, where, 2), draw_points(data, where, 3)
     expected = brute.distances(where.free, sources, targets)
-    np.testing.assert_allclose(Geodesics(where).distances(sources, targets), expected, rtol=0, atol=8e-12)
+    np.testing.assert_allclose(
+        Geodesics(where).compute_distances(sources, targets), expected, rtol=0, atol=8e-12
+    )
 
 
 @settings(max_examples=150, deadline=None)
@@ -150,8 +152,8 @@ def test_paths_are_as_long_as_the_distance_and_keep_to_free_space(where, data):
     source, *others = draw_points(data, where, 4)
     geodesics = Geodesics(where)
     for target in others:
-        way = geodesics.path(np.array(source), np.array(target))
-        distance = geodesics.distances([source], [target])[0, 0]
+        way = geodesics.find_path(np.array(source), np.array(target))
+        distance = geodesics.compute_distances([source], [target])[0, 0]
         if np.isinf(distance):
             assert way.shape == (0, 2)
             continue
@@ -166,7 +168,7 @@ def test_distances_are_a_metric_no_shorter_than_the_straight_line(where, data):
     points = np.array(draw_points(data, where, 4))
     vertices = shapely.get_coordinates(where.free)
     inner = np.array([not (vertices == p).all(axis=1).any() for p in points])
-    distances = Geodesics(where).distances(points, points)
+    distances = Geodesics(where).compute_distances(points, points)
     straight = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
     assert (distances >= straight - 1e-11).all()
     np.testing.assert_array_equal(np.diag(distances), 0.0)
@@ -180,7 +182,7 @@ def test_distances_are_a_metric_no_shorter_than_the_straight_line(where, data):
 def test_without_obstacles_the_distance_is_euclidean():
     rng = np.random.default_rng(5)
     points = rng.uniform(size=(20, 2))
-    distances = Geodesics(environment()).distances(points, points)
+    distances = Geodesics(environment()).compute_distances(points, points)
     np.testing.assert_allclose(
         distances, np.hypot(*(points[:, None] - points).transpose(2, 0, 1)), atol=1e-15
     )
@@ -197,8 +199,8 @@ def test_points_a_hair_inside_an_obstacle_are_on_its_wall(depth):
     for part in np.linspace(0.01, 0.99, 30):
         wall = a + part * (b - a)
         target = [[0.6, 0.9]]
-        distance = geodesics.distances([wall + depth * inward], target)[0, 0]
-        outside = geodesics.distances([wall - 1e-8 * inward], target)[0, 0]
+        distance = geodesics.compute_distances([wall + depth * inward], target)[0, 0]
+        outside = geodesics.compute_distances([wall - 1e-8 * inward], target)[0, 0]
         assert distance == pytest.approx(outside, abs=1.1e-6 if depth == 1e-6 else 3e-8)
         assert distance > np.hypot(*(wall - target[0])) + 0.01
 
@@ -208,14 +210,14 @@ def test_points_outside_the_free_space_are_named(point):
     with pytest.raises(
         InputError, match=r"positions\[1\] = \[.*\] is .* m outside the free space of map 'test'"
     ):
-        Geodesics(SLANTED).place([[0.1, 0.1], point])
+        Geodesics(SLANTED).snap_to_free_space([[0.1, 0.1], point])
 
 
 def test_points_that_are_no_numbers_are_named():
     with pytest.raises(InputError, match=r"positions\[0\] = \[nan, 1\]: finite numbers"):
-        Geodesics(SLANTED).place([[np.nan, 1.0]])
+        Geodesics(SLANTED).snap_to_free_space([[np.nan, 1.0]])
     with pytest.raises(InputError, match=r"positions: an array of shape \(3,\)"):
-        Geodesics(SLANTED).place([1.0, 2.0, 3.0])
+        Geodesics(SLANTED).snap_to_free_space([1.0, 2.0, 3.0])
 
 
 @pytest.mark.slow
@@ -227,7 +229,9 @@ def test_a_large_map_agrees_with_the_brute_force():
     cost = CoverageCost(where, lattice=10)
     robots = cost.points[[3, 30, 31, 60]]
     expected = brute.distances(where.free, robots, cost.points)
-    np.testing.assert_allclose(cost.geodesics.distances(robots, cost.points), expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        cost.geodesics.compute_distances(robots, cost.points), expected, rtol=0, atol=1e-12
+    )
     for count in (1, 4):
         nearest = expected[:count].min(axis=0)
         np.testing.assert_allclose(cost(robots[:count]).distances, nearest, rtol=0, atol=1e-12)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import Environment, PolygonObstacle
-from robocov.geodesic.walls import Grid, cross, locate, useful, vertex_at, walls_of
+from robocov.geodesic.walls import Grid, build_walls, can_bend_at_corner, count_windings, cross, find_vertex
 
 SIZE = 8.0
 
@@ -21,7 +21,7 @@ HALL = box(0, 0, 8, 8)
 
 def walls(*obstacles, boundary=HALL):
     where = Environment("test", boundary, tuple(PolygonObstacle(ring) for ring in obstacles))
-    return walls_of(shapely.transform(where.free, Grid.over(np.zeros(2), SIZE).snap))
+    return build_walls(shapely.transform(where.free, Grid.from_square(np.zeros(2), SIZE).snap))
 
 
 def corners(walls):
@@ -55,7 +55,7 @@ def test_vertices_in_line_are_no_corners():
 @pytest.mark.parametrize("touching", [box(5, 5, 7, 7), ((5, 5), (7, 5), (6, 7))])
 def test_a_pinch_has_two_narrow_sectors_and_no_corner(touching):
     pinch = walls(box(3, 3, 5, 5), touching)
-    at = vertex_at(pinch.vertices, 5.0 / 8 * 2.0**48, 5.0 / 8 * 2.0**48)
+    at = find_vertex(pinch.vertices, 5.0 / 8 * 2.0**48, 5.0 / 8 * 2.0**48)
     sectors = pinch.sectors[slice(*pinch.first[at : at + 2])]
     assert len(sectors) == 2
     assert (5.0, 5.0) not in corners(pinch)
@@ -83,15 +83,15 @@ def test_useful_points_of_a_corner_are_those_beside_its_walls():
         (4.001, 6): False,
     }
     x, y = (np.array(list(points)) / SIZE * 2.0**48).T
-    found = [useful(room.corners, 0, *point) for point in zip(x, y, strict=True)]
+    found = [can_bend_at_corner(room.corners, 0, *point) for point in zip(x, y, strict=True)]
     assert found == list(points.values())
 
 
 def test_vertices_are_found_by_their_place():
     pillar = walls(box(3, 3, 5, 5))
     for number, (x, y) in enumerate(pillar.vertices):
-        assert vertex_at(pillar.vertices, x, y) == number
-        assert vertex_at(pillar.vertices, x + 1, y) == vertex_at(pillar.vertices, x, y - 1) == -1
+        assert find_vertex(pillar.vertices, x, y) == number
+        assert find_vertex(pillar.vertices, x + 1, y) == find_vertex(pillar.vertices, x, y - 1) == -1
 
 
 def test_points_are_inside_outside_or_on_the_boundary():
@@ -104,7 +104,7 @@ def test_points_are_inside_outside_or_on_the_boundary():
         tuple(map(PolygonObstacle, (box(3, 3, 5, 5), box(5, 5, 7, 7), box(0, 4, 3.5, 4.5), box(7, 4, 8, 6)))),
     )
     holds = np.empty((len(points), len(where.free.geoms)), dtype=np.int64)
-    locate(pinch, points, holds)
+    count_windings(pinch, points, holds)
     for k, part in enumerate(where.free.geoms):
         np.testing.assert_array_equal(holds[:, k] > 0, shapely.intersects_xy(part, x, y))
         np.testing.assert_array_equal(holds[:, k] == 1, shapely.contains_xy(part, x, y))
@@ -125,8 +125,8 @@ def test_the_side_of_a_line_is_exact(ux, uy, near_x, near_y, multiple, wx, wy):
 
 
 def test_the_grid_keeps_dyadic_numbers():
-    grid = Grid.over(np.array([-3.0, 5.0]), 10.0)
+    grid = Grid.from_square(np.array([-3.0, 5.0]), 10.0)
     points = np.array([[-2.875, 5.5], [7.0, 14.99]])
     assert grid.unit == 2.0**-44
-    np.testing.assert_allclose(grid.metres(grid.snap(points)), points, rtol=0, atol=grid.unit)
-    np.testing.assert_array_equal(grid.metres(grid.snap(points))[0], points[0])
+    np.testing.assert_allclose(grid.to_metres(grid.snap(points)), points, rtol=0, atol=grid.unit)
+    np.testing.assert_array_equal(grid.to_metres(grid.snap(points))[0], points[0])

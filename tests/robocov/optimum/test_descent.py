@@ -11,7 +11,7 @@ from scipy.spatial.distance import pdist
 
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-from robocov.optimum import Room, _direction, descended
+from robocov.optimum import ConfigurationSpace, _direction, descend
 
 OFFICE = Environment(
     "office",
@@ -25,7 +25,7 @@ OFFICE = Environment(
 )
 COST = CoverageCost(OFFICE, 40)
 RADIUS = 0.15
-ROOM = Room(OFFICE.free, RADIUS)
+ROOM = ConfigurationSpace(OFFICE.free, RADIUS)
 EMPTY = Environment("empty", ((0, 0), (6, 0), (6, 6), (0, 6)))
 
 
@@ -59,7 +59,7 @@ def test_robots_are_moved_to_where_they_fit(seed, count):
 
 def test_where_robots_do_not_fit_there_is_no_place():
     closet = Environment("closet", ((0, 0), (1, 0), (1, 1), (0, 1)))
-    room = Room(closet.free, 0.2)
+    room = ConfigurationSpace(closet.free, 0.2)
     middle = np.full((5, 2), 0.5)
     assert room.nearest(middle[:4], np.zeros(4, dtype=int)) is not None
     assert room.nearest(middle, np.zeros(5, dtype=int)) is None
@@ -67,12 +67,12 @@ def test_where_robots_do_not_fit_there_is_no_place():
 
 def test_robots_stay_in_their_component():
     halves = Environment("halves", EMPTY.boundary, (WallObstacle(((3.5, 0), (3.5, 6)), 0.1),))
-    room = Room(halves.free, 0.1)
+    room = ConfigurationSpace(halves.free, 0.1)
     assert [part.centroid.x < 3.5 for part in room.parts] == [True, False]
     wanted = np.array([[5.0, 2.0], [1.0, 2.0]])
     positions = room.nearest(wanted, np.array([0, 1]))
     np.testing.assert_allclose(positions, [[3.348, 2.0], [3.652, 2.0]], atol=1e-9)
-    result = descended(CoverageCost(halves, 24), room, positions, np.array([0, 1]))
+    result = descend(CoverageCost(halves, 24), room, positions, np.array([0, 1]))
     np.testing.assert_allclose(result.positions, [[1.725, 3.0], [4.775, 3.0]], atol=0.03)
 
 
@@ -81,7 +81,7 @@ def test_robots_stay_in_their_component():
 def test_the_end_is_a_local_minimum_that_is_never_above_the_start(seed, count):
     begin = starts(seed, count)
     before = COST(begin)
-    result = descended(COST, ROOM, begin, np.zeros(count, dtype=int))
+    result = descend(COST, ROOM, begin, np.zeros(count, dtype=int))
     assert result.mean_distance <= before.mean_distance
     assert clear(result.positions, RADIUS, OFFICE.free)
     assert COST(result.positions).mean_distance == result.mean_distance
@@ -97,14 +97,14 @@ def test_the_end_is_a_local_minimum_that_is_never_above_the_start(seed, count):
 
 def test_one_robot_ends_at_the_geometric_median_whatever_the_start():
     triangle = Environment("triangle", ((0, 0), (6, 0), (0, 4)))
-    cost, room = CoverageCost(triangle, 48), Room(triangle.free, 0.1)
+    cost, room = CoverageCost(triangle, 48), ConfigurationSpace(triangle.free, 0.1)
     # Weiszfeld's iteration over the same sites
     median = cost.points.mean(axis=0)
     for _ in range(500):
         weight = 1.0 / np.hypot(*(cost.points - median).T)
         median = weight @ cost.points / weight.sum()
     for begin in ([[0.2, 0.2]], [[5.0, 0.3]], [[1.0, 2.9]]):
-        result = descended(cost, room, np.array(begin), np.zeros(1, dtype=int))
+        result = descend(cost, room, np.array(begin), np.zeros(1, dtype=int))
         np.testing.assert_allclose(result.positions[0], median, atol=2e-3)
 
 
@@ -117,18 +117,18 @@ def test_giving_up():
             raise InterruptedError
 
     with pytest.raises(InterruptedError):
-        descended(COST, ROOM, starts(0, 5), np.zeros(5, dtype=int), beat)
+        descend(COST, ROOM, starts(0, 5), np.zeros(5, dtype=int), beat)
     assert len(steps) == 3
 
 
 def test_where_nothing_can_be_gained_robots_stay():
     # a component without a site: its robot has no slope
     closet = Environment("closet", EMPTY.boundary, (WallObstacle(((0.25, 0), (0.25, 6)), 0.02),))
-    cost, room = CoverageCost(closet, 6), Room(closet.free, 0.1)
+    cost, room = CoverageCost(closet, 6), ConfigurationSpace(closet.free, 0.1)
     begin = np.array([[0.12, 1.0], [3.0, 3.0]])
-    result = descended(cost, room, begin, np.array([1, 0]))
+    result = descend(cost, room, begin, np.array([1, 0]))
     np.testing.assert_array_equal(result.positions[0], begin[0])
-    only = descended(cost, room, begin[:1], np.array([1]))
+    only = descend(cost, room, begin[:1], np.array([1]))
     assert np.isnan(only.mean_distance)
 
 
@@ -150,6 +150,6 @@ def test_some_tens_of_steps_are_enough():
     steps = []
     for seed in range(6):
         before = len(steps)
-        descended(COST, ROOM, starts(seed, 6), np.zeros(6, dtype=int), lambda: steps.append(1))
+        descend(COST, ROOM, starts(seed, 6), np.zeros(6, dtype=int), lambda: steps.append(1))
         assert len(steps) - before < 60
     assert len(steps) / 6 < 35

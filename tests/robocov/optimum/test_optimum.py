@@ -18,7 +18,7 @@ from robocov.errors import ParameterError
 from robocov.generator import generated_map
 from robocov.k_median import seeded
 from robocov.mapfile import load_map
-from robocov.optimum import _Search, optimum
+from robocov.optimum import _Search, find_optimum
 
 
 def room(width, height, *obstacles, name="room"):
@@ -34,28 +34,28 @@ TRAP = room(5, 4, WallObstacle(((2.5, 0), (2.5, 2.8), (4, 2.8)), 0.1), box(0.8, 
 
 
 def test_one_robot_stands_in_the_middle_of_a_square():
-    best = optimum(room(4, 4), 1, restarts=3)
+    best = find_optimum(room(4, 4), 1, restarts=3)
     np.testing.assert_allclose(best.positions, [[2, 2]], atol=1e-3)
     # the mean distance in a square from its middle
     assert best.mean_distance == pytest.approx(4 * 0.3825978582, rel=1e-4)
     assert best.value == pytest.approx(best.mean_distance * 16.0)
     assert best.uncovered_area == 0.0
-    assert best.agreement() == 1.0
+    assert best.compute_agreement() == 1.0
 
 
 def test_four_robots_stand_in_the_middles_of_the_quarters():
-    best = optimum(room(4, 4), 4)
+    best = find_optimum(room(4, 4), 4)
     np.testing.assert_allclose(best.positions, [[1, 1], [1, 3], [3, 1], [3, 3]], atol=2e-3)
 
 
 def test_two_robots_halve_a_corridor():
-    best = optimum(room(20, 0.5), 2, lattice=200, restarts=4)
+    best = find_optimum(room(20, 0.5), 2, lattice=200, restarts=4)
     np.testing.assert_allclose(best.positions, [[5, 0.25], [15, 0.25]], atol=0.01)
 
 
 def test_one_robot_stands_where_a_search_of_the_whole_plane_finds_it():
     arms = room(9, 5, box(0, 0, 4, 4), box(5, 0, 9, 4), name="T")
-    best = optimum(arms, 1, restarts=4)
+    best = find_optimum(arms, 1, restarts=4)
     cost = CoverageCost(arms, 64)
     x, y = (part.ravel() for part in np.mgrid[0.1:8.95:0.1, 0.1:4.95:0.1])
     inside = shapely.contains_xy(arms.free.buffer(-0.1), x, y)
@@ -71,9 +71,9 @@ def test_no_pair_of_sites_is_better_than_two_robots(where):
     cost = CoverageCost(where, lattice)
     away = shapely.distance(where.free.boundary, shapely.points(cost.points))
     places = np.nonzero(away >= 0.102)[0]
-    table = cost.geodesics.distances(cost.points[places], cost.points)
+    table = cost.geodesics.compute_distances(cost.points[places], cost.points)
     of_all = min(np.minimum(table[i], table[j]).mean() for i, j in combinations(range(len(places)), 2))
-    best = optimum(where, 2, lattice=lattice)
+    best = find_optimum(where, 2, lattice=lattice)
     assert best.mean_distance <= of_all
     # some site is at most half a diagonal away from each robot, and not much more where walls are near
     assert best.mean_distance >= of_all - cost.spacing
@@ -99,7 +99,7 @@ def test_no_descent_of_another_kind_ends_below(count):
         begin = rng.uniform((0, 0), (5, 4), (count, 2))
         found = minimize(penalised, begin.ravel(), method="Nelder-Mead", options={"maxfev": 300})
         ends.append(found.fun)
-    best = optimum(TRAP, count, lattice=24)
+    best = find_optimum(TRAP, count, lattice=24)
     assert best.mean_distance <= min(ends) * (1.0 + 1e-6)
     # and the comparison means something
     assert min(ends) < best.mean_distance * 1.05
@@ -107,7 +107,7 @@ def test_no_descent_of_another_kind_ends_below(count):
 
 def lloyds(cost, positions):
     """Return the cost of Lloyd's iteration with geodesic distances: each robot to its cell's best site."""
-    table = cost.geodesics.distances(cost.points, cost.points)
+    table = cost.geodesics.compute_distances(cost.points, cost.points)
     reached = cost(positions)
     while True:
         moved = reached.positions.copy()
@@ -125,7 +125,7 @@ def lloyds(cost, positions):
 @pytest.mark.parametrize("name", ["rooms", "museum", "blocks-a", "trap"])
 def test_it_never_ends_above_its_seeds_nor_above_lloyds_iteration_from_them(name):
     where, lattice, restarts = load_map(name), 16, 6
-    best = optimum(where, 5, lattice=lattice, restarts=restarts, seed=3)
+    best = find_optimum(where, 5, lattice=lattice, restarts=restarts, seed=3)
     search = _Search(where, CoverageCost(where, lattice), 5, 0.1)
     ends = []
     for restart in range(restarts):
@@ -135,14 +135,14 @@ def test_it_never_ends_above_its_seeds_nor_above_lloyds_iteration_from_them(name
         ends.append(lloyds(search.cost, begin))
     assert best.mean_distance <= min(ends)
     assert best.costs.min() == best.mean_distance == best.costs[best.restart]
-    assert best.gap(min(ends)) == min(ends) / best.mean_distance - 1.0 >= 0.0
+    assert best.compute_gap(min(ends)) == min(ends) / best.mean_distance - 1.0 >= 0.0
 
 
 @settings(max_examples=12)
 @given(st.integers(0, 2**20), st.sampled_from(["polygons", "blocks", "rooms"]), st.integers(1, 9))
 def test_positions_are_clear_and_the_cost_is_theirs(seed, kind, robots):
     where = generated_map(seed, kind=kind, side=8.0, gap=0.4)
-    best = optimum(where, robots, lattice=24, restarts=3, seed=seed)
+    best = find_optimum(where, robots, lattice=24, restarts=3, seed=seed)
     assert best.positions.shape == (robots, 2)
     points = shapely.points(best.positions)
     assert shapely.contains_properly(where.free, points).all()
@@ -158,7 +158,7 @@ def test_positions_are_clear_and_the_cost_is_theirs(seed, kind, robots):
 @pytest.mark.slow
 def test_more_restarts_are_never_worse_and_begin_alike():
     where = load_map("museum")
-    found = [optimum(where, 6, lattice=24, restarts=restarts, seed=1) for restarts in (1, 2, 5, 9)]
+    found = [find_optimum(where, 6, lattice=24, restarts=restarts, seed=1) for restarts in (1, 2, 5, 9)]
     costs = [best.mean_distance for best in found]
     assert costs == sorted(costs, reverse=True)
     assert costs[0] > costs[-1]
@@ -169,15 +169,15 @@ def test_more_restarts_are_never_worse_and_begin_alike():
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_also_in_another_process():
     script = (
-        "import sys\nfrom robocov.mapfile import load_map\nfrom robocov.optimum import optimum\n"
-        "best = optimum(load_map('trap'), 4, lattice=32, restarts=4, seed=5)\n"
+        "import sys\nfrom robocov.mapfile import load_map\nfrom robocov.optimum import find_optimum\n"
+        "best = find_optimum(load_map('trap'), 4, lattice=32, restarts=4, seed=5)\n"
         "sys.stdout.write(best.positions.tobytes().hex() + best.costs.tobytes().hex())"
     )
-    best = optimum(load_map("trap"), 4, lattice=32, restarts=4, seed=5)
+    best = find_optimum(load_map("trap"), 4, lattice=32, restarts=4, seed=5)
     here = best.positions.tobytes().hex() + best.costs.tobytes().hex()
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout == here
-    other = optimum(load_map("trap"), 4, lattice=32, restarts=4, seed=6)
+    other = find_optimum(load_map("trap"), 4, lattice=32, restarts=4, seed=6)
     assert other.costs.tobytes() != best.costs.tobytes()
 
 
@@ -185,12 +185,12 @@ def test_the_largest_components_are_covered_first():
     halves = room(12, 4, box(7, 0, 7.2, 4), box(9.4, 0, 9.6, 4), name="three")
     areas = [28.0, 9.6, 8.8]
     for robots in (1, 2, 3, 5):
-        best = optimum(halves, robots, lattice=48, restarts=4)
+        best = find_optimum(halves, robots, lattice=48, restarts=4)
         assert best.uncovered_area == pytest.approx(sum(areas[robots:]))
         assert best.costs.min() == best.mean_distance
     # of five the largest room gets three
     assert (best.positions[:, 0] < 7).sum() == 3
-    one = optimum(halves, 1, lattice=48, restarts=2)
+    one = find_optimum(halves, 1, lattice=48, restarts=2)
     np.testing.assert_allclose(one.positions, [[3.5, 2.0]], atol=0.02)
 
 
@@ -204,7 +204,7 @@ def test_rooms_are_never_given_up_for_a_lower_mean(monkeypatch):
     monkeypatch.setattr("robocov.optimum.seeded", all_in_the_small_one)
     search = _Search(halves, CoverageCost(halves, 32), 3, 0.1)
     drawn = search.places[all_in_the_small_one(search.table, 3, None)]
-    best = optimum(halves, 3, lattice=32, restarts=1)
+    best = find_optimum(halves, 3, lattice=32, restarts=1)
     assert (drawn[:, 0] > 9.2).all()
     assert search.cost(drawn).mean_distance < best.mean_distance
     assert best.uncovered_area == 0.0
@@ -235,30 +235,30 @@ def test_places_for_robots_fill_the_room():
 
 def test_pockets_where_no_robot_fits_or_without_a_site_are_left_alone():
     pocket = room(6, 4, box(0.15, 0, 0.25, 4), name="pocket")  # 0.15 m wide: no robot fits
-    best = optimum(pocket, 2, lattice=32, restarts=3)
+    best = find_optimum(pocket, 2, lattice=32, restarts=3)
     assert best.uncovered_area == pytest.approx(0.6)
     assert (best.positions[:, 0] > 0.25).all()
     slot = room(6, 4, box(0.3, 0, 0.4, 4), name="slot")  # a robot fits, but no site of so coarse a lattice
-    best = optimum(slot, 2, lattice=6, restarts=3)
+    best = find_optimum(slot, 2, lattice=6, restarts=3)
     assert best.uncovered_area == pytest.approx(1.2)
 
 
 def test_a_crowded_room():
     closet = room(1.2, 1.2, name="closet")
-    best = optimum(closet, 16, lattice=32, restarts=2)
+    best = find_optimum(closet, 16, lattice=32, restarts=2)
     assert (pdist(best.positions) >= 0.2).all()
     with pytest.raises(
         ParameterError, match=r"robots: 60 of radius 0\.1 m, but there is room for about \d\d in map"
     ):
-        optimum(closet, 60, lattice=32)
+        find_optimum(closet, 60, lattice=32)
     with pytest.raises(ParameterError, match="there is no room for any in map 'closet'"):
-        optimum(closet, 1, radius=0.7)
+        find_optimum(closet, 1, radius=0.7)
 
 
 def test_larger_robots_keep_farther_away():
     narrow = room(6, 6, box(0, 2.6, 5, 3.0), name="narrow")
     for radius in (0.05, 0.3, 0.45):
-        best = optimum(narrow, 6, radius=radius, lattice=24, restarts=4)
+        best = find_optimum(narrow, 6, radius=radius, lattice=24, restarts=4)
         distance = shapely.distance(narrow.free.boundary, shapely.points(best.positions))
         assert distance.min() >= radius
         assert pdist(best.positions).min() >= 2 * radius
@@ -279,13 +279,13 @@ def test_larger_robots_keep_farther_away():
 )
 def test_parameters_out_of_range_are_named(words, message):
     with pytest.raises(ParameterError) as caught:
-        optimum(L_ROOM, **{"robots": 2, **words})
+        find_optimum(L_ROOM, **{"robots": 2, **words})
     assert str(caught.value).startswith(message)
 
 
 def test_progress_goes_from_nothing_to_all_and_may_give_up():
     parts = []
-    optimum(TRAP, 2, lattice=24, restarts=5, progress=parts.append)
+    find_optimum(TRAP, 2, lattice=24, restarts=5, progress=parts.append)
     assert parts == sorted(parts)
     assert parts[0] < 0.3
     assert parts[-1] == 1.0
@@ -296,4 +296,4 @@ def test_progress_goes_from_nothing_to_all_and_may_give_up():
             raise InterruptedError
 
     with pytest.raises(InterruptedError):
-        optimum(TRAP, 2, lattice=24, restarts=5, progress=stop)
+        find_optimum(TRAP, 2, lattice=24, restarts=5, progress=stop)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.controllers import Lloyd, Rapf
-from robocov.cost import CoverageCost, MomentaryCost
+from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle, WallObstacle
 from robocov.errors import StartError
 from robocov.metrics import MOVING_RATE, clearances, cost_history
@@ -142,22 +142,22 @@ def test_cost_is_of_the_map_as_it_is() -> None:
 
 
 def test_the_cost_of_a_place_that_comes_by_again_is_known() -> None:
-    momentary = MomentaryCost(CoverageCost(HALL, 8))
-    assert momentary.at(3.0) is momentary.at(3.0 + 24.0)
-    assert momentary.at(3.0) is not momentary.at(3.5)
+    momentary = TimeVaryingCost(CoverageCost(HALL, 8))
+    assert momentary.get_cost(3.0) is momentary.get_cost(3.0 + 24.0)
+    assert momentary.get_cost(3.0) is not momentary.get_cost(3.5)
     standing = CoverageCost(HALL.static, 8)
-    assert MomentaryCost(standing).at(9.0) is standing
+    assert TimeVaryingCost(standing).get_cost(9.0) is standing
 
 
 def test_who_is_run_over_covers_nothing() -> None:
-    cost = MomentaryCost(CoverageCost(HALL, 16))
+    cost = TimeVaryingCost(CoverageCost(HALL, 16))
     places = np.array([[2.0, 1.0], [8.0, 4.0]])  # the first is where the cart is
-    assert cost.counted(0.0, places).tolist() == [False, True]
-    assert cost.counted(6.0, places).tolist() == [True, True]
+    assert cost.find_counted_robots(0.0, places).tolist() == [False, True]
+    assert cost.find_counted_robots(6.0, places).tolist() == [True, True]
     result = cost(0.0, places)
     assert result is not None
     assert result.positions.tolist() == [[8.0, 4.0]]
-    alone = cost.figures(0.0, places[:1])
+    alone = cost.compute_figures(0.0, places[:1])
     assert np.isnan(alone[0])
     assert alone[2] == pytest.approx(HALL.free_area)
 

@@ -89,7 +89,7 @@ def test_the_oracle_assigns_as_brute_force_does() -> None:
     plan, rng = Plan(WALLED, 0.13, 8), np.random.default_rng(0)
     for _ in range(5):
         places, goals = rng.uniform((0.2, 0.2), (3.8, 2.8), (2, 4, 2)) * 1.0
-        far = plan.paths.distances(*(np.clip(each, 0.2, (1.8, 2.8)) for each in (places, goals)))
+        far = plan.paths.compute_distances(*(np.clip(each, 0.2, (1.8, 2.8)) for each in (places, goals)))
         found = assigned(plan, *(np.clip(each, 0.2, (1.8, 2.8)) for each in (places, goals)))
         best = min(itertools.permutations(range(4)), key=lambda order: (far[range(4), order] ** 2).sum())
         assert found.tolist() == list(best)

@@ -11,7 +11,7 @@ from PIL import Image
 
 from robocov.environment import DiscStart, Environment, WallObstacle
 from robocov.mapfile import save_map
-from robocov.optimum import optimum
+from robocov.optimum import find_optimum
 from robocov_app.cli import main
 
 FAST = ("--lattice", "24", "--restarts", "3")
@@ -24,7 +24,7 @@ def test_the_answer_is_that_of_the_library_and_its_positions_cost_as_much(
     row = answer(capsys, "optimum", "trap", *FAST, "--robots", "3", "--seed", "2", "--positions", str(file))
     from robocov.mapfile import load_map
 
-    best = optimum(load_map("trap"), 3, lattice=24, restarts=3, seed=2)
+    best = find_optimum(load_map("trap"), 3, lattice=24, restarts=3, seed=2)
     assert row["mean_distance_m"] == best.mean_distance
     assert row["positions_m"] == best.positions.tolist() == json.loads(file.read_bytes())
     assert row["restart_mean_distances_m"] == best.costs.tolist()
@@ -33,9 +33,9 @@ def test_the_answer_is_that_of_the_library_and_its_positions_cost_as_much(
     assert row["runs"] == []
     assert row["lower_bound"] is None
     assert row["agreement"] == {
-        "0.001": best.agreement(0.001),
-        "0.005": best.agreement(),
-        "0.02": best.agreement(0.02),
+        "0.001": best.compute_agreement(0.001),
+        "0.005": best.compute_agreement(),
+        "0.02": best.compute_agreement(0.02),
     }
     cost = answer(capsys, "cost", "trap", "--positions", str(file), "--lattice", "24")
     assert cost["mean_distance_m"] == pytest.approx(best.mean_distance, rel=1e-12)

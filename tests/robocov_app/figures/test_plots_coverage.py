@@ -105,7 +105,7 @@ def test_the_colours_are_those_of_the_scale(theme, tmp_path):
     geodesics = COSTS["hall"].geodesics
     hits = 0
     for place in COSTS["hall"].points[::97]:
-        exact = geodesics.distances(place[None], moment.field.result.positions)[0]
+        exact = geodesics.compute_distances(place[None], moment.field.result.positions)[0]
         column, height = axes.transData.transform(place)
         row = len(pixels) - 1 - int(height)
         around = pixels[row - 3 : row + 4, int(column) - 3 : int(column) + 4].reshape(-1, 3)

@@ -49,7 +49,7 @@ def test_colours_are_those_of_the_exact_distances(environment, theme):
     cost, what = scene(environment)
     frame, painter = painted(what, "distances", theme=theme)
     pixels, places = free_pixels(painter, environment, 150)
-    exact = cost.geodesics.distances(places, what.field.result.positions).min(axis=1)
+    exact = cost.geodesics.compute_distances(places, what.field.result.positions).min(axis=1)
     reached = np.isfinite(exact)
     wanted = palette(theme)[np.minimum(exact[reached] / 8.0 * FARTHEST, FARTHEST).astype(int)].astype(int)
     seen = frame[pixels[reached, 1], pixels[reached, 0]]
@@ -76,7 +76,7 @@ def test_geodesic_cells_have_the_tint_of_the_nearest_robot(n):
     cost, what = scene(n=n, seed=2)
     frame, painter = painted(what, "geodesic_cells")
     pixels, places = free_pixels(painter, ROOMS, 200)
-    exact = cost.geodesics.distances(places, what.field.result.positions)
+    exact = cost.geodesics.compute_distances(places, what.field.result.positions)
     ordered = np.sort(exact, axis=1)
     reached = np.isfinite(ordered[:, 0])
     clear = reached.copy()
@@ -96,7 +96,7 @@ def test_borders_are_drawn_where_owners_change_and_nowhere_else():
     chosen = slice(None, None, len(rows) // 60)
     places = painter.camera.to_world(np.column_stack([columns, rows])[chosen].astype(float))
     free = shapely.contains_xy(ROOMS.free, *places.T)
-    exact = np.sort(cost.geodesics.distances(places[free], what.field.result.positions), axis=1)
+    exact = np.sort(cost.geodesics.compute_distances(places[free], what.field.result.positions), axis=1)
     assert (exact[:, 1] - exact[:, 0]).max() < 3.0 / painter.camera.zoom
 
 
@@ -185,7 +185,7 @@ def test_any_zoom_shows_the_same_colours(zoom):
     painter.camera = replace(painter.camera, center=(9.0, 8.0), zoom=painter.camera.zoom * zoom)
     frame = painter.frame(what).astype(int)
     x, y = np.rint(painter.camera.to_pixels(place)).astype(int)
-    exact = cost.geodesics.distances(place[None], what.field.result.positions).min()
+    exact = cost.geodesics.compute_distances(place[None], what.field.result.positions).min()
     wanted = palette(LIGHT)[int(exact / 8.0 * FARTHEST)]
     assert np.abs(frame[y, x] - wanted).max() <= (60 if zoom < 1 else 6)
 

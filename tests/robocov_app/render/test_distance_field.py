@@ -62,7 +62,7 @@ def test_distances_are_the_exact_ones(environment, seed):
     x, y, _ = pixels(environment)
     row, column = some_free(environment, x, y, 150, seed)
     places = np.column_stack([x[column], y[row]])
-    exact = cost.geodesics.distances(places, field.result.positions).min(axis=1)
+    exact = cost.geodesics.compute_distances(places, field.result.positions).min(axis=1)
     error = np.abs(field.distances(x, y)[row, column] - exact)
     # nearly everywhere to rounding; beside shadows of corners by far less than the lattice's step
     assert np.quantile(error, 0.9) < 1e-9
@@ -75,7 +75,7 @@ def test_the_owner_is_the_nearest_robot(seed):
     x, y, step = pixels(ROOMS)
     owner, _ = field.cells(x, y, step)
     row, column = some_free(ROOMS, x, y, 150, seed)
-    exact = cost.geodesics.distances(np.column_stack([x[column], y[row]]), field.result.positions)
+    exact = cost.geodesics.compute_distances(np.column_stack([x[column], y[row]]), field.result.positions)
     chosen = exact[np.arange(150), owner[row, column]]
     assert (chosen - exact.min(axis=1)).max() < 0.2 * cost.spacing
 
@@ -88,7 +88,7 @@ def test_borders_are_where_two_robots_are_equally_near(seed):
     free = shapely.contains_xy(ROOMS.free, x[borders.column], y[borders.row])
     chosen = np.nonzero(free)[0][::7]
     places = np.column_stack([x[borders.column[chosen]], y[borders.row[chosen]]])
-    exact = np.sort(cost.geodesics.distances(places, field.result.positions), axis=1)
+    exact = np.sort(cost.geodesics.compute_distances(places, field.result.positions), axis=1)
     # two distances grow apart by at most twice the way to the border
     assert len(chosen) > 30
     assert (exact[:, 1] - exact[:, 0]).max() < 2.0 * borders.gap[chosen].max() + 0.1 * cost.spacing

@@ -104,7 +104,7 @@ def test_answers_are_those_of_the_cost():
     cost = CoverageCost(HALL, 32)
     assert answers[0].result.mean_distance == cost(PLACES).mean_distance
     assert (answers[0].time, answers[0].path) == (1.5, None)
-    np.testing.assert_array_equal(answers[3].path, cost.path(OTHERS, np.array([3.5, 0.5])))
+    np.testing.assert_array_equal(answers[3].path, cost.find_path(OTHERS, np.array([3.5, 0.5])))
     assert isinstance(answers[3].field, Field)
     assert answers[3].field is answers[3].field
     assert costs.poll() == []
@@ -327,7 +327,7 @@ def test_another_process_says_the_same(worker_costs):
         assert answers[pane].result.mean_distance == cost(places).mean_distance
         np.testing.assert_array_equal(answers[pane].result.distances, cost(places).distances)
     assert answers[0].path is None
-    np.testing.assert_array_equal(answers[5].path, cost.path(OTHERS, point))
+    np.testing.assert_array_equal(answers[5].path, cost.find_path(OTHERS, point))
     assert answers[5].field.largest > 0.0
     assert worker_costs.state == ""
     assert worker_costs.known == answers

@@ -6,7 +6,7 @@ from pathlib import Path
 import pygame
 
 from robocov.controllers import controller_kinds
-from robocov.cost import LATTICE
+from robocov.cost import DEFAULT_LATTICE
 from robocov.environment import Environment
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Item, Sketch
@@ -79,7 +79,7 @@ def begun(editor: Editor, screen: pygame.Surface, scale: float, *, patient: bool
     session = Session(Scenario(environment, robots=editor.robots, start=name, seed=editor.seed, limits=spec))
     if patient:
         session.clock.budget = float("inf")
-    costs = Costs(LATTICE, direct=patient)
+    costs = Costs(DEFAULT_LATTICE, direct=patient)
     try:
         shown = {layer.name for layer in standard_layers() if layer.default}
         demo = PlayPresenter(session, costs, shown, editor.folder, editor.document.title)

@@ -6,7 +6,7 @@ import shapely
 
 from robocov.environment import Environment, PolygonObstacle
 from robocov.geodesic import Geodesics
-from robocov.geodesic.visibility import AngularWallIndex, enter_walls, pseudo_angle, sees
+from robocov.geodesic.angular_index import AngularWallIndex, add_walls, compute_pseudo_angle, is_visible
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 
@@ -17,16 +17,16 @@ def environment(*obstacles):
 
 def test_pseudo_angles_grow_with_the_angle():
     angle = np.linspace(-np.pi / 2, 3 * np.pi / 2, 1000, endpoint=False)
-    values = np.array([pseudo_angle(np.cos(a), np.sin(a)) for a in angle])
+    values = np.array([compute_pseudo_angle(np.cos(a), np.sin(a)) for a in angle])
     assert (np.diff(values) > 0.0).all()
     assert values.min() >= 0.0
     assert values.max() <= 4.0
 
 
 def indexed(geodesics, points, reach, bins=64):
-    index, used = AngularWallIndex.room(len(points), bins, 5000 * len(points)), 0
+    index, used = AngularWallIndex.allocate(len(points), bins, 5000 * len(points)), 0
     for i, (x, y) in enumerate(points):
-        used = enter_walls(geodesics.walls, index, i, x, y, reach**2, used)
+        used = add_walls(geodesics.walls, index, i, x, y, reach**2, used)
         assert used >= 0
     return index
 
@@ -34,7 +34,7 @@ def indexed(geodesics, points, reach, bins=64):
 def seen(geodesics, index, targets):
     """Return which of the targets each source sees."""
     return np.array(
-        [[sees(geodesics.walls, index, i, *q) for q in targets] for i in range(len(index.sources))]
+        [[is_visible(geodesics.walls, index, i, *q) for q in targets] for i in range(len(index.sources))]
     )
 
 

@@ -13,7 +13,15 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.geodesic.walls import LEAF, Walls, cross, near2, sectors_hold, skipped, vertex_at
+from robocov.geodesic.walls import (
+    LEAF_SIZE,
+    Walls,
+    compute_squared_box_distance,
+    contains_direction,
+    cross,
+    find_vertex,
+    skip_subtree,
+)
 
 _PAD = 1e-9
 """Added to the angles that a wall spans, and taken off its distance: far more than rounding, at no cost."""
@@ -37,8 +45,8 @@ class AngularWallIndex(NamedTuple):
     """Nodes of the tree that are to be looked at."""
 
     @classmethod
-    def room(cls, n: int, bins: int, entries: int) -> AngularWallIndex:
-        """Return room for the index of so many sources, for `enter_walls`; bins are a power of 2."""
+    def allocate(cls, n: int, bins: int, entries: int) -> AngularWallIndex:
+        """Return room for the index of so many sources, for `add_walls`; bins are a power of 2."""
         return cls(
             np.empty((n, 3)), np.empty((n, bins, 2)), np.empty((n, bins), np.int64),
             np.empty((entries, 2), np.int64), np.empty(64, np.int64),
@@ -46,10 +54,10 @@ class AngularWallIndex(NamedTuple):
 
 
 @kernel
-def pseudo_angle(dx: float, dy: float) -> float:
+def compute_pseudo_angle(dx: float, dy: float) -> float:
     """Return a number in [0, 4] that grows with the direction's angle, without trigonometry.
 
-    >>> [pseudo_angle(dx, dy) for dx, dy in ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))]
+    >>> [compute_pseudo_angle(dx, dy) for dx, dy in ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))]
     [0.0, 1.0, 2.0, 3.0]
     """
     part = dy / max(abs(dx) + abs(dy), 1e-300)
@@ -57,10 +65,10 @@ def pseudo_angle(dx: float, dy: float) -> float:
 
 
 @kernel
-def beyond_horizon(boxes: Array, node: int, index: AngularWallIndex, i: int) -> bool:
+def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, i: int) -> bool:
     """Return whether all of a box is hidden from source i: beyond the horizon in every bin where it lies."""
     x, y, limits = index.sources[i, 0], index.sources[i, 1], index.limits
-    least = near2(boxes, node, x, y) * (1.0 - _PAD)
+    least = compute_squared_box_distance(boxes, node, x, y) * (1.0 - _PAD)
     if least == 0.0:
         return False
     bins = limits.shape[1]
@@ -68,7 +76,7 @@ def beyond_horizon(boxes: Array, node: int, index: AngularWallIndex, i: int) -> 
     dx, dy = boxes[node, 0] + half_x - x, boxes[node, 1] + half_y - y
     # a pseudo-angle grows by at most the angle, of which a half turn is at most pi/2 by its sine
     wide = np.sqrt((half_x * half_x + half_y * half_y) / (dx * dx + dy * dy)) * (0.5 * np.pi) + _PAD
-    angle = pseudo_angle(dx, dy)
+    angle = compute_pseudo_angle(dx, dy)
     first, last = int(np.floor((angle - wide) * (bins * 0.25))), int(np.floor((angle + wide) * (bins * 0.25)))
     for k in range(first, min(last, first + bins - 1) + 1):  # noqa: SIM110, kernels are plain loops
         if limits[i, k & (bins - 1), 1] >= least:
@@ -77,7 +85,7 @@ def beyond_horizon(boxes: Array, node: int, index: AngularWallIndex, i: int) -> 
 
 
 @kernel
-def enter_walls(
+def add_walls(
     walls: Walls, index: AngularWallIndex, i: int, x: float, y: float, reach2: float, used: int
 ) -> int:
     """Enter the walls around (x, y), not inside an obstacle, as source i.
@@ -93,21 +101,24 @@ def enter_walls(
     while height:
         height -= 1
         node = stack[height]
-        if near2(boxes, node, x, y) >= reach2 or beyond_horizon(boxes, node, index, i):
+        if compute_squared_box_distance(boxes, node, x, y) >= reach2 or is_box_hidden(boxes, node, index, i):
             continue
         if node < leaves:
             # the nearer half first: what it hides need not be looked at
-            near = 2 * node + int(near2(boxes, 2 * node + 1, x, y) < near2(boxes, 2 * node, x, y))
+            near = 2 * node + int(
+                compute_squared_box_distance(boxes, 2 * node + 1, x, y)
+                < compute_squared_box_distance(boxes, 2 * node, x, y)
+            )
             stack[height], stack[height + 1] = near ^ 1, near
             height += 2
             continue
-        begin = (node - leaves) * LEAF
-        for wall in range(begin, min(begin + LEAF, len(walls.ends))):
+        begin = (node - leaves) * LEAF_SIZE
+        for wall in range(begin, min(begin + LEAF_SIZE, len(walls.ends))):
             if used + bins > len(index.entries):
                 return -1
             if walls.facts[wall, 2]:
                 used = _enter(walls, wall, index, i, used)
-    if vertex_at(walls.vertices, x, y) >= 0:
+    if find_vertex(walls.vertices, x, y) >= 0:
         # its sectors decide before the walls do
         for k in range(bins):
             limits[i, k, 0] = -1.0
@@ -132,7 +143,7 @@ def _enter(walls: Walls, wall: int, index: AngularWallIndex, i: int, used: int) 
     # seen from its front, a wall runs counter-clockwise from a to b, by at most a half turn
     bins = limits.shape[1]
     scale = bins * 0.25
-    start, stop = pseudo_angle(ax, ay), pseudo_angle(bx, by)
+    start, stop = compute_pseudo_angle(ax, ay), compute_pseudo_angle(bx, by)
     if stop < start:
         stop += 4.0
     low, high = int(np.floor((start - _PAD) * scale)), int(np.floor((stop + _PAD) * scale))
@@ -168,7 +179,7 @@ def _chained(walls: Walls, wall: int, px: float, py: float, angle: float, wanted
         bx, by = ends[wall, 2] - px, ends[wall, 3] - py
         if cross(ax, ay, bx - ax, by - ay) <= 0.0:
             break
-        stop = pseudo_angle(bx, by)
+        stop = compute_pseudo_angle(bx, by)
         while stop < angle - _PAD:
             stop += 4.0
         angle, far = stop, max(far, (bx * bx + by * by) * (1.0 + _PAD))
@@ -178,12 +189,12 @@ def _chained(walls: Walls, wall: int, px: float, py: float, angle: float, wanted
 
 
 @kernel
-def sees(walls: Walls, index: AngularWallIndex, i: int, x: float, y: float) -> bool:
+def is_visible(walls: Walls, index: AngularWallIndex, i: int, x: float, y: float) -> bool:
     """Return whether source i sees a target, at any distance; from a vertex into its free space only."""
     dx, dy = x - index.sources[i, 0], y - index.sources[i, 1]
     away2 = dx * dx + dy * dy
     bins = index.limits.shape[1]
-    k = min(int(pseudo_angle(dx, dy) * (bins * 0.25)), bins - 1)
+    k = min(int(compute_pseudo_angle(dx, dy) * (bins * 0.25)), bins - 1)
     # this decides most
     if away2 <= index.limits[i, k, 0]:
         return True
@@ -196,8 +207,8 @@ def sees(walls: Walls, index: AngularWallIndex, i: int, x: float, y: float) -> b
 def _sees_past(walls: Walls, index: AngularWallIndex, i: int, k: int, dx: float, dy: float) -> bool:
     """Return whether source i sees what is at (dx, dy) from it, in bin k, by looking at each wall."""
     px, py = index.sources[i, 0], index.sources[i, 1]
-    if index.limits[i, k, 0] < 0.0 and not sectors_hold(
-        walls.first, walls.sectors, vertex_at(walls.vertices, px, py), dx, dy
+    if index.limits[i, k, 0] < 0.0 and not contains_direction(
+        walls.first, walls.sectors, find_vertex(walls.vertices, px, py), dx, dy
     ):
         return False
     if dx * dx + dy * dy > index.sources[i, 2]:
@@ -232,22 +243,22 @@ def _unhidden(walls: Walls, px: float, py: float, dx: float, dy: float) -> bool:
             boxes[node, 0] > high_x or boxes[node, 2] < low_x
             or boxes[node, 1] > high_y or boxes[node, 3] < low_y
         ):  # fmt: skip
-            node = skipped(node)
+            node = skip_subtree(node)
             continue
         half_x, half_y = 0.5 * (boxes[node, 2] - boxes[node, 0]), 0.5 * (boxes[node, 3] - boxes[node, 1])
         side = dx * (boxes[node, 1] + half_y - py) - dy * (boxes[node, 0] + half_x - px)
         if abs(side) * (1.0 - _PAD) > (abs(dx) * half_y + abs(dy) * half_x) * (1.0 + _PAD) + 2.0**55:
-            node = skipped(node)
+            node = skip_subtree(node)
             continue
         if node < leaves:
             node *= 2
             continue
-        begin = (node - leaves) * LEAF
-        for wall in range(begin, min(begin + LEAF, len(ends))):
+        begin = (node - leaves) * LEAF_SIZE
+        for wall in range(begin, min(begin + LEAF_SIZE, len(ends))):
             ax, ay, bx, by = ends[wall, 0] - px, ends[wall, 1] - py, ends[wall, 2] - px, ends[wall, 3] - py
             side = cross(ax, ay, bx - ax, by - ay)
             faces = side > 0.0 or (side == 0.0 and ax * bx + ay * by < 0.0)
             if faces and walls.facts[wall, 2] and _hides(ends, wall, px, py, dx, dy):
                 return False
-        node = skipped(node)
+        node = skip_subtree(node)
     return True
