@@ -14,7 +14,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.observation.neighbours import binned, row_of
+from robocov.observation.neighbours import find_bin, sort_into_bins
 
 CONTACT_DISTANCE = 0.01
 """Distance in metres below which the repulsion no longer grows: a tenth of a robot's radius."""
@@ -69,8 +69,8 @@ def potential_forces(
                     _push(forces, i, j, x - positions[j, 0], y - positions[j, 1], k_rep, rho_0)
         else:
             if i % team == 0:
-                left, low, scale, columns, rows = binned(positions, i, i + team, rho_0, starts, order)
-            column, row = row_of(x - left, scale), row_of(y - low, scale)
+                left, low, scale, columns, rows = sort_into_bins(positions, i, i + team, rho_0, starts, order)
+            column, row = find_bin(x - left, scale), find_bin(y - low, scale)
             for r in range(max(row - 1, 0), min(row + 2, rows)):
                 b = r * columns
                 for k in range(starts[b + max(column - 1, 0)], starts[b + min(column + 2, columns)]):

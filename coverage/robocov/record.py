@@ -259,11 +259,11 @@ class Record(Drawable):
     def snapshot(self, k: int) -> Snapshot:
         """Return moment `k` as far as it was recorded: without force terms and cells."""
         working = None if self.conditions is None else self.working[k]
-        neighbours = Neighbours.within(self.positions[k], self.team.communication_range)
+        neighbours = Neighbours.from_ranges(self.positions[k], self.team.communication_range)
         seen = Observations(
             positions=self.positions[k],
             velocities=self.velocities[k],
-            neighbours=neighbours if working is None else neighbours.among(working),
+            neighbours=neighbours if working is None else neighbours.keep_working(working),
             obstacle_points=self.obstacle_points[k],
             region=self.environment.region,
             time=float(self.time[k]),

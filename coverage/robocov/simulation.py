@@ -36,9 +36,9 @@ from robocov.observation import (
     Scanning,
     Scans,
     Snapshot,
-    checked_decision,
-    detached,
-    given_forces,
+    check_decision,
+    check_forces,
+    copy_decision,
 )
 from robocov.observation.neighbours import Neighbours
 from robocov.record import ARRAYS, Record, Recorder
@@ -173,7 +173,7 @@ class Simulation:
         self.inbox = None if self._perception is None else self._perception.begin()
         self._everybody = None
         if np.isinf(self.team.communication_range).all():
-            self._everybody = Neighbours.beside([Neighbours(each)] * runs)
+            self._everybody = Neighbours.combine([Neighbours(each)] * runs)
         self._law = self._asked(informed, controller, environment.static)
         self.memory = self._asked(self._law.begin, environment.region, self.team)
         self._scanning: Scanning | None = self._asked(getattr, controller, "scanning", None)
@@ -241,9 +241,9 @@ class Simulation:
             team, scanning, neighbours, scans = self.team, self._scanning, self._everybody, None
             if neighbours is None:
                 ranges, runs = team.communication_range, self._each_run
-                parts = [Neighbours.within(self.positions[run], ranges[run]) for run in runs]
-                neighbours = Neighbours.beside(parts)
-            if scanning is not None and self._steps % scanning.every(self.dt) == 0:
+                parts = [Neighbours.from_ranges(self.positions[run], ranges[run]) for run in runs]
+                neighbours = Neighbours.combine(parts)
+            if scanning is not None and self._steps % scanning.count_steps(self.dt) == 0:
                 scans = Scans(*self.sensor.scan(self.positions, scanning.rays, team.sensing_range))
             seen = Observations(
                 positions=self.positions,
@@ -266,7 +266,7 @@ class Simulation:
     def _decided(self, seen: Observations) -> Decision:
         count, name = len(seen.positions), self.controller.name
         if self._built_in:
-            return checked_decision(self._law.decide(seen, self.memory), count, name, seen.time)
+            return check_decision(self._law.decide(seen, self.memory), count, name, seen.time)
         # a user's controller may change what it is given, and use again what it gave
         memory = self.memory
         if remembers(self.controller):
@@ -274,7 +274,7 @@ class Simulation:
                 memory = deepcopy(memory)
         made = self._asked(self._law.decide, replace(seen), memory)
         source = "" if isinstance(self._law, Individually) else location_of(self._law.decide)
-        return detached(checked_decision(made, count, name, seen.time, source), name, source)
+        return copy_decision(check_decision(made, count, name, seen.time, source), name, source)
 
     def _asked(self, question: Callable[..., Any], *args: Any) -> Any:
         """Ask the controller; a fault of a controller that is not ours becomes one clear line."""
@@ -299,12 +299,12 @@ class Simulation:
         """
         count, memory = len(self.team), self.memory
         if external_forces is not None:
-            external_forces = given_forces(external_forces, count, "external_forces")
+            external_forces = check_forces(external_forces, count, "external_forces")
         if forces is None:
             decision = self.snapshot.decision
             forces, memory = decision.forces, decision.memory
         else:
-            forces = given_forces(forces, count, "forces")
+            forces = check_forces(forces, count, "forces")
         inbox = None if self._perception is None else self._observed()[1]
         before = self.positions
         self._world.step(forces, self.dt, external_forces, time=self.time)

@@ -46,7 +46,7 @@ def main(budget: int) -> None:
     print(f"{'robots':>6} {'Delaunay':>12} {'partition':>18} {'limited range':>18} {'polygons':>12}")
     for n in (2, 4, 5, 6, 12, 50, 200, 1000):
         points = rng.uniform([0.0, 0.0], [10.0, 6.0], (n, 2))
-        heard = Neighbours.within(points, np.full(n, RANGE))
+        heard = Neighbours.from_ranges(points, np.full(n, RANGE))
         calls: dict[str, Callable[[], object]] = {
             "partition": lambda points=points: partition(points, REGION),
             "limited": lambda points=points, heard=heard: partition(points, REGION, heard),

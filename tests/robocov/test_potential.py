@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.observation.neighbours import NOBODY, Neighbours
+from robocov.observation.neighbours import NO_INDICES, Neighbours
 from robocov.potential import CONTACT_DISTANCE, potential_forces, separation
 
 coordinate = st.floats(-5, 5)
@@ -17,7 +17,7 @@ def forces(
     obstacle_points: np.ndarray | None = None,
     goals: np.ndarray | None = None,
     k: tuple[float, ...] = (0.0, 2.0, 0.0, np.inf),
-    links: tuple[np.ndarray, np.ndarray] = (NOBODY, NOBODY),
+    links: tuple[np.ndarray, np.ndarray] = (NO_INDICES, NO_INDICES),
     reported: np.ndarray | None = None,
 ) -> np.ndarray:
     """Return all forces, by strength and range of the repulsion, strength and limit of the attraction."""
@@ -139,10 +139,10 @@ def test_all_forces_against_one_pair_after_the_other(n: int, seed: int, rho_0: f
     rng = np.random.default_rng(seed)
     positions, goals, points = rng.uniform(0.0, 10.0, (3, n, 2))
     points[rng.random(n) < 0.3] = np.nan
-    neighbours = Neighbours(n) if heard == "all" else Neighbours.within(positions, rng.uniform(0, 8, n))
-    robot, other = neighbours.pairs()
+    neighbours = Neighbours(n) if heard == "all" else Neighbours.from_ranges(positions, rng.uniform(0, 8, n))
+    robot, other = neighbours.list_pairs()
     places = positions[other] + (0.1 * rng.normal(size=(len(other), 2)) if heard == "reports" else 0.0)
-    links = (NOBODY, NOBODY) if neighbours.indptr is None else (neighbours.indptr, other)
+    links = (NO_INDICES, NO_INDICES) if neighbours.indptr is None else (neighbours.indptr, other)
     found = forces(
         positions, points, goals, (0.7, rho_0, 1.3, 5.0), links, places if heard == "reports" else None
     )

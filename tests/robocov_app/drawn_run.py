@@ -108,7 +108,7 @@ def explained(
     seen = Observations(
         positions,
         zero if velocities is None else velocities,
-        Neighbours.within(positions, team.communication_range),
+        Neighbours.from_ranges(positions, team.communication_range),
         np.full_like(positions, np.nan) if obstacle_points is None else obstacle_points,
         SQUARE.region,
         1.5,

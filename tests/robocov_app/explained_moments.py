@@ -38,7 +38,7 @@ def moment(
     seen = Observations(
         positions,
         np.zeros_like(positions) if velocities is None else np.array(velocities, dtype=float),
-        Neighbours.within(positions, team.communication_range),
+        Neighbours.from_ranges(positions, team.communication_range),
         nothing if points is None else np.array(points, dtype=float),
         environment.region,
     )

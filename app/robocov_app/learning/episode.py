@@ -14,7 +14,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, StartError, describe_unknown_name, quote
 from robocov.metrics import TOUCHING
 from robocov.observation import Decision, Observations, Scanning, Snapshot
-from robocov.observation.neighbours import close_pairs
+from robocov.observation.neighbours import find_close_pairs
 from robocov.observation.region import Region
 from robocov.record import Record
 from robocov.robots import Team
@@ -277,7 +277,7 @@ def _touching(simulation: Simulation, each: int) -> BoolArray:
     reach, run = 2.0 * float(radius.max()) + TOUCHING, np.arange(len(positions)) // each
     # nobody is near those of other runs
     apart = positions + (2.0 * (simulation.environment.region.diameter + reach) * run)[:, None]
-    first, second, _ = close_pairs(apart, 1.001 * reach)
+    first, second, _ = find_close_pairs(apart, 1.001 * reach)
     if len(first):
         x, y = (positions[first] - positions[second]).T
         met = np.sqrt(x * x + y * y) <= radius[first] + radius[second] + TOUCHING

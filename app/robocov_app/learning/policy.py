@@ -161,7 +161,7 @@ class ControllerPolicy:
         scanning: Scanning | None = getattr(self._law, "scanning", None)
         if scanning is None:
             return None
-        number = episode.cycle * episode.task.repeat // scanning.every(episode.task.dt)
+        number = episode.cycle * episode.task.repeat // scanning.count_steps(episode.task.dt)
         if number == self._scan_number:
             return None
         self._scan_number, simulation = number, episode.simulation

@@ -25,7 +25,7 @@ from robocov.errors import (
     require_type,
 )
 from robocov.mapfile import load_map
-from robocov.observation import MOST_RAYS, Observations, Scans
+from robocov.observation import MAX_RAYS, Observations, Scans
 from robocov.observation.region import Region
 from robocov.robots import Team
 from robocov.simulation import DEFAULT_DT, check_dt
@@ -229,7 +229,7 @@ class ObservationLayout:
     centroid: bool = False
 
     def __post_init__(self) -> None:
-        for name, most in (("neighbours", MOST_NEIGHBOURS), ("rays", MOST_RAYS)):
+        for name, most in (("neighbours", MOST_NEIGHBOURS), ("rays", MAX_RAYS)):
             require_number(f"observation.{name}", getattr(self, name), 0, most, whole=True)
         require_type("observation.centroid", self.centroid, bool, "true or false")
 
@@ -265,7 +265,7 @@ class ObservationLayout:
         obstacle[sensed, :2] = ((seen.obstacle_points - seen.positions) / reach)[sensed]
         obstacle[:, 2] = sensed
         if self.neighbours:
-            robot, _, offset, distance = seen.neighbours_within(4.0 * unit)
+            robot, _, offset, distance = seen.find_near_neighbours(4.0 * unit)
             nearest = np.zeros((n, self.neighbours, 3))
             farthest = np.full((n, self.neighbours), np.inf)
             _nearest(robot, offset, distance, unit, farthest, nearest)

@@ -194,12 +194,12 @@ def snapshot_of(snapshot: Snapshot, rows: IntArray) -> Snapshot:
     seen, decision = snapshot.seen, snapshot.decision
     number = np.full(len(seen.positions), -1, dtype=np.intp)
     number[rows] = np.arange(len(rows))
-    robot, neighbour = seen.neighbours.pairs()
+    robot, neighbour = seen.neighbours.list_pairs()
     kept = (number[robot] >= 0) & (number[neighbour] >= 0)
     neighbours = Neighbours(len(rows))
-    if not seen.neighbours.complete:
+    if not seen.neighbours.is_complete:
         ranges = None if seen.neighbours.ranges is None else seen.neighbours.ranges[rows]
-        neighbours = Neighbours.of_pairs(len(rows), number[robot[kept]], number[neighbour[kept]], ranges)
+        neighbours = Neighbours.from_pairs(len(rows), number[robot[kept]], number[neighbour[kept]], ranges)
 
     def chosen(of: Any, which: Any, *names: str) -> dict[str, Any]:
         return {name: value[which] for name in names if (value := getattr(of, name)) is not None}

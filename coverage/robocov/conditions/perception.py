@@ -54,7 +54,7 @@ class Perception:
         points.setflags(write=False)
         seen = replace(seen, positions=positions, obstacle_points=points, scans=self._scanned(step, seen))
         if inbox is None or not self._conditions.talks:
-            return replace(seen, neighbours=seen.neighbours.among(working)), None
+            return replace(seen, neighbours=seen.neighbours.keep_working(working)), None
         inbox = self.exchange(inbox, step, positions, truth, working)
         neighbours, places, ages = self.reports(inbox, step, working)
         return replace(seen, neighbours=neighbours, reported_positions=places, report_ages=ages), inbox
@@ -120,7 +120,7 @@ class Perception:
         silence = (step - inbox.arrived) * self._dt
         known = (inbox.arrived >= 0) & (silence <= self._conditions.forget_after + SOON)
         robot, neighbour = np.nonzero(known & working[:, None])
-        neighbours = Neighbours.of_pairs(len(known), robot, neighbour, self._ranges)
+        neighbours = Neighbours.from_pairs(len(known), robot, neighbour, self._ranges)
         ages = (step - inbox.sent[robot, neighbour]) * self._dt
         return neighbours, inbox.places[robot, neighbour], np.asarray(ages)
 
@@ -134,7 +134,7 @@ class Perception:
 
     def _reached(self, step: int, positions: Array, working: BoolArray) -> BoolArray:
         """Return whom a message of each robot gets to, (receiver, sender) bool."""
-        receiver, sender = Neighbours.within(positions, self._ranges).among(working).pairs()
+        receiver, sender = Neighbours.from_ranges(positions, self._ranges).keep_working(working).list_pairs()
         reaches = np.zeros((len(positions), len(positions)), dtype=bool)
         reaches[receiver, sender] = True
         if self._conditions.loss:

@@ -98,7 +98,7 @@ class Adaptive(Law):
 
     def decide(self, seen: Observations, memory: AdaptiveMemory) -> Decision:
         if memory.goals is None or not memory.planned <= seen.time < memory.planned + self.period - 1e-9:
-            robot, _, offset, _ = seen.neighbours_within(np.inf)
+            robot, _, offset, _ = seen.find_near_neighbours(np.inf)
             places, heard = memory.lattice.places, seen.positions[robot] - offset
             mine = own_samples(places, seen.positions, robot, heard)
             if self.estimate == "gp":
@@ -123,7 +123,7 @@ class Adaptive(Law):
         lever = mine * (away * (goals - seen.positions)[:, None]).sum(axis=2) * lattice.area
         agreed = before.copy()
         for i in range(len(before)):
-            known = seen.neighbours.of(i)
+            known = seen.neighbours.list_neighbours(i)
             if len(known):
                 agreed[i] = before[known].mean(axis=0)
         change = (
@@ -142,7 +142,7 @@ class Adaptive(Law):
         lattice, values = memory.lattice, _measured(seen)
         measured, estimates = memory.measured.copy(), memory.estimates.copy()
         for i, place in enumerate(seen.positions):
-            for j in seen.neighbours.of(i):
+            for j in seen.neighbours.list_neighbours(i):
                 measured[i] = np.where(np.isnan(measured[i]), memory.measured[j], measured[i])
             measured[i, ((lattice.squares - place) ** 2).sum(axis=1).argmin()] = values[i]
             known = ~np.isnan(measured[i])

@@ -216,7 +216,7 @@ class Atlas(Law):
         routes, legs = list(memory.routes), memory.legs.copy()
         for i, state in enumerate(states):
             if seen.time >= max(state.due, 0.0 if estimates is None else _LISTENED) - 1e-9:
-                reports = self._reports(states, seen.neighbours.of(i))
+                reports = self._reports(states, seen.neighbours.list_neighbours(i))
                 states[i], goal = self._planned(seen, memory.team, state, i, reports)
                 ways = states[i].ways
                 if goal is not None and ways is not None:
@@ -236,7 +236,9 @@ class Atlas(Law):
         """Return the maps after a scan of each robot; where others are, it is free."""
         each = zip(maps, seen.positions, scans.distances, scans.hit, strict=True)
         maps = [known.scanned(*scan) for known, *scan in each]
-        return [known.visited(seen.neighbour_positions(i), float(radius[i])) for i, known in enumerate(maps)]
+        return [
+            known.visited(seen.get_neighbour_positions(i), float(radius[i])) for i, known in enumerate(maps)
+        ]
 
     def _reports(self, states: Sequence[PlannerState], heard: IntArray) -> list[Teammates]:
         """Return what robots that are heard tell of others."""
@@ -314,7 +316,7 @@ class Atlas(Law):
         were going, and are forgotten, not taken for failed, when they are not heard there.
         """
         known, hears, place = state.others, float(team.communication_range[i]), seen.positions[i]
-        robots, at = seen.neighbours.of(i), seen.neighbour_positions(i)
+        robots, at = seen.neighbours.list_neighbours(i), seen.get_neighbour_positions(i)
         silence = np.where(np.isin(known.robots, robots), 0.0, seen.time - known.heard)
         failed = (silence > 0.0) & (known.away + 2.0 * float(team.max_speed[i]) * silence < hears)
         if state.places is not None:

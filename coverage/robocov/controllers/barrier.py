@@ -106,7 +106,7 @@ class Barrier(Law):
         # from farther away two robots at full speed can stop, and gamma h³ is not yet small
         stopping = 2.0 * float(team.max_speed.max()) ** 2 / float(alpha.min())
         reach = 2.0 * float(team.radius.max()) + self.safe_gap + 2.0 * stopping
-        robot, neighbour, offset, distance = seen.neighbours_within(reach)
+        robot, neighbour, offset, distance = seen.find_near_neighbours(reach)
         heard = Heard(seen.time, robot * n + neighbour, seen.positions[robot] - offset)
         closing = seen.velocities[robot] - _derived(heard, memory.heard, team.max_speed[neighbour])
         together = distance < _TOGETHER

@@ -222,7 +222,7 @@ class Individually:
         for i in range(len(forces)):
             place, velocity = seen.positions[i].copy(), seen.velocities[i].copy()
             point = None if np.isnan(seen.obstacle_points[i, 0]) else seen.obstacle_points[i].copy()
-            heard = seen.neighbour_positions(i)
+            heard = seen.get_neighbour_positions(i)
             heading = None if seen.steering is None else float(seen.steering[i, 0])
             known_now = i, place, velocity, heard, point, seen.region, seen.time, cells
             own = OwnView(*known_now, heading=heading, memory=memory.own[i])

@@ -13,8 +13,16 @@ from robocov.compiled import kernel
 from robocov.controllers.base import Law, Memory
 from robocov.controllers.driving import approach, avoid, drive, last_returns, summed, with_nearest
 from robocov.controllers.gains import choice, gain, response_time_gain
-from robocov.observation import Decision, Observations, Scanning, headings
-from robocov.observation.sight import View, behind, importance, joined, last_view, smaller_steps, windows
+from robocov.observation import Decision, Observations, Scanning, compute_headings
+from robocov.observation.scanned_view import (
+    View,
+    compute_step_fractions,
+    compute_view,
+    evaluate_density,
+    find_windows,
+    is_behind_wall,
+    is_path_clear,
+)
 
 _RINGS = 10  # places along each ray at which the integrals are sampled
 _SETTLED = 2.0  # seconds in which a robot that is at an optimum
@@ -134,7 +142,7 @@ class Boosting(Law):
     def decide(self, seen: Observations, memory: BoostingMemory) -> Decision:
         team, gradient, step, climbs = memory.team, memory.gradient, memory.step, memory.climbs
         reach = np.minimum(team.sensing_range, seen.region.diameter)
-        view = last_view(seen, memory.view, self.scanning, reach)
+        view = compute_view(seen, memory.view, self.scanning, reach)
         if gradient is None or step is None or seen.scans is not None:
             before = gradient
             climbs = climbs or tuple(Climb(frozen(place), seen.time) for place in seen.positions)
@@ -144,7 +152,7 @@ class Boosting(Law):
             climbs = tuple(own.after(here, seen.time, value, often, longest) for own, here, value in now)
             follows = np.array([climb.mode is Mode.BOOSTED for climb in climbs])
             gradient = np.where(follows[:, None], boosted, gradient)
-            step = smaller_steps(gradient, before, step)
+            step = compute_step_fractions(gradient, before, step)
         wanted = approach(gradient, self.k_grad, team.max_speed) * step[:, None]
         for i, climb in enumerate(climbs):
             if climb.mode is Mode.BACK:
@@ -159,15 +167,15 @@ class Boosting(Law):
     def slopes(self, seen: Observations, view: View, reach: Array) -> tuple[Array, Array, Array]:
         """Return what each robot adds to H, (n,) m², and its gradient and its boosted one, (n, 2) m each."""
         n, rays = view.distances.shape
-        directions, turn = headings(rays), 2.0 * np.pi / rays
-        robot, other, offset, distance = seen.neighbours_within(2.0 * float(reach.max()))
+        directions, turn = compute_headings(rays), 2.0 * np.pi / rays
+        robot, other, offset, distance = seen.find_near_neighbours(2.0 * float(reach.max()))
         middle = (np.arange(_RINGS) + 0.5) / _RINGS
         along = view.distances[..., None] * middle  # (n, rays, rings) m
         places = seen.positions[:, None, None] + along[..., None] * directions[:, None]
         walls = np.where(view.hit, view.distances, np.inf)
         alone = undetected(along, walls, directions, robot, other, -offset, reach, self.decay)
         own = np.exp(-self.decay * along)
-        weight = importance(seen.density, places) * alone
+        weight = evaluate_density(seen.density, places) * alone
         area = along * (view.distances / _RINGS * turn)[..., None]
         added = (weight * own * area).sum(axis=(1, 2))
         boosted = weight
@@ -177,7 +185,7 @@ class Boosting(Law):
             detected = 1.0 - alone * (1.0 - own)
             boosted = self.kappa * np.maximum(detected, 1e-3) ** -self.gamma * weight
 
-        edges = windows(view, directions, reach, self.jump)
+        edges = find_windows(view, directions, reach, self.jump)
         ends = ~view.hit * np.exp(-self.decay * reach)[:, None] * reach[:, None] * turn
         gradients = []
         for each in (weight, boosted):
@@ -209,13 +217,13 @@ def undetected(
     result = np.ones(along.shape)
     for m in range(len(robot)):
         i, far = robot[m], reach[other[m]]
-        if behind(towards[m, 0], towards[m, 1], walls[i]):
+        if is_behind_wall(towards[m, 0], towards[m, 1], walls[i]):
             continue
         for r in range(len(directions)):
             for c in range(along.shape[2]):
                 x, y = along[i, r, c] * directions[r, 0], along[i, r, c] * directions[r, 1]
                 dx, dy = towards[m, 0] - x, towards[m, 1] - y
                 distance = math.sqrt(dx * dx + dy * dy)
-                if distance <= far and joined(x, y, dx, dy, walls[i]):
+                if distance <= far and is_path_clear(x, y, dx, dy, walls[i]):
                     result[i, r, c] *= 1.0 - math.exp(-decay * distance)
     return result

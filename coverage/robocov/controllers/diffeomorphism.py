@@ -96,7 +96,7 @@ class Diffeomorphism(Law):
         team, chart = memory.team, self._chart(memory.team)
         images, slopes = chart.at(seen.positions)
         if memory.centroids is None or not memory.planned <= seen.time < memory.planned + self.period - 1e-9:
-            robot, other, offset, _ = seen.neighbours_within(np.inf)
+            robot, other, offset, _ = seen.find_near_neighbours(np.inf)
             told = seen.reported_positions is not None
             heard = chart.at(seen.positions[robot] - offset)[0] if told else images[other]
             mine = own_samples(chart.samples, images, robot, heard)

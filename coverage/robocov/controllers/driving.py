@@ -132,7 +132,7 @@ def nearest_allowed(wanted: Array, normals: Array, offsets: Array, radius: Array
 
 def neighbour_offsets(seen: Observations, reach: float) -> Array:
     """Return the offsets from each robot's neighbours within reach to itself, (n, k, 2) m; nan for none."""
-    robot, _, offset, _ = seen.neighbours_within(reach)
+    robot, _, offset, _ = seen.find_near_neighbours(reach)
     return in_rows(robot, len(seen.positions), offset, np.nan)
 
 

@@ -122,12 +122,12 @@ class Plan:
     def ways(self, seen: Observations, exponent: float) -> tuple[Array, Array, Array]:
         """Return each robot's goal and the first way-point to it, (n, 2) m, and the way left, (n,) m."""
         places = find_nearest_inside(self.room, seen.positions)
-        if seen.neighbours.complete:
+        if seen.neighbours.is_complete:
             goals = self._goals(places, exponent)
         else:
             goals = np.empty_like(places)
             for i in range(len(places)):
-                heard = find_nearest_inside(self.room, seen.neighbour_positions(i))
+                heard = find_nearest_inside(self.room, seen.get_neighbour_positions(i))
                 goals[i] = self._goals(np.vstack([places[i], heard]), exponent)[0]
         way, beyond = goals.copy(), np.zeros(len(goals))
         lines = shapely.linestrings(np.stack([places, goals], axis=1))

@@ -66,7 +66,7 @@ def localized(seen: Observations, before: Estimates, team: Team) -> tuple[Observ
     own = predicted + gain[:, None] * (seen.positions - predicted)
     points = seen.obstacle_points - seen.positions + own
     assert seen.reported_positions is not None and seen.report_ages is not None
-    robot, other = seen.neighbours.pairs()
+    robot, other = seen.neighbours.list_pairs()
     sigma, change = np.sqrt(variance), _MANOEUVRE * team.max_acceleration
     when, known = seen.time - seen.report_ages, (before.sent, before.messages, before.at, before.going)
     told = seen.reported_positions
@@ -80,7 +80,7 @@ def localized(seen: Observations, before: Estimates, team: Team) -> tuple[Observ
 def wary(seen: Observations, estimates: Estimates) -> Observations:
     """Return the observations with others as near as they may be, for keeping apart from them."""
     assert seen.reported_positions is not None
-    robot, other = seen.neighbours.pairs()
+    robot, other = seen.neighbours.list_pairs()
     offset = seen.reported_positions - seen.positions[robot]
     distance = np.sqrt((offset**2).sum(axis=1))
     ages = np.clip(seen.time - estimates.sent[robot, other], 0.0, _HORIZON)

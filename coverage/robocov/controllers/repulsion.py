@@ -10,7 +10,7 @@ from robocov.controllers.driving import avoid, drive, last_returns, summed, with
 from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.locational.best_points import HEIGHT, MEANING, TARGETS, targets
 from robocov.observation import Decision, Observations, Scanning
-from robocov.observation.neighbours import NOBODY
+from robocov.observation.neighbours import NO_INDICES
 from robocov.observation.region import Region
 from robocov.potential import CONTACT_DISTANCE, potential_forces, separation
 from robocov.robots import Team
@@ -30,16 +30,19 @@ def _potential_forces(
 ) -> Array:  # fmt: skip
     """Return what `potential_forces` does, of what the robots see; no `limit` is None."""
     n, links = len(seen.positions), seen.neighbours
-    indptr = np.zeros(n + 1, np.intp) if not from_robots else NOBODY if links.indptr is None else links.indptr
-    indices = NOBODY if links.indices is None else links.indices
+    if from_robots:
+        indptr = NO_INDICES if links.indptr is None else links.indptr
+    else:
+        indptr = np.zeros(n + 1, np.intp)
+    indices = NO_INDICES if links.indices is None else links.indices
     reported = _NOT_REPORTED if seen.reported_positions is None else seen.reported_positions
     known = seen.positions, reported, indptr, indices, n, seen.obstacle_points
     return potential_forces(*known, goals, k_rep, rho_0, k_att, np.inf if limit is None else limit)
 
 
 def _close_pairs(seen: Observations, reach: float) -> tuple[IntArray, IntArray, Array, Array]:
-    """Return `neighbours_within`, with a direction apart for robots in one place, too."""
-    robot, neighbour, offset, distance = seen.neighbours_within(reach)
+    """Return `find_near_neighbours`, with a direction apart for robots in one place, too."""
+    robot, neighbour, offset, distance = seen.find_near_neighbours(reach)
     together = distance < _TOGETHER
     offset[together] = _TOGETHER * separation(robot[together], neighbour[together])
     return robot, neighbour, offset, distance
@@ -224,7 +227,7 @@ class Poduri(Law):
             critical[ask] = (crowd <= most) & (nearer < most)
             return critical
         knows = np.eye(n, dtype=bool)
-        first, second = seen.neighbours.pairs()
+        first, second = seen.neighbours.list_pairs()
         knows[first, second] = True
         known = knows.astype(np.float32) @ near.astype(np.float32).T
         ask = np.flatnonzero(~critical & (known[robot, neighbour] <= most))
@@ -240,7 +243,7 @@ class Poduri(Law):
         """Return for links how many robots are near the neighbour, and nearer to it, by what was heard."""
         counts = []
         for i, j, far, limit in zip(robot.tolist(), neighbour.tolist(), distance, reach, strict=True):
-            ids, places = seen.neighbours.of(i), seen.neighbour_positions(i)
+            ids, places = seen.neighbours.list_neighbours(i), seen.get_neighbour_positions(i)
             here = int(np.flatnonzero(ids == j)[0])
             away = np.hypot(*(np.delete(places, here, axis=0) - places[here]).T)
             counts.append(((away <= self.eta * limit).sum() + (far <= self.eta * limit), (away < far).sum()))

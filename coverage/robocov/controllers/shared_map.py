@@ -218,9 +218,9 @@ Circle: TypeAlias = tuple[int, ...]
 
 def circles(neighbours: Neighbours) -> list[Circle]:
     """Return the circle of each robot."""
-    if neighbours.complete:
+    if neighbours.is_complete:
         return [tuple(range(neighbours.count))] * neighbours.count
-    return [tuple(sorted({i, *neighbours.of(i).tolist()})) for i in range(neighbours.count)]
+    return [tuple(sorted({i, *neighbours.list_neighbours(i).tolist()})) for i in range(neighbours.count)]
 
 
 def surveyed(
@@ -250,8 +250,8 @@ def surveyed(
 def _group(seen: Observations, team: Team, former: Plan | None, i: int) -> Group:
     """Return for whom robot i plans."""
     place = seen.positions[i : i + 1]
-    robots = np.append(seen.neighbours.of(i), i)
-    at, heard = np.vstack([seen.neighbour_positions(i), place]), np.full(len(robots), seen.time)
+    robots = np.append(seen.neighbours.list_neighbours(i), i)
+    at, heard = np.vstack([seen.get_neighbour_positions(i), place]), np.full(len(robots), seen.time)
     if former is not None:
         away = np.sqrt(((former.places - place) ** 2).sum(axis=1))
         late = seen.time - former.group.heard > _MISSED

@@ -14,7 +14,7 @@ from robocov.compiled import kernel
 from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, avoid, drive, last_returns, with_nearest
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.observation import Decision, Observations, Scanning, headings
+from robocov.observation import Decision, Observations, Scanning, compute_headings
 from robocov.robots import Team
 
 _GRAIN = 0.1  # side in metres of the squares in which a robot remembers what it has met
@@ -147,7 +147,7 @@ class TangentBug(Law):
         self, seen: Observations, team: Team, bug: Bug, i: int, goal: Array, points: Array, met: ComplexArray
     ) -> Bug:
         """Return what robot i does from now on."""
-        position, directions = seen.positions[i], headings(self.scanning.rays)
+        position, directions = seen.positions[i], compute_headings(self.scanning.rays)
         bug = bug.before(position, goal, self.moved)
         goal = (goal if bug.aim is None else bug.aim) - position
         reach = min(float(team.sensing_range[i]), seen.region.diameter)

@@ -9,8 +9,16 @@ from robocov.compiled import kernel
 from robocov.controllers.base import Law, Memory
 from robocov.controllers.driving import approach, avoid, drive, last_returns, summed, with_nearest
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.observation import Decision, Observations, Scanning, headings
-from robocov.observation.sight import View, behind, importance, joined, last_view, smaller_steps, windows
+from robocov.observation import Decision, Observations, Scanning, compute_headings
+from robocov.observation.scanned_view import (
+    View,
+    compute_step_fractions,
+    compute_view,
+    evaluate_density,
+    find_windows,
+    is_behind_wall,
+    is_path_clear,
+)
 
 _RINGS = 12  # places along each ray at which the integrals are sampled
 _PARTS = np.append((np.arange(_RINGS) + 0.5) / _RINGS, 1.0)
@@ -65,10 +73,10 @@ class Visibility(Law):
     def decide(self, seen: Observations, memory: VisibilityMemory) -> Decision:
         team, gradient, step = memory.team, memory.gradient, memory.step
         reach = np.minimum(team.sensing_range, seen.region.diameter)
-        view = last_view(seen, memory.view, self.scanning, reach)
+        view = compute_view(seen, memory.view, self.scanning, reach)
         if gradient is None or step is None or seen.scans is not None:
             before, gradient = gradient, self.gradient(seen, view, reach)
-            step = smaller_steps(gradient, before, step)
+            step = compute_step_fractions(gradient, before, step)
         returns = last_returns(seen, memory.returns)
         wanted = approach(gradient, self.k_area, team.max_speed) * step[:, None]
         keep = team.radius + self.clearance
@@ -81,16 +89,16 @@ class Visibility(Law):
     def gradient(self, seen: Observations, view: View, reach: Array) -> Array:
         """Return by how much the area in view grows per metre of each robot's way, (n, 2) m."""
         n, rays = view.distances.shape
-        directions = headings(rays)
+        directions = compute_headings(rays)
         along = view.distances[..., None] * _PARTS  # (n, rays, rings + 1) m
         walls = np.where(view.hit, view.distances, np.inf)
-        robot, other, offset, _ = seen.neighbours_within(2.0 * float(reach.max()))
+        robot, other, offset, _ = seen.find_near_neighbours(2.0 * float(reach.max()))
         places = seen.positions[:, None, None] + along[..., None] * directions[:, None]
-        weight = importance(seen.density, places)
+        weight = evaluate_density(seen.density, places)
         weight = weight * in_charge(along, walls, directions, robot, other, -offset, reach)
         arcs = ~view.hit * weight[..., -1] * reach[:, None] * (2.0 * np.pi / rays)
 
-        edges = windows(view, directions, reach, self.jump)
+        edges = find_windows(view, directions, reach, self.jump)
         here = edges.robot, edges.ray
         past = np.maximum(along[here] - edges.corner[:, None], 0.0)[:, :-1]
         swept = (weight[here][:, :-1] * past).sum(axis=1) / np.maximum(edges.corner, 1e-3)
@@ -117,7 +125,7 @@ def in_charge(
     mine = np.ones(along.shape, dtype=np.bool_)
     for m in range(len(robot)):
         i, far = robot[m], reach[other[m]]
-        if behind(towards[m, 0], towards[m, 1], walls[i]):
+        if is_behind_wall(towards[m, 0], towards[m, 1], walls[i]):
             continue
         for r in range(len(directions)):
             for c in range(along.shape[2]):
@@ -125,5 +133,5 @@ def in_charge(
                 dx, dy = towards[m, 0] - x, towards[m, 1] - y
                 power = dx * dx + dy * dy - far * far
                 if power <= 0.0 and power < along[i, r, c] ** 2 - reach[i] ** 2 and mine[i, r, c]:
-                    mine[i, r, c] = not joined(x, y, dx, dy, walls[i])
+                    mine[i, r, c] = not is_path_clear(x, y, dx, dy, walls[i])
     return mine

@@ -134,10 +134,10 @@ def connections(places: Array, ranges: Array) -> tuple[int, float]:
     n = len(places)
     if n == 0:
         return 0, 0.0
-    neighbours = Neighbours.within(places, ranges)
-    if neighbours.complete:
+    neighbours = Neighbours.from_ranges(places, ranges)
+    if neighbours.is_complete:
         return 1, float(n) if n > 1 else 0.0
-    one, other = neighbours.pairs()
+    one, other = neighbours.list_pairs()
     parts = int(connected_components(coo_array((np.ones(len(one)), (one, other)), (n, n)), directed=False)[0])
     if n == 1 or parts > 1:
         return parts, 0.0

@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.density.base import CellEdges, Density, Uniform
 from robocov.errors import ParameterError, format_count, quote, require_number
-from robocov.observation.neighbours import Neighbours, close_pairs
+from robocov.observation.neighbours import Neighbours, find_close_pairs
 from robocov.observation.region import Region
 
-MOST_RAYS = 3600
+MAX_RAYS = 3600
 """A ray for each tenth of a degree."""
 
 
@@ -44,13 +44,13 @@ class Scanning:
     period: float = 0.5
 
     def __post_init__(self) -> None:
-        require_number("scanning.rays", self.rays, 1, MOST_RAYS, whole=True)
+        require_number("scanning.rays", self.rays, 1, MAX_RAYS, whole=True)
         require_number("scanning.period", self.period, 0.0, 1e6, "s")
 
-    def every(self, dt: float) -> int:
+    def count_steps(self, dt: float) -> int:
         """Return after how many control periods of `dt` seconds each scan follows the one before.
 
-        >>> Scanning(period=0.5).every(0.02)
+        >>> Scanning(period=0.5).count_steps(0.02)
         25
         """
         return max(1, round(self.period / dt))
@@ -73,10 +73,10 @@ class Scans:
     @property
     def headings(self) -> Array:
         """Unit vectors along the rays, (rays, 2)."""
-        return headings(self.rays)
+        return compute_headings(self.rays)
 
 
-def headings(rays: int) -> Array:
+def compute_headings(rays: int) -> Array:
     """Return unit vectors evenly round a full turn, (rays, 2), the first along +x."""
     angle = np.arange(rays) * (2.0 * np.pi / rays)
     return np.column_stack([np.cos(angle), np.sin(angle)])
@@ -116,24 +116,24 @@ class Observations:
     """(n, 2) rad from +x and rad/s, heading and turning rate of unicycles: a robot knows its own. None in a
     team of points."""
 
-    def neighbour_positions(self, robot: int) -> Array:
-        """Return where a robot knows its neighbours to be, (k, 2) m, in the order of ``neighbours.of``."""
+    def get_neighbour_positions(self, robot: int) -> Array:
+        """Return the known positions of a robot's neighbours, (k, 2) m, as `list_neighbours` orders them."""
         if self.reported_positions is None or self.neighbours.indptr is None:
-            return self.positions[self.neighbours.of(robot)]
+            return self.positions[self.neighbours.list_neighbours(robot)]
         begin, end = self.neighbours.indptr[robot : robot + 2]
         return self.reported_positions[begin:end]
 
-    def neighbours_within(self, reach: float) -> tuple[IntArray, IntArray, Array, Array]:
+    def find_near_neighbours(self, reach: float) -> tuple[IntArray, IntArray, Array, Array]:
         """Return the directed pairs of neighbours that are at most `reach` metres apart, for all they know.
 
         Robots and neighbours, (m,) each, are sorted: sums over a row are then the same to the last bit
         whatever robots that this one cannot hear do. Offsets, (m, 2) m, lead from the neighbour, as the robot
         knows it, to the robot; distances are (m,) m.
         """
-        if self.reported_positions is None and self.neighbours.complete:
-            robot, neighbour, distance = close_pairs(self.positions, reach)
+        if self.reported_positions is None and self.neighbours.is_complete:
+            robot, neighbour, distance = find_close_pairs(self.positions, reach)
             return robot, neighbour, self.positions[robot] - self.positions[neighbour], distance
-        robot, neighbour = self.neighbours.pairs()
+        robot, neighbour = self.neighbours.list_pairs()
         known = self.positions[neighbour] if self.reported_positions is None else self.reported_positions
         offset = self.positions[robot] - known
         distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
@@ -240,7 +240,7 @@ class Cells(ABC):
         return self.polar_moment - self.mass * (lever[:, 0] ** 2 + lever[:, 1] ** 2)
 
 
-def checked_decision(made: Any, count: int, controller: str, time: float, source: str = "") -> Decision:
+def check_decision(made: Any, count: int, controller: str, time: float, source: str = "") -> Decision:
     """Return what a controller decided, if it can be carried out and recorded.
 
     Parameters
@@ -279,10 +279,10 @@ def checked_decision(made: Any, count: int, controller: str, time: float, source
     return decision
 
 
-def detached(decision: Decision, controller: str, source: str = "") -> Decision:
+def copy_decision(decision: Decision, controller: str, source: str = "") -> Decision:
     """Return a checked decision with arrays of its own: a user's controller may use its arrays again.
 
-    `controller` and `source` are as in `checked_decision`. Raises ParameterError when its terms or cells are
+    `controller` and `source` are as in `check_decision`. Raises ParameterError when its terms or cells are
     of no use.
     """
     where = f"controller {controller!r}: decide(seen, memory) returned"
@@ -300,7 +300,7 @@ def detached(decision: Decision, controller: str, source: str = "") -> Decision:
     return replace(decision, forces=decision.forces.copy(), goals=goals, terms=terms)
 
 
-def given_forces(values: Any, count: int, what: str) -> Array:
+def check_forces(values: Any, count: int, what: str) -> Array:
     """Return forces from outside, N; a ParameterError when they are not finite and (n, 2)."""
     forces = _rows(values, count, what)
     if not _finite(forces):

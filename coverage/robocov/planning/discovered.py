@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
-from robocov.observation import headings
+from robocov.observation import compute_headings
 from robocov.observation.region import Region
 
 UNKNOWN, FREE, PRESUMED, WALL, SURE = 0, 1, 2, 3, 6
@@ -101,7 +101,7 @@ class DiscoveredMap:
         # beyond the region there is nothing to know
         far = np.minimum(distances, self.raster.region.diameter)
         grid = np.array([*self.raster.origin, self.raster.cell])
-        _enter_scan(state, grid, position, headings(len(distances)), far, hit)
+        _enter_scan(state, grid, position, compute_headings(len(distances)), far, hit)
         return self if np.array_equal(state, self.state) else DiscoveredMap(self.raster, state)
 
     def visited(self, places: Array, radius: float) -> DiscoveredMap:

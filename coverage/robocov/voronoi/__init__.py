@@ -18,7 +18,7 @@ from robocov.compiled import kernel
 from robocov.density.base import REGION, CellEdges, Density
 from robocov.errors import InputError, quote
 from robocov.observation import Cells
-from robocov.observation.neighbours import NOBODY, Neighbours
+from robocov.observation.neighbours import NO_INDICES, Neighbours
 from robocov.observation.region import Region
 from robocov.voronoi.delaunay import Mesh, before, following, triangulated
 
@@ -102,7 +102,7 @@ def partition(
     if neighbours is None or neighbours.indptr is None or neighbours.indices is None:
         if heard is not None:
             raise InputError("heard: given without the neighbours that they are of")
-        indptr = indices = NOBODY
+        indptr = indices = NO_INDICES
         if n >= _TRIANGULATE_FROM:
             size = 8 * n + 4
             mesh = np.full((2, size), -1, np.int32) if warm is None or warm.shape[1] != size else warm.copy()

@@ -154,10 +154,10 @@ def weighted_partition(
     if (speeds == speeds[:1]).all():
         return partition(points, region, neighbours, warm, heard=heard, density=density)
     n = len(points)
-    one, other = neighbours.pairs()
+    one, other = neighbours.list_pairs()
     equal = speeds[one] == speeds[other]
     places = None if heard is None else heard[equal]
-    cells = partition(points, region, Neighbours.of_pairs(n, one[equal], other[equal]), heard=places)
+    cells = partition(points, region, Neighbours.from_pairs(n, one[equal], other[equal]), heard=places)
     edges = np.column_stack([cells.edges.start, cells.edges.end, cells.edges.cell, cells.edges.beyond])
     offsets = (points[other] if heard is None else heard) - points[one]
     pairs = np.column_stack([one, other, offsets, speeds[one], speeds[other]])

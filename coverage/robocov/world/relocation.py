@@ -7,7 +7,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array, BoolArray
 from robocov.environment import Environment, Point
 from robocov.errors import StartError
-from robocov.observation.neighbours import close_pairs
+from robocov.observation.neighbours import find_close_pairs
 from robocov.robots import Team
 
 _GAP = 1e-3  # room in metres that is left beside what a robot is moved away from
@@ -26,7 +26,7 @@ def relocated(environment: Environment, positions: Array, team: Team) -> Array:
         for robot in np.flatnonzero(_wall_distance(environment, places) < team.radius).tolist():
             line = shapely.shortest_line(room[float(team.radius[robot])], shapely.Point(places[robot]))
             places[robot] = line.coords[0]
-        first, second, distance = close_pairs(places, 2.0 * float(team.radius.max()))
+        first, second, distance = find_close_pairs(places, 2.0 * float(team.radius.max()))
         missing = team.radius[first] + team.radius[second] - distance
         clash = np.flatnonzero((missing > 0.0) & (first < second))
         if not len(clash):
@@ -79,7 +79,7 @@ def check_starts(
         if wall[i] < 0.0:
             wrong = f"inside an obstacle or outside the boundary of map {environment.name!r}"
         raise StartError(f"{place} is {wrong}")
-    first, second, distance = close_pairs(positions, 2.0 * float(team.radius.max()))
+    first, second, distance = find_close_pairs(positions, 2.0 * float(team.radius.max()))
     clash = distance < team.radius[first] + team.radius[second] - slack
     for k in np.flatnonzero(clash & there[first] & there[second]).tolist():
         pair = f"starts[{first[k]}] and starts[{second[k]}]"

@@ -11,7 +11,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.errors import ParameterError
-from robocov.observation.neighbours import close_pairs
+from robocov.observation.neighbours import find_close_pairs
 from robocov.robots import Team
 from robocov.world.bodies import MAX_TEAMS_PER_SPACE, Obstacles, compute_mover_states
 from robocov.world.contacts import ContactSolver, FreeSpace
@@ -354,7 +354,7 @@ class World:
             )
             is_resolved[robots - rows.start] = True
             positions = np.ascontiguousarray(states[rows, :2])
-            first, second, distance = close_pairs(positions, 2.0 * float(radius.max()))
+            first, second, distance = find_close_pairs(positions, 2.0 * float(radius.max()))
             overlaps = distance < radius[first] + radius[second]
             is_reached = is_resolved[first] & ~is_resolved[second] & overlaps
             if not is_reached.any():

@@ -92,7 +92,7 @@ def test_what_is_heard_equals_what_was_told_one_by_one(
     for step, now in enumerate(places):
         inbox = radio.exchange(inbox, step, now, now, working[step])
         neighbours, heard, ages = radio.reports(inbox, step, working[step])
-        robot, other = neighbours.pairs()
+        robot, other = neighbours.list_pairs()
         assert list(zip(robot.tolist(), other.tolist(), strict=True)) == sorted(expected[step])
         for k, pair in enumerate(sorted(expected[step])):
             when, place = expected[step][pair]
@@ -191,11 +191,11 @@ LIGHT = tuple(kind for kind in CONTROLLERS.values() if kind.name not in PLANNING
 def test_what_was_heard_as_it_is_changes_nothing(kind: type, n: int, seed: int, reach: float) -> None:
     """Bit for bit: where messages say what is, the decisions are those without messages."""
     places = np.random.default_rng(seed).uniform(1, 9, size=(n, 2))
-    neighbours = Neighbours.within(places, np.full(n, reach))
+    neighbours = Neighbours.from_ranges(places, np.full(n, reach))
     controller = made(kind)
     team = Team.homogeneous(n, communication_range=reach)
     plain = controller.decide(seen_by(kind, places, neighbours, None, seed), controller.begin(SQUARE, team))
-    heard = places[neighbours.pairs()[1]]
+    heard = places[neighbours.list_pairs()[1]]
     told = controller.decide(seen_by(kind, places, neighbours, heard, seed), controller.begin(SQUARE, team))
     assert told.forces.tobytes() == plain.forces.tobytes()
     if plain.goals is not None and told.goals is not None:
@@ -210,7 +210,7 @@ def test_a_robot_goes_by_what_it_heard_not_by_where_others_are(kind: type, n: in
     places = rng.uniform(1, 9, size=(n, 2))
     pairs = [(i, j) for i in range(n) for j in range(n) if i != j and rng.random() < 0.7]
     robot, other = (np.array([pair[k] for pair in pairs], dtype=np.intp) for k in (0, 1))
-    neighbours = Neighbours.of_pairs(n, robot, other)
+    neighbours = Neighbours.from_pairs(n, robot, other)
     heard = places[other] + rng.normal(scale=0.5, size=(len(pairs), 2))
     i = int(rng.integers(n))
     controller = made(kind)
@@ -229,8 +229,8 @@ def test_a_robot_goes_by_what_it_heard_not_by_where_others_are(kind: type, n: in
 def test_what_was_heard_matters(kind: type) -> None:
     """The property above is not empty: what robot 1 is told is near makes a difference to it."""
     places = np.array([[4.0, 4.0], [5.0, 4.5], [8.0, 6.0]])
-    neighbours = Neighbours.within(places, np.full(3, 20.0))
-    heard = places[neighbours.pairs()[1]]
+    neighbours = Neighbours.from_ranges(places, np.full(3, 20.0))
+    heard = places[neighbours.list_pairs()[1]]
     nearer = heard.copy()
     nearer[0] = [3.77, 4.0]
     controller, team = made(kind), Team.homogeneous(3)
@@ -249,8 +249,8 @@ def test_those_that_plan_go_by_what_they_heard_too(name: str, monkeypatch: pytes
     monkeypatch.setattr(atlas, "_LISTENED", 0.0)
     kind, team = CONTROLLERS[name], Team.homogeneous(4)
     places = np.random.default_rng(5).uniform(1, 9, size=(4, 2))
-    neighbours = Neighbours.within(places, np.full(4, 20.0))
-    heard = places[neighbours.pairs()[1]]
+    neighbours = Neighbours.from_ranges(places, np.full(4, 20.0))
+    heard = places[neighbours.list_pairs()[1]]
     plain, told, moved = (
         made(kind).decide(seen_by(kind, *seen, 5), made(kind).begin(SQUARE, team)).forces
         for seen in (
@@ -271,7 +271,7 @@ def test_cells_of_what_is_heard_are_those_of_each_robots_own_picture(n: int, see
     places = rng.uniform(0.5, 9.5, size=(n, 2))
     robot, other = np.nonzero((rng.random((n, n)) < 0.6) & ~np.eye(n, dtype=bool))
     heard = rng.uniform(0, 10, size=(len(robot), 2))
-    cells = partition(places, SQUARE, Neighbours.of_pairs(n, robot, other), heard=heard)
+    cells = partition(places, SQUARE, Neighbours.from_pairs(n, robot, other), heard=heard)
     for i in range(n):
         picture = np.concatenate([places[i : i + 1], heard[robot == i]])
         own = partition(picture, SQUARE, Neighbours(len(picture)))
@@ -285,9 +285,9 @@ def test_cells_of_many_that_hear_the_truth_are_the_plain_ones(n: int) -> None:
     """Bit for bit, also where only the nearest of those that a robot hears are sorted at first."""
     places = np.random.default_rng(n).uniform(0.5, 9.5, size=(n, 2))
     places[: n // 2] *= 0.05  # a crowd, whose far neighbours matter
-    neighbours = Neighbours.within(places, np.full(n, 20.0))
+    neighbours = Neighbours.from_ranges(places, np.full(n, 20.0))
     plain = partition(places, SQUARE, neighbours)
-    told = partition(places, SQUARE, neighbours, heard=places[neighbours.pairs()[1]])
+    told = partition(places, SQUARE, neighbours, heard=places[neighbours.list_pairs()[1]])
     assert told.mass.tobytes() == plain.mass.tobytes()
     assert told.centroid.tobytes() == plain.centroid.tobytes()
 

@@ -122,7 +122,7 @@ def test_a_distance_is_never_measured_as_none_and_always_towards_the_point() -> 
 def test_who_is_heard_is_said_by_where_robots_are_not_by_where_they_think_they_are() -> None:
     lost = simulation(Conditions(position_noise=100.0), reach=2.5).observe()
     ideal = simulation(None, reach=2.5).observe()
-    assert lost.neighbours.pairs()[0].tolist() == ideal.neighbours.pairs()[0].tolist() != []
+    assert lost.neighbours.list_pairs()[0].tolist() == ideal.neighbours.list_pairs()[0].tolist() != []
 
 
 def test_streams_are_independent() -> None:
@@ -196,7 +196,7 @@ def test_what_is_told_is_what_is_believed() -> None:
     one = simulation(Conditions(position_noise=0.3, seed=9))
     seen = one.observe()
     assert seen.reported_positions is not None
-    assert (seen.reported_positions == seen.positions[seen.neighbours.pairs()[1]]).all()
+    assert (seen.reported_positions == seen.positions[seen.neighbours.list_pairs()[1]]).all()
     assert seen.report_ages is not None
     assert not seen.report_ages.any()
 
@@ -217,14 +217,14 @@ def test_who_fails_is_forgotten_after_a_while_where_messages_are_not_ideal() -> 
     one = simulation(Conditions(message_rate=20.0, forget_after=0.5, failures=((2, 0.3),)))
     heard = []
     for _ in range(24):
-        heard.append(1 in one.observe().neighbours.of(0).tolist())
+        heard.append(1 in one.observe().neighbours.list_neighbours(0).tolist())
         one.step()
     # the last message of 0.25 s is forgotten after 0.75 s
     assert heard == [True] * 16 + [False] * 8
     ideal = simulation(Conditions(failures=((2, 0.3),)))
     ideal_heard = []
     for _ in range(10):
-        ideal_heard.append(1 in ideal.observe().neighbours.of(0).tolist())
+        ideal_heard.append(1 in ideal.observe().neighbours.list_neighbours(0).tolist())
         ideal.step()
     assert ideal_heard == [True] * 6 + [False] * 4
 

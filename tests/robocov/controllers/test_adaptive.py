@@ -53,7 +53,7 @@ class OfBasis(Probed):
 
 def seen_from(positions: Array, time: float, density: Density | None, reach: float = np.inf) -> Observations:
     n = len(positions)
-    neighbours = Neighbours.within(positions, np.full(n, reach))
+    neighbours = Neighbours.from_ranges(positions, np.full(n, reach))
     nothing = np.full((n, 2), np.nan)
     return Observations(positions, np.zeros((n, 2)), neighbours, nothing, REGION, time, density=density)
 

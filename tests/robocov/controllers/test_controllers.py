@@ -93,7 +93,7 @@ def observations(positions: np.ndarray, reach: float, seed: int) -> Observations
     points = positions + rng.normal(scale=0.8, size=(n, 2))
     points[rng.random(n) < 0.4] = np.nan
     ranges = np.full(n, reach)
-    neighbours = Neighbours.within(positions, ranges)
+    neighbours = Neighbours.from_ranges(positions, ranges)
     seen = Observations(positions, rng.normal(size=(n, 2)), neighbours, points, REGION, 3.0)
     return replace(seen, max_speeds=rng.choice([0.4, 0.7, 1.0], n))
 
@@ -141,7 +141,7 @@ def connected(neighbours: Neighbours, i: int) -> np.ndarray:
         k = left.pop()
         if not reached[k]:
             reached[k] = True
-            left += neighbours.of(k).tolist()
+            left += neighbours.list_neighbours(k).tolist()
     return reached
 
 
@@ -151,7 +151,7 @@ def with_others_changed(
     """Return what is seen with all changed that robot i does not know, and nobody who is `telling` it."""
     n, positions = len(seen.positions), seen.positions
     others, heard = ~telling, telling.copy()
-    heard[seen.neighbours.of(i)] = True
+    heard[seen.neighbours.list_neighbours(i)] = True
     moved = positions.copy()
     strangers = np.flatnonzero(others & ~heard)
     for k in strangers:
@@ -160,8 +160,8 @@ def with_others_changed(
             moved[k] = place
     velocities = np.where(others[:, None], rng.normal(size=(n, 2)), seen.velocities)
     points = np.where(others[:, None], moved + rng.normal(size=(n, 2)), seen.obstacle_points)
-    neighbours = Neighbours.within(moved, np.full(n, reach))
-    assert np.array_equal(neighbours.of(i), seen.neighbours.of(i))
+    neighbours = Neighbours.from_ranges(moved, np.full(n, reach))
+    assert np.array_equal(neighbours.list_neighbours(i), seen.neighbours.list_neighbours(i))
     speeds = np.array(seen.max_speeds)
     speeds[strangers] = rng.choice([0.3, 0.7, 2.0], len(strangers))
     changed = replace(
@@ -249,7 +249,7 @@ def test_coincident_robots_get_finite_forces(controller: Controller, n: int) -> 
     seen = Observations(
         positions,
         np.zeros((n, 2)),
-        Neighbours.within(positions, np.full(n, np.inf)),
+        Neighbours.from_ranges(positions, np.full(n, np.inf)),
         positions.copy(),
         REGION,
     )

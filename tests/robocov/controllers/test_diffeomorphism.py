@@ -74,7 +74,7 @@ CHART = Chart(Environment("walls", ((0, 0), (10, 0), (10, 8), (0, 8)), WALLS), 0
 def test_samples_belong_to_the_nearest_robot_that_is_heard() -> None:
     rng = np.random.default_rng(1)
     places, positions = rng.uniform(0, 10, (300, 2)), rng.uniform(0, 10, (7, 2))
-    robot, other = Neighbours.within(positions, np.full(7, 5.0)).pairs()
+    robot, other = Neighbours.from_ranges(positions, np.full(7, 5.0)).list_pairs()
     mine = own_samples(places, positions, robot, positions[other])
     for i in range(7):
         known = [i, *other[robot == i]]

@@ -201,7 +201,7 @@ def test_limited_communication_and_a_density() -> None:
     seen = Observations(
         positions,
         np.zeros((2, 2)),
-        Neighbours.within(positions, team.communication_range),
+        Neighbours.from_ranges(positions, team.communication_range),
         np.full((2, 2), np.nan),
         SQUARE.region,
     )

@@ -8,7 +8,7 @@ import pytest
 from robocov.controllers import Howard
 from robocov.controllers.driving import last_returns, with_nearest
 from robocov.environment import Environment
-from robocov.observation import Observations, Scans, headings
+from robocov.observation import Observations, Scans, compute_headings
 from robocov.observation.neighbours import Neighbours
 from robocov.robots import Team
 from robocov.simulation import Simulation
@@ -29,7 +29,7 @@ def seen_from(positions: np.ndarray, velocities: np.ndarray | None = None) -> Ob
 
 def wall_scan(distance: float, rays: int) -> Scans:
     """What a robot measures of an endless wall at x = `distance` from it."""
-    cosine = headings(rays)[:, 0]
+    cosine = compute_headings(rays)[:, 0]
     hit = cosine > 1e-9
     distances = np.where(hit, distance / np.where(hit, cosine, 1.0), 1e6)
     return Scans(distances[None], hit[None])

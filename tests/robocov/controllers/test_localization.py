@@ -53,14 +53,14 @@ def test_late_messages_of_who_goes_straight_on_are_made_up_for(seed: int, delay:
     known, _, errors = driven(paths, Conditions(delay=delay, message_rate=4.0))
     assert max(map(np.max, errors)) < 1e-9
     assert known.reported_positions is not None
-    _, other = known.neighbours.pairs()
+    _, other = known.neighbours.list_pairs()
     assert np.allclose(known.reported_positions, paths[-1][other], atol=1e-9)
 
 
 def test_nobody_is_taken_to_go_on_for_ever() -> None:
     paths = np.concatenate([lines(2, 40), np.repeat(lines(2, 40)[-1:], 60, axis=0)])
     known, estimates, _ = driven(paths[:45], Conditions(delay=2.0, message_rate=2.0, forget_after=9.0))
-    robot, other = known.neighbours.pairs()
+    robot, other = known.neighbours.list_pairs()
     assert known.reported_positions is not None
     ahead = np.hypot(*(known.reported_positions - estimates.at[robot, other]).T)
     assert np.allclose(ahead, 1.5 * np.hypot(*estimates.going[robot, other].T))
@@ -73,7 +73,7 @@ def test_noise_is_averaged_out(seed: int) -> None:
     assert np.sqrt(np.mean(np.square(errors[80:]))) < 0.035
     assert np.all((estimates.variance > 0.06**2) & (estimates.variance < 0.14**2))
     assert known.reported_positions is not None
-    _, other = known.neighbours.pairs()
+    _, other = known.neighbours.list_pairs()
     off = np.hypot(*(known.reported_positions - paths[-1][other]).T)
     assert np.sqrt(np.mean(off**2)) < 0.09  # 0.141 m without a filter; of these seeds 20 is the worst, 0.0841
 
@@ -102,20 +102,20 @@ def test_a_robot_knows_nothing_of_what_it_does_not_hear(seed: int) -> None:
     for far in (50.0, 70.0):
         estimates, inbox = Estimates.nothing(4), perception.begin()
         for k, places in enumerate(lines(4, 20, seed) * 0.05 + [[0, 0], [1, 0], [far, 0], [far, 1]]):
-            near = Neighbours.within(places, team.communication_range)
+            near = Neighbours.from_ranges(places, team.communication_range)
             truth = Observations(places, places * 0.0, near, places, Region(SQUARE), k * DT)
             seen, inbox = perception.known(truth, inbox, np.ones(4, dtype=bool))
             known, estimates = localized(seen, estimates, team)
         close = wary(known, estimates)
         assert close.reported_positions is not None
-        rows = close.neighbours.pairs()[0] < 2
+        rows = close.neighbours.list_pairs()[0] < 2
         found.append([known.positions[:2].tobytes(), close.reported_positions[rows].tobytes()])
     assert found[0] == found[1]
 
 
 def test_others_may_be_nearer_by_the_noise_and_with_time() -> None:
     known, estimates, _ = driven(lines(3, 60), Conditions(position_noise=0.1, delay=0.5))
-    robot, other = known.neighbours.pairs()
+    robot, other = known.neighbours.list_pairs()
     close = wary(known, estimates)
     assert known.reported_positions is not None and close.reported_positions is not None
     before, after = (

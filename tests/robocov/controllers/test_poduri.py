@@ -24,7 +24,7 @@ def seen_from(positions: np.ndarray, reach: float = np.inf) -> Observations:
     return Observations(
         positions,
         np.zeros((n, 2)),
-        Neighbours.within(positions, np.full(n, reach)),
+        Neighbours.from_ranges(positions, np.full(n, reach)),
         np.full((n, 2), np.nan),
         HALL.region,
     )
@@ -97,7 +97,7 @@ def test_forces_are_those_of_the_rule_written_down_robot_by_robot(seed: int, k: 
         return len(near) <= k and sum(far < away[j] for far in away.values()) < k
 
     for i in range(9):
-        known = {i, *seen.neighbours.of(i).tolist()}
+        known = {i, *seen.neighbours.list_neighbours(i).tolist()}
         expected = np.zeros(2)
         for j in known - {i}:
             away = positions[i] - positions[j]
@@ -110,10 +110,9 @@ def test_forces_are_those_of_the_rule_written_down_robot_by_robot(seed: int, k: 
                 expected -= pull * away / far
         np.testing.assert_allclose(decision.forces[i], expected, rtol=1e-9, atol=1e-9)
     # with what was heard, which is the truth here, the same by the other way
-    heard = replace(
-        seen_from(positions, min(reach, 100.0)),
-        reported_positions=positions[Neighbours.within(positions, np.full(9, min(reach, 100.0))).pairs()[1]],
-    )
+    ranges = np.full(9, min(reach, 100.0))
+    _, neighbour = Neighbours.from_ranges(positions, ranges).list_pairs()
+    heard = replace(seen_from(positions, min(reach, 100.0)), reported_positions=positions[neighbour])
     again = law.decide(heard, law.begin(HALL.region, Team.homogeneous(9, communication_range=reach)))
     np.testing.assert_allclose(again.forces, decision.forces, rtol=1e-9, atol=1e-9)
 

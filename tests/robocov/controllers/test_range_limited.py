@@ -22,7 +22,7 @@ SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
 
 def seen_from(positions: np.ndarray, reach: float = np.inf, **more: object) -> Observations:
     n = len(positions)
-    neighbours = Neighbours.within(positions, np.full(n, reach))
+    neighbours = Neighbours.from_ranges(positions, np.full(n, reach))
     nothing = np.full((n, 2), np.nan)
     return Observations(positions, np.zeros((n, 2)), neighbours, nothing, REGION, **more)  # type: ignore[arg-type]
 

@@ -122,7 +122,7 @@ def test_maps_go_to_those_who_hear() -> None:
     together = surveyed(maps, *observed(Neighbours(4), blind, False))
     assert np.array_equal(together[0].state, first) and len({id(known) for known in together}) == 1
     # each knows best what it has seen itself; else the first counts that has
-    line = Neighbours.within(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [9.0, 0.0]]), np.full(4, 1.5))
+    line = Neighbours.from_ranges(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [9.0, 0.0]]), np.full(4, 1.5))
     told = surveyed(maps, *observed(line, blind, False))
     assert np.array_equal(told[0].state, np.where(states[0] != UNKNOWN, states[0], states[1]))
     assert np.array_equal(told[1].state == UNKNOWN, (states[:3] == UNKNOWN).all(axis=0))
@@ -132,7 +132,9 @@ def test_maps_go_to_those_who_hear() -> None:
 def test_what_one_has_mistaken_is_corrected_by_whoever_sees_it() -> None:
     """Robot 1 takes for free what robot 2 sees to be a wall; two pairs do not hear each other."""
     free, nothing = (DiscoveredMap(RASTER, np.full(RASTER.shape, each, np.uint8)) for each in (FREE, UNKNOWN))
-    pairs = Neighbours.within(np.array([[0.0, 0.0], [1.0, 0.0], [8.0, 0.0], [9.0, 0.0]]), np.full(4, 1.5))
+    pairs = Neighbours.from_ranges(
+        np.array([[0.0, 0.0], [1.0, 0.0], [8.0, 0.0], [9.0, 0.0]]), np.full(4, 1.5)
+    )
     distances = np.array([[0.0], [1.0], [0.0], [0.0]])
     seen, scans, around = observed(pairs, distances, False)
     scans.hit[1] = True

@@ -13,7 +13,7 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
 from robocov.metrics import settled_at
-from robocov.observation import headings
+from robocov.observation import compute_headings
 from robocov.robots import Team
 from robocov.simulation import Simulation
 
@@ -92,7 +92,7 @@ def test_a_disc_that_goes_as_far_as_it_may_touches_and_no_more(seed: int, keep: 
     rng = np.random.default_rng(seed)
     points = rng.uniform(-3, 3, size=(40, 2))
     points = points[np.hypot(*points.T) > keep / 0.95]
-    directions = headings(24)
+    directions = compute_headings(24)
     free = free_distances(points, directions, keep, 2.5)
     for direction, far in zip(directions, free, strict=True):
         way = np.linspace(0.0, far, 200)[:, None] * direction
@@ -103,11 +103,11 @@ def test_a_disc_that_goes_as_far_as_it_may_touches_and_no_more(seed: int, keep: 
 
 
 def test_nothing_around_is_free_as_far_as_one_sees() -> None:
-    np.testing.assert_array_equal(free_distances(np.full((3, 2), np.nan), headings(4), 0.1, 2.0), 2.0)
+    np.testing.assert_array_equal(free_distances(np.full((3, 2), np.nan), compute_headings(4), 0.1, 2.0), 2.0)
 
 
 def test_who_is_too_near_may_go_away_and_along() -> None:
-    free = free_distances(np.array([[0.05, 0.0]]), headings(4), 0.15, 2.0)
+    free = free_distances(np.array([[0.05, 0.0]]), compute_headings(4), 0.15, 2.0)
     assert free[0] < 0.05
     np.testing.assert_array_equal(free[1:], 2.0)
 
@@ -115,7 +115,7 @@ def test_who_is_too_near_may_go_away_and_along() -> None:
 def test_ends_of_a_wall() -> None:
     """A wall across from (1, -1) to (1, 0.5): its ends are about there, seen from the origin."""
     wall = np.column_stack([np.ones(60), np.linspace(-1.0, 0.5, 60)])
-    directions = headings(360)
+    directions = compute_headings(360)
     free = free_distances(wall, directions, 0.1, 3.0)
     ends = {turn: end_of_contour(free, directions, 0, turn, 0.9, 0.5, 3.0) for turn in (1, -1)}
     assert ends[1] is not None and ends[-1] is not None

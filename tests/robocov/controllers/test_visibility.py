@@ -13,10 +13,10 @@ from robocov.controllers.boosting import Climb, Mode, undetected
 from robocov.controllers.visibility import in_charge
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, PolygonObstacle
-from robocov.observation import Observations, headings
+from robocov.observation import Observations, compute_headings
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.observation.sight import View, smaller_steps, windows
+from robocov.observation.scanned_view import View, compute_step_fractions, find_windows
 from robocov.robots import Team
 from robocov.simulation import Simulation
 
@@ -34,7 +34,7 @@ def scanned(place: np.ndarray, rays: int, reach: float) -> View:
         np.concatenate([np.array(ring.coords)[part] for ring in (ROOM.exterior, *ROOM.interiors)])
         for part in (slice(None, -1), slice(1, None))
     )
-    along, across, to = headings(rays)[:, None], end - begin, begin - place
+    along, across, to = compute_headings(rays)[:, None], end - begin, begin - place
     turn = along[..., 0] * across[:, 1] - along[..., 1] * across[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         far = (to[:, 0] * across[:, 1] - to[:, 1] * across[:, 0]) / turn
@@ -56,7 +56,7 @@ def worth(place: np.ndarray, reach: float, decay: float | None, density: Gaussia
     along = distances[:, None] * (np.arange(rings) + 0.5) / rings
     values = np.ones_like(along) if decay is None else np.exp(-decay * along)
     if density is not None:
-        points = place + along[..., None] * headings(rays)[:, None]
+        points = place + along[..., None] * compute_headings(rays)[:, None]
         values = values * density.value(points.reshape(-1, 2)).reshape(along.shape)
     return float((values * along * distances[:, None]).sum() / rings * 2.0 * np.pi / rays)
 
@@ -88,9 +88,9 @@ def test_gradients_are_those_of_what_is_in_view(
 def test_who_sees_a_place_with_the_least_power_is_in_charge(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
     positions, reach = rng.uniform((1, 1), (9, 7), size=(n, 2)), rng.uniform(1.0, 4.0, n)
-    directions, walls = headings(16), np.full((n, 16), np.inf)
+    directions, walls = compute_headings(16), np.full((n, 16), np.inf)
     along = reach[:, None, None] * np.broadcast_to(rng.uniform(0.0, 1.0, 5), (n, 16, 5))
-    robot, other, offset, _ = seen_from(positions).neighbours_within(np.inf)
+    robot, other, offset, _ = seen_from(positions).find_near_neighbours(np.inf)
     mine = in_charge(along, walls, directions, robot, other, -offset, reach)
     for i in range(n):
         places = positions[i] + along[i][..., None] * directions[:, None]
@@ -103,15 +103,15 @@ def test_who_sees_a_place_with_the_least_power_is_in_charge(seed: int, n: int) -
 
 def test_a_wall_at_a_low_angle_is_no_window() -> None:
     """Along a straight wall the distance leaps from ray to ray, and nothing is hidden."""
-    directions = headings(180)
+    directions = compute_headings(180)
     with np.errstate(divide="ignore"):
         wall = np.where(directions[:, 1] < 0.0, -0.3 / directions[:, 1], np.inf)
     view = View(np.minimum(wall, 20.0)[None], (wall < 20.0)[None])
-    assert len(windows(view, directions, np.array([20.0]), 0.3).robot) == 0
+    assert len(find_windows(view, directions, np.array([20.0]), 0.3).robot) == 0
     # it ends at x = 1
     shorter = np.where(directions[:, 0] * wall > 1.0, np.inf, wall)
     view = View(np.minimum(shorter, 20.0)[None], (shorter < 20.0)[None])
-    found = windows(view, directions, np.array([20.0]), 0.3)
+    found = find_windows(view, directions, np.array([20.0]), 0.3)
     assert len(found.robot) == 1
     assert found.corner[0] == pytest.approx(np.hypot(1.0, 0.3), rel=0.1)
     assert found.across[0] @ [0.3, 1.0] > 0.0  # up, off the wall
@@ -143,14 +143,14 @@ def test_robots_spread_until_their_views_are_apart_and_touch_nothing(law: Visibi
 
 def test_steps_are_halved_where_gradients_turn_back() -> None:
     one, back = np.array([[1.0, 0.0]]), np.array([[-1.0, 0.1]])
-    assert smaller_steps(one, None, None) == 1.0
-    assert smaller_steps(back, one, np.array([0.8])) == 0.4
-    assert smaller_steps(one, one, np.array([0.5])) == pytest.approx(0.6)
+    assert compute_step_fractions(one, None, None) == 1.0
+    assert compute_step_fractions(back, one, np.array([0.8])) == 0.4
+    assert compute_step_fractions(one, one, np.array([0.5])) == pytest.approx(0.6)
 
 
 def test_a_neighbour_behind_a_wall_detects_nothing_here() -> None:
     """What Φ counts: the product over those whose line to the place is in front of walls."""
-    directions = headings(72)
+    directions = compute_headings(72)
     along = np.full((1, 72, 1), 1.0)
     walls = np.full((1, 72), np.inf)
     pair = np.array([0]), np.array([1]), np.array([[2.0, 0.0]])

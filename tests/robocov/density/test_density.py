@@ -229,7 +229,7 @@ def test_a_cell_depends_on_nothing_but_what_its_robot_hears(density):
     ranges = np.full(len(points), 1.6)
 
     def row(places, i):
-        heard = Neighbours.within(places, ranges[: len(places)])
+        heard = Neighbours.from_ranges(places, ranges[: len(places)])
         cells = partition(places, SQUARE, heard, density=density)
         return cells.mass[i], *cells.centroid[i], cells.polar_moment[i]
 

@@ -93,7 +93,8 @@ def test_a_target_depends_on_nothing_but_what_its_robot_hears(target):
     ranges = np.full(len(points), 1.6)
 
     def row(places):
-        cells = partition(places, SQUARE, Neighbours.within(places, ranges[: len(places)]), density=density)
+        neighbours = Neighbours.from_ranges(places, ranges[: len(places)])
+        cells = partition(places, SQUARE, neighbours, density=density)
         return targets(cells, density, target, 1.0)[0].tolist()
 
     near = np.flatnonzero(np.hypot(*(points - points[0]).T) <= 1.6)

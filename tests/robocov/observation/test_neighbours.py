@@ -6,13 +6,13 @@ from hypothesis import strategies as st
 from voronoi_cases import SQUARE
 
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours, close_pairs
+from robocov.observation.neighbours import Neighbours, find_close_pairs
 
 
 @given(n=st.integers(1, 120), reach=st.floats(0.0, 8.0), seed=st.integers(0, 2**32))
 def test_close_pairs_agree_with_all_distances(n: int, reach: float, seed: int) -> None:
     positions = np.random.default_rng(seed).uniform(0, 10, size=(n, 2))
-    first, second, distance = close_pairs(positions, reach)
+    first, second, distance = find_close_pairs(positions, reach)
     expected = [
         (i, j)
         for i in range(n)
@@ -28,15 +28,15 @@ def test_two_robots_are_neighbours_when_both_are_in_range(n: int, seed: int) -> 
     rng = np.random.default_rng(seed)
     positions = rng.uniform(0, 10, size=(n, 2))
     ranges = rng.uniform(0, 8, size=n)
-    neighbours = Neighbours.within(positions, ranges)
-    assert not neighbours.complete
+    neighbours = Neighbours.from_ranges(positions, ranges)
+    assert not neighbours.is_complete
     for i in range(n):
         expected = [
             j
             for j in range(n)
             if j != i and np.hypot(*(positions[i] - positions[j])) <= min(ranges[i], ranges[j])
         ]
-        assert neighbours.of(i).tolist() == expected
+        assert neighbours.list_neighbours(i).tolist() == expected
 
 
 def seen(positions: np.ndarray, neighbours: Neighbours) -> Observations:
@@ -45,17 +45,17 @@ def seen(positions: np.ndarray, neighbours: Neighbours) -> Observations:
 
 def test_without_limits_everybody_hears_everybody() -> None:
     positions = np.array([[0.0, 0.0], [1e5, 0.0], [0.0, 2.0]])
-    neighbours = Neighbours.within(positions, np.full(3, np.inf))
-    assert neighbours.complete
-    assert neighbours.of(1).tolist() == [0, 2]
-    first, second, _, _ = seen(positions, neighbours).neighbours_within(5.0)
+    neighbours = Neighbours.from_ranges(positions, np.full(3, np.inf))
+    assert neighbours.is_complete
+    assert neighbours.list_neighbours(1).tolist() == [0, 2]
+    first, second, _, _ = seen(positions, neighbours).find_near_neighbours(5.0)
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(0, 2), (2, 0)]
 
 
 def test_close_pairs_of_neighbours_only() -> None:
     positions = np.array([[0.0, 0.0], [1.0, 0.0], [1.5, 0.0]])
-    neighbours = Neighbours.within(positions, np.array([0.5, 3.0, 3.0]))
-    first, second, offset, distance = seen(positions, neighbours).neighbours_within(2.0)
+    neighbours = Neighbours.from_ranges(positions, np.array([0.5, 3.0, 3.0]))
+    first, second, offset, distance = seen(positions, neighbours).find_near_neighbours(2.0)
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(1, 2), (2, 1)]
     np.testing.assert_allclose(distance, 0.5)
     np.testing.assert_allclose(offset, [[-0.5, 0.0], [0.5, 0.0]])

@@ -5,7 +5,7 @@ import pytest
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError
-from robocov.observation import Decision, Observations, Scanning, headings
+from robocov.observation import Decision, Observations, Scanning, compute_headings
 from robocov.sensor import RangeSensor
 from robocov.simulation import Simulation
 from robocov.world.solid import solid_pieces
@@ -48,7 +48,7 @@ def test_scans_of_a_team_are_those_of_each_robot(cluttered: Environment) -> None
     for i in range(3):
         alone, points = sensor.scan_from(places[i], 36, float(ranges[i]))
         assert np.array_equal(alone, distances[i])
-        ends = places[i] + distances[i][:, None] * headings(36)
+        ends = places[i] + distances[i][:, None] * compute_headings(36)
         np.testing.assert_allclose(points, ends, atol=1e-9)
         assert np.array_equal(hit[i], distances[i] < min(ranges[i], 1e6))
     assert hit[2].all()
@@ -71,6 +71,6 @@ def test_what_cannot_be_scanned_is_told(values: dict[str, object], message: str)
 
 
 def test_periods_are_whole_steps() -> None:
-    assert Scanning(period=0.5).every(1 / 60) == 30
-    assert Scanning(period=0.0).every(0.02) == 1
-    np.testing.assert_allclose(headings(4), [[1, 0], [0, 1], [-1, 0], [0, -1]], atol=1e-15)
+    assert Scanning(period=0.5).count_steps(1 / 60) == 30
+    assert Scanning(period=0.0).count_steps(0.02) == 1
+    np.testing.assert_allclose(compute_headings(4), [[1, 0], [0, 1], [-1, 0], [0, -1]], atol=1e-15)

@@ -200,8 +200,8 @@ def test_a_cell_depends_on_the_heard_alone_to_the_last_bit(seed: int, n: int, ra
     rng = np.random.default_rng(seed)
     points = scattered(SQUARE, n, rng)
     robot = int(rng.integers(n))
-    neighbours = Neighbours.within(points, np.full(n, range_))
-    heard = np.union1d(neighbours.of(robot), [robot])
+    neighbours = Neighbours.from_ranges(points, np.full(n, range_))
+    heard = np.union1d(neighbours.list_neighbours(robot), [robot])
     before = partition(points, SQUARE, neighbours)
 
     # the others move, out of range still, and some leave the team or join it
@@ -215,7 +215,7 @@ def test_a_cell_depends_on_the_heard_alone_to_the_last_bit(seed: int, n: int, ra
     joined = joined[np.hypot(*(joined - points[robot]).T) > range_]
     moved = np.concatenate([moved[kept], joined])
     again = int(np.searchsorted(kept, robot))
-    after = partition(moved, SQUARE, Neighbours.within(moved, np.full(len(moved), range_)))
+    after = partition(moved, SQUARE, Neighbours.from_ranges(moved, np.full(len(moved), range_)))
 
     assert after.mass[again] == before.mass[robot]
     assert after.centroid[again].tolist() == before.centroid[robot].tolist()
@@ -227,10 +227,10 @@ def test_a_cell_depends_on_the_heard_alone_to_the_last_bit(seed: int, n: int, ra
 @given(seeds, st.integers(1, 12), st.floats(0.1, 6.0))
 def test_limited_cells_are_those_of_the_heard_alone(seed: int, n: int, range_: float) -> None:
     points = scattered(PENTAGON, n, np.random.default_rng(seed))
-    neighbours = Neighbours.within(points, np.full(n, range_))
+    neighbours = Neighbours.from_ranges(points, np.full(n, range_))
     cells = partition(points, PENTAGON, neighbours)
     for robot in range(n):
-        heard = np.concatenate([points[robot : robot + 1], points[neighbours.of(robot)]])
+        heard = np.concatenate([points[robot : robot + 1], points[neighbours.list_neighbours(robot)]])
         area, mx, my, _ = map(float, exact_cell(0, heard, PENTAGON))
         assert cells.mass[robot] == pytest.approx(area, abs=1e-11)
         lever = cells.centroid[robot] - points[robot]

@@ -21,7 +21,7 @@ from voronoi_cases import (
 
 from robocov.density import Gaussian, Gaussians, Uniform
 from robocov.errors import InputError
-from robocov.observation.neighbours import Neighbours, close_pairs
+from robocov.observation.neighbours import Neighbours, find_close_pairs
 from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
@@ -82,10 +82,10 @@ def test_cells_are_those_of_buffers_that_shapely_cuts(seed: int, name: str, reac
     points = scattered(region, int(rng.integers(2, 9)), rng)
     n = len(points)
     speeds = rng.choice([0.4, 1.0, 1.0, 1.7], n)
-    neighbours = Neighbours.within(points, np.full(n, reach))
+    neighbours = Neighbours.from_ranges(points, np.full(n, reach))
     cells = weighted_partition(points, speeds, region, neighbours)
     for i in range(n):
-        expected = buffered(i, points, speeds, region, neighbours.of(i))
+        expected = buffered(i, points, speeds, region, neighbours.list_neighbours(i))
         assert cells.mass[i] == pytest.approx(expected.area, abs=1e-6 * region.area)
         if expected.area > 1e-3 * region.area:
             np.testing.assert_allclose(cells.centroid[i], expected.centroid.coords[0], atol=1e-4)
@@ -131,7 +131,7 @@ def test_speeds_that_hardly_differ_give_hardly_other_cells(seed: int, name: str,
     """The circles have radii of 10^13 m here, and the ordinary cells come out of them to 1e-12."""
     rng = np.random.default_rng(seed)
     points = scattered(REGIONS[name], n, rng)
-    if len(close_pairs(points, 0.05)[0]):
+    if len(find_close_pairs(points, 0.05)[0]):
         return
     cells = weighted_partition(points, 1.0 + 1e-14 * rng.integers(1, 9, n), REGIONS[name])
     ordinary = partition(points, REGIONS[name])
@@ -214,11 +214,11 @@ def test_a_cell_depends_on_nothing_but_whom_its_robot_hears(seed: int, n: int, r
     rng = np.random.default_rng(seed)
     points = scattered(SQUARE, n, rng)
     speeds = rng.choice([0.5, 1.0], n)
-    neighbours = Neighbours.within(points, np.full(n, reach))
+    neighbours = Neighbours.from_ranges(points, np.full(n, reach))
     i = int(rng.integers(n))
     strangers = np.ones(n, dtype=bool)
     strangers[i] = False
-    strangers[neighbours.of(i)] = False
+    strangers[neighbours.list_neighbours(i)] = False
     other, slower = points.copy(), speeds.copy()
     for k in np.flatnonzero(strangers):
         place = scattered(SQUARE, 1, rng)[0]
@@ -226,7 +226,7 @@ def test_a_cell_depends_on_nothing_but_whom_its_robot_hears(seed: int, n: int, r
             other[k] = place
         slower[k] = rng.choice([0.5, 1.0, 2.0])
     before = weighted_partition(points, speeds, SQUARE, neighbours)
-    after = weighted_partition(other, slower, SQUARE, Neighbours.within(other, np.full(n, reach)))
+    after = weighted_partition(other, slower, SQUARE, Neighbours.from_ranges(other, np.full(n, reach)))
     assert before.mass[i].tobytes() == after.mass[i].tobytes()
     assert before.centroid[i].tobytes() == after.centroid[i].tobytes()
 
@@ -234,12 +234,12 @@ def test_a_cell_depends_on_nothing_but_whom_its_robot_hears(seed: int, n: int, r
 def test_neighbours_may_be_believed_elsewhere() -> None:
     points = np.array([[1.0, 1.0], [5.0, 1.0], [3.0, 5.0]])
     speeds = np.array([1.0, 2.0, 1.0])
-    neighbours = Neighbours.within(points, np.full(3, 100.0))
+    neighbours = Neighbours.from_ranges(points, np.full(3, 100.0))
     heard = points[neighbours.indices] + [[0.3, 0.1]] * 6
     cells = weighted_partition(points, speeds, SQUARE, neighbours, heard=heard)
     for i in range(3):
         known = points.copy()
-        known[neighbours.of(i)] = heard[neighbours.indptr[i] : neighbours.indptr[i + 1]]
+        known[neighbours.list_neighbours(i)] = heard[neighbours.indptr[i] : neighbours.indptr[i + 1]]
         alone = weighted_partition(known, speeds, SQUARE)
         assert cells.mass[i] == pytest.approx(alone.mass[i], rel=1e-12)
 

@@ -164,7 +164,7 @@ def test_a_robot_uses_only_what_it_knows(seed: int, n: int, reach: float) -> Non
         seen = Observations(
             places,
             np.where(own, velocities, rng.normal(size=(n, 2))),
-            Neighbours.within(places, np.full(n, reach)),
+            Neighbours.from_ranges(places, np.full(n, reach)),
             np.where(own, points, places + rng.normal(size=(n, 2))),
             REGION,
         )

@@ -57,9 +57,10 @@ def test_neighbours_are_renumbered(record: Record) -> None:
     assert scene.snapshot is not None
     whole, part = record.snapshot(30).seen.neighbours, scene.snapshot.seen.neighbours
     rows = np.array(scene.numbers) - 1
-    expected = {(i, j) for i, j in zip(*(x.tolist() for x in whole.pairs()), strict=True)}
-    found = {(int(rows[i]), int(rows[j])) for i, j in zip(*(x.tolist() for x in part.pairs()), strict=True)}
-    assert found == expected
+    robot, neighbour = whole.list_pairs()
+    expected = set(zip(robot.tolist(), neighbour.tolist(), strict=True))
+    robot, neighbour = part.list_pairs()
+    assert set(zip(rows[robot].tolist(), rows[neighbour].tolist(), strict=True)) == expected
 
 
 def test_who_joins_has_no_trail_before(record: Record) -> None:

@@ -27,7 +27,7 @@ def replayed_snapshot(state: State, time: float, dt: float = DEFAULT_DT) -> Snap
     region, density, sensor = setup.solid.region, setup.solid.density, sensor_in(setup.solid)
     sensor.set_time(time)
     points = sensor.find_nearest_points(positions, team.sensing_range)
-    neighbours = Neighbours.within(positions, team.communication_range)
+    neighbours = Neighbours.from_ranges(positions, team.communication_range)
     seen = Observations(positions, state.velocities, neighbours, points, region, time, team.max_speed)
     seen = replace(seen, density=density, steering=state.steering)
     if (perception := _perception(setup, dt)) is not None:

@@ -34,7 +34,7 @@ class Windows(NamedTuple):
     corner: Array  # (w,) m, ρ
 
 
-def last_view(seen: Observations, before: View | None, scanning: Scanning, reach: Array) -> View:
+def compute_view(seen: Observations, before: View | None, scanning: Scanning, reach: Array) -> View:
     """Return what the last scan shows; all in range, (n,) m, is free for a robot that has not scanned yet."""
     if seen.scans is not None:
         return View(np.minimum(seen.scans.distances, reach[:, None]), seen.scans.hit)
@@ -44,7 +44,7 @@ def last_view(seen: Observations, before: View | None, scanning: Scanning, reach
     return View(np.broadcast_to(reach[:, None], shape), np.zeros(shape, dtype=bool))
 
 
-def windows(view: View, directions: Array, reach: Array, jump: float) -> Windows:
+def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Windows:
     """Return where the view in (rays, 2) directions opens by more than `jump` (m) from one ray to the next.
 
     A wall seen at a low angle opens the view, too: along it 1/distance is a sinusoid of the angle, so that
@@ -67,14 +67,14 @@ def windows(view: View, directions: Array, reach: Array, jump: float) -> Windows
     return Windows(robot[order], ray[order], across[order], corner[order])
 
 
-def importance(density: Density | None, points: Array) -> Array:
+def evaluate_density(density: Density | None, points: Array) -> Array:
     """Return φ at (..., 2) points (m), as an array of their shape."""
     if density is None:
         return np.ones(points.shape[:-1])
     return density.value(points.reshape(-1, 2)).reshape(points.shape[:-1])
 
 
-def smaller_steps(gradient: Array, before: Array | None, step: Array | None) -> Array:
+def compute_step_fractions(gradient: Array, before: Array | None, step: Array | None) -> Array:
     """Return the part of full speed, (n,), with which robots follow gradients, (n, 2), that leap.
 
     Areas in view have ridges, such as doors, from both sides of which the gradient leads back: at each
@@ -87,7 +87,7 @@ def smaller_steps(gradient: Array, before: Array | None, step: Array | None) -> 
 
 
 @kernel
-def behind(x: float, y: float, walls: Array) -> bool:
+def is_behind_wall(x: float, y: float, walls: Array) -> bool:
     """Return whether a place, relative to the robot, is farther away than the wall that it sees there."""
     rays = len(walls)
     ray = math.floor(math.atan2(y, x) * (rays / (2.0 * math.pi)) + 0.5) % rays
@@ -95,9 +95,9 @@ def behind(x: float, y: float, walls: Array) -> bool:
 
 
 @kernel
-def joined(x: float, y: float, dx: float, dy: float, walls: Array) -> bool:
+def is_path_clear(x: float, y: float, dx: float, dy: float, walls: Array) -> bool:
     """Return whether the way (dx, dy) from a place in view leads past no wall that the robot sees."""
     clear = True
     for k in range(1, _CHECKS):
-        clear = clear and not behind(x + dx * k / _CHECKS, y + dy * k / _CHECKS, walls)
+        clear = clear and not is_behind_wall(x + dx * k / _CHECKS, y + dy * k / _CHECKS, walls)
     return clear
