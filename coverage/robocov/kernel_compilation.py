@@ -31,7 +31,7 @@ from robocov.controllers import CONTROLLERS, Lloyd, Rapf
 from robocov.cost import CoverageCost
 from robocov.density import Density, Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
 from robocov.environment import Environment, PolygonObstacle
-from robocov.files.atomic import written
+from robocov.files.writing import replace_file
 from robocov.metrics import cost_history, summarise
 from robocov.robots import Team
 from robocov.simulation import Simulation
@@ -245,7 +245,7 @@ def _save_compiled_list(folder: Path) -> None:
         compiled = set(list_compiled_kernels())
         with suppress(OSError, ValueError):
             compiled |= set(json.loads(path.read_text(encoding="utf-8")))
-        with written(path, durable=False) as part:
+        with replace_file(path, durable=False) as part:
             part.write_text(json.dumps(sorted(compiled)), encoding="utf-8")
 
 

@@ -32,9 +32,9 @@ from robocov.errors import (
 )
 from robocov.extras import extra
 from robocov.files.array_files import read_arrays
-from robocov.files.atomic import written
 from robocov.files.result_folder import settle
 from robocov.files.strictjson import Document, read_document, wanted
+from robocov.files.writing import replace_file
 from robocov.mapfile import from_json, to_json
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
@@ -351,10 +351,10 @@ class Record(Drawable):
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OutputError(f"{folder}: cannot be made: {describe_error(error)}") from error
-        with written(folder / "record.npz") as part, part.open("wb") as file:
+        with replace_file(folder / "record.npz") as part, part.open("wb") as file:
             # compressing gains 10 % and takes 20 times as long
             np.savez(file, **{name: getattr(self, name) for name in self.arrays})
-        with written(folder / "run.json") as part:
+        with replace_file(folder / "run.json") as part:
             text = json.dumps(self.to_json(summary, lattice=lattice), indent=1, allow_nan=False)
             part.write_text(text + "\n", encoding="utf-8")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from robocov.errors import OutputError
-from robocov.files.atomic import locked
+from robocov.files.folder_lock import lock_folder
 from robocov_app.replication.plan import BeyondPlan, Plan
 from robocov_app.replication.results import RunnerOptions
 from robocov_app.terminal.interruption import Interruption
@@ -64,7 +64,7 @@ def shared(factory: pytest.TempPathFactory, name: str) -> Iterator[Path]:
     folder.mkdir(exist_ok=True)
     while True:
         try:
-            with locked(folder):
+            with lock_folder(folder):
                 yield folder
             return
         except OutputError as error:

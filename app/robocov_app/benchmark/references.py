@@ -10,7 +10,7 @@ import numpy as np
 
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
-from robocov.files.atomic import written
+from robocov.files.writing import replace_file
 from robocov.mapfile import from_json, to_json
 from robocov_app.benchmark import suite
 from robocov_app.replication.references import Question, searched
@@ -103,5 +103,5 @@ def _save(path: Path, maps: Mapping[str, Any]) -> None:
         own = dict(sorted(maps[name]["references"].items(), key=lambda item: int(item[0])))
         lines.append(f"{json.dumps(name)}: {json.dumps({**maps[name], 'references': own})}")
     head = json.dumps({"format": "robocov-benchmark-suite", "version": suite.VERSION, "search": how})[:-1]
-    with written(path) as part:
+    with replace_file(path) as part:
         part.write_text(head + ', "maps": {\n' + ",\n".join(lines) + "\n}}\n", encoding="utf-8")

@@ -16,8 +16,8 @@ from robocov.controllers import information_of, make_controller
 from robocov.controllers.gains import Value
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, quote
-from robocov.files.atomic import written
 from robocov.files.strictjson import parse, read_bytes
+from robocov.files.writing import replace_file
 from robocov_app.benchmark import suite
 from robocov_app.sweep.executors import LocalPool
 from robocov_app.sweep.ledger import RUNS, Entry, Ledger, difference_of
@@ -141,7 +141,7 @@ def run_benchmark(
     }
     head = json.dumps(result, indent=1)
     lines = ",\n".join(json.dumps(row, allow_nan=False) for row in rows)
-    with written(out / RESULT) as part:
+    with replace_file(out / RESULT) as part:
         part.write_text(f'{head[:-2]},\n "rows": [\n{lines}\n]}}\n', encoding="utf-8")
     return {**result, "rows": rows}
 

@@ -150,7 +150,7 @@ def _verify(options: Arguments) -> int:
 
 
 def _page(options: Arguments) -> int:
-    from robocov.files.atomic import written
+    from robocov.files.writing import replace_file
     from robocov_app.benchmark.page import page_of
     from robocov_app.benchmark.running import bundled_results, read_result
     from robocov_app.commands.report import check_target
@@ -160,7 +160,7 @@ def _page(options: Arguments) -> int:
     results = [read_result(path) for path in options.paths]
     results += [] if options.alone else bundled_results(results)
     data = page_of(results, options.title).encode("utf-8", "replace")
-    with written(target) as part:
+    with replace_file(target) as part:
         part.write_bytes(data)
     answer = {"path": str(target), "bytes": len(data), "entries": len(results)}
     tell(options, answer, f"written to {target} ({len(data) / 1e6:.2f} MB)")

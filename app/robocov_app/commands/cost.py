@@ -10,7 +10,7 @@ import tyro
 
 from robocov.arrays import Array
 from robocov.errors import InputError, ParameterError, describe_error, is_number, quote, require_number
-from robocov.files.atomic import writable, written
+from robocov.files.writing import replace_file, resolve_target
 from robocov.mapfile import load_map
 from robocov_app.render.density import density_kind, density_lines, mean_label
 from robocov_app.runs.cost import built_cost, cost_for_pictures, draw_distances
@@ -40,7 +40,7 @@ class Arguments(PlotOptions):
         super().__post_init__()
         require_number("--lattice", self.lattice, 2, 2048, whole=True)
         if self.sites is not None:
-            writable(self.sites)
+            resolve_target(self.sites)
 
 
 def command(options: Arguments) -> None:
@@ -56,7 +56,7 @@ def command(options: Arguments) -> None:
     if options.sites is not None:
         chosen = timed or result
         arrays: dict[str, Any] = {"points": cost.points, "distances": chosen.distances, "owner": chosen.owner}
-        with written(options.sites) as part, part.open("wb") as file:
+        with replace_file(options.sites) as part, part.open("wb") as file:
             np.savez(file, **arrays if timed is None else arrays | {"times": timed.times})
     if options.plot is not None:
         mean = f"{mean_label(environment)} {result.mean_distance:.3f} m"

@@ -149,14 +149,14 @@ def session_of(options: Arguments) -> Session:
 
 
 def rendered(opening: Launcher, options: Arguments) -> int:
-    from robocov.files.atomic import writable
     from robocov.files.result_folder import results
+    from robocov.files.writing import resolve_target
     from robocov_app.runs.encoding import encoder, save_moving_picture
     from robocov_app.viewer.film import pixels
     from robocov_app.viewer.launch import HEADLESS_FPS
 
     if options.video is not None:
-        writable(options.video)
+        resolve_target(options.video)
         encoder()
     made = nullcontext() if options.out is None else results(options.out, overwrite=False)
     with made as result, opening.window() as window, Interruption() as stop:

@@ -72,7 +72,7 @@ def _open_editor(options: Arguments) -> int:
         if options.screenshot is None:
             show(window, options, options.folder)
             return 0
-        from robocov.files.atomic import written
+        from robocov.files.writing import replace_file
         from robocov_app.runs.encoding import png_bytes
         from robocov_app.viewer.film import pixels
 
@@ -80,7 +80,7 @@ def _open_editor(options: Arguments) -> int:
         window.editor.message = ""
         for _ in range(3):
             window.frame(0.2)
-        with written(options.screenshot) as part:
+        with replace_file(options.screenshot) as part:
             part.write_bytes(png_bytes(pixels(window.screen)))
     echo(f"saved {options.screenshot}")
     return 0

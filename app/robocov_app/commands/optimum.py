@@ -10,7 +10,7 @@ import numpy as np
 import tyro
 
 from robocov.errors import InputError, ParameterError, format_count, require_number
-from robocov.files.atomic import written
+from robocov.files.writing import replace_file
 from robocov.lower_bound import MIN_PRECISION, LowerBound, compute_lower_bound
 from robocov.mapfile import load_map
 from robocov.optimum import MAX_RESTARTS, MAX_ROBOTS, find_optimum
@@ -110,7 +110,7 @@ def command(options: Arguments) -> None:
             gaps.append({"run": each.folder.name, "mean_distance_m": result.mean_distance, "gap": gap})
     if options.positions is not None:
         rows = ",\n ".join(json.dumps(place) for place in best.positions.tolist())
-        with written(options.positions) as part:
+        with replace_file(options.positions) as part:
             part.write_text(f"[{rows}]\n", encoding="utf-8")
     if options.plot is not None:
         cost = built_cost(environment, PICTURE_LATTICE, quiet=True)

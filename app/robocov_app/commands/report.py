@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 import tyro
 
 from robocov.errors import InputError, OutputError, ParameterError, format_count
-from robocov.files.atomic import writable, written
 from robocov.files.result_folder import REPORT, extended, is_report
+from robocov.files.writing import replace_file, resolve_target
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import echo, tell
@@ -101,9 +101,9 @@ def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: 
         if target == options.folders[0] / REPORT and results[0].kind != "sweep":
             more = stack.enter_context(extended(options.folders[0]))
             more.claim(REPORT)
-            stack.enter_context(written(more.new / REPORT)).write_bytes(data)
+            stack.enter_context(replace_file(more.new / REPORT)).write_bytes(data)
         else:
-            stack.enter_context(written(target)).write_bytes(data)
+            stack.enter_context(replace_file(target)).write_bytes(data)
     counts, lines = [], []
     for (folder, _), result, shown in zip(parts, results, page.shown, strict=True):
         runs, failed, lost = len(result.fine), len(result.failed), [each._asdict() for each in result.damaged]
@@ -119,7 +119,7 @@ def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: 
 
 def check_target(target: Path, *, overwrite: bool) -> None:
     """Raise InputError or OutputError, before any work is done, where no page may be written."""
-    writable(target)
+    resolve_target(target)
     if not target.parent.is_dir():
         raise OutputError(f"{target}: cannot be written: there is no folder {target.parent}")
     if target.exists() and not overwrite and not is_report(target):

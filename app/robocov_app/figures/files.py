@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from robocov.errors import OutputError, ParameterError, quote
-from robocov.files.atomic import writable, written
+from robocov.files.writing import replace_file, resolve_target
 from robocov.text import escape_controls
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def save_figure(figure: Figure, path: Path | str) -> None:
     Raises OutputError when the file cannot be written; ParameterError when the suffix is another.
     """
     kind = figure_kind(Path(path))
-    with written(Path(path)) as part:
+    with replace_file(Path(path)) as part:
         _write(figure, part, kind)
 
 
@@ -81,7 +81,7 @@ def _write(figure: Figure, file: Path | IO[bytes], kind: str) -> None:
 def check_figure_path(path: Path) -> None:
     """Raise OutputError or ParameterError, before any work is done, where no figure can be written."""
     figure_kind(path)
-    if not writable(path).parent.is_dir():
+    if not resolve_target(path).parent.is_dir():
         raise OutputError(f"{path}: cannot be written: there is no folder {path.parent}")
 
 

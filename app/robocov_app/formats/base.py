@@ -343,7 +343,8 @@ class ExportReport(_Report):
 class Exporter:
     """A foreign format to write, as an `Importer`.
 
-    ``write(environment, path, options)`` writes the map whole or not at all (`robocov.files.atomic.written`).
+    ``write(environment, path, options)`` writes the map whole or not at all, by
+    `robocov.files.writing.replace_file`.
     ``files(path, options)``: all files that would be written, the given one first.
     """
 

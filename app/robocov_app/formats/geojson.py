@@ -27,7 +27,7 @@ from robocov.environment import Environment
 from robocov.errors import JsonPath as Steps
 from robocov.errors import ParameterError, RobocovError, format_path, quote, to_one_line
 from robocov.extras import extra
-from robocov.files.atomic import written
+from robocov.files.writing import replace_file
 from robocov_app.formats import files
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import JsonFile, is_number
@@ -254,7 +254,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     if lost:
         notes.append(f"{lost} shapes are nothing with {digits} decimals")
     members, lines = json.dumps(head, ensure_ascii=False, indent=1).removesuffix("\n}"), ",\n".join(features)
-    with written(path) as part:
+    with replace_file(path) as part:
         part.write_text(f'{members},\n "features": [\n{lines}\n]}}\n', encoding="utf-8")
     kept = free_area(areas[0], areas[1:])
     dropped = not_held(environment, names=False)

@@ -14,7 +14,7 @@ import numpy as np
 
 from robocov.environment import Environment
 from robocov.errors import MapError, quote, to_one_line
-from robocov.files.atomic import written
+from robocov.files.writing import replace_file
 from robocov_app.formats import files
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.geometry.rasterize import free_cells, grid_over, grid_report
@@ -99,7 +99,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     letters[:, :-1][free[::-1]] = ord(".")
     letters[:, -1] = ord("\n")
     head = f"type octile\nheight {grid.rows}\nwidth {grid.columns}\nmap\n"
-    with written(path) as part:
+    with replace_file(path) as part:
         part.write_bytes(head.encode("ascii") + letters.tobytes())
     x, y = grid.origin
     place = f"the cell size, {grid.cell:g} m, and the lower left corner, [{x:g}, {y:g}]"

@@ -25,7 +25,7 @@ from scipy import ndimage
 from robocov.arrays import BoolArray
 from robocov.environment import Environment
 from robocov.errors import MapError, format_count, quote, to_one_line
-from robocov.files.atomic import written
+from robocov.files.writing import replace_file
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
 from robocov_app.formats.base import (
@@ -525,6 +525,6 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     texts = PngImagePlugin.PngInfo()
     texts.add_text(TITLE, environment.name)
     texts.add_text(CHUNK, json.dumps({"cell_m": grid.cell, "origin_m": list(grid.origin)}))
-    with written(path) as part:
+    with replace_file(path) as part:
         Image.fromarray(free[::-1]).save(part, format="PNG", pnginfo=texts)
     return grid_report("picture", (path,), environment, grid, free)

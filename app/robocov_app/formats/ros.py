@@ -28,7 +28,7 @@ from scipy import ndimage
 from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.errors import MapError, OutputError, ParameterError, quote, to_one_line
-from robocov.files.atomic import written
+from robocov.files.writing import replace_file
 from robocov_app.formats import files
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.geometry.rasterize import free_cells, grid_over, grid_report
@@ -244,7 +244,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
             alpha = np.where(unknown, np.uint8(0), np.uint8(255))
     pixels = pixels.astype(np.uint8)
     picture = np.ascontiguousarray((pixels if alpha is None else np.dstack([pixels, alpha]))[::-1])
-    with written(image) as part:
+    with replace_file(image) as part:
         if image.suffix == ".pgm":
             head = f"P5\n# robocov {grid.cell!r} m/pix\n{grid.columns} {grid.rows}\n255\n"
             part.write_bytes(head.encode("ascii") + picture.tobytes())
@@ -252,7 +252,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
             import PIL.Image
 
             PIL.Image.fromarray(picture).save(part, format="PNG")
-    with written(path) as part:
+    with replace_file(path) as part:
         part.write_text(
             f"image: {text_name}\nmode: {mode}\nresolution: {grid.cell!r}\n"
             f"origin: [{grid.origin[0]!r}, {grid.origin[1]!r}, 0.0]\n"

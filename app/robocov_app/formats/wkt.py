@@ -24,8 +24,8 @@ from shapely import MultiPolygon, Polygon
 from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.errors import MapError, format_count, quote
-from robocov.files.atomic import written
 from robocov.files.strictjson import line_and_column
+from robocov.files.writing import replace_file
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import MAX_DEPTH, name_of_map, read_text
 from robocov_app.formats.geometry.polygons import (
@@ -288,7 +288,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     free = on_grid(environment.free, digits)
     parts = [_text(part, digits) for part in free]
     text = f"POLYGON {parts[0]}" if len(parts) == 1 else f"MULTIPOLYGON ({', '.join(parts)})"
-    with written(path) as part:
+    with replace_file(path) as part:
         part.write_text(text + "\n", encoding="ascii")
     notes = [f"in metres, {digits} decimals"]
     if len(parts) > 1:

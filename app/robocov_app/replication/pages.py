@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 from markupsafe import Markup
 
 from robocov import __version__
-from robocov.files.atomic import written
 from robocov.files.result_folder import for_results
+from robocov.files.writing import replace_file
 from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
 from robocov.record import Record, versions
 from robocov.text import escape_controls
@@ -52,7 +52,7 @@ class Image(NamedTuple):
 
 
 def save(path: Path, text: str) -> None:
-    with written(path) as part:
+    with replace_file(path) as part:
         part.write_text(text, encoding="utf-8")
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from robocov.errors import OutputError
-from robocov.files.atomic import written
 from robocov.files.result_folder import for_results
+from robocov.files.writing import replace_file
 from robocov.mapfile import from_json, to_json
 from robocov_app.replication.plan import ROBOTS, TEAM, Plan
 from robocov_app.sweep.study import StudyMap
@@ -104,7 +104,7 @@ def _keep(path: Path, question: Question, answer: Reference) -> None:
     content |= {"restarts": question.restarts, "seed": question.seed}
     content |= {"mean_distance_m": answer.mean_distance, "agreement": answer.agreement}
     content["positions_m"] = answer.positions
-    with written(path) as part:
+    with replace_file(path) as part:
         part.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 

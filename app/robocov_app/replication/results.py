@@ -15,8 +15,8 @@ import robocov
 from robocov.controllers import CONTROLLERS, controller_kind
 from robocov.cost import CoverageCost
 from robocov.errors import InputError
-from robocov.files.atomic import written
 from robocov.files.result_folder import for_results
+from robocov.files.writing import replace_file
 from robocov.metrics import CostHistory
 from robocov.metrics.results import read_results
 from robocov.record import Record
@@ -154,7 +154,7 @@ def open_folder(folder: Path, plan: Plan) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         empty = not any(folder.iterdir())
     if empty:
-        with written(mark) as part:
+        with replace_file(mark) as part:
             part.write_text(json.dumps({**_HEAD, "plan": plan.name}) + "\n", encoding="utf-8")
         return
     words = "the folder is not empty, and what is in it is no study of the paper"

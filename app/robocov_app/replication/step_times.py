@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from robocov.controllers import gain_values, make_controller
-from robocov.files.atomic import written
+from robocov.files.writing import replace_file
 from robocov.mapfile import load_map
 from robocov.record import versions
 from robocov_app.figures.statistics import Interval, bootstrap
@@ -79,7 +79,7 @@ def step_times(
                 break
             kept[str(robots)] = entry = {"digest": digest, "seconds_per_step": seconds}
             document = {**_HEAD, "map": MAP, "dt_s": plan.dt, "steps_per_block": BLOCK, "robots": kept}
-            with written(path) as part:
+            with replace_file(path) as part:
                 part.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
         taken = {name: tuple(own) for name, own in entry["seconds_per_step"].items()}
         found[robots] = StepTimes(robots, plan.dt, taken)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.errors import OutputError, ParameterError, describe_error, quote
-from robocov.files.atomic import written
+from robocov.files.writing import replace_file
 
 Frame: TypeAlias = NDArray[np.uint8]  # RGB, (height, width, 3), 0 to 255
 
@@ -47,7 +47,7 @@ def _kept(folder: Path, frames: Iterable[Frame]) -> Iterator[Frame]:
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written: {describe_error(error)}") from error
     for number, frame in enumerate(frames):
-        with written(folder / f"{number:06d}.png", durable=False) as part:
+        with replace_file(folder / f"{number:06d}.png", durable=False) as part:
             part.write_bytes(png_bytes(frame))
         yield frame
 
@@ -62,7 +62,7 @@ def save_film(path: Path, frames: Iterable[Frame], *, fps: float = 30.0) -> None
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{path.parent}: cannot be made ({describe_error(error)})") from error
-    with written(path) as part, _encoder(part, path, _even(first), fps) as pipe:
+    with replace_file(path) as part, _encoder(part, path, _even(first), fps) as pipe:
         for frame in chain([first], source):
             if frame.shape != first.shape:
                 sizes = f"{quote(frame.shape)} after {quote(first.shape)}"

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from robocov.errors import InputError, OutputError, format_count
-from robocov.files.atomic import locked, on_disk
+from robocov.files.folder_lock import lock_folder
 from robocov.files.result_folder import for_results
+from robocov.files.writing import flush_to_disk
 from robocov_app.sweep.study import Task
 from robocov_app.sweep.worker import FIGURES, Outcome, made_with
 from robocov_app.terminal.output import write_json
@@ -142,7 +143,7 @@ class Ledger:
             part.mkdir()
             for name, content in files.items():
                 (part / name).write_bytes(content)
-            on_disk([*(part / name for name in files), part])
+            flush_to_disk([*(part / name for name in files), part])
             _remove(target)
             part.rename(target)
         except OSError as error:
@@ -168,7 +169,7 @@ def opened(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
         raise InputError(f"{folder}: {foreign}; another --out was wanted")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OutputError(f"{folder}: cannot be used for results: Permission denied")
-    with locked(folder):
+    with lock_folder(folder):
         ledger = Ledger(folder)
         try:
             for part in (*ledger._runs.glob(".*"), *folder.glob(".*")):

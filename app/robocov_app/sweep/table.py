@@ -14,7 +14,7 @@ from robocov.controllers import gains_of
 from robocov.controllers.gains import Option
 from robocov.errors import OutputError
 from robocov.extras import extra
-from robocov.files.atomic import on_disk, writable
+from robocov.files.writing import flush_to_disk, resolve_target
 from robocov.metrics.results import read_rows
 from robocov_app.sweep.ledger import CSV, STUDY, Entry, has_all_rows, rows_in
 from robocov_app.sweep.study import CONDITIONS, UNITS, WORDS, Study, Task, parameter_column
@@ -116,7 +116,7 @@ class Table:
 
     def __enter__(self) -> Table:
         for name in self._names:
-            writable(self._folder / name)
+            resolve_target(self._folder / name)
             if name == PARQUET:
                 extra("pyarrow", "parquet", f"{self._folder / name}: ")
         # rows of an earlier table, which only one that grows replaces before the end
@@ -150,10 +150,10 @@ class Table:
                     names[STUDY] = ".study.part.json"
                     (self._folder / names[STUDY]).write_bytes(self._study)
                 grown = [self._folder / CSV] * self.replaced
-                on_disk([self._folder / part for part in names.values()] + grown)
+                flush_to_disk([self._folder / part for part in names.values()] + grown)
                 for name, part in names.items():
                     (self._folder / part).replace(self._folder / name)
-                on_disk([self._folder])
+                flush_to_disk([self._folder])
             self.replaced = True
 
     def add(self, row: Mapping[str, Any]) -> None:

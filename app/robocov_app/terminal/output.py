@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robocov.errors import InputError
-from robocov.files.atomic import writable, written
 from robocov.files.csv_cells import quote_cell
+from robocov.files.writing import replace_file, resolve_target
 from robocov.text import escape_controls
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def require_fresh(
     path: Path, other: str, *, overwrite: bool, source: Path | None = None, read: str = "file"
 ) -> None:
     """Raise InputError where `path` may not be written: it is the source, or there is a file already."""
-    if not writable(path).exists():
+    if not resolve_target(path).exists():
         return
     if source is not None and source.exists() and path.samefile(source):
         raise InputError(f"{path}: the {read} that is read; {other} was wanted")
@@ -66,7 +66,7 @@ def listed(folder: Path) -> str:
 
 
 def write_json(path: Path, content: Any) -> None:
-    with written(path) as part:
+    with replace_file(path) as part:
         part.write_text(json_text(content), encoding="utf-8")
 
 
@@ -75,7 +75,7 @@ def json_text(content: Any) -> str:
 
 
 def write_csv(path: Path, header: str, rows: Iterable[Iterable[object]]) -> None:
-    with written(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
+    with replace_file(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
         file.write(csv_text(header, rows))
 
 

@@ -15,8 +15,9 @@ from typing import Any, TypeVar
 from platformdirs import user_state_path
 
 from robocov.errors import MapError, OutputError
-from robocov.files.atomic import locked, written
+from robocov.files.folder_lock import lock_folder
 from robocov.files.strictjson import parse, read_bytes
+from robocov.files.writing import replace_file
 from robocov_app.toolkit.opening import require_regular_file
 
 FOLDER = "ROBOCOV_DRAFTS"  # environment variable with another folder to keep work in; empty for none
@@ -56,7 +57,7 @@ class Autosaver:
         self._writing = self._closed = self._hurried = False
         self._holds = resumed is not None
         if resumed is not None:
-            self._lock.enter_context(locked(resumed))
+            self._lock.enter_context(lock_folder(resumed))
         self._place = resumed if resumed is not None or folder is None else self._new_place(folder)
         if self._place is None:
             return
@@ -112,7 +113,7 @@ class Autosaver:
                 folder.mkdir(parents=True, exist_ok=True, mode=0o700)
                 place = folder / f"{datetime.now():%Y%m%d-%H%M%S}-{secrets.token_hex(4)}"
                 place.mkdir(mode=0o700)
-                self._lock.enter_context(locked(place))
+                self._lock.enter_context(lock_folder(place))
                 self.trouble = ""
                 return place
             except (OSError, OutputError) as error:
@@ -137,7 +138,7 @@ class Autosaver:
                 when = datetime.now().astimezone().isoformat(timespec="seconds")
                 record: dict[str, Any] = {"format": self._kind, "version": 1, "path": file, "when": when}
                 record |= content() if content is not None else {}
-                with written(self._place / _FILE) as part:
+                with replace_file(self._place / _FILE) as part:
                     part.write_text(json.dumps(record, ensure_ascii=False), encoding="utf-8")
                 self._holds = content is not None
             except Exception as error:  # the thread goes on: later work may be kept again
@@ -197,7 +198,7 @@ def recoverable(folder: Path | None, kind: str, read: Callable[[Record], _Work |
     found = []
     for place in _places(folder):
         with suppress(Exception):  # in use, or not to be read
-            with locked(place):
+            with lock_folder(place):
                 record = read_record(place, kind) if (place / _FILE).exists() else None
                 work = None if record is None else read(record)
             if record is not None and work is not None:
@@ -227,7 +228,7 @@ def opened_elsewhere(folder: Path | None, kind: str, path: Path) -> bool:
             named = read_record(place, kind).path
             if named is not None and os.path.realpath(named) == wanted:
                 try:
-                    with locked(place):
+                    with lock_folder(place):
                         pass
                 except OutputError:
                     return True

@@ -8,7 +8,7 @@ from platformdirs import user_config_path
 from pydantic import BaseModel
 
 from robocov.errors import OutputError
-from robocov.files.atomic import written
+from robocov.files.writing import replace_file
 
 FOLDER = "ROBOCOV_SETTINGS"  # environment variable with another folder for the settings; empty for none
 Kept = TypeVar("Kept", bound=BaseModel)
@@ -39,7 +39,7 @@ def save_settings(settings: BaseModel, file: Path | None) -> str:
         return ""
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        with written(file) as part:
+        with replace_file(file) as part:
             part.write_text(settings.model_dump_json(indent=1) + "\n", encoding="utf-8")
     except (OSError, OutputError) as error:
         return f"settings not saved: {error}"

@@ -15,7 +15,7 @@ import pygame
 from pygame import Surface
 
 from robocov.errors import InputError
-from robocov.files.atomic import written
+from robocov.files.writing import replace_file
 from robocov.text import remove_controls
 from robocov_app.render.theme import LIGHT
 from robocov_app.terminal.output import free_name
@@ -260,7 +260,7 @@ class BaseWindow:
     def save_screenshot(self, folder: Path) -> str:
         target, picture = free_name(folder, "robocov", ".png"), BytesIO()
         pygame.image.save(self.screen, picture, ".png")
-        with written(target) as part:
+        with replace_file(target) as part:
             part.write_bytes(picture.getvalue())
         return f"screenshot saved: {target}"
 

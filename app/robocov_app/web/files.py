@@ -9,8 +9,8 @@ from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile
 
 from robocov.errors import InputError, OutputError, RobocovError, describe_error
-from robocov.files.atomic import written
 from robocov.files.result_folder import MANIFEST
+from robocov.files.writing import replace_file
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit.dialogs import MOST_LISTED
 
@@ -84,7 +84,7 @@ class Upload:
         try:
             if path.exists():
                 path = free_name(folder, path.stem, path.suffix)
-            with written(path) as part:
+            with replace_file(path) as part:
                 part.write_bytes(b"".join(self._pieces))
         except OSError as error:
             raise TransferError(

@@ -10,7 +10,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeGuard
 
-from robocov.files.atomic import written
+from robocov.files.writing import replace_file
 
 FILE_NAME = ".robocov-visitors.json"
 _ID_BYTES = 18
@@ -85,7 +85,7 @@ class VisitorFolders:
         # another server may have the same folder
         self._names = {**_read_names(self._read()), **self._names, _hash(visitor): path.name}
         content = {"cookie": self.cookie, "visitors": self._names}
-        with written(self._folder / FILE_NAME) as part:
+        with replace_file(self._folder / FILE_NAME) as part:
             part.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
     def _read(self) -> dict[str, Any]:

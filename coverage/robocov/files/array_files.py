@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.errors import InputError, OutputError
-from robocov.files.atomic import written
 from robocov.files.cache_folders import find_cache_root, is_private
+from robocov.files.writing import replace_file
 
 MOST_BYTES = 2_000_000_000
 """Bytes that the arrays of one file may take: about the largest run that can be asked for."""
@@ -141,7 +141,7 @@ class ArrayCache:
             return
         with suppress(OSError, OutputError):
             self.folder.mkdir(parents=True, exist_ok=True)
-            with written(self.folder / f"{key}{_SUFFIX}", durable=False) as path:
+            with replace_file(self.folder / f"{key}{_SUFFIX}", durable=False) as path:
                 path.write_bytes(b"".join([_FORMAT, _digest(payload), payload]))
                 path.chmod(0o600)  # `load` ignores what others may have written
             self._tidy()

@@ -17,7 +17,8 @@ from pathlib import Path, PurePosixPath
 from typing import Literal, TypeAlias
 
 from robocov.errors import InputError, OutputError, describe_error, quote
-from robocov.files.atomic import locked, on_disk, written
+from robocov.files.folder_lock import lock_folder
+from robocov.files.writing import flush_to_disk, replace_file
 
 Kind: TypeAlias = Literal["run", "comparison", "replay", "story"]
 REPORT = "report.html"
@@ -77,7 +78,7 @@ class ResultFolder:
                     raise OutputError(f"{folder}: cannot be written to: Permission denied")
             files = made if self._replaces else made | self._owned
             journal = {**_HEAD, "files": sorted(files), "removed": sorted(self._owned - files)}
-            with written(staging / _JOURNAL) as part:
+            with replace_file(staging / _JOURNAL) as part:
                 part.write_text(json.dumps(journal, indent=0) + "\n", encoding="utf-8")
             (staging / _JOURNAL).replace(self.path / _JOURNAL)  # from here on the new result counts
             _carry_out(self.path)
@@ -138,7 +139,7 @@ def settle(folder: Path) -> None:
     Raises `InputError` when it cannot be known what is left to be done, `OutputError` when it cannot be done.
     """
     if os.path.lexists(folder / _JOURNAL):
-        with locked(folder, _LOCK, remove=True), for_results(folder):
+        with lock_folder(folder, _LOCK, remove=True), for_results(folder):
             _carry_out(folder)
     home, part = _home(folder, _JOURNAL)
     if part:
@@ -179,7 +180,7 @@ def _carry_out(folder: Path) -> None:
     if journal is None:
         return
     files, removed = journal
-    on_disk([folder])
+    flush_to_disk([folder])
     for name in removed:
         path = _inside(folder, name)
         if _is_file(path):
@@ -201,7 +202,7 @@ def _carry_out(folder: Path) -> None:
 @contextmanager
 def _held(folder: Path) -> Iterator[None]:
     """Lock a folder and put it in order; afterwards discard what was made and not committed."""
-    with locked(folder, _LOCK, remove=True):
+    with lock_folder(folder, _LOCK, remove=True):
         with for_results(folder):
             _carry_out(folder)
             _discard_staging(folder)

@@ -25,8 +25,8 @@ from robocov.errors import (
     quote_json,
     to_one_line,
 )
-from robocov.files.atomic import written
 from robocov.files.strictjson import located, parse, read_bytes, require_json
+from robocov.files.writing import replace_file
 from robocov.mapfile.check import check_rules
 from robocov.mapfile.models import HEAD, LIGHTEST, NOTHING, DensityModel, RasterModel, plain, validate
 from robocov.mapfile.models import map_schema as map_schema
@@ -145,7 +145,7 @@ def save_map(environment: Environment, path: str | Path) -> None:
         check_rules(environment, str(path))
     else:
         from_json(document, str(path))
-    with written(Path(path)) as part:
+    with replace_file(Path(path)) as part:
         part.write_bytes(dump_document(document).encode())
 
 

@@ -14,7 +14,7 @@ from robocov.conditions import Conditions
 from robocov.controllers import Individually, Rapf, Rpf, gain_values, make_controller
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, RobocovError
-from robocov.files.atomic import written
+from robocov.files.writing import replace_file
 from robocov.mapfile import from_json
 from robocov.metrics import sample_moments
 from robocov.observation import Decision, Observations, Snapshot
@@ -365,21 +365,24 @@ class TestReusedArrays:
 def test_a_file_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
     target = tmp_path / "result.txt"
     target.write_text("old")
-    with pytest.raises(RuntimeError), written(target) as part:
+    with pytest.raises(RuntimeError), replace_file(target) as part:
         part.write_text("half")
         raise RuntimeError
     assert target.read_text() == "old"
     with (
         pytest.raises(OutputError, match=r"result.txt: cannot be written: No space left on device"),
-        written(target) as part,
+        replace_file(target) as part,
     ):
         part.write_text("half")
         raise OSError(28, os.strerror(28))
     assert [path.name for path in tmp_path.iterdir()] == ["result.txt"]
-    with written(target) as part:
+    with replace_file(target) as part:
         part.write_text("new")
     assert target.read_text() == "new"
-    with pytest.raises(OutputError, match="cannot be written"), written(tmp_path / "no" / "x.txt") as part:
+    with (
+        pytest.raises(OutputError, match="cannot be written"),
+        replace_file(tmp_path / "no" / "x.txt") as part,
+    ):
         part.write_text("")
 
 

@@ -74,7 +74,7 @@ def test_a_report_goes_with_its_results_and_another_file_of_that_name_stays(run)
         (["nothing"], "nothing: there is no such folder"),
         (["."], ".: not the folder of a run, a comparison or a sweep"),
         (["one", "--out", "no/page.html"], "no/page.html: cannot be written: there is no folder no"),
-        (["one", "--out", "one"], "one: is a folder, but a file was wanted"),
+        (["one", "--out", "one"], "one: expected a file, got a folder"),
         ([], "DIR"),
     ],
 )

@@ -239,7 +239,7 @@ def test_a_table_that_grows_appears_when_it_is_as_long_as_the_one_of_a_sweep_tha
 @pytest.mark.parametrize("name", ["results.csv", "results.parquet"])
 def test_what_is_no_file_is_not_replaced(tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()
-    told = pytest.raises(OutputError, match=f"{name}: is a folder, but a file was wanted")
+    told = pytest.raises(OutputError, match=f"{name}: expected a file, got a folder")
     with told, Table(tmp_path, columns_of(small_study()), parquet=True):
         pass
 

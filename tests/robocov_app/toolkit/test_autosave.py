@@ -307,7 +307,7 @@ def test_a_record_says_what_it_is(folder, tmp_path):
 
 def test_a_program_that_is_disturbed_while_it_begins_takes_another_folder(folder, monkeypatch):
     times = []
-    lock = autosave.locked
+    lock = autosave.lock_folder
 
     def disturbed(place):
         times.append(place)
@@ -315,7 +315,7 @@ def test_a_program_that_is_disturbed_while_it_begins_takes_another_folder(folder
             raise OutputError(f"{place}: another process is at work in this folder")
         return lock(place)
 
-    monkeypatch.setattr(autosave, "locked", disturbed)
+    monkeypatch.setattr(autosave, "lock_folder", disturbed)
     keeper = Autosaver(folder, KIND)
     assert keeper.trouble == ""
     assert keeper.flush()

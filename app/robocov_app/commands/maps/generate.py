@@ -18,7 +18,7 @@ from robocov.errors import (
     format_count,
     require_number,
 )
-from robocov.files.atomic import writable
+from robocov.files.writing import resolve_target
 from robocov.mapfile import bundled_maps, dump_map, load_map, save_map
 from robocov.mapfile.check import check_map
 from robocov_app.runs.options import PlotOptions
@@ -144,7 +144,7 @@ def check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
 
 
 def _require_map(path: Path) -> None:
-    if writable(path).exists():
+    if resolve_target(path).exists():
         try:
             load_map(path)
         except MapError:

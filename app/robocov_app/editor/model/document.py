@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Literal, Self, TypeAlias
 
 from robocov.errors import MapError, OutputError, format_count, to_one_line
-from robocov.files.atomic import writable, written
 from robocov.files.strictjson import read_bytes
+from robocov.files.writing import replace_file, resolve_target
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.editor.model.parser import parse_sketch, sketch_of
 from robocov_app.editor.model.selection import Change, Selection
@@ -190,14 +190,14 @@ def read_sketch(path: Path) -> tuple[Sketch, OnDisk]:
 def write_sketch(sketch: Sketch, path: Path, before: OnDisk | None = None, *, over: bool = False) -> OnDisk:
     """Write a file whole or not at all; ChangedError, unless `over`, when it is not as it was `before`."""
     path, text = path.absolute(), sketch_text(sketch).encode()
-    writable(path)
+    resolve_target(path)
     ours = before if before is not None and before.path == path else None
     if not over and ours is None and _stamp(path) is not None:
         raise ChangedError(f"{to_one_line(path)}: there is such a file already")
     if not over and ours is not None and state_of(ours) == "changed":
         what = "has been changed by something else since it was opened or saved here"
         raise ChangedError(f"{to_one_line(path)}: {what}")
-    with written(path) as part:
+    with replace_file(path) as part:
         part.write_bytes(text)
     return OnDisk(path, sha256(text).hexdigest(), _stamp(path) or (-1, 0))
 

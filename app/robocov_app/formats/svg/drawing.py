@@ -26,7 +26,7 @@ from shapely import Polygon
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle, Environment, Obstacle, Ring, WallObstacle
 from robocov.errors import MapError, to_one_line
-from robocov.files.atomic import written
+from robocov.files.writing import replace_file
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.colours import Paint, read_colour
@@ -499,7 +499,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
         boundary=pen.ring(environment.boundary),
         obstacles="".join(f"{pen.shape(each)}\n" for each in environment.obstacles),
     )
-    with written(path) as part:
+    with replace_file(path) as part:
         part.write_text(page, encoding="utf-8")
     obstacles = [with_numbers(obstacle, pen.rounded).polygon for obstacle in environment.obstacles]
     area = free_area(Polygon([(pen.rounded(x), pen.rounded(y)) for x, y in environment.boundary]), obstacles)

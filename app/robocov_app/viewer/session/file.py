@@ -18,8 +18,8 @@ from pydantic_core import PydanticCustomError
 
 from robocov.environment import Environment
 from robocov.errors import MapError, Mistake, quote_json
-from robocov.files.atomic import written
 from robocov.files.strictjson import check_header, located, parse, read_bytes, refused
+from robocov.files.writing import replace_file
 from robocov.mapfile import bundled_maps, from_json, load_map, to_json
 from robocov_app.viewer.session import changes
 from robocov_app.viewer.session.changes import Change, Drag, Restart, Robot, Step
@@ -159,7 +159,7 @@ def session_schema() -> dict[str, Any]:
 def save_session(path: Path, document: Document, head: Node, step: int, view: Mapping[str, Any]) -> None:
     """Write a session file, whole or not at all; OutputError when it cannot be written."""
     content = session_json(document, head, step, view)
-    with written(path) as part:
+    with replace_file(path) as part:
         part.write_text(dumped(content), encoding="utf-8")
 
 

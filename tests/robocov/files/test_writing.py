@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from robocov.errors import OutputError
-from robocov.files.atomic import writable, written
+from robocov.files.writing import replace_file, resolve_target
 
 posix = pytest.mark.skipif(os.name == "nt", reason="special files of POSIX")
 
 
 def put(target: Path, text: str = "new") -> None:
-    with written(target) as part:
+    with replace_file(target) as part:
         part.write_text(text)
 
 
@@ -43,7 +43,7 @@ def test_what_is_no_file_is_refused_before_anything_is_made(
     if linked:
         target = tmp_path / "link"
         target.symlink_to(path)
-    with pytest.raises(OutputError, match=f"{target}: is {kind}, but a file was wanted"):
+    with pytest.raises(OutputError, match=f"{target}: expected a file, got {kind}"):
         put(target)
     assert path.lstat().st_mode == before
     assert {each.name for each in tmp_path.iterdir()} == {path.name, target.name}
@@ -63,7 +63,7 @@ def test_a_link_to_a_file_stays_and_so_do_the_permissions_of_the_file(tmp_path: 
 
 @posix
 @pytest.mark.parametrize(
-    ("to", "words"), [("nowhere", "is a link to nothing"), ("link", "cannot be written")]
+    ("to", "words"), [("nowhere", "expected a file, got a link to nothing"), ("link", "cannot be written")]
 )
 def test_a_link_that_leads_nowhere_is_refused(tmp_path: Path, to: str, words: str) -> None:
     (tmp_path / "link").symlink_to(tmp_path / to)
@@ -74,7 +74,7 @@ def test_a_link_that_leads_nowhere_is_refused(tmp_path: Path, to: str, words: st
 
 def test_two_writers_at_once_do_not_meet(tmp_path: Path) -> None:
     target = tmp_path / "x.txt"
-    with written(target) as one, written(target) as two:
+    with replace_file(target) as one, replace_file(target) as two:
         one.write_text("one")
         two.write_text("two")
     assert target.read_text() == "one", "the last to finish"
@@ -96,4 +96,4 @@ def test_names_that_there_cannot_be_are_one_line(tmp_path: Path, name: str) -> N
 
 
 def test_a_new_file_is_written_where_its_name_says(tmp_path: Path) -> None:
-    assert writable(tmp_path / "new") == tmp_path / "new"
+    assert resolve_target(tmp_path / "new") == tmp_path / "new"

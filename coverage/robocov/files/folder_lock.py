@@ -1,0 +1,60 @@
+"""A lock on a folder, which one process holds at a time."""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from robocov.errors import OutputError, describe_error
+
+_UNSUPPORTED = frozenset({errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP})
+"""Errors of file systems that cannot lock files."""
+
+
+@contextmanager
+def lock_folder(folder: Path, name: str = ".lock", *, remove: bool = False) -> Iterator[None]:
+    """Lock a folder within a ``with`` block, or until this process ends, however it ends.
+
+    On file systems that cannot lock files, the block runs without a lock.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder to lock; it must exist.
+    name : str
+        Name of the lock file in the folder.
+    remove : bool
+        Remove the lock file at the end.
+
+    Raises
+    ------
+    OutputError
+        If another process has locked the folder, or it cannot be written to.
+    """
+    # Imported only now, because it takes a tenth of a second and most commands lock nothing.
+    from filelock import FileLock, Timeout
+
+    path = folder / name
+    # Not local to a thread: whichever thread leaves the block releases the lock.
+    lock = FileLock(path, mode=0o644, timeout=0, thread_local=False)
+    try:
+        lock.acquire()
+    except Timeout:
+        raise OutputError(
+            f"{folder}: another process is at work in this folder; wait until it has ended"
+        ) from None
+    except OSError as error:
+        if error.errno not in _UNSUPPORTED:
+            raise OutputError(f"{folder}: cannot be written to: {describe_error(error)}") from error
+    except NotImplementedError:
+        pass  # The file system cannot lock files.
+    try:
+        yield
+    finally:
+        if remove:
+            # While the lock is held: a process that waits for this file notices that it has no name any more.
+            with suppress(OSError):
+                path.unlink()
+        lock.release()
