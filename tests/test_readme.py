@@ -9,7 +9,7 @@ import pytest
 
 from robocov.controllers import make_controller
 from robocov.errors import MapError
-from robocov.mapfile import bundled_maps, load_map, parse_map
+from robocov.mapfile import list_bundled_maps, load_map, parse_map
 from robocov.simulation import Simulation
 from robocov_app.cli import COMMANDS
 
@@ -52,7 +52,7 @@ def test_every_command_and_map_that_it_names_exists() -> None:
     for command, word in calls:
         assert command in COMMANDS
         if command in ("run", "compare", "cost") and word != "story":  # a session's file
-            assert word in bundled_maps()
+            assert word in list_bundled_maps()
 
 
 def test_the_readme_is_one_screen() -> None:

@@ -15,7 +15,7 @@ import robocov as rc
 from robocov.controllers import controller_kinds, gains_of, information_of
 from robocov.controllers.base import Law
 from robocov.controllers.gains import Option, value_text
-from robocov.mapfile import map_schema
+from robocov.mapfile import build_map_schema
 from robocov.metrics.run_metrics import COLUMNS
 from robocov_app.cli import COMMANDS, main
 from robocov_app.sweep import table
@@ -89,7 +89,7 @@ def formats() -> str:
         "# File formats\n\nMaps and sessions are JSON, studies TOML; [the folder of a run](../results.md) is "
     )
     text += "described by itself. `robocov schema map` and `robocov schema session` print the schemas.\n"
-    for title, schema in (("Maps", map_schema()), ("Sessions", session_schema())):
+    for title, schema in (("Maps", build_map_schema()), ("Sessions", session_schema())):
         text += f"\n## {title}\n"
         parts = {str(schema.get("title", title)): schema, **schema.get("$defs", {})}
         for name, part in parts.items():

@@ -34,9 +34,9 @@ if TYPE_CHECKING:  # isort: off
     )
     from robocov.errors import InputError, MapError, OutputError, ParameterError, RobocovError, StartError
     from robocov.files.array_files import ArrayCache
-    from robocov.generator import GENERATORS, generated_map
+    from robocov.generator import GENERATORS, generate_map
     from robocov.lower_bound import LowerBound, compute_lower_bound
-    from robocov.mapfile import bundled_maps, load_map, map_schema, save_map
+    from robocov.mapfile import build_map_schema, list_bundled_maps, load_map, save_map
     from robocov.mapfile.check import check_map
     from robocov.metrics import cost_history, settled_at, summarise
     from robocov.metrics.results import Results, read_results
@@ -67,9 +67,9 @@ _NAMES = {
     "UniformStart WallObstacle",
     "errors": "InputError MapError OutputError ParameterError RobocovError StartError",
     "files.array_files": "ArrayCache",
-    "generator": "GENERATORS generated_map",
+    "generator": "GENERATORS generate_map",
     "lower_bound": "LowerBound compute_lower_bound",
-    "mapfile": "bundled_maps load_map map_schema save_map",
+    "mapfile": "build_map_schema list_bundled_maps load_map save_map",
     "mapfile.check": "check_map",
     "metrics": "cost_history settled_at summarise",
     "metrics.results": "Results read_results",
@@ -93,15 +93,15 @@ _HOME = {name: module for module, names in _NAMES.items() for name in names.spli
 __all__ = [
     "CONTROLLERS", "GENERATORS", "ArrayCache", "Atlas", "AtlasShared", "CircleObstacle", "Conditions",
     "Controller", "CoverageCost", "CoverageResult", "Decision", "Density", "DiscStart", "Environment",
-    "Failure", "Gaussian", "Gaussians", "IndividualController", "Individually", "InputError", "Join", "Lloyd",
-    "LowerBound", "MapError", "Neighbours", "Observations", "ObstaclePath", "Optimum", "OutputError",
-    "OwnView", "ParameterError", "PointsStart", "PolygonObstacle", "RangeSensor", "Rapf", "Raster", "Record",
-    "Region", "Results", "RobocovError", "Rpf", "RunMetrics", "Simulation", "Snapshot", "StartError", "Team",
-    "TimeVaryingCost", "Uniform", "UniformStart", "VoronoiPartition", "WallObstacle", "WeightedArea",
-    "WeightedCells", "WeightedPolygons", "World", "bundled_maps", "check_map", "choice",
-    "compute_lower_bound", "cost_history", "find_optimum", "gain", "generated_map", "load_map",
-    "make_controller", "map_schema", "partition", "read_results", "read_team", "run_metrics", "save_map",
-    "settled_at", "show", "simulate_many", "summarise", "weighted_partition",
+    "Failure", "Gaussian", "Gaussians", "IndividualController", "Individually", "InputError", "Join",
+    "Lloyd", "LowerBound", "MapError", "Neighbours", "Observations", "ObstaclePath", "Optimum",
+    "OutputError", "OwnView", "ParameterError", "PointsStart", "PolygonObstacle", "RangeSensor", "Rapf",
+    "Raster", "Record", "Region", "Results", "RobocovError", "Rpf", "RunMetrics", "Simulation",
+    "Snapshot", "StartError", "Team", "TimeVaryingCost", "Uniform", "UniformStart", "VoronoiPartition",
+    "WallObstacle", "WeightedArea", "WeightedCells", "WeightedPolygons", "World", "build_map_schema",
+    "check_map", "choice", "compute_lower_bound", "cost_history", "find_optimum", "gain", "generate_map",
+    "list_bundled_maps", "load_map", "make_controller", "partition", "read_results", "read_team",
+    "run_metrics", "save_map", "settled_at", "show", "simulate_many", "summarise", "weighted_partition",
 ]
 # fmt: on
 

@@ -43,7 +43,7 @@ _PACKING_TRIALS, _FEW_ROBOTS = 6, 300
 """Number of packings that are tried where there is room for few robots, and how many are few."""
 _LEAST_OVERLAP = 1e-6
 """Area in m² from which an obstacle is in the way: what is less is rounding, of obstacles that touch."""
-NEGLIGIBLE = math.pi * DEFAULT_RADIUS**2
+MIN_POCKET_AREA_M2 = math.pi * DEFAULT_RADIUS**2
 """A gap to a pocket smaller than this, in m², is none: no robot would go there."""
 _CRACK = 2 * SAGITTA
 """Walls closer than this, in metres, touch: a circle that touches a wall is a polygon that nearly does."""
@@ -244,7 +244,7 @@ class Environment(Drawable):
             return self
         obstacles = tuple(
             # to the nanometre, so that an obstacle that comes by again stands in the very same place
-            shape if shape.path is None else shifted(shape, np.round(shape.path.shift(time), 9))
+            shape if shape.path is None else shift_obstacle(shape, np.round(shape.path.shift(time), 9))
             for shape in self.obstacles
         )
         return replace(self, obstacles=obstacles)
@@ -477,14 +477,14 @@ def _hexagonal(rng: np.random.Generator, room: BaseGeometry, n: int, spacing: fl
     return best
 
 
-def swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
+def compute_swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
     """Return all places that an obstacle comes by on its path, given its polygon at time zero."""
     points = np.array([*path.points, *path.points[: path.repeat == "loop"]], dtype=float)
     shifts = points - points[:1]
     return shapely.union_all([polygon, *(_along(polygon, a, b) for a, b in pairwise(shifts))])
 
 
-def in_the_way(
+def find_overlaps(
     area: BaseGeometry, others: Mapping[Any, BaseGeometry], inside: BaseGeometry | None = None
 ) -> tuple[dict[Any, BaseGeometry], BaseGeometry | None]:
     """Return what of an area the others take, by more than a touch, and what of it is not `inside`."""
@@ -507,7 +507,7 @@ def _along(polygon: Polygon, begin: Array, end: Array) -> BaseGeometry:
     return shapely.union_all([*parts, *ends])
 
 
-def shifted(obstacle: Obstacle, by: Array) -> Obstacle:
+def shift_obstacle(obstacle: Obstacle, by: Array) -> Obstacle:
     """Return an obstacle elsewhere, without a path."""
     dx, dy = by.tolist()
 
@@ -543,7 +543,7 @@ class Gap(NamedTuple):
     between: tuple[Point, Point]
 
 
-def narrowest_gap(free: MultiPolygon) -> Gap | None:
+def find_narrowest_gap(free: MultiPolygon) -> Gap | None:
     """Return the narrowest passage of `free`, counter-clockwise polygons, or None where there is none.
 
     A passage leads round an obstacle, or to a part of the free space that is neither smaller
@@ -563,7 +563,7 @@ def narrowest_gap(free: MultiPolygon) -> Gap | None:
     return best
 
 
-def gaps_narrower(free: MultiPolygon, width: float) -> tuple[Gap, ...]:
+def find_narrow_gaps(free: MultiPolygon, width: float) -> tuple[Gap, ...]:
     """Return all passages of `free` that are narrower than a width in metres, the narrowest first.
 
     One may be found several times, as at all corners of a door.
@@ -647,7 +647,7 @@ class _Search:
         sides = np.array([_area(half) for half in halves])
         # outside a hole's ring there is no pocket: only the side of positive area is one
         pocket = sides.min(where=sides > 0, initial=np.inf)
-        return bool(pocket >= max(NEGLIGIBLE, width * width))
+        return bool(pocket >= max(MIN_POCKET_AREA_M2, width * width))
 
 
 def _without_cracks(free: MultiPolygon) -> MultiPolygon:

@@ -30,7 +30,6 @@ from robocov.errors import (
     quote,
     to_one_line,
 )
-from robocov.extras import extra
 from robocov.files.array_files import read_arrays
 from robocov.files.result_folder import settle
 from robocov.files.strictjson import Document, read_document, wanted
@@ -38,6 +37,7 @@ from robocov.files.writing import replace_file
 from robocov.mapfile import from_json, to_json
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
+from robocov.optional_imports import import_optional
 from robocov.robots import MOST_ROBOTS, Team
 from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
@@ -307,7 +307,7 @@ class Record(Drawable):
         fy_N, goal_x_m, goal_y_m, obstacle_x_m and obstacle_y_m; of teams that turn also heading_rad and
         turning_rate_rad_s. It needs ``robocov[pandas]``.
         """
-        pandas = extra("pandas", "pandas")
+        pandas = import_optional("pandas", "pandas")
         moments, robots = self.positions.shape[:2]
         columns: dict[str, Array | IntArray] = {
             "time_s": np.repeat(self.time, robots),

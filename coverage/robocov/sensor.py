@@ -17,7 +17,7 @@ from robocov.arrays import Array, BoolArray
 from robocov.compiled import IS_COMPILER_ENABLED, is_interpreting
 from robocov.observation import compute_headings
 from robocov.world.bodies import Obstacles, build_obstacle_space
-from robocov.world.solid import Mover
+from robocov.world.obstacle_pieces import Mover
 
 _MAX_RANGE_M = 1e6
 """Stands for an unlimited range: pymunk's bounding boxes cannot hold an infinite one."""
@@ -30,7 +30,8 @@ class RangeSensor:
     Parameters
     ----------
     walls : tuple of (k, 2) arrays, m
-        Convex polygons that tile everything that is not free, as `world.solid.solid_pieces` returns them.
+        Convex polygons that tile everything that is not free, see
+        `world.obstacle_pieces.build_solid_pieces`.
     movers : tuple of Mover
         Moving obstacles, which stand where they are at time zero until `set_time` moves them.
 

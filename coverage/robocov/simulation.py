@@ -45,8 +45,8 @@ from robocov.record import ARRAYS, Record, Recorder
 from robocov.robots import Team
 from robocov.sensor import RangeSensor
 from robocov.world import MAX_PENETRATION, ChangingWorld, World
-from robocov.world.relocation import check_starts
-from robocov.world.solid import movers, solid_pieces
+from robocov.world.free_positions import require_free_starts
+from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
 
 DEFAULT_DT = 1 / 60
 """Control period in seconds where nothing else is said."""
@@ -155,10 +155,10 @@ class Simulation:
         slack = 1e-6 if velocities is None else 2.0 * MAX_PENETRATION
         there = None if conditions is None else conditions.working(self.time, len(positions))
         for run in self._each_run if not resumed else ():
-            check_starts(environment.at(self.time), positions[run], self.team[run], slack, there)
+            require_free_starts(environment.at(self.time), positions[run], self.team[run], slack, there)
         self._built_in = type(controller) in CONTROLLERS.values()
         self.conditions = conditions
-        walls, moving = solid_pieces(environment), movers(environment)
+        walls, moving = build_solid_pieces(environment), build_movers(environment)
         changes = conditions is not None and conditions.team_changes
         self._obstacles_change = bool(moving) or changes
         self.sensor = RangeSensor(walls, moving)
@@ -330,7 +330,7 @@ class Simulation:
 
     def restart(self, run: int, positions: Array) -> None:
         """Put the robots of a run to other places, at rest; raises StartError where they do not fit."""
-        check_starts(self.environment.at(self.time), positions, self.team[self._each_run[run]], 1e-6)
+        require_free_starts(self.environment.at(self.time), positions, self.team[self._each_run[run]], 1e-6)
         assert isinstance(self._world, World)
         self._world.place(run, positions)
         self._begin_step()

@@ -25,7 +25,7 @@ from robocov import (
     Simulation,
     Team,
     UniformStart,
-    generated_map,
+    generate_map,
     load_map,
     make_controller,
     settled_at,
@@ -67,7 +67,7 @@ def doors(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
 
 def final(name: str, seed: int, hears: float, robots: int) -> tuple[float, float]:
     """Return the mean distance, and the mean way, of a team in generated rooms after 60 s, m."""
-    rooms, team = generated_map(seed, kind="rooms"), Team.homogeneous(robots, communication_range=hears)
+    rooms, team = generate_map(seed, kind="rooms"), Team.homogeneous(robots, communication_range=hears)
     start = rooms.start(None).sample(robots, seed=0, radius=0.1)
     some, walked, before = Simulation(rooms, make_controller(name), start, team), 0.0, start
     while some.time < 60.0:
@@ -145,7 +145,7 @@ def pace(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
     """Seconds of the whole simulation for one second: six robots on 10 x 10 m, more on as much each."""
     for n in SIZES:
         side = 10.0 * max(1.0, math.sqrt(n / 6.0))
-        rooms = generated_map(7, kind="polygons", side=side, obstacles=max(6, n))
+        rooms = generate_map(7, kind="polygons", side=side, obstacles=max(6, n))
         start, took = rooms.start("uniform").sample(n, seed=0, radius=0.1), []
         for each in (name, "rapf"):
             some = Simulation(rooms, make_controller(each), start)

@@ -7,7 +7,7 @@ from typing import Any
 
 import jsonschema
 
-from robocov.mapfile import map_schema
+from robocov.mapfile import build_map_schema
 
 DELETED = object()
 
@@ -44,7 +44,7 @@ DOCUMENT: dict[str, Any] = {
     "extra": {"author": {"name": "Ada"}, "tags": [1, 2.5, None, True, "é"]},
 }
 
-SCHEMA = jsonschema.Draft202012Validator(map_schema())
+SCHEMA = jsonschema.Draft202012Validator(build_map_schema())
 
 
 def changed(*path: Any, document: dict[str, Any] = DOCUMENT) -> dict[str, Any]:

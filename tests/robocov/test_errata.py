@@ -15,7 +15,7 @@ from robocov.locational.best_points import best_points
 from robocov.robots import Team
 from robocov.voronoi import partition
 from robocov.world import World
-from robocov.world.solid import solid_pieces
+from robocov.world.obstacle_pieces import build_solid_pieces
 
 # (28): F = m q'' - ν q'
 
@@ -24,7 +24,7 @@ def test_with_the_printed_sign_of_28_robots_would_fly_apart(empty: Environment) 
     """Left alone, a robot must lose its energy; m q'' = ν q' makes it grow without bound."""
     m, nu, v0, seconds = 2.0, 1.5, 0.4, 1.0
     world = World(
-        solid_pieces(empty),
+        build_solid_pieces(empty),
         Team.homogeneous(1, mass=m, viscosity=nu),
         np.array([[2.0, 5.0]]),
         np.array([[v0, 0.0]]),

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from robocov.compiled import IS_COMPILER_ENABLED
 from robocov.environment import Environment
 from robocov.sensor import RangeSensor, _load_compiled_queries
-from robocov.world.solid import solid_pieces
+from robocov.world.obstacle_pieces import build_solid_pieces
 
 
 @pytest.fixture(scope="module")
 def sensor(cluttered: Environment) -> RangeSensor:
-    return RangeSensor(solid_pieces(cluttered))
+    return RangeSensor(build_solid_pieces(cluttered))
 
 
 def free_points(environment: Environment, n: int, seed: int) -> np.ndarray:

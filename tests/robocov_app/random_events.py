@@ -13,7 +13,7 @@ from typing import Any
 import pygame
 from driven_window import MODIFIERS, key_event
 
-from robocov.mapfile import bundled_maps, load_map, save_map
+from robocov.mapfile import list_bundled_maps, load_map, save_map
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.window import BaseWindow
 from robocov_app.web import events as page_events
@@ -140,7 +140,7 @@ def write_odd_files(folder: Path) -> list[str]:
             file.write((folder / "fine.json").read_bytes())
         paths.append(os.fsdecode(raw))
     long_name = "x" * 5000 + ".json"
-    return [*paths, "", ".", "\x00", "a\x00b.json", long_name, *map(str, bundled_maps().values())]
+    return [*paths, "", ".", "\x00", "a\x00b.json", long_name, *map(str, list_bundled_maps().values())]
 
 
 class RandomEvents:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import robocov
 from robocov.controllers import CONTROLLERS, gains_of
-from robocov.mapfile import bundled_maps, load_map
+from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.cli import COMMANDS, main
 
 
@@ -42,12 +42,12 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_maps_lists_every_bundled_map(capsys: pytest.CaptureFixture[str]) -> None:
     rows = answer(capsys, "maps")["maps"]
-    assert [row["name"] for row in rows] == list(bundled_maps())
+    assert [row["name"] for row in rows] == list(list_bundled_maps())
     for row in rows:
         assert row["starts"] == list(load_map(row["name"]).starts)
     assert main(["maps"]) == 0
     out = capsys.readouterr().out
-    assert all(name in out for name in bundled_maps())
+    assert all(name in out for name in list_bundled_maps())
 
 
 def test_controllers_lists_gains_with_units_and_marks_the_flagship(

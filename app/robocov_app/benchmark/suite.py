@@ -14,7 +14,7 @@ from typing import Any
 
 from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, describe_unknown_name
-from robocov.generator import GENERATORS, generated_map
+from robocov.generator import GENERATORS, generate_map
 from robocov.mapfile import load_map, to_json
 from robocov_app.benchmark.drawn import KINDS, drawn_map
 from robocov_app.replication.studies import with_hot_spots
@@ -103,9 +103,9 @@ def made_map(name: str) -> Environment:
     if name.startswith("dense-"):
         return with_hot_spots(StudyMap(name, made_map(f"{kind}-{seed}")), int(seed)).environment
     if name.startswith("large-"):
-        return generated_map(int(seed), kind=kind, **_LARGE)
+        return generate_map(int(seed), kind=kind, **_LARGE)
     if kind in GENERATORS and name not in _BUNDLED:
-        return generated_map(int(seed), kind=kind)
+        return generate_map(int(seed), kind=kind)
     return drawn_map(kind, int(seed)) if kind in KINDS else load_map(name)
 
 

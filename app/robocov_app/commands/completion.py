@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 import tyro
 
 from robocov.controllers import CONTROLLERS
-from robocov.mapfile import bundled_maps
+from robocov.mapfile import list_bundled_maps
 from robocov_app.commands import COMMANDS
 from robocov_app.terminal.arguments import groups_of
 from robocov_app.terminal.output import echo
@@ -56,7 +56,7 @@ def command(options: Arguments) -> None:
         own, words[name], positionals = _described(import_module(f"robocov_app.commands.{module}").Arguments)
         flags[name] = ["--help", *own]
         mapped += [name] * bool({"map", "files"} & positionals)
-    maps, controllers = " ".join(bundled_maps()), " ".join(CONTROLLERS)
+    maps, controllers = " ".join(list_bundled_maps()), " ".join(CONTROLLERS)
     if options.shell == "fish":
         echo("complete -c robocov -n __fish_use_subcommand -f")
         for name, (_, line) in COMMANDS.items():

@@ -109,13 +109,13 @@ def _replay(options: Arguments) -> int:
 
 
 def open_window(options: Arguments, session: Session, file: Path | None = None) -> int:
-    from robocov.mapfile import bundled_maps, load_map
+    from robocov.mapfile import list_bundled_maps, load_map
     from robocov_app.viewer.launch import Launcher
     from robocov_app.web import prepare, show
 
     prepare(options, Path())
 
-    same = (key for key in bundled_maps() if load_map(key) == session.environment)
+    same = (key for key in list_bundled_maps() if load_map(key) == session.environment)
     (also, without), film = options.film.layers(), options.film
     look: dict[str, Any] = {"theme": film.theme, "size": window_size(film.size), "laws": options.controller}
     look |= {"also": also, "without": without, "file": file, "served": options.serve}

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import tyro
 
 from robocov.errors import ParameterError, format_count, require_number
-from robocov.extras import extra
+from robocov.optional_imports import import_optional
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
 from robocov_app.terminal.output import tell
@@ -56,7 +56,7 @@ class Arguments(JsonOption):
 
 def command(options: Arguments) -> int:
     if options.parquet:
-        extra("pyarrow", "parquet")
+        import_optional("pyarrow", "parquet")
     from robocov_app.sweep.executors import Cluster, processors
     from robocov_app.sweep.study_file import read_study
     from robocov_app.sweep.sweeping import duration, rehearsed, sweep

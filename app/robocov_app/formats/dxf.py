@@ -21,8 +21,8 @@ from scipy.interpolate import BSpline
 
 from robocov.arrays import Array
 from robocov.errors import MapError, RobocovError, quote, to_one_line
-from robocov.extras import extra
 from robocov.mapfile.models import FARTHEST
+from robocov.optional_imports import import_optional
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.curves import MOST_POINTS, TOLERANCE, sampled
@@ -49,7 +49,7 @@ _CLOSED = 1e-9  # curves whose ends are nearer, in parts of their coordinates, a
 
 def polyline(points: Array, bulges: Array, tolerance: float) -> Array:
     """Return points of a polyline, (k, 2); the bulge of an edge after one is tan(angle / 4), to the left."""
-    arcs = extra("ezdxf.math", "dxf")
+    arcs = import_optional("ezdxf.math", "dxf")
     drawn = [points[:1]]
     left = float(MOST_POINTS)
     for (a, b), bulge in zip(pairwise(points), bulges[:-1].tolist(), strict=True):
@@ -307,7 +307,7 @@ def _document(path: Path, where: str) -> Any:
     if (lines := content.count(b"\n")) > MOST_LINES:
         raise MapError(f"{where}: {lines} lines, but at most {MOST_LINES} were wanted")
     try:
-        ezdxf, recover = extra("ezdxf", "dxf"), extra("ezdxf.recover", "dxf")
+        ezdxf, recover = import_optional("ezdxf", "dxf"), import_optional("ezdxf.recover", "dxf")
     except RobocovError as error:
         raise MapError(f"{where}: {error}") from None
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # what it notes is no answer of ours

@@ -26,8 +26,8 @@ from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.errors import JsonPath as Steps
 from robocov.errors import ParameterError, RobocovError, format_path, quote, to_one_line
-from robocov.extras import extra
 from robocov.files.writing import replace_file
+from robocov.optional_imports import import_optional
 from robocov_app.formats import files
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import JsonFile, is_number
@@ -264,7 +264,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
 def _plane(environment: Environment, origin: tuple[float, float]) -> LocalPlane:
     """Return the plane about a place, if longitudes do not run all around in the map."""
     try:
-        plane = LocalPlane(extra("pyproj", "geo"), *origin)
+        plane = LocalPlane(import_optional("pyproj", "geo"), *origin)
     except RobocovError as error:
         raise ParameterError(f"origin: degrees need more: {error}") from None
     if np.ptp(plane.degrees(np.array(environment.boundary, dtype=float))[:, 0]) >= 180.0:

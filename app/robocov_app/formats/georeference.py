@@ -12,8 +12,8 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.environment import Point
 from robocov.errors import MapError, RobocovError, quote
-from robocov.extras import extra
 from robocov.mapfile.models import LARGEST
+from robocov.optional_imports import import_optional
 from robocov_app.formats.files import require_shapes
 from robocov_app.formats.geometry.shapes import Figure, Shapes
 
@@ -88,7 +88,7 @@ def _projected(figures: Sequence[Figure], name: str, shapes: Shapes, origin: Poi
     """Return figures in metres east and north of a place, by the azimuthal equidistant projection."""
     where, system = shapes.where, "degrees" if name in _IN_DEGREES else name
     try:
-        pyproj = extra("pyproj", "geo")
+        pyproj = import_optional("pyproj", "geo")
     except RobocovError as error:
         what = "degrees" if name == DEGREES else name
         raise MapError(f"{where}: coordinates in {what}: {error} ({_AS_THEY_ARE})") from None

@@ -44,7 +44,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from robocov.extras import extra
+from robocov.optional_imports import import_optional
 
 if TYPE_CHECKING:
     from robocov_app.learning.gym import CoverageEnv, CoverageVectorEnv
@@ -66,7 +66,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module = _HOME[name]
     for package in _NEEDED.get(module, ()):
-        extra(package, "rl")
+        import_optional(package, "rl")
     value = getattr(importlib.import_module(f"{__name__}.{module}"), name)
     globals()[name] = value
     return value

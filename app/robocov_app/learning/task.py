@@ -117,10 +117,10 @@ def shares(reward: Reward, before: CoverageResult, after: CoverageResult, part: 
 
 @dataclass(frozen=True)
 class GeneratedMaps:
-    """Makes a map of a seed by `robocov.generated_map`, to learn on many.
+    """Makes a map of a seed by `robocov.generate_map`, to learn on many.
 
     The `seeds` are the maps that there are, as in ``range(1000)``; others can then be kept for the test.
-    None: any. The `parameters` are further ones of `robocov.generated_map`: ``obstacles``, ``area``, ``gap``,
+    None: any. The `parameters` are further ones of `robocov.generate_map`: ``obstacles``, ``area``, ``gap``,
     ...
 
     Examples
@@ -140,12 +140,12 @@ class GeneratedMaps:
     def __call__(self, seed: int) -> Environment:
         """Return the map of a seed, or where `seeds` are given that of ``seeds[seed % len(seeds)]``.
 
-        Raises ParameterError as `robocov.generated_map`.
+        Raises ParameterError as `robocov.generate_map`.
         """
-        from robocov.generator import generated_map
+        from robocov.generator import generate_map
 
         number = seed if self.seeds is None else self.seeds[seed % len(self.seeds)]
-        return generated_map(number, kind=self.kind, **self.parameters)
+        return generate_map(number, kind=self.kind, **self.parameters)
 
 
 class Scenarios:

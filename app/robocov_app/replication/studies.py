@@ -19,7 +19,7 @@ from robocov.controllers.gains import Value
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import DiscStart, Environment, StartSpec, UniformStart
 from robocov.errors import StartError
-from robocov.generator import generated_map
+from robocov.generator import generate_map
 from robocov.mapfile import load_map
 from robocov_app.replication import contenders as laws
 from robocov_app.replication.contenders import Contender
@@ -82,7 +82,7 @@ def generated(seed: int) -> StudyMap:
     """
     rng = np.random.default_rng([seed, 2])
     obstacles, area = int(rng.integers(4, 9)), round(float(rng.uniform(0.16, 0.25)), 3)
-    environment = generated_map(seed, kind="polygons", obstacles=obstacles, area=area, gap=0.6, side=SIDE)
+    environment = generate_map(seed, kind="polygons", obstacles=obstacles, area=area, gap=0.6, side=SIDE)
     return StudyMap(f"generated-{seed}", with_kinds_of_starts(environment))
 
 
@@ -151,7 +151,7 @@ def convex_maps(plan: Plan) -> tuple[StudyMap, ...]:
 def unseen_maps(plan: Plan) -> tuple[StudyMap, ...]:
     """Return generated maps of other families than those of the claims, with the study's starts."""
     found = product(UNSEEN, plan.beyond.unseen)
-    drawn = {f"{kind}-{seed}": generated_map(seed, kind=kind) for kind, seed in found}
+    drawn = {f"{kind}-{seed}": generate_map(seed, kind=kind) for kind, seed in found}
     return tuple(StudyMap(name, with_kinds_of_starts(each)) for name, each in drawn.items())
 
 

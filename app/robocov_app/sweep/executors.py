@@ -18,7 +18,7 @@ from contextlib import suppress
 from typing import Any, NamedTuple, Self, TypeAlias
 
 from robocov.errors import InputError, OutputError
-from robocov.extras import extra
+from robocov.optional_imports import import_optional
 from robocov_app.sweep.study import Task
 from robocov_app.sweep.worker import Outcome, failed, perform
 from robocov_app.terminal.supervision import describe_status
@@ -237,7 +237,7 @@ class Cluster(Executor):
 
     def __init__(self, address: str) -> None:
         super().__init__()
-        dask = extra("distributed", "dask", "--scheduler: ")
+        dask = import_optional("distributed", "dask", "--scheduler: ")
         self._address, self._killed = address, dask.KilledWorker
         self._futures: set[Any] = set()
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeAlias, get_args
 
 from robocov.errors import InputError, describe_unknown_name, format_path, quote, to_one_line
 from robocov.files.strictjson import parse_toml, read_bytes
-from robocov.mapfile import bundled_maps, load_map
+from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.sweep import study
 from robocov_app.sweep.study import NO_LIMIT, Method, Place, Range, Sampling, Scale, Study, StudyMap, once
 
@@ -144,7 +144,7 @@ def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
 
 
 def _maps(entries: list[str], folder: Path) -> list[StudyMap]:
-    known = bundled_maps()
+    known = list_bundled_maps()
     if entries == [study.ALL]:
         entries = list(known)
     once(entries, ("maps",))

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 from robocov.controllers import gains_of
 from robocov.controllers.gains import Option
 from robocov.errors import OutputError
-from robocov.extras import extra
 from robocov.files.writing import flush_to_disk, resolve_target
 from robocov.metrics.results import read_rows
+from robocov.optional_imports import import_optional
 from robocov_app.sweep.ledger import CSV, STUDY, Entry, has_all_rows, rows_in
 from robocov_app.sweep.study import CONDITIONS, UNITS, WORDS, Study, Task, parameter_column
 from robocov_app.sweep.worker import FIGURES, TIMED
@@ -118,7 +118,7 @@ class Table:
         for name in self._names:
             resolve_target(self._folder / name)
             if name == PARQUET:
-                extra("pyarrow", "parquet", f"{self._folder / name}: ")
+                import_optional("pyarrow", "parquet", f"{self._folder / name}: ")
         # rows of an earlier table, which only one that grows replaces before the end
         self._former = rows_in(self._folder)
         self._shown_from = math.inf if has_all_rows(self._folder) else self._former

@@ -9,7 +9,7 @@ from robocov.controllers import CONTROLLERS
 from robocov.controllers.gains import Value
 from robocov.environment import Point
 from robocov.errors import InputError, ParameterError, RobocovError
-from robocov.mapfile import bundled_maps, load_map, save_map
+from robocov.mapfile import list_bundled_maps, load_map, save_map
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit.autosave import Record
 from robocov_app.toolkit.faults import describe_os_error
@@ -90,7 +90,7 @@ class Presenter:
         return [*gain_parameters(setup.law), *limit_parameters(setup.limits)]
 
     def maps(self) -> list[str]:
-        return list(dict.fromkeys([*bundled_maps(), *([self.map_name] if self.map_name else [])]))
+        return list(dict.fromkeys([*list_bundled_maps(), *([self.map_name] if self.map_name else [])]))
 
     def say(self, words: str, *, trouble: bool = False) -> None:
         if words:

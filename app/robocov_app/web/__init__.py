@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robocov.extras import extra
+from robocov.optional_imports import import_optional
 from robocov_app.terminal.output import echo
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def prepare(options: Any, folder: Path) -> None:
     """
     if not options.serve:
         return
-    extra("websockets", "web")
+    import_optional("websockets", "web")
     from robocov_app.web.files import prepare_folder
 
     prepare_folder(folder)

@@ -15,7 +15,7 @@ import robocov_app
 from robocov.compiled import cache_folder
 from robocov.errors import InputError
 from robocov.files.array_files import ArrayCache
-from robocov.mapfile import bundled_maps
+from robocov.mapfile import list_bundled_maps
 
 # Python's audit events, and which of their arguments are paths
 _READING = ("os.listdir", "os.scandir")
@@ -62,7 +62,11 @@ def confined(folder: Path) -> Iterator[None]:
     _add_hook()
     programs = *sysconfig.get_paths().values(), sys.prefix, sys.base_prefix, "/dev", "/proc", "/usr/share"
     packages = (Path(str(module.__file__)).parent for module in (robocov, robocov_app))
-    places: tuple[str | Path, ...] = *programs, *packages, *(path.parent for path in bundled_maps().values())
+    places: tuple[str | Path, ...] = (
+        *programs,
+        *packages,
+        *(path.parent for path in list_bundled_maps().values()),
+    )
     arrays = ArrayCache.of_user()
     caches = [each for each in (cache_folder(), arrays and arrays.folder) if each]
     before = tempfile.tempdir

@@ -11,7 +11,7 @@ from html import escape
 from urllib.parse import urlsplit
 
 from robocov.errors import RobocovError
-from robocov.extras import extra
+from robocov.optional_imports import import_optional
 from robocov_app.toolkit.autosave import FOLDER as DRAFTS
 
 
@@ -23,7 +23,7 @@ class LiveWindow:
     """
 
     def __init__(self, arguments: Sequence[str], height: int = 620) -> None:
-        extra("websockets", "web")
+        import_optional("websockets", "web")
         call = [sys.executable, "-m", "robocov_app", *arguments, "--serve", "--port", "0"]
         environment = {**os.environ, DRAFTS: ""}  # the cell makes the window again, there is nothing to offer
         # a file: nobody reads on once the window is open, and a pipe that is full would stop the process

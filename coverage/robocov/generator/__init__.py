@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 import shapely
 
-from robocov.environment import DiscStart, Environment, Obstacle, StartSpec, UniformStart, narrowest_gap
+from robocov.environment import DiscStart, Environment, Obstacle, StartSpec, UniformStart, find_narrowest_gap
 from robocov.errors import MapError, ParameterError, describe_unknown_name, is_number, quote, require_number
 from robocov.generator.blocks import city
 from robocov.generator.caves import cave
@@ -54,7 +54,7 @@ GENERATORS: dict[str, Kind] = {
 """The kinds of maps by their names."""
 
 
-def generated_map(
+def generate_map(
     seed: int,
     *,
     kind: str = "polygons",
@@ -184,7 +184,7 @@ def _fulfils(environment: Environment, request: Request) -> bool:
     free, share = environment.free, 1.0 - environment.free_area / environment.area
     if abs(share - request.area) > AREA_TOLERANCE or len(free.geoms) != 1:
         return False
-    narrowest = narrowest_gap(free)
+    narrowest = find_narrowest_gap(free)
     wide = narrowest is None or narrowest.width >= request.gap - 1e-6
     # where a disc as wide as the gap may be must hang together
     return wide and isinstance(free.buffer(-request.gap / 2.0 + 1e-6, quad_segs=16), shapely.Polygon)

@@ -14,7 +14,7 @@ from shapely import LineString, MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
-from robocov.environment import DiscStart, Gap, Obstacle, PolygonObstacle, gaps_narrower
+from robocov.environment import DiscStart, Gap, Obstacle, PolygonObstacle, find_narrow_gaps
 from robocov.generator.request import AREA_TOLERANCE, Request
 
 _WAVES, _LENGTHS = 48, (0.7, 1.7)  # of a field; shortest and longest, in sides of a usual chamber
@@ -93,7 +93,9 @@ def cave(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[
         space = Polygon(outline, pillars)
         if abs(blocked(space) - request.area) > _CLOSE * AREA_TOLERANCE:
             return None
-        narrow = [gap for gap in gaps_narrower(MultiPolygon([space]), request.gap) if gap.width < request.gap]
+        narrow = [
+            gap for gap in find_narrow_gaps(MultiPolygon([space]), request.gap) if gap.width < request.gap
+        ]
         if not narrow:
             around = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
             rock = PolygonObstacle(around, (outline,), "rock")

@@ -22,7 +22,7 @@ SIDES = 1.0, 1000.0  # m
 
 @dataclass(frozen=True)
 class Request:
-    """Request for a map, see `robocov.generator.generated_map`."""
+    """Request for a map, see `robocov.generator.generate_map`."""
 
     obstacles: int
     area: float

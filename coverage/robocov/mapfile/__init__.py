@@ -29,7 +29,7 @@ from robocov.files.strictjson import located, parse, read_bytes, require_json
 from robocov.files.writing import replace_file
 from robocov.mapfile.check import check_rules
 from robocov.mapfile.models import HEAD, LIGHTEST, NOTHING, DensityModel, RasterModel, plain, validate
-from robocov.mapfile.models import map_schema as map_schema
+from robocov.mapfile.models import build_map_schema as build_map_schema
 
 _LINE = 100
 """Objects that fit in so many characters stand on one line of a dumped map, each number counted as two."""
@@ -61,7 +61,7 @@ def map_file(source: str | Path) -> Path:
         raise ParameterError(f"map: {quote(source)}, but a path, or the name of a bundled map, was wanted")
     if not isinstance(source, str) or any(char in source for char in "./\\\0"):
         return Path(source)
-    known = bundled_maps()
+    known = list_bundled_maps()
     if source in known:
         return known[source]
     with suppress(OSError):  # as of a name that is longer than any file's
@@ -70,7 +70,7 @@ def map_file(source: str | Path) -> Path:
     raise MapError(describe_unknown_name("map", source, known))
 
 
-def bundled_maps() -> dict[str, Path]:
+def list_bundled_maps() -> dict[str, Path]:
     """Return the files of the bundled maps by name, sorted: those in the package, else in the checkout."""
     here = Path(__file__).resolve()
     inside, beside = (sorted((here.parents[up] / "maps").glob("*.json")) for up in (1, 3))

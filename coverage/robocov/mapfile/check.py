@@ -21,9 +21,9 @@ from robocov.environment import (
     Ring,
     UniformStart,
     WallObstacle,
-    in_the_way,
-    narrowest_gap,
-    swept_area,
+    compute_swept_area,
+    find_narrowest_gap,
+    find_overlaps,
 )
 from robocov.errors import JsonPath, MapError, Mistake, StartError, format_count, format_path, summarize_names
 from robocov.mapfile.models import LARGEST, SMALLEST
@@ -248,7 +248,7 @@ class MapReport:
 
 def check_map(environment: Environment, radius: float = DEFAULT_RADIUS) -> MapReport:
     """Measure a valid map, and warn of what may be a mistake with robots of a radius, m."""
-    gap = narrowest_gap(environment.free)
+    gap = find_narrowest_gap(environment.free)
     vertices = vertex_count(environment)
     warnings = [many_vertices(vertices)] if vertices > MANY_VERTICES else []
     warnings += [*_shape_warnings(environment), *_path_warnings(environment)]
@@ -333,8 +333,8 @@ def _path_warnings(environment: Environment) -> Iterator[str]:
     for k, obstacle in enumerate(environment.obstacles):
         if obstacle.path is None:
             continue
-        area = swept_area(obstacle.polygon, obstacle.path)
-        met, beyond = in_the_way(area, standing, environment.boundary_polygon)
+        area = compute_swept_area(obstacle.polygon, obstacle.path)
+        met, beyond = find_overlaps(area, standing, environment.boundary_polygon)
         names = [_called(other, environment.obstacles[other].name) for other in met]
         names += ["the boundary"] if beyond is not None else []
         if names:

@@ -276,7 +276,7 @@ def plain(value: Any) -> Any:
     return document
 
 
-def map_schema() -> dict[str, Any]:
+def build_map_schema() -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of a map, with descriptions and examples for editors."""
     schema = MapModel.model_json_schema(by_alias=True)
     # pydantic says what keys of a pattern hold, but not that other keys are errors

@@ -15,7 +15,7 @@ from robocov.errors import format_count, require_type
 from robocov.metrics.advice import advise
 from robocov.record import Record, nearest_moments
 from robocov.sensor import RangeSensor
-from robocov.world.solid import movers, solid_pieces
+from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
 
 SETTLED_WINDOW, SETTLED_DISTANCE = 4.0, 0.05
 """Seconds over which a robot at rest must not get anywhere, and metres that it may get in these."""
@@ -168,7 +168,7 @@ def clearances(record: Record) -> Array:
     nearest = record.obstacle_points.reshape(-1, 2).copy()
     left = np.flatnonzero(np.isnan(nearest[:, 0]))
     if len(left):
-        sensor = RangeSensor(solid_pieces(record.environment))
+        sensor = RangeSensor(build_solid_pieces(record.environment))
         reach = 1.0  # a query costs the more the farther it reaches
         while len(left):
             nearest[left] = sensor.find_nearest_points(positions[left], np.full(len(left), reach))
@@ -181,7 +181,7 @@ def clearances(record: Record) -> Array:
 def _clearances_asked_for(record: Record) -> Array:
     """Return the same where the robots sensed what was not there, or what is there changes."""
     environment, working, radius = record.environment, record.working, record.team.radius
-    sensor = RangeSensor(solid_pieces(environment), movers(environment))
+    sensor = RangeSensor(build_solid_pieces(environment), build_movers(environment))
     failed = record.present & ~working
     reach = np.full(len(radius), float(np.hypot(*np.ptp(environment.region.vertices, axis=0))))
     gap = np.full(working.shape, np.inf)

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robocov.errors import InputError, describe_unknown_name, format_count, quote
-from robocov.extras import extra
 from robocov.files.csv_cells import unquote_cell
 from robocov.metrics import CostHistory
+from robocov.optional_imports import import_optional
 from robocov.record import Record
 from robocov.text import escape_controls
 
@@ -79,7 +79,11 @@ class Results:
 
     def to_pandas(self, columns: Sequence[str] | None = None) -> DataFrame:
         """Return the rows as a data frame, as `rows`; pandas comes with ``robocov[pandas]``."""
-        pandas, names, kinds = extra("pandas", "pandas"), list(columns or self.columns), self._kinds()
+        pandas, names, kinds = (
+            import_optional("pandas", "pandas"),
+            list(columns or self.columns),
+            self._kinds(),
+        )
         frame: DataFrame = pandas.DataFrame(list(self.rows(names)), columns=names)
         empty = [name for name in names if kinds.get(name) != "string" and frame[name].isna().all()]
         return frame.astype(dict.fromkeys(empty, float))

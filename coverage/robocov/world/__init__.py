@@ -3,7 +3,7 @@
 - `world`, `changing_world`: a team that stays the same, and one whose robots fail and join
 - `dynamics`, `unicycles`: from a controller's force to the net force that pymunk integrates
 - `contacts`, `bodies`: contacts, and pymunk's bodies as arrays
-- `solid`, `relocation`: obstacles as convex polygons, and free positions for robots
+- `obstacle_pieces`, `free_positions`: obstacles as convex polygons, and free positions for robots
 """
 
 from robocov.world.changing_world import ChangingWorld

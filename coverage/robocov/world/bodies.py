@@ -13,7 +13,7 @@ import pymunk
 from pymunk import batch
 
 from robocov.arrays import Array, IntArray
-from robocov.world.solid import Mover
+from robocov.world.obstacle_pieces import Mover
 
 WALL_CATEGORY = 0b1
 """Filter category of what robots never enter: walls and failed robots, but not moving obstacles."""
@@ -35,7 +35,8 @@ class Obstacles:
     Attributes
     ----------
     walls : tuple of (k, 2) arrays, m
-        Convex polygons that tile everything that is not free, as `solid.solid_pieces` returns them.
+        Convex polygons that tile everything that is not free, see
+        `obstacle_pieces.build_solid_pieces`.
     movers : tuple of Mover
         Moving obstacles.
     failed_robots : (w, 3) array or None, m

@@ -12,8 +12,8 @@ from robocov.conditions import Conditions
 from robocov.environment import Environment
 from robocov.errors import StartError
 from robocov.robots import Team
-from robocov.world.relocation import nearest_free
-from robocov.world.solid import movers, solid_pieces
+from robocov.world.free_positions import find_free_position
+from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
 from robocov.world.unicycles import initialize_steering
 from robocov.world.world import World
 
@@ -60,8 +60,8 @@ class ChangingWorld:
         self.team = team
         self._conditions = conditions
         self._environment = environment
-        self._pieces = solid_pieces(environment)
-        self._movers = movers(environment)
+        self._pieces = build_solid_pieces(environment)
+        self._movers = build_movers(environment)
         self.positions = np.array(positions, dtype=float)
         self.velocities = np.zeros_like(self.positions) if velocities is None else np.array(velocities)
         self.steering = initialize_steering(team, self.velocities, steering)
@@ -140,7 +140,7 @@ class ChangingWorld:
         """Return the free position at which a robot joins, the nearest to the one where it should."""
         x, y = self.positions[robot].tolist()
         try:
-            return nearest_free(
+            return find_free_position(
                 self._environment.at(time),
                 float(self.team.radius[robot]),
                 self.positions[is_present],

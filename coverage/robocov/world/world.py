@@ -16,7 +16,7 @@ from robocov.robots import Team
 from robocov.world.bodies import MAX_TEAMS_PER_SPACE, Obstacles, compute_mover_states
 from robocov.world.contacts import ContactSolver, FreeSpace
 from robocov.world.dynamics import MotionResponse, compute_net_forces, compute_response
-from robocov.world.solid import Mover
+from robocov.world.obstacle_pieces import Mover
 from robocov.world.unicycles import compute_drive_command, initialize_steering, remove_sideways_velocity
 
 MAX_SUBSTEP_S = 0.02
@@ -42,7 +42,8 @@ class World:
     Parameters
     ----------
     pieces : tuple of (k, 2) arrays, m
-        Convex polygons that tile everything that is not free, as `solid.solid_pieces` returns them.
+        Convex polygons that tile everything that is not free, see
+        `obstacle_pieces.build_solid_pieces`.
     team : Team
         The n robots.
     positions : (n, 2) array, m

@@ -22,7 +22,7 @@ from robocov.controllers.geodesic_lloyd import Plan
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
-from robocov.generator import generated_map
+from robocov.generator import generate_map
 from robocov.mapfile import load_map
 from robocov.observation import Decision, Observations
 from robocov.observation.neighbours import Neighbours
@@ -42,7 +42,7 @@ DOOR = Environment("door", SQUARE.boundary, (WallObstacle(((5, 0), (5, 8)), 0.2)
 )
 def test_a_step_to_the_goals_does_not_raise_the_cost(seed: int, kind: str, exponent: float) -> None:
     """The claim, for a step of robots without inertia: sum of d^s over the sites falls, or stays."""
-    environment = generated_map(seed % 20, kind=kind)
+    environment = generate_map(seed % 20, kind=kind)
     plan = Plan(environment, 0.13, 32)
     places = find_nearest_inside(plan.room, environment.start("uniform").sample(4, seed=seed))
     nothing = np.full((4, 2), np.nan)

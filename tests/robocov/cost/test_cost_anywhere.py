@@ -16,7 +16,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from robocov.cost import CoverageCost
-from robocov.mapfile import bundled_maps, load_map
+from robocov.mapfile import list_bundled_maps, load_map
 
 kinds = st.sampled_from(sorted(KINDS))
 seeds = st.integers(0, 2**32)
@@ -146,7 +146,7 @@ def test_the_gradient_is_the_slope_of_the_value(kind, count, seed):
     assert compared
 
 
-@pytest.mark.parametrize("name", bundled_maps())
+@pytest.mark.parametrize("name", list_bundled_maps())
 def test_every_bundled_map(name):
     environment = load_map(name)
     robots = environment.start("uniform").sample(30, seed=1)

@@ -17,7 +17,7 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
-from robocov.mapfile import dump_map, from_json, map_schema, parse_map, to_json
+from robocov.mapfile import build_map_schema, dump_map, from_json, parse_map, to_json
 
 HALL = ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0))
 places = st.tuples(st.floats(-50, 50), st.floats(-50, 50))
@@ -154,7 +154,7 @@ def test_what_is_wrong_with_a_path_is_named(path: object, message: str) -> None:
 
 def test_the_schema_knows_paths() -> None:
     jsonschema = pytest.importorskip("jsonschema")
-    schema = jsonschema.Draft202012Validator(map_schema())
+    schema = jsonschema.Draft202012Validator(build_map_schema())
     document = to_json(moving())
     schema.validate(document)
     document["obstacles"][1]["path"]["speed"] = 0

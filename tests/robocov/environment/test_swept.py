@@ -8,7 +8,14 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.environment import CircleObstacle, ObstaclePath, PolygonObstacle, in_the_way, shifted, swept_area
+from robocov.environment import (
+    CircleObstacle,
+    ObstaclePath,
+    PolygonObstacle,
+    compute_swept_area,
+    find_overlaps,
+    shift_obstacle,
+)
 
 FRAME = PolygonObstacle(
     ((0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)), (((0.2, 0.2), (0.8, 0.2), (0.5, 0.8)),)
@@ -21,9 +28,9 @@ POINTS = st.lists(st.tuples(NUMBERS, NUMBERS), min_size=2, max_size=4, unique=Tr
 @given(POINTS, st.sampled_from(["loop", "back-and-forth"]))
 def test_it_is_where_the_obstacle_comes_by(points, repeat) -> None:
     path = ObstaclePath(points, 0.5, repeat)
-    area = swept_area(FRAME.polygon, path)
+    area = compute_swept_area(FRAME.polygon, path)
     times = np.linspace(0.0, path.period, 200)
-    met = shapely.union_all([shifted(FRAME, path.shift(time)).polygon for time in times])
+    met = shapely.union_all([shift_obstacle(FRAME, path.shift(time)).polygon for time in times])
     assert met.difference(area.buffer(1e-6)).area < 1e-6  # nothing is missing
     step = 0.5 * path.period / 199
     assert area.difference(met.buffer(step + 1e-6)).area < 1e-6  # nor is there more
@@ -31,38 +38,38 @@ def test_it_is_where_the_obstacle_comes_by(points, repeat) -> None:
 
 def test_what_passes_from_hole_to_hole_is_met() -> None:
     frame = shapely.box(0, 0, 10, 4) - shapely.box(1, 1, 4, 3) - shapely.box(5, 1, 9, 3)
-    area = swept_area(frame, ObstaclePath(((0.0, 0.0), (-2.5, 0.0)), 1.0))
+    area = compute_swept_area(frame, ObstaclePath(((0.0, 0.0), (-2.5, 0.0)), 1.0))
     assert area.covers(shapely.box(1.5, 1, 4, 3)), "the bar between them comes by"
     assert area.area == pytest.approx(12.5 * 4 - 2 * (1.5 - 1 + 9 - 2.5 - 5))
 
 
 def test_a_hole_is_filled_only_as_far_as_its_rim_comes() -> None:
     wide = PolygonObstacle(((0, 0), (4, 0), (4, 4), (0, 4)), (((1, 1), (3, 1), (3, 3), (1, 3)),))
-    area = swept_area(wide.polygon, ObstaclePath(((0, 0), (0.5, 0)), 1.0))
+    area = compute_swept_area(wide.polygon, ObstaclePath(((0, 0), (0.5, 0)), 1.0))
     assert area.area == pytest.approx(4.5 * 4 - 1.5 * 2)
 
 
 @pytest.mark.parametrize("points", [(), ((1, 1),), ((1, 1), (1, 1))])
 @pytest.mark.parametrize("repeat", ["loop", "back-and-forth"])
 def test_a_path_that_leads_nowhere_leaves_it_where_it_is(points, repeat) -> None:
-    assert swept_area(FRAME.polygon, ObstaclePath(points, 1.0, repeat)).equals(FRAME.polygon)
+    assert compute_swept_area(FRAME.polygon, ObstaclePath(points, 1.0, repeat)).equals(FRAME.polygon)
 
 
 def test_what_is_only_touched_is_not_in_the_way() -> None:
-    area = swept_area(CircleObstacle((0, 0), 0.5).polygon, ObstaclePath(((0, 0), (4, 0)), 1.0))
+    area = compute_swept_area(CircleObstacle((0, 0), 0.5).polygon, ObstaclePath(((0, 0), (4, 0)), 1.0))
     others = {
         "before": shapely.box(2, -0.1, 2.2, 0.1),
         "beside": shapely.box(1, 0.5, 2, 1),
         "off": shapely.box(8, 8, 9, 9),
     }
-    met, beyond = in_the_way(area, others)
+    met, beyond = find_overlaps(area, others)
     assert list(met) == ["before"] and beyond is None
     assert met["before"].equals(others["before"])
-    assert in_the_way(area, {}) == ({}, None)
+    assert find_overlaps(area, {}) == ({}, None)
 
 
 def test_what_leaves_the_boundary_is_told() -> None:
-    area = swept_area(CircleObstacle((0, 0), 0.5).polygon, ObstaclePath(((0, 0), (4, 0)), 1.0))
-    _, beyond = in_the_way(area, {}, shapely.box(-1, -1, 4, 1))
+    area = compute_swept_area(CircleObstacle((0, 0), 0.5).polygon, ObstaclePath(((0, 0), (4, 0)), 1.0))
+    _, beyond = find_overlaps(area, {}, shapely.box(-1, -1, 4, 1))
     assert beyond is not None and beyond.bounds == pytest.approx((4.0, -0.5, 4.5, 0.5), abs=1e-2)
-    assert in_the_way(area, {}, shapely.box(-1, -1, 5, 1)) == ({}, None)
+    assert find_overlaps(area, {}, shapely.box(-1, -1, 5, 1)) == ({}, None)

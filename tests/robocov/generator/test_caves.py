@@ -13,8 +13,8 @@ from shapely import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
-from robocov.environment import Gap, PolygonObstacle, narrowest_gap
-from robocov.generator import generated_map
+from robocov.environment import Gap, PolygonObstacle, find_narrowest_gap
+from robocov.generator import generate_map
 from robocov.generator.caves import below, random_field, through, tunnels
 from robocov.generator.request import Request
 
@@ -24,7 +24,7 @@ SEEDS = range(10)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_rock_goes_all_round_and_pillars_stand_apart(seed: int) -> None:
-    environment = generated_map(seed, kind="caves")
+    environment = generate_map(seed, kind="caves")
     rock, *pillars = environment.obstacles
     assert isinstance(rock, PolygonObstacle)
     assert (rock.name, len(rock.holes), len(rock.vertices)) == ("rock", 1, 4)
@@ -43,7 +43,7 @@ def test_rock_goes_all_round_and_pillars_stand_apart(seed: int) -> None:
 @pytest.mark.slow
 def test_vertices_are_few_and_walls_smooth() -> None:
     for seed in SEEDS:
-        (free,) = generated_map(seed, kind="caves").free.geoms
+        (free,) = generate_map(seed, kind="caves").free.geoms
         rings = [np.asarray(ring.coords)[:-1] for ring in (free.exterior, *free.interiors)]
         assert sum(map(len, rings)) < 200
         turns = []
@@ -61,7 +61,7 @@ def test_vertices_are_few_and_walls_smooth() -> None:
 def test_caves_have_chambers_and_tunnels_and_sometimes_pillars() -> None:
     narrow, pillars = [], 0
     for seed in range(20):
-        environment = generated_map(seed, kind="caves")
+        environment = generate_map(seed, kind="caves")
         (free,) = environment.free.geoms
         pillars += len(free.interiors)
         # what a disc of twice the gap does not get through
@@ -79,10 +79,8 @@ def test_caves_have_chambers_and_tunnels_and_sometimes_pillars() -> None:
     st.sampled_from([0.22, 0.3, 0.5, 0.9, 1.4]),
 )
 def test_no_passage_is_narrower_than_the_gap(seed: int, chambers: int, area: float, gap: float) -> None:
-    environment = generated_map(
-        seed, kind="caves", obstacles=chambers, area=area, gap=gap, width=12, height=9
-    )
-    found = narrowest_gap(environment.free)
+    environment = generate_map(seed, kind="caves", obstacles=chambers, area=area, gap=gap, width=12, height=9)
+    found = find_narrowest_gap(environment.free)
     assert found is None or found.width >= gap
     (free,) = environment.free.geoms
     room = free.buffer(-gap / 2.0 + 1e-6)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from robocov import generator
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import ParameterError
-from robocov.generator import GENERATORS, generated_map
+from robocov.generator import GENERATORS, generate_map
 from robocov.generator.request import AREA_TOLERANCE
 from robocov.mapfile import dump_map, load_map, save_map, to_json
 from robocov.mapfile.check import check_map
@@ -68,7 +68,7 @@ def coordinates(environment):
 @example({"seed": 3, "kind": "rooms", "obstacles": 12, "area": 0.15, "gap": 0.6, "side": 10.0})
 @example({"seed": 1, "kind": "polygons", "obstacles": 3, "area": 0.1, "gap": 0.25, "side": 1.5})
 def test_a_map_is_what_was_asked_for(words):
-    environment = generated_map(**words)
+    environment = generate_map(**words)
     gap = words["gap"]
     width, height = words.get("width", words.get("side")), words.get("height", words.get("side"))
     whole = shapely.box(0, 0, width, height)
@@ -101,7 +101,7 @@ def test_a_map_is_what_was_asked_for(words):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["polygons", "blocks", "rooms", "mazes"])
 def test_maps_may_be_large(kind):
-    environment = generated_map(0, kind=kind, obstacles=250, side=50.0)
+    environment = generate_map(0, kind=kind, obstacles=250, side=50.0)
     assert len(environment.free.geoms) == 1
     assert len(environment.obstacles) > 50
 
@@ -109,7 +109,7 @@ def test_maps_may_be_large(kind):
 @settings(max_examples=20)
 @given(asked())
 def test_files_hold_the_same_map(tmp_path_factory, words):
-    environment = generated_map(**words)
+    environment = generate_map(**words)
     path = tmp_path_factory.mktemp("maps") / "generated.json"
     save_map(environment, path)
     assert load_map(path) == environment
@@ -126,7 +126,7 @@ def test_files_hold_the_same_map(tmp_path_factory, words):
 @pytest.mark.parametrize("kind", GENERATORS)
 def test_starts_have_room_for_a_team(kind):
     for seed in range(12):
-        environment = generated_map(seed, kind=kind)
+        environment = generate_map(seed, kind=kind)
         corner = environment.starts["corner"]
         assert environment.free.contains(shapely.Point(corner.center).buffer(corner.radius))
         off = np.abs(np.array(corner.center) - [[0, 0], [10, 0], [0, 10], [10, 10]]).max(axis=1)
@@ -139,8 +139,8 @@ def test_starts_have_room_for_a_team(kind):
 
 def test_the_same_seed_gives_the_same_map_and_another_seed_another():
     for kind in GENERATORS:
-        maps = [generated_map(seed, kind=kind) for seed in range(3)]
-        assert [generated_map(seed, kind=kind) for seed in range(3)] == maps
+        maps = [generate_map(seed, kind=kind) for seed in range(3)]
+        assert [generate_map(seed, kind=kind) for seed in range(3)] == maps
         assert len({environment.obstacles for environment in maps}) == 3
 
 
@@ -190,25 +190,25 @@ def digest(environment):
 )
 def test_maps_that_studies_used_stay_as_they_are(words, expected):
     """Bit for bit: a seed in a paper must give the same map in every version."""
-    assert digest(generated_map(**words)) == expected
+    assert digest(generate_map(**words)) == expected
 
 
 @pytest.mark.slow
 def test_maps_do_not_depend_on_the_process():
     script = (
         "import sys\n"
-        "from robocov.generator import GENERATORS, generated_map\n"
+        "from robocov.generator import GENERATORS, generate_map\n"
         "from robocov.mapfile import dump_map\n"
-        "sys.stdout.write(''.join(dump_map(generated_map(5, kind=kind)) for kind in GENERATORS))"
+        "sys.stdout.write(''.join(dump_map(generate_map(5, kind=kind)) for kind in GENERATORS))"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout == "".join(dump_map(generated_map(5, kind=kind)) for kind in GENERATORS)
+    assert done.stdout == "".join(dump_map(generate_map(5, kind=kind)) for kind in GENERATORS)
 
 
 def test_numbers_may_be_numpys():
-    plain = generated_map(4, obstacles=5, area=0.125, gap=0.5, side=8.0)
+    plain = generate_map(4, obstacles=5, area=0.125, gap=0.5, side=8.0)
     assert (
-        generated_map(
+        generate_map(
             np.int64(4), obstacles=np.int32(5), area=np.float64(0.125), gap=np.float32(0.5), side=np.int64(8)
         )
         == plain
@@ -219,7 +219,7 @@ def test_numbers_may_be_numpys():
 def test_the_shapes_of_polygons_are_mixed():
     counts = {"convex": 0, 6: 0, 8: 0}
     for seed in range(60):
-        for obstacle in generated_map(seed, obstacles=5, area=0.2).obstacles:
+        for obstacle in generate_map(seed, obstacles=5, area=0.2).obstacles:
             convex = obstacle.polygon.convex_hull.area - obstacle.polygon.area < 0.05
             counts["convex" if convex else len(obstacle.vertices)] += 1
     # of 300, with chances of 0.6, 0.2 and 0.2
@@ -229,7 +229,7 @@ def test_the_shapes_of_polygons_are_mixed():
 
 
 def test_rooms_have_walls_doors_and_furniture():
-    environment = generated_map(0, kind="rooms", obstacles=7, area=0.14)
+    environment = generate_map(0, kind="rooms", obstacles=7, area=0.14)
     walls = [obstacle for obstacle in environment.obstacles if isinstance(obstacle, WallObstacle)]
     furniture = [obstacle for obstacle in environment.obstacles if not isinstance(obstacle, WallObstacle)]
     assert {obstacle.name for obstacle in furniture} <= {"cabinet", "table", "round table"}
@@ -262,7 +262,7 @@ def test_rooms_have_walls_doors_and_furniture():
 )
 def test_parameters_out_of_range_are_named(words, message):
     with pytest.raises(ParameterError) as caught:
-        generated_map(**{"seed": 0, **words})
+        generate_map(**{"seed": 0, **words})
     assert str(caught.value).startswith(message)
 
 
@@ -282,7 +282,7 @@ def test_parameters_out_of_range_are_named(words, message):
 )
 def test_what_is_impossible_is_given_up(words):
     with pytest.raises(ParameterError) as caught:
-        generated_map(0, **words)
+        generate_map(0, **words)
     assert str(caught.value).startswith(
         f"area: {words['area']:g}, but no layout of {words['obstacles']} {GENERATORS[words['kind']].counted} "
     )
@@ -318,12 +318,12 @@ def test_kinds_are_a_registry_and_no_layout_gets_through_unchecked(layout, area,
     mine = replace(GENERATORS["polygons"], layout=of_mine, counted="things")
     monkeypatch.setitem(generator.GENERATORS, "mine", mine)
     if good:
-        environment = generated_map(0, kind="mine", area=area)
+        environment = generate_map(0, kind="mine", area=area)
         assert environment.obstacles == tuple(layout)
         assert environment.name == "mine 0"
     else:
         with pytest.raises(ParameterError, match="of 6 things was found"):
-            generated_map(0, kind="mine", area=area)
+            generate_map(0, kind="mine", area=area)
         # every attempt has random numbers of its own
         assert len(set(drawn)) == len(drawn) > 1
 

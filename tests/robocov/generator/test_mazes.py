@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Point
 
-from robocov.environment import Environment, WallObstacle, narrowest_gap
-from robocov.generator import generated_map
+from robocov.environment import Environment, WallObstacle, find_narrowest_gap
+from robocov.generator import generate_map
 from robocov.generator.mazes import inner_walls, trails, tree_passages
 
 
@@ -76,9 +76,9 @@ def corridors(environment: Environment) -> tuple[float, set[float]]:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_walls_are_of_one_thickness_and_corridors_of_one_width(seed: int) -> None:
-    environment = generated_map(seed, kind="mazes", obstacles=64, area=0.15)
+    environment = generate_map(seed, kind="mazes", obstacles=64, area=0.15)
     count, (thickness,) = corridors(environment)
-    gap = narrowest_gap(environment.free)
+    gap = find_narrowest_gap(environment.free)
     assert gap is not None
     # eight corridors and seven walls side by side, on whole centimetres
     assert gap.width == pytest.approx((10.0 - 7 * thickness) / 8, abs=0.011)
@@ -89,7 +89,7 @@ def test_walls_are_of_one_thickness_and_corridors_of_one_width(seed: int) -> Non
 @pytest.mark.slow
 def test_there_are_dead_ends_and_ways_round() -> None:
     for seed in range(20):
-        environment = generated_map(seed, kind="mazes")
+        environment = generate_map(seed, kind="mazes")
         (free,) = environment.free.geoms
         # a hole for each way round
         assert 1 <= len(free.interiors) <= 8
@@ -119,7 +119,7 @@ def test_the_grid_has_about_as_many_cells_as_are_wanted(
 ) -> None:
     found: tuple[set[int], set[int]] = (set(), set())
     for seed in range(6):
-        environment = generated_map(
+        environment = generate_map(
             seed, kind="mazes", obstacles=obstacles, area=0.1, width=width, height=height
         )
         assert f"about {obstacles} cells" in environment.description
@@ -137,7 +137,7 @@ def test_the_grid_has_about_as_many_cells_as_are_wanted(
 def test_no_wall_stands_in_the_start() -> None:
     for seed in range(12):
         # corridors are narrower than the disc
-        environment = generated_map(seed, kind="mazes", obstacles=144, area=0.15)
+        environment = generate_map(seed, kind="mazes", obstacles=144, area=0.15)
         start = environment.starts["corner"]
         assert start.radius == 0.6  # type: ignore[union-attr]
         assert environment.free.contains(Point(start.center).buffer(0.6))  # type: ignore[union-attr]

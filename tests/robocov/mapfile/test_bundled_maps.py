@@ -10,10 +10,10 @@ import pytest
 import shapely
 
 from robocov.environment import CircleObstacle, PointsStart, PolygonObstacle, UniformStart, WallObstacle
-from robocov.mapfile import bundled_maps, dump_map, load_map, map_schema
+from robocov.mapfile import build_map_schema, dump_map, list_bundled_maps, load_map
 from robocov.mapfile.check import check_map
 
-NAMES = sorted(bundled_maps())
+NAMES = sorted(list_bundled_maps())
 NARROW = {"gaps": 0.3}
 
 
@@ -46,10 +46,10 @@ def test_it_is_described(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_it_is_in_the_form_that_the_editor_writes(name: str) -> None:
-    text = bundled_maps()[name].read_text(encoding="utf-8")
+    text = list_bundled_maps()[name].read_text(encoding="utf-8")
     assert dump_map(load_map(name)) == text
     assert max(len(line) for line in text.splitlines()) < 1000
-    jsonschema.Draft202012Validator(map_schema()).validate(json.loads(text))
+    jsonschema.Draft202012Validator(build_map_schema()).validate(json.loads(text))
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -19,7 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.errors import MapError
-from robocov.mapfile import bundled_maps, from_json, load_map, map_schema, parse_map, to_json
+from robocov.mapfile import build_map_schema, from_json, list_bundled_maps, load_map, parse_map, to_json
 from robocov.mapfile.models import validate
 
 json_values = st.recursive(
@@ -273,7 +273,7 @@ def test_files_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_names_of_bundled_maps() -> None:
-    assert load_map("rooms") == load_map(bundled_maps()["rooms"])
+    assert load_map("rooms") == load_map(list_bundled_maps()["rooms"])
     with pytest.raises(MapError, match=r"unknown map 'roms': did you mean 'rooms'\? \(known: .*rooms"):
         load_map("roms")
 
@@ -373,7 +373,7 @@ def test_the_schema_knows_which_names_starts_may_have() -> None:
 
 
 def test_the_schema_is_one_and_knows_every_key() -> None:
-    schema = map_schema()
+    schema = build_map_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
     assert schema["$schema"].endswith("2020-12/schema")
     assert set(schema["properties"]) == {*DOCUMENT}
@@ -386,7 +386,7 @@ def test_the_schema_is_one_and_knows_every_key() -> None:
 
 
 def test_the_examples_of_the_schema_are_good() -> None:
-    schema = map_schema()
+    schema = build_map_schema()
     for item in (schema, *schema["$defs"].values()):
         for key, value in item["properties"].items():
             whole = {"$schema": schema["$schema"], "$defs": schema["$defs"], **value}
@@ -398,9 +398,9 @@ def test_the_examples_of_the_schema_are_good() -> None:
     assert from_json(whole).obstacles
 
 
-@pytest.mark.parametrize("name", bundled_maps())
+@pytest.mark.parametrize("name", list_bundled_maps())
 def test_the_schema_knows_every_bundled_map(name: str) -> None:
-    SCHEMA.validate(json.loads(bundled_maps()[name].read_text()))
+    SCHEMA.validate(json.loads(list_bundled_maps()[name].read_text()))
 
 
 @pytest.mark.parametrize(("document", "wanted"), STRUCTURAL, ids=lambda value: str(value)[-40:])

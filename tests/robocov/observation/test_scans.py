@@ -8,7 +8,7 @@ from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations, Scanning, compute_headings
 from robocov.sensor import RangeSensor
 from robocov.simulation import Simulation
-from robocov.world.solid import solid_pieces
+from robocov.world.obstacle_pieces import build_solid_pieces
 
 
 class Looking:
@@ -41,7 +41,7 @@ def test_scans_come_when_they_are_asked_for(cluttered: Environment) -> None:
 
 
 def test_scans_of_a_team_are_those_of_each_robot(cluttered: Environment) -> None:
-    sensor = RangeSensor(solid_pieces(cluttered))
+    sensor = RangeSensor(build_solid_pieces(cluttered))
     places = np.array([[1.0, 2.0], [1.5, 2.2], [0.6, 4.0]])
     ranges = np.array([0.7, 2.0, np.inf])
     distances, hit = sensor.scan(places, 36, ranges)

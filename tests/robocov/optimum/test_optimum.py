@@ -15,7 +15,7 @@ from scipy.spatial.distance import pdist
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.errors import ParameterError
-from robocov.generator import generated_map
+from robocov.generator import generate_map
 from robocov.k_median import seeded
 from robocov.mapfile import load_map
 from robocov.optimum import _Search, find_optimum
@@ -141,7 +141,7 @@ def test_it_never_ends_above_its_seeds_nor_above_lloyds_iteration_from_them(name
 @settings(max_examples=12)
 @given(st.integers(0, 2**20), st.sampled_from(["polygons", "blocks", "rooms"]), st.integers(1, 9))
 def test_positions_are_clear_and_the_cost_is_theirs(seed, kind, robots):
-    where = generated_map(seed, kind=kind, side=8.0, gap=0.4)
+    where = generate_map(seed, kind=kind, side=8.0, gap=0.4)
     best = find_optimum(where, robots, lattice=24, restarts=3, seed=seed)
     assert best.positions.shape == (robots, 2)
     points = shapely.points(best.positions)

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from robocov.environment import Environment
 from robocov.planning.discovered import FREE, PRESUMED, SURE, UNKNOWN, WALL, DiscoveredMap, Raster, dilate
 from robocov.sensor import RangeSensor
-from robocov.world.solid import solid_pieces
+from robocov.world.obstacle_pieces import build_solid_pieces
 
 
 @pytest.fixture(scope="module")
 def sensor(cluttered: Environment) -> RangeSensor:
-    return RangeSensor(solid_pieces(cluttered))
+    return RangeSensor(build_solid_pieces(cluttered))
 
 
 def explored(

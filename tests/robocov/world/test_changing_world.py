@@ -13,7 +13,7 @@ from robocov.record import Record
 from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov.world import ChangingWorld, World
-from robocov.world.solid import solid_pieces
+from robocov.world.obstacle_pieces import build_solid_pieces
 
 HALL = Environment("hall", ((0, 0), (10, 0), (10, 8), (0, 8)))
 STARTS = np.array([[1.0, 1.0], [2.0, 1.5], [1.0, 3.0], [3.0, 2.5]])
@@ -28,7 +28,7 @@ def test_as_long_as_all_work_it_is_a_world() -> None:
     """Bit for bit, with robots that touch."""
     places = np.array([[1.0, 1.0], [1.3, 1.0], [1.6, 1.05]])
     changing = world(Conditions(failures=((1, 100.0),)), places)
-    plain = World(solid_pieces(HALL), Team.homogeneous(3), places)
+    plain = World(build_solid_pieces(HALL), Team.homogeneous(3), places)
     forces = np.array([[3.0, 0.0], [0.0, 0.1], [-3.0, 0.0]])
     for step in range(60):
         changing.step(forces, 0.05, time=step * 0.05)

@@ -18,14 +18,14 @@ from robocov.mapfile import load_map
 from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov.world import World
-from robocov.world.solid import solid_pieces
+from robocov.world.obstacle_pieces import build_solid_pieces
 
 DT = 1 / 60
 
 
 def unicycles(environment: Environment, n: int, seed: int, **team: float) -> World:
     starts = environment.start("uniform").sample(n, seed)
-    return World(solid_pieces(environment), Team.homogeneous(n, kinematics="unicycle", **team), starts)
+    return World(build_solid_pieces(environment), Team.homogeneous(n, kinematics="unicycle", **team), starts)
 
 
 @settings(max_examples=25)
@@ -68,7 +68,9 @@ def test_wheels_and_turns_keep_their_limits_and_nobody_slips(
 
 
 def test_a_unicycle_turns_in_place_before_it_drives(empty: Environment) -> None:
-    team = World(solid_pieces(empty), Team.homogeneous(1, kinematics="unicycle"), np.array([[5.0, 5.0]]))
+    team = World(
+        build_solid_pieces(empty), Team.homogeneous(1, kinematics="unicycle"), np.array([[5.0, 5.0]])
+    )
     for _ in range(12):
         team.step(np.array([[-1.0, 0.1]]), DT)
         np.testing.assert_array_equal(team.positions, [[5.0, 5.0]])
@@ -86,7 +88,7 @@ def test_it_brakes_as_hard_as_a_point(empty: Environment, speed: float, heading:
     left = []
     for kind in ("point", "unicycle"):
         team = World(
-            solid_pieces(empty), Team.homogeneous(1, kinematics=kind), place, speed * along,
+            build_solid_pieces(empty), Team.homogeneous(1, kinematics=kind), place, speed * along,
             steering=np.array([[heading, 0.0]]),
         )  # fmt: skip
         team.step(-force * along, DT)
@@ -100,7 +102,7 @@ def test_points_beside_unicycles_move_as_among_points(empty: Environment) -> Non
     starts = np.array([[1.0 + 1.5 * k, 5.0] for k in range(n)])
     points = Team.homogeneous(n)
     mixed = replace(points, track_width=np.array([0.0, 0.2] * 3))
-    one, other = (World(solid_pieces(empty), team, starts) for team in (points, mixed))
+    one, other = (World(build_solid_pieces(empty), team, starts) for team in (points, mixed))
     assert one.steering is None
     for _ in range(60):
         forces = rng.normal(0.0, 1.0, (n, 2))
@@ -112,7 +114,9 @@ def test_points_beside_unicycles_move_as_among_points(empty: Environment) -> Non
 
 
 def test_a_hand_carries_a_unicycle(empty: Environment) -> None:
-    team = World(solid_pieces(empty), Team.homogeneous(1, kinematics="unicycle"), np.array([[5.0, 5.0]]))
+    team = World(
+        build_solid_pieces(empty), Team.homogeneous(1, kinematics="unicycle"), np.array([[5.0, 5.0]])
+    )
     for _ in range(30):
         team.step(np.zeros((1, 2)), DT, np.array([[0.0, 2.0]]))
     assert team.positions[0, 1] > 5.1 and team.steering is not None and not team.steering.any()

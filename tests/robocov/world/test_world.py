@@ -12,7 +12,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.robots import Team
 from robocov.world import MAX_PENETRATION, World
-from robocov.world.solid import solid_pieces
+from robocov.world.obstacle_pieces import build_solid_pieces
 
 DT = 1 / 60
 
@@ -21,7 +21,7 @@ def world(
     environment: Environment, n: int = 6, seed: int = 0, start: str = "uniform", **team: float
 ) -> World:
     positions = environment.start(start).sample(n, seed)
-    return World(solid_pieces(environment), Team.homogeneous(n, **team), positions)
+    return World(build_solid_pieces(environment), Team.homogeneous(n, **team), positions)
 
 
 def clearance(environment: Environment, positions: np.ndarray) -> float:
@@ -32,7 +32,9 @@ def clearance(environment: Environment, positions: np.ndarray) -> float:
 
 def test_viscous_motion_has_the_exact_solution(empty: Environment) -> None:
     """m v' = F - nu v: v(t) = F/nu (1 - exp(-nu t / m))."""
-    one = World(solid_pieces(empty), Team.homogeneous(1, mass=2.0, viscosity=1.5), np.array([[2.0, 5.0]]))
+    one = World(
+        build_solid_pieces(empty), Team.homogeneous(1, mass=2.0, viscosity=1.5), np.array([[2.0, 5.0]])
+    )
     force = np.array([[0.6, 0.0]])
     for step in range(1, 121):
         one.step(force, DT)
@@ -42,7 +44,7 @@ def test_viscous_motion_has_the_exact_solution(empty: Environment) -> None:
 
 def test_without_viscosity_a_robot_coasts(empty: Environment) -> None:
     one = World(
-        solid_pieces(empty),
+        build_solid_pieces(empty),
         Team.homogeneous(1, viscosity=0.0),
         np.array([[2.0, 5.0]]),
         np.array([[0.5, 0.0]]),
@@ -70,7 +72,7 @@ def test_limits_hold_under_any_forces(cluttered: Environment, seed: int, size: f
 
 def test_acceleration_is_limited_where_nothing_is_touched(empty: Environment) -> None:
     rng = np.random.default_rng(4)
-    one = World(solid_pieces(empty), Team.homogeneous(1), np.array([[5.0, 5.0]]))
+    one = World(build_solid_pieces(empty), Team.homogeneous(1), np.array([[5.0, 5.0]]))
     before = one.velocities
     for _ in range(200):
         one.step(rng.normal(scale=50.0, size=(1, 2)), DT)
@@ -110,7 +112,7 @@ def test_a_pressed_crowd_neither_overlaps_nor_sinks_into_walls(
     team = replace(everyone, mass=mass, radius=radius)
     places = empty.start("uniform").sample(n, 1, radius=float(radius.max()))
     for target in ([5.0, 5.0], [-2.0, -1.0]):
-        crowd = World(solid_pieces(empty), team, places)
+        crowd = World(build_solid_pieces(empty), team, places)
         for _ in range(int(600 / speed)):
             crowd.step(50.0 * speed * mass[:, None] * (np.array(target) - crowd.positions), DT)
             apart = np.hypot(*(crowd.positions[:, None] - crowd.positions[None]).transpose(2, 0, 1))
@@ -127,7 +129,7 @@ def test_masses_whose_contacts_cannot_be_resolved_are_refused(empty: Environment
     team = Team.joined([Team.homogeneous(1, mass=0.5), Team.homogeneous(1, mass=501.0)])
     message = r"team.mass: expected .* 1000 times as heavy .* got 0.5 to 501 kg"
     with pytest.raises(ParameterError, match=message):
-        World(solid_pieces(empty), team, np.array([[2.0, 2.0], [2.0, 6.0]]))
+        World(build_solid_pieces(empty), team, np.array([[2.0, 2.0], [2.0, 6.0]]))
 
 
 def test_energy_never_grows_without_forces(cluttered: Environment) -> None:
@@ -138,7 +140,7 @@ def test_energy_never_grows_without_forces(cluttered: Environment) -> None:
         velocities = rng.normal(size=(30, 2))
         velocities /= np.maximum(np.hypot(*velocities.T), 1.0)[:, None]
         team = World(
-            solid_pieces(cluttered), Team.homogeneous(30, viscosity=viscosity), positions, velocities
+            build_solid_pieces(cluttered), Team.homogeneous(30, viscosity=viscosity), positions, velocities
         )
         energy = 0.5 * (velocities**2).sum()
         for _ in range(300):
@@ -195,7 +197,7 @@ def test_heterogeneous_teams_keep_their_own_limits(empty: Environment) -> None:
         sensing_range=np.array([3.0, 3.0]),
         communication_range=np.array([np.inf, np.inf]),
     )
-    pair = World(solid_pieces(empty), team, np.array([[2.0, 2.0], [2.0, 6.0]]))
+    pair = World(build_solid_pieces(empty), team, np.array([[2.0, 2.0], [2.0, 6.0]]))
     for _ in range(120):
         pair.step(np.full((2, 2), [100.0, 0.0]), DT)
     np.testing.assert_allclose(np.hypot(*pair.velocities.T), [1.0, 0.4], rtol=1e-9)
@@ -265,7 +267,10 @@ def test_a_robot_on_a_spring_follows_the_hand_and_is_thrown() -> None:
 def test_a_robot_that_is_pushed_is_no_faster_than_its_limit(empty: Environment) -> None:
     team = Team.joined([Team.homogeneous(1, max_speed=2.0, mass=50.0), Team.homogeneous(1, max_speed=0.5)])
     pair = World(
-        solid_pieces(empty), team, np.array([[3.0, 5.0], [3.5, 5.0]]), np.array([[2.0, 0.0], [0.0, 0.0]])
+        build_solid_pieces(empty),
+        team,
+        np.array([[3.0, 5.0], [3.5, 5.0]]),
+        np.array([[2.0, 0.0], [0.0, 0.0]]),
     )
     for _ in range(60):
         pair.step(np.array([[500.0, 0.0], [0.0, 0.0]]), DT)

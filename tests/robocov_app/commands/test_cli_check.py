@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from called import COMMAND
 
-from robocov.mapfile import bundled_maps
+from robocov.mapfile import list_bundled_maps
 from robocov_app.cli import main
 from robocov_app.commands.maps import check
 
@@ -131,7 +131,7 @@ def test_a_bundled_map_is_watched_at_its_file(monkeypatch: pytest.MonkeyPatch) -
     watched: list[Path] = []
     monkeypatch.setattr(check, "changes", lambda paths: watched.extend(paths) or iter(()))
     assert main(["check", "--watch", "rooms", "no such", "there/none.json"]) == 0
-    assert watched == [bundled_maps()["rooms"], Path("no such"), Path("there/none.json")]
+    assert watched == [list_bundled_maps()["rooms"], Path("no such"), Path("there/none.json")]
 
 
 def read_until(stream: int, wanted: bytes, seconds: float = 30.0) -> bytes:

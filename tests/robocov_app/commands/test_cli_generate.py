@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from called import COMMAND, answer, complaint
 
-from robocov.generator import GENERATORS, generated_map
-from robocov.mapfile import bundled_maps, dump_map, load_map
+from robocov.generator import GENERATORS, generate_map
+from robocov.mapfile import dump_map, list_bundled_maps, load_map
 from robocov_app.cli import main
 from robocov_app.commands.maps.generate import KindName
 from robocov_app.replication.plan import QUICK
@@ -24,7 +24,7 @@ def test_every_kind_can_be_asked_for() -> None:
 
 @pytest.mark.parametrize("kind", GENERATORS)
 def test_a_map_is_printed_or_saved(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    expected = generated_map(5, kind=kind)
+    expected = generate_map(5, kind=kind)
     assert main(["generate", "--kind", kind, "--seed", "5"]) == 0
     said = capsys.readouterr()
     assert (said.out, said.err) == (dump_map(expected), "")
@@ -39,14 +39,14 @@ def test_every_option_arrives(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     out = tmp_path / "map.json"
     words = "--kind rooms --seed 3 --obstacles 8 --area 0.15 --gap 0.7 --width 12 --height 9"
     row = answer(capsys, "generate", *words.split(), "--out", str(out))
-    expected = generated_map(3, kind="rooms", obstacles=8, area=0.15, gap=0.7, width=12, height=9)
+    expected = generate_map(3, kind="rooms", obstacles=8, area=0.15, gap=0.7, width=12, height=9)
     assert load_map(out) == expected
     assert row["out"] == str(out)
     (told,) = row["maps"]
     assert told["file"] == str(out) and told["area_m2"] == 108.0
     assert told["narrowest_gap_m"] >= 0.7 and told["warnings"] == []
     assert main(["generate", "--side", "8", "--out", str(out), "--overwrite"]) == 0
-    assert load_map(out) == generated_map(0, side=8.0)
+    assert load_map(out) == generate_map(0, side=8.0)
 
 
 def test_a_folder_of_maps_and_a_sheet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -59,7 +59,7 @@ def test_a_folder_of_maps_and_a_sheet(tmp_path: Path, capsys: pytest.CaptureFixt
     names = ["mazes-08.json", "mazes-09.json", "mazes-10.json", "mazes-11.json"]
     assert sorted(path.name for path in folder.iterdir()) == names
     for seed, name in enumerate(names, start=8):
-        assert load_map(folder / name) == generated_map(seed, kind="mazes")
+        assert load_map(folder / name) == generate_map(seed, kind="mazes")
     assert sheet.read_bytes().startswith(b"\x89PNG")
     assert complaint(capsys, *words).startswith(f"{folder}: the folder is not empty; another --out, or")
 
@@ -72,7 +72,7 @@ def test_overwriting_replaces_maps_and_nothing_else(
     other.write_text("mine")
     assert main([*words, "--gap", "0.5"]) == 0
     assert main(words) == 0
-    assert load_map(tmp_path / "polygons-1.json") == generated_map(1)
+    assert load_map(tmp_path / "polygons-1.json") == generate_map(1)
     capsys.readouterr()
     mine.write_text("{}")
     assert main(words) == 2
@@ -85,7 +85,7 @@ def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str
     rows = answer(capsys, "generate", "--study", "quick", "--out", str(tmp_path))["maps"]
     every = *claim_maps(QUICK), *generated_maps(QUICK.tuning), *convex_maps(QUICK)
     maps = {each.name: each.environment for each in every}
-    drawn = {name: environment for name, environment in maps.items() if name not in bundled_maps()}
+    drawn = {name: environment for name, environment in maps.items() if name not in list_bundled_maps()}
     assert len(drawn) == sum(map(len, (QUICK.generated, QUICK.tuning, QUICK.convex_generated)))
     assert [Path(row["file"]).stem for row in rows] == list(drawn)
     for name, environment in drawn.items():

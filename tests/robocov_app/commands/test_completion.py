@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 
-from robocov.mapfile import bundled_maps
+from robocov.mapfile import list_bundled_maps
 from robocov_app.cli import main
 from robocov_app.commands import COMMANDS
 
@@ -56,7 +56,7 @@ def test_the_options_of_a_command_are_those_of_its_help(
         (("robocov", "run", "--rob"), ["--robots"]),
         (("robocov", "run", "--controller", "atlas"), ["atlas", "atlas-shared"]),
         (("robocov", "benchmark", "ver"), ["verify"]),
-        (("robocov", "check", ""), list(bundled_maps())),
+        (("robocov", "check", ""), list(list_bundled_maps())),
         (("robocov", "run", "--json", "roo"), ["rooms"]),
     ],
 )

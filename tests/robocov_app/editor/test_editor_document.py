@@ -20,7 +20,7 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
-from robocov.mapfile import bundled_maps, dump_map, load_map, parse_map, to_json
+from robocov.mapfile import dump_map, list_bundled_maps, load_map, parse_map, to_json
 from robocov_app.editor.edits import vertices
 from robocov_app.editor.model.background import Background, annotated, taken_apart
 from robocov_app.editor.model.parser import parse_sketch, sketch_of
@@ -52,7 +52,7 @@ def test_a_sketch_comes_back_from_its_text(sketch):
     assert sketch_text(parse_sketch(text, "again")) == text
 
 
-@pytest.mark.parametrize("name", bundled_maps())
+@pytest.mark.parametrize("name", list_bundled_maps())
 def test_bundled_maps_pass_through_unchanged(name):
     environment = load_map(name)
     sketch = Sketch.from_environment(environment)

@@ -7,7 +7,7 @@ from driven_editor import sheet, touched
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, RobocovError
-from robocov.mapfile import bundled_maps, load_map
+from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.editor.edits import create, properties
 from robocov_app.editor.model.document import FIRST_SHEET, ChangedError, Document, recoverable
 from robocov_app.editor.model.selection import Selection
@@ -49,7 +49,7 @@ def test_saving_and_opening_again(tmp_path: Path) -> None:
 
 
 def test_a_bundled_map_opens_as_a_copy_and_is_never_written(tmp_path: Path) -> None:
-    bundled = bundled_maps()["rooms"]
+    bundled = list_bundled_maps()["rooms"]
     document = Document.opened(bundled, None)
     assert document.path is None and document.title == "rooms"
     assert document.suggested(tmp_path).name == "rooms.json"

@@ -11,7 +11,7 @@ from scipy import ndimage
 from shapely import MultiPolygon
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
-from robocov.mapfile import bundled_maps, load_map
+from robocov.mapfile import list_bundled_maps, load_map
 from robocov.mapfile.check import check_map
 from robocov_app.editor.model.measurement import measure, reach_of
 from robocov_app.editor.model.sketch import Sketch
@@ -157,7 +157,7 @@ def test_it_says_what_check_says(name):
     assert result.components == report.components
     assert result.gap == report.narrowest_gap
     assert sum(result.reached) <= report.free_area
-    assert name in bundled_maps()
+    assert name in list_bundled_maps()
 
 
 @settings(max_examples=50)

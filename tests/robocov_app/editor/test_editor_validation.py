@@ -16,7 +16,7 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
-from robocov.mapfile import bundled_maps, load_map
+from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
 from robocov_app.editor.model.validation import in_words
 
@@ -52,7 +52,7 @@ def test_something_is_grave_exactly_when_the_map_does_not_run(sketch):
     assert graves == sorted(graves, reverse=True)
 
 
-@pytest.mark.parametrize("name", bundled_maps())
+@pytest.mark.parametrize("name", list_bundled_maps())
 def test_bundled_maps_have_nothing_grave(name):
     assert not any(each.grave for each in problems(Sketch.from_environment(load_map(name))))
 

@@ -13,8 +13,8 @@ from shapely import Polygon
 
 from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, ParameterError
-from robocov.generator import generated_map
-from robocov.mapfile import bundled_maps, load_map
+from robocov.generator import generate_map
+from robocov.mapfile import list_bundled_maps, load_map
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.formats import (
     EXPORTERS,
@@ -140,14 +140,17 @@ WAYS: dict[str, tuple[str, WriteOptions]] = {
     "metres": (".geojson", WriteOptions()),
     **{place: (".geojson", WriteOptions(origin=at)) for place, at in PLACES.items()},
 }
-MAPS = [*bundled_maps(), *(f"generated {kind}" for kind in ("blocks", "caves", "mazes", "polygons", "rooms"))]
+MAPS = [
+    *list_bundled_maps(),
+    *(f"generated {kind}" for kind in ("blocks", "caves", "mazes", "polygons", "rooms")),
+]
 QUICK = ("rooms", "campus", "generated polygons")
 
 
 @functools.cache
 def a_map(name: str) -> Environment:
     kind = name.removeprefix("generated ")
-    return load_map(name) if kind == name else generated_map(1, kind=kind)
+    return load_map(name) if kind == name else generate_map(1, kind=kind)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
 from robocov.errors import OutputError, ParameterError
-from robocov.mapfile import bundled_maps, load_map
+from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.formats import (
     ForeignMap,
     ReadOptions,
@@ -46,7 +46,7 @@ def out_and_in(environment: Environment, path: Path, **options: Any) -> ForeignM
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "options"), FORMATS)
-@pytest.mark.parametrize("name", bundled_maps())
+@pytest.mark.parametrize("name", list_bundled_maps())
 def test_bundled_maps(tmp_path: Path, name: str, kind: str, options: dict[str, Any]) -> None:
     environment = load_map(name)
     foreign = out_and_in(environment, tmp_path / f"{name}.{kind}", **options)

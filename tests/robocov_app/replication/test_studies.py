@@ -8,7 +8,7 @@ from tiny_paper import TINY
 from robocov.controllers import CONTROLLERS, gain_values, gains_of, make_controller
 from robocov.environment import CircleObstacle, DiscStart, Environment, PolygonObstacle
 from robocov.errors import StartError
-from robocov.mapfile import bundled_maps, load_map
+from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.figures.statistics import share
 from robocov_app.replication import studies
 from robocov_app.replication.claims import ALPHA, LEAST_MAPS, NEARLY_ALWAYS, REGISTERED
@@ -51,9 +51,9 @@ class TestMaps:
                 assert environment.free.contains(shapely.Point(spec.center).buffer(spec.radius - 0.01))
 
     def test_they_are_all_but_three_of_those_that_are_not_convex(self):
-        convex = {name for name in bundled_maps() if load_map(name).blocked.is_empty}
+        convex = {name for name in list_bundled_maps() if load_map(name).blocked.is_empty}
         assert convex == set(CONVEX)
-        assert set(bundled_maps()) - convex - set(NON_CONVEX) == {"campus", "forklifts", "hospital"}
+        assert set(list_bundled_maps()) - convex - set(NON_CONVEX) == {"campus", "forklifts", "hospital"}
 
     def test_clustered_starts_are_as_near_as_can_be(self):
         ring = ((0, 0), (8, 0), (8, 6), (0, 6))

@@ -8,7 +8,7 @@ import pytest
 from swept import HALL, controller
 
 from robocov.errors import InputError
-from robocov.mapfile import bundled_maps, save_map
+from robocov.mapfile import list_bundled_maps, save_map
 from robocov_app.sweep.study import team_of
 from robocov_app.sweep.study_file import read_study
 
@@ -97,7 +97,7 @@ def test_little_needs_to_be_said(folder: Path) -> None:
 
 def test_all_bundled_maps(folder: Path) -> None:
     study = read_study(written(folder, 'maps = "*"\ncontrollers = ["rapf"]\nseeds = [3]\n'))
-    assert [each.name for each in study.maps] == list(bundled_maps())
+    assert [each.name for each in study.maps] == list(list_bundled_maps())
     assert study.seeds == (3,)
 
 

@@ -10,7 +10,7 @@ import pytest
 from driven_window import do, typed
 from touched_run import HALL, LLOYD, RAPF, RPF, all_told, viewer_of
 
-from robocov.mapfile import bundled_maps, load_map
+from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.viewer.session.clock import SPEEDS
 from robocov_app.viewer.session.scenario import MOST_ROBOTS
 
@@ -112,7 +112,7 @@ def test_robots_without_room_are_told_and_nothing_changes() -> None:
 def test_maps_are_turned_through_both_ways() -> None:
     viewer = viewer_of()
     typed(viewer, "map rooms")
-    names = list(bundled_maps())
+    names = list(list_bundled_maps())
     do(viewer, "map:next")
     assert viewer.map_name == names[names.index("rooms") + 1] and viewer.session.environment.name != HALL.name
     do(viewer, "map:previous")
@@ -131,9 +131,9 @@ def test_a_map_that_is_no_map_is_told_and_the_old_one_stays(tmp_path: Path) -> N
 
 def test_an_own_map_is_offered_beside_the_bundled_ones() -> None:
     viewer = viewer_of()
-    assert viewer.maps() == [*bundled_maps(), "hall"]
+    assert viewer.maps() == [*list_bundled_maps(), "hall"]
     typed(viewer, "map square")
-    assert viewer.maps() == list(bundled_maps())
+    assert viewer.maps() == list(list_bundled_maps())
 
 
 def test_a_saved_map_can_be_opened_and_has_what_was_drawn(tmp_path: Path) -> None:

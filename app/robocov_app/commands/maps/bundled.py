@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from robocov.mapfile import bundled_maps, load_map
+from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.render.density import density_kind
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.output import BOLD, print_table, tell
@@ -19,7 +19,7 @@ class Arguments(JsonOption):
 
 def command(options: Arguments) -> None:
     rows, cells = [], []
-    for name in bundled_maps():
+    for name in list_bundled_maps():
         environment = load_map(name)
         low_x, low_y, high_x, high_y = environment.region.bounds
         width, height, starts = high_x - low_x, high_y - low_y, list(environment.starts)

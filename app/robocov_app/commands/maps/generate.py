@@ -19,7 +19,7 @@ from robocov.errors import (
     require_number,
 )
 from robocov.files.writing import resolve_target
-from robocov.mapfile import bundled_maps, dump_map, load_map, save_map
+from robocov.mapfile import dump_map, list_bundled_maps, load_map, save_map
 from robocov.mapfile.check import check_map
 from robocov_app.runs.options import PlotOptions
 from robocov_app.terminal.output import echo, require_fresh, tell
@@ -155,16 +155,16 @@ def _require_map(path: Path) -> None:
 def jobs_of(options: Arguments) -> list[tuple[str, Callable[[], Environment]]]:
     """Return names of maps, and what makes them: of the seeds, or of a study of the paper."""
     if options.study is None:
-        from robocov.generator import generated_map
+        from robocov.generator import generate_map
 
         names = "kind", "obstacles", "area", "gap", "side", "width", "height"
         words = {name: getattr(options, name) for name in names}
         seeds = range(options.seed, options.seed + (options.count or 1))
         kind, digits = options.kind, len(str(seeds[-1]))
-        return [(f"{kind}-{seed:0{digits}}", partial(generated_map, seed, **words)) for seed in seeds]
+        return [(f"{kind}-{seed:0{digits}}", partial(generate_map, seed, **words)) for seed in seeds]
     from robocov_app.replication.plan import FULL, QUICK
     from robocov_app.replication.studies import claim_maps, convex_maps, generated_maps
 
     plan = FULL if options.study == "full" else QUICK
-    maps, bundled = (*claim_maps(plan), *generated_maps(plan.tuning), *convex_maps(plan)), bundled_maps()
+    maps, bundled = (*claim_maps(plan), *generated_maps(plan.tuning), *convex_maps(plan)), list_bundled_maps()
     return [(each.name, partial(replace, each.environment)) for each in maps if each.name not in bundled]

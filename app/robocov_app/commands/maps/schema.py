@@ -23,7 +23,7 @@ class Arguments(JsonOption):
 
 def command(options: Arguments) -> None:
     if options.of == "map":
-        from robocov.mapfile import map_schema as schema
+        from robocov.mapfile import build_map_schema as schema
     else:
         from robocov_app.viewer.session.file import session_schema as schema
     echo(json.dumps(schema(), indent=1))

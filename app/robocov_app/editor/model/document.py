@@ -14,7 +14,7 @@ from typing import Any, Literal, Self, TypeAlias
 from robocov.errors import MapError, OutputError, format_count, to_one_line
 from robocov.files.strictjson import read_bytes
 from robocov.files.writing import replace_file, resolve_target
-from robocov.mapfile import bundled_maps, load_map
+from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.editor.model.parser import parse_sketch, sketch_of
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch, draft_document, sketch_text
@@ -346,7 +346,7 @@ class Document:
 def is_bundled(path: Path) -> bool:
     """Return whether a file is one of the maps that come with robocov; what cannot be a file is none."""
     with suppress(OSError, ValueError, RuntimeError):
-        return path.resolve() in {each.resolve() for each in bundled_maps().values()}
+        return path.resolve() in {each.resolve() for each in list_bundled_maps().values()}
     return False
 
 

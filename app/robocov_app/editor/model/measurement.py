@@ -8,7 +8,7 @@ import shapely
 from shapely import LineString, MultiPolygon, Polygon
 
 from robocov.arrays import Array, IntArray
-from robocov.environment import SAGITTA, Gap, Point, gaps_narrower, narrowest_gap
+from robocov.environment import SAGITTA, Gap, Point, find_narrow_gaps, find_narrowest_gap
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.model.geometry import middle_of
 from robocov_app.editor.model.sketch import Item, Sketch
@@ -39,7 +39,7 @@ class Measurement:
 def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:
     """Measure a sketch for robots of a radius, m; a broken one as far as its free space can be made out."""
     found, free = examined(sketch, radius)
-    narrow = gaps_narrower(free, 2.0 * radius - _EXACTLY)
+    narrow = find_narrow_gaps(free, 2.0 * radius - _EXACTLY)
     reached, untouched = reach_of(free, radius)
     discs = [shapely.Point(_middle(gap)).buffer(gap.width / 2) for gap in narrow]
     marks = _polygons(shapely.union_all([*discs, untouched]) & free)
@@ -55,7 +55,7 @@ def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:
         free_area=float(free.area),
         components=tuple(float(part.area) for part in free.geoms),
         reached=tuple(float(part.area) for part in reached),
-        gap=narrow[0] if narrow else narrowest_gap(free),
+        gap=narrow[0] if narrow else find_narrowest_gap(free),
         impassable=MultiPolygon(marks),
         sealed=sealed,
         vertices=sum(len(ring) for owner in sketch.owners for _, ring, _ in sketch.rings_of(owner)),

@@ -335,7 +335,9 @@ def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
     for item in sound:
         if item.shape.path is None:
             continue
-        met, beyond = env.in_the_way(env.swept_area(item.shape.polygon, item.shape.path), standing, inside)
+        met, beyond = env.find_overlaps(
+            env.compute_swept_area(item.shape.polygon, item.shape.path), standing, inside
+        )
         names = [numbered_name(sketch, key) for key in met] + ([] if beyond is None else ["the boundary"])
         if names:
             where = shapely.union_all([*met.values(), beyond])

@@ -10,7 +10,7 @@ from typing import TypeAlias
 from PIL import Image, UnidentifiedImageError
 
 from robocov.errors import MapError
-from robocov.mapfile import bundled_maps, map_file
+from robocov.mapfile import list_bundled_maps, map_file
 from robocov.text import remove_controls
 from robocov_app.editor.edits.properties import underlaid
 from robocov_app.editor.model import require
@@ -92,7 +92,7 @@ class FileCommands:
 
     def ask_recent(self) -> None:
         names = [Option(path, "recent") for path in self.editor.recent if Path(path).exists()]
-        names += [Option(name, "comes with robocov; opens as a copy") for name in bundled_maps()]
+        names += [Option(name, "comes with robocov; opens as a copy") for name in list_bundled_maps()]
 
         def chosen(option: Option) -> None:
             self.editor.carry_out(lambda: self.open(map_file(option.text)))

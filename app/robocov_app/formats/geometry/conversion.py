@@ -679,7 +679,7 @@ def compare(foreign: ForeignMap, environment: Environment, report: ImportReport)
     before = before if before.is_valid else made_valid(before)
     everything = [before, after, environment.region.polygon, foreign.boundary or before]
     lost, opened = _changed(before, after, report.tolerance), _changed(after, before, report.tolerance)
-    gap = env.narrowest_gap(after) if report.vertices_kept <= _MOST_VERTICES else None
+    gap = env.find_narrowest_gap(after) if report.vertices_kept <= _MOST_VERTICES else None
     return Comparison(before, after, lost, opened, shapely.GeometryCollection(everything).convex_hull, gap)
 
 

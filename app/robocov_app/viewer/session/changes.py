@@ -12,7 +12,7 @@ from robocov.environment import Environment, Obstacle, Point
 from robocov.errors import MapError, ParameterError, RobocovError
 from robocov.mapfile import density_of, to_json
 from robocov.mapfile.models import DensityModel, ObstacleModel, plain
-from robocov.world.relocation import nearest_free
+from robocov.world.free_positions import find_free_position
 from robocov_app.viewer.session.map_edits import painted, with_replaced
 from robocov_app.viewer.session.pane import Continuation, Pane
 from robocov_app.viewer.session.scenario import MOST_ROBOTS, Law, Limits, Position, Scenario, read_as, refused
@@ -265,7 +265,7 @@ def _fitting(pane: Pane, number: int, point: Point) -> Point:
     rows = [row for row, each in enumerate(pane.numbers) if each != number]
     wrecks = {each: place for each, place in setup.failed.items() if each != number}
     solid, radius = replace(setup, failed=wrecks).solid, setup.limits.radius_of(number)
-    return nearest_free(solid, radius, simulation.positions[rows], point, simulation.team.radius[rows])
+    return find_free_position(solid, radius, simulation.positions[rows], point, simulation.team.radius[rows])
 
 
 def _with(pane: Pane, number: int, at: Point | None = None, failed: Point | None = None) -> Continuation:

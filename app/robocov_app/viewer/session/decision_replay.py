@@ -17,7 +17,7 @@ from robocov.observation.neighbours import Neighbours
 from robocov.sensor import RangeSensor
 from robocov.simulation import DEFAULT_DT
 from robocov.voronoi.weighted_cells import weighted_partition
-from robocov.world.solid import movers, solid_pieces
+from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
 from robocov_app.viewer.session.moments import PaneSetup, State
 
 
@@ -73,4 +73,4 @@ def _perception(setup: PaneSetup, dt: float) -> Perception | None:
 
 @lru_cache(maxsize=4)
 def sensor_in(environment: Environment) -> RangeSensor:
-    return RangeSensor(solid_pieces(environment), movers(environment))
+    return RangeSensor(build_solid_pieces(environment), build_movers(environment))

@@ -20,7 +20,7 @@ from robocov.environment import Environment
 from robocov.errors import MapError, Mistake, quote_json
 from robocov.files.strictjson import check_header, located, parse, read_bytes, refused
 from robocov.files.writing import replace_file
-from robocov.mapfile import bundled_maps, from_json, load_map, to_json
+from robocov.mapfile import from_json, list_bundled_maps, load_map, to_json
 from robocov_app.viewer.session import changes
 from robocov_app.viewer.session.changes import Change, Drag, Restart, Robot, Step
 from robocov_app.viewer.session.scenario import Coordinate, Text
@@ -290,7 +290,7 @@ class _Maps:
                 words = f"maps[{number}]: {str(error).removeprefix('map: ')}"
                 raise MapError.of(self.where, [Mistake(("maps", number), words)]) from None
         refuse = partial(_refuse, self.where, "maps", number)
-        if model.bundled not in bundled_maps():
+        if model.bundled not in list_bundled_maps():
             refuse("bundled", value=model.bundled, wanted="the name of a bundled map")
         found = load_map(model.bundled)
         if _digest(to_json(found)) != model.digest:
@@ -307,7 +307,7 @@ def _map_json(environment: Environment) -> dict[str, Any]:
 
 @cache
 def _bundled() -> dict[str, str]:
-    return {_digest(to_json(load_map(name))): name for name in bundled_maps()}
+    return {_digest(to_json(load_map(name))): name for name in list_bundled_maps()}
 
 
 def _digest(document: Mapping[str, Any]) -> str:

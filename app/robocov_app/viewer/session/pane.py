@@ -12,7 +12,7 @@ from robocov.controllers import remembers
 from robocov.errors import StartError
 from robocov.observation import Snapshot
 from robocov.simulation import Simulation
-from robocov.world.relocation import relocated
+from robocov.world.free_positions import relocate_robots
 from robocov_app.render.scene import Scene, Sensed
 from robocov_app.runs.spec import RunSpec
 from robocov_app.viewer.session.curves import Curve
@@ -104,7 +104,7 @@ class Pane:
         try:
             changed = make(positions=positions, velocities=velocities)
         except StartError:  # who does not fit comes to rest where it does
-            placed = relocated(environment.at(old.time), positions, team)
+            placed = relocate_robots(environment.at(old.time), positions, team)
             moved = np.hypot(*(placed - positions).T) > 1e-3
             changed = make(positions=placed, velocities=np.where(moved[:, None], 0.0, velocities))
         if old.inbox is not None and setup.numbers != self.numbers:

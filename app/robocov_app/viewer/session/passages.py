@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from robocov.arrays import Array
-from robocov.environment import Environment, Point, gaps_narrower
+from robocov.environment import Environment, Point, find_narrow_gaps
 
 
 def passage_words(
@@ -31,7 +31,7 @@ def passage_words(
         if area > radius * radius:
             words.append(f"{area:.1f} m² cut off")
     width = 2 * radius * (1 - 1e-6)  # what is just wide enough is wide enough
-    known = {gap.between for gap in gaps_narrower(before.free, width)}
-    new = [gap for gap in gaps_narrower(after.free, width) if gap.between not in known]
+    known = {gap.between for gap in find_narrow_gaps(before.free, width)}
+    new = [gap for gap in find_narrow_gaps(after.free, width) if gap.between not in known]
     words += [f"a gap of {100 * gap.width:.0f} cm, too narrow for a robot" for gap in new[:1]]
     return "; ".join(words)

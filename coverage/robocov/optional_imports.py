@@ -6,7 +6,7 @@ from typing import Any
 from robocov.errors import RobocovError
 
 
-def extra(module: str, name: str, where: str = "") -> Any:
+def import_optional(module: str, name: str, where: str = "") -> Any:
     """Return a module that the extra ``robocov[name]`` brings; raise RobocovError where it is missing."""
     try:
         return importlib.import_module(module)

@@ -12,7 +12,7 @@ from robocov.environment import CircleObstacle, Environment
 from robocov.errors import StartError
 from robocov.robots import Team
 from robocov.simulation import Simulation
-from robocov.world.relocation import relocated
+from robocov.world.free_positions import relocate_robots
 
 SQUARE = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
 EMPTY = Environment("empty", SQUARE)
@@ -32,7 +32,7 @@ def test_all_robots_fit_and_whoever_did_stays(kind, count, seed, robots, crowded
     rng = np.random.default_rng(seed)
     places = rng.uniform(0.0, 8.0, (robots, 2)) * (0.1 if crowded else 1.0) + (4.0 if crowded else 0.0)
     team = Team.homogeneous(robots, radius=0.05)
-    moved = relocated(environment, places, team)
+    moved = relocate_robots(environment, places, team)
     # the simulation takes them as they are
     Simulation(environment, Rapf(), moved, team)
     wall = shapely.distance(environment.free.boundary, shapely.points(places))
@@ -47,27 +47,27 @@ def test_a_robot_leaves_an_obstacle_by_the_shortest_way():
     team = Team.homogeneous(1, radius=0.1)
     for angle in np.linspace(0.0, 6.0, 7):
         along = np.array([np.cos(angle), np.sin(angle)])
-        (moved,) = relocated(where, (4.0 + 0.7 * along)[None], team)
+        (moved,) = relocate_robots(where, (4.0 + 0.7 * along)[None], team)
         np.testing.assert_allclose(moved, 4.0 + 1.1 * along, atol=0.03)
 
 
 def test_robots_in_one_place_make_room_for_each_other():
-    moved = relocated(EMPTY, np.full((12, 2), 4.0), Team.homogeneous(12, radius=0.2))
+    moved = relocate_robots(EMPTY, np.full((12, 2), 4.0), Team.homogeneous(12, radius=0.2))
     table = np.hypot(*(moved[:, None] - moved).transpose(2, 0, 1)) + 10.0 * np.eye(12)
     assert table.min() >= 0.4
     assert np.hypot(*(moved - 4.0).T).max() < 2.0
 
 
 def test_robots_outside_come_in():
-    moved = relocated(EMPTY, np.array([[-5.0, 4.0], [20.0, 20.0]]), Team.homogeneous(2))
+    moved = relocate_robots(EMPTY, np.array([[-5.0, 4.0], [20.0, 20.0]]), Team.homogeneous(2))
     np.testing.assert_allclose(moved, [[0.1, 4.0], [7.9, 7.9]], atol=0.01)
 
 
 def test_where_there_is_no_room_a_robot_is_named():
     with pytest.raises(StartError, match=r"robot 2 of radius 5 m fits nowhere in map 'empty'"):
-        relocated(EMPTY, np.ones((2, 2)), Team(**_radii([0.1, 5.0])))
+        relocate_robots(EMPTY, np.ones((2, 2)), Team(**_radii([0.1, 5.0])))
     with pytest.raises(StartError, match="have no room beside each other"):
-        relocated(EMPTY, np.full((40, 2), 4.0), Team.homogeneous(40, radius=1.0))
+        relocate_robots(EMPTY, np.full((40, 2), 4.0), Team.homogeneous(40, radius=1.0))
 
 
 def _radii(radii):

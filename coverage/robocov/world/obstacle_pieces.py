@@ -20,7 +20,7 @@ FRAME = 2.0
 """Thickness in metres of the wall that stands around the region."""
 
 
-def solid_pieces(environment: Environment) -> tuple[Array, ...]:
+def build_solid_pieces(environment: Environment) -> tuple[Array, ...]:
     """Return convex counter-clockwise polygons, (k, 2) m each, that tile all that is not free.
 
     That are obstacles that stand still, the outside of the boundary, and a `FRAME` around the region.
@@ -31,7 +31,9 @@ def solid_pieces(environment: Environment) -> tuple[Array, ...]:
     if pieces is None:
         low_x, low_y, high_x, high_y = environment.region.bounds
         frame = shapely.box(low_x - FRAME, low_y - FRAME, high_x + FRAME, high_y + FRAME)
-        pieces = vars(static)["_solid_pieces"] = convex_pieces(shapely.difference(frame, static.free))
+        pieces = vars(static)["_solid_pieces"] = split_into_convex_pieces(
+            shapely.difference(frame, static.free)
+        )
     return pieces
 
 
@@ -42,13 +44,15 @@ class Mover(NamedTuple):
     path: ObstaclePath
 
 
-def movers(environment: Environment) -> tuple[Mover, ...]:
+def build_movers(environment: Environment) -> tuple[Mover, ...]:
     """Return the obstacles that move."""
     moving = ((shape.polygon, shape.path) for shape in environment.obstacles)
-    return tuple(Mover(convex_pieces(polygon), path) for polygon, path in moving if path is not None)
+    return tuple(
+        Mover(split_into_convex_pieces(polygon), path) for polygon, path in moving if path is not None
+    )
 
 
-def convex_pieces(geometry: BaseGeometry) -> tuple[Array, ...]:
+def split_into_convex_pieces(geometry: BaseGeometry) -> tuple[Array, ...]:
     """Return convex counter-clockwise polygons, (k, 2) m each, that tile the polygons of `geometry`."""
     parts = shapely.get_parts(geometry)
     polygons = (part for part in parts if part.geom_type == "Polygon" and part.area > 0.0)

@@ -14,7 +14,7 @@ _GAP = 1e-3  # room in metres that is left beside what a robot is moved away fro
 _ROUNDS = 300  # after so many the robots that push each other are taken to have no room
 
 
-def relocated(environment: Environment, positions: Array, team: Team) -> Array:
+def relocate_robots(environment: Environment, positions: Array, team: Team) -> Array:
     """Return places, (n, 2) m, where all robots fit, near where they are; StartError where there is none."""
     places = np.array(positions, dtype=float)
     room = {radius: _room(environment, radius) for radius in np.unique(team.radius).tolist()}
@@ -43,7 +43,7 @@ def relocated(environment: Environment, positions: Array, team: Team) -> Array:
     raise StartError(f"{pair} have no room beside each other in map {environment.name!r}")
 
 
-def nearest_free(
+def find_free_position(
     environment: Environment, radius: float, others: Array, point: Point, radii: Array | None = None
 ) -> Point:
     """Return the place nearest to a point where a robot fits beside others, (n, 2) m, by default as large.
@@ -65,7 +65,7 @@ def nearest_free(
     return x, y
 
 
-def check_starts(
+def require_free_starts(
     environment: Environment, positions: Array, team: Team, slack: float, there: BoolArray | None = None
 ) -> None:
     """Raise StartError when a robot that is there is in a wall or another one by more than `slack` metres."""

@@ -5,16 +5,16 @@ import sys
 import pytest
 
 from robocov.errors import RobocovError
-from robocov.extras import extra
+from robocov.optional_imports import import_optional
 
 
 def test_a_module_that_is_there() -> None:
-    assert extra("json", "any") is sys.modules["json"]
+    assert import_optional("json", "any") is sys.modules["json"]
 
 
 def test_one_that_is_not_says_how_it_is_had() -> None:
     with pytest.raises(RobocovError) as caught:
-        extra("no_such_module", "frames")
+        import_optional("no_such_module", "frames")
     assert str(caught.value) == 'no_such_module is not installed: pip install "robocov[frames]"'
 
 
@@ -22,4 +22,4 @@ def test_one_that_misses_something_itself_is_not_said_to_be_missing(tmp_path, mo
     (tmp_path / "half_there.py").write_text("import nothing_of_that_name\n")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ModuleNotFoundError, match="nothing_of_that_name"):
-        extra("half_there", "frames")
+        import_optional("half_there", "frames")

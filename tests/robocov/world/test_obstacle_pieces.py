@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import Environment
-from robocov.mapfile import bundled_maps, load_map
-from robocov.world.solid import convex_pieces, solid_pieces
+from robocov.mapfile import list_bundled_maps, load_map
+from robocov.world.obstacle_pieces import build_solid_pieces, split_into_convex_pieces
 
 
 def is_convex(ring: np.ndarray) -> bool:
@@ -22,10 +22,10 @@ def engine_area(ring: np.ndarray) -> float:
     return float(pymunk.Poly(None, ring.tolist()).area)
 
 
-@pytest.mark.parametrize("name", sorted(bundled_maps()))
+@pytest.mark.parametrize("name", sorted(list_bundled_maps()))
 def test_the_engine_gets_exactly_what_is_not_free(name: str) -> None:
     environment = load_map(name).static  # what moves is no part of the walls
-    pieces = solid_pieces(environment)
+    pieces = build_solid_pieces(environment)
     frame = shapely.box(*shapely.union_all([shapely.Polygon(ring) for ring in pieces]).bounds)
     solid = shapely.union_all([shapely.Polygon(ring) for ring in pieces])
     expected = shapely.difference(frame, environment.free)
@@ -38,7 +38,7 @@ def test_the_engine_gets_exactly_what_is_not_free(name: str) -> None:
 
 def test_a_concave_polygon_is_not_filled() -> None:
     u_shape = shapely.Polygon([(0, 0), (6, 0), (6, 6), (4, 6), (4, 2), (2, 2), (2, 6), (0, 6)])
-    pieces = convex_pieces(u_shape)
+    pieces = split_into_convex_pieces(u_shape)
     assert engine_area(np.array(u_shape.exterior.coords)[:-1]) == pytest.approx(36.0)
     assert sum(map(engine_area, pieces)) == pytest.approx(u_shape.area) == pytest.approx(28.0)
     assert len(pieces) == 3, "an optimal decomposition of a U has three pieces"
@@ -50,13 +50,13 @@ def test_pieces_tile_unions_of_discs(discs: list[tuple[float, float, float]]) ->
     union = shapely.union_all(
         [shapely.Point(x, y).buffer(r, quad_segs=3) for x, y, r in discs], grid_size=1e-6
     )
-    pieces = convex_pieces(union)
+    pieces = split_into_convex_pieces(union)
     assert sum(shapely.Polygon(piece).area for piece in pieces) == pytest.approx(union.area, rel=1e-9)
     assert sum(map(engine_area, pieces)) == pytest.approx(union.area, rel=1e-6)
 
 
 def test_everything_outside_a_non_convex_boundary_is_solid(cluttered: Environment) -> None:
-    pieces = [shapely.Polygon(ring) for ring in solid_pieces(cluttered)]
+    pieces = [shapely.Polygon(ring) for ring in build_solid_pieces(cluttered)]
     outside = shapely.Point(2.0, 8.0)  # inside the hull, outside the L
     assert any(piece.contains(outside) for piece in pieces)
     assert not any(piece.contains(shapely.Point(7.0, 7.0)) for piece in pieces)
