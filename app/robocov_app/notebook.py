@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike
+from robocov.team import Team
 
 from robocov.controllers.gains import gain_values
 from robocov.cost import DEFAULT_LATTICE, CoverageResult
@@ -21,7 +22,6 @@ from robocov.errors import ParameterError, RobocovError, format_count, quote
 from robocov.mapfile import load_map, save_map
 from robocov.metrics import CostHistory, cost_history
 from robocov.record import Record
-from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov.text import escape_controls
 from robocov_app.figures.files import figure_png

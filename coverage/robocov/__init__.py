@@ -46,7 +46,7 @@ if TYPE_CHECKING:  # isort: off
     from robocov.observation.region import Region
     from robocov.optimum import Optimum, find_optimum
     from robocov.record import Record
-    from robocov.robots import Team, read_team
+    from robocov.team import Team, read_team
     from robocov.sensor import RangeSensor
     from robocov.simulation import Simulation, simulate_many
     from robocov.voronoi import VoronoiPartition, partition

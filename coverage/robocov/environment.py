@@ -17,13 +17,13 @@ from scipy.spatial import cKDTree
 from shapely import LineString, MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, IntArray, frozen
+from robocov.arrays import Array, IntArray, freeze
 from robocov.density import Density
 from robocov.density.base import masses_of_polygons
 from robocov.drawing import Drawable
 from robocov.errors import StartError, describe_unknown_name, format_count, is_number, require_type
 from robocov.observation.region import Region
-from robocov.robots import DEFAULT_RADIUS
+from robocov.team import DEFAULT_RADIUS
 
 Point: TypeAlias = tuple[float, float]
 Ring: TypeAlias = tuple[Point, ...]
@@ -265,8 +265,8 @@ class Environment(Drawable):
         parts = self.free.geoms
         if self.density is None or self.density.uniform:
             weight = 1.0 if self.density is None else self.density.highest
-            return frozen([part.area * weight for part in parts])
-        return frozen(masses_of_polygons(self.density, list(parts)))
+            return freeze([part.area * weight for part in parts])
+        return freeze(masses_of_polygons(self.density, list(parts)))
 
     def with_density(self, density: Density | None) -> Environment:
         """Return the same map with another density; what is derived from its geometry is kept."""

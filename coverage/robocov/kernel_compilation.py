@@ -33,8 +33,8 @@ from robocov.density import Density, Gaussian, Gaussians, Raster, WeightedArea, 
 from robocov.environment import Environment, PolygonObstacle
 from robocov.files.writing import replace_file
 from robocov.metrics import cost_history, summarise
-from robocov.robots import Team
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 Example: TypeAlias = Callable[[], None]
 

@@ -31,7 +31,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 
-from robocov.arrays import Array, IntArray, frozen
+from robocov.arrays import Array, IntArray, freeze
 from robocov.compiled import kernel
 from robocov.cost import CoverageCost
 from robocov.environment import GRID, Environment
@@ -40,7 +40,7 @@ from robocov.geodesic import BINS, seen_corners
 from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_visible
 from robocov.geodesic.walls import Walls
 from robocov.k_median import Beat
-from robocov.robots import DEFAULT_RADIUS
+from robocov.team import DEFAULT_RADIUS
 
 MIN_PRECISION = 1e-5
 """The best precision that may be asked for."""
@@ -126,7 +126,7 @@ def compute_lower_bound(
     mean, everywhere = max(best, 0.0) / dual.total, np.full(len(cost.points), np.nan)
     everywhere[dual.sites] = best_prices
     mass = float(environment.free_masses[dual.covered].sum())
-    return LowerBound(mean, mean * mass, dual.reached / dual.total, frozen(everywhere))
+    return LowerBound(mean, mean * mass, dual.reached / dual.total, freeze(everywhere))
 
 
 class _Known(NamedTuple):

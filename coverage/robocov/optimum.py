@@ -21,12 +21,12 @@ from scipy.spatial import cKDTree
 from shapely import MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, BoolArray, IntArray, frozen
+from robocov.arrays import Array, BoolArray, IntArray, freeze
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.environment import START_GAP, Environment
 from robocov.errors import ParameterError, is_number, quote, require_number
 from robocov.k_median import Beat, best_swaps, lloyd_iterations, seeded
-from robocov.robots import DEFAULT_RADIUS
+from robocov.team import DEFAULT_RADIUS
 
 MAX_ROBOTS = 500
 MAX_RESTARTS = 100_000
@@ -126,7 +126,7 @@ def find_optimum(
     tell(1.0)
     assert best is not None
     undescended, costs = map(frozen, zip(*outcomes, strict=True))
-    positions = frozen(best.positions[np.lexsort(best.positions.T[::-1])])
+    positions = freeze(best.positions[np.lexsort(best.positions.T[::-1])])
     cost_there = best.mean_distance, best.value, best.uncovered_area
     return Optimum(positions, *cost_there, costs, undescended, best_restart)
 

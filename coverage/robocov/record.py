@@ -38,7 +38,7 @@ from robocov.mapfile import from_json, to_json
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
 from robocov.optional_imports import import_optional
-from robocov.robots import MOST_ROBOTS, Team
+from robocov.team import MOST_ROBOTS, Team
 from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
 
@@ -245,7 +245,7 @@ class Record(Drawable):
     @property
     def by_time(self) -> bool:
         """Whether the law divided the region by the time to a place, and that differs from by distance."""
-        return self.gains.get("cells") == "time" and self.team.mixed_speeds
+        return self.gains.get("cells") == "time" and self.team.has_mixed_speeds
 
     def cells(self, k: int = -1) -> VoronoiPartition | WeightedCells:
         """Return the cells of the robots that worked at moment `k`, everybody heard; see `by_time`."""
@@ -441,7 +441,7 @@ class Recorder:
 
     def record(self, joined: tuple[Joined, ...] = ()) -> Record:
         """Return what was collected so far; `joined` are the robots that joined in the simulation."""
-        names = (*ARRAYS, TURNING) if self.team.turns.any() else ARRAYS
+        names = (*ARRAYS, TURNING) if self.team.is_unicycle.any() else ARRAYS
         columns = zip(*self._moments, strict=True) if self._moments else [()] * len(names)
         arrays: dict[str, Any] = {name: np.array(rows) for name, rows in zip(names, columns, strict=True)}
         law = str(self.name), to_one_line(self.controller.label), self._gains
@@ -465,7 +465,7 @@ def nearest_moments(time: Array, rate: float) -> IntArray:
 
 def _arrays_of(path: Path, team: Team) -> dict[str, Any]:
     """Return the arrays of a record of a team, which are checked."""
-    robots, names = len(team), (*ARRAYS, TURNING) if team.turns.any() else ARRAYS
+    robots, names = len(team), (*ARRAYS, TURNING) if team.is_unicycle.any() else ARRAYS
     with path.open("rb") as file:
         saved = read_arrays(file, str(path))
     for name in names:

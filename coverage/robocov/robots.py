@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray, frozen
+from robocov.arrays import Array, BoolArray, IntArray, freeze
 from robocov.errors import (
     InputError,
     ParameterError,
@@ -113,11 +113,11 @@ class Team:
     def __post_init__(self) -> None:
         size = np.atleast_1d(np.asarray(self.radius)).shape[0]
         for name, (low, high, infinite) in LIMITS.items():
-            values = frozen(
+            values = freeze(
                 np.atleast_1d(to_floats(f"team.{name}", getattr(self, name), "a number for each robot"))
             )
             if name in _OF_UNICYCLES and not len(values):
-                values = frozen(np.full(size, _OF_UNICYCLES[name]))
+                values = freeze(np.full(size, _OF_UNICYCLES[name]))
             if values.shape != (size,):
                 what = f"{values.shape} values, but one for each of {size} robots was wanted"
                 raise ParameterError(f"team.{name}: {what}")
@@ -267,7 +267,7 @@ def team_of_groups(
     robots = sum(map(len, parts))
     if robots > MOST_ROBOTS:
         raise InputError(f"{format_path(path)}: {robots} robots, but at most {MOST_ROBOTS} were wanted")
-    return Team.joined(parts)
+    return Team.concatenate(parts)
 
 
 def _group(group: object, path: tuple[str | int, ...], values: dict[str, Any]) -> Team:

@@ -42,8 +42,8 @@ from robocov.observation import (
 )
 from robocov.observation.neighbours import Neighbours
 from robocov.record import ARRAYS, Record, Recorder
-from robocov.robots import Team
 from robocov.sensor import RangeSensor
+from robocov.team import Team
 from robocov.world import MAX_PENETRATION, ChangingWorld, World
 from robocov.world.free_positions import require_free_starts
 from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
@@ -459,7 +459,7 @@ def simulate_many(
     together: dict[int, list[int]] = {}
     records: dict[int, Record] = {}
     by_itself = environment.moves or remembers(controller) or type(controller) not in CONTROLLERS.values()
-    by_itself = by_itself or (team is not None and bool(team.turns.any()))
+    by_itself = by_itself or (team is not None and bool(team.is_unicycle.any()))
     for run, (positions, under) in enumerate(zip(starts, each, strict=True)):
         if by_itself or len(positions) > _LARGEST_TEAM or not (under is None or under.ideal):
             simulation = Simulation(environment, controller, positions, team, dt, conditions=under)
@@ -470,7 +470,10 @@ def simulate_many(
         one = Team.homogeneous(size) if team is None else team
         for first in range(0, len(group), _AT_ONCE):
             runs = group[first : first + _AT_ONCE]
-            places, robots = np.concatenate([starts[run] for run in runs]), Team.joined([one] * len(runs))
+            places, robots = (
+                np.concatenate([starts[run] for run in runs]),
+                Team.concatenate([one] * len(runs)),
+            )
             simulation = Simulation(environment, controller, places, robots, dt, runs=len(runs))
             record = simulation.run(duration, start=start)
             for k, run in enumerate(runs):

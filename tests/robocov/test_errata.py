@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from robocov.team import Team
 from scipy.integrate import quad, solve_ivp
 from voronoi_cases import PENTAGON, REGIONS, names, seeds
 
 from robocov.environment import Environment
-from robocov.locational import Sensing, gradient
-from robocov.locational.best_points import best_points
-from robocov.robots import Team
+from robocov.locational_cost import Sensing, compute_gradients
+from robocov.locational_cost.best_points import find_best_points
 from robocov.voronoi import partition
 from robocov.world import World
 from robocov.world.obstacle_pieces import build_solid_pieces
@@ -101,7 +101,9 @@ def test_which_does_no_harm_and_the_rest_is_ours(seed: int, name: str, h: float)
     cells = partition(region.centroid[None], region)
     noise = 1e-9 / h
     assert second == pytest.approx(0.0, abs=noise)
-    assert gradient(cells.edges, p[None], Sensing(h))[0, 1] == pytest.approx(first, rel=1e-7, abs=noise)
+    assert compute_gradients(cells.edges, p[None], Sensing(h))[0, 1] == pytest.approx(
+        first, rel=1e-7, abs=noise
+    )
 
 
 # after (14): the optimum does not depend on h
@@ -114,7 +116,7 @@ def test_which_does_no_harm_and_the_rest_is_ours(seed: int, name: str, h: float)
 def test_the_optimum_depends_on_the_height(h: float, optimum: tuple[float, float]) -> None:
     """On a pentagon without symmetry, by an evaluation of (21) apart from ours, to four digits."""
     cells = partition(PENTAGON.centroid[None], PENTAGON)
-    assert best_points(cells, Sensing(h))[0] == pytest.approx(optimum, abs=6e-5)
+    assert find_best_points(cells, Sensing(h))[0] == pytest.approx(optimum, abs=6e-5)
 
 
 def test_it_goes_from_the_mean_logarithm_to_the_centroid() -> None:
@@ -129,11 +131,11 @@ def test_it_goes_from_the_mean_logarithm_to_the_centroid() -> None:
         with np.errstate(divide="ignore"):
             return float(np.log(np.where(toward > 0.0, room[:, None] / toward, np.inf).min(axis=0)).mean())
 
-    low = best_points(cells, Sensing(1e-9))[0]
+    low = find_best_points(cells, Sensing(1e-9))[0]
     for shift in 0.02 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [0.7, 0.7], [-0.7, -0.7], [0.7, -0.7]]):
         assert mean_logarithm(low + shift) < mean_logarithm(low)
     away = [
-        np.hypot(*(best_points(cells, Sensing(h))[0] - PENTAGON.centroid))
+        np.hypot(*(find_best_points(cells, Sensing(h))[0] - PENTAGON.centroid))
         for h in (1e-9, 0.3, 3.0, 30.0, 3e3)
     ]
     assert away == sorted(away, reverse=True)
@@ -146,6 +148,6 @@ def test_only_on_a_regular_cell_it_does_not(sides: int) -> None:
     turn = 2.0 * np.pi * np.arange(sides) / sides
     region = type(PENTAGON)(np.column_stack([np.cos(turn), np.sin(turn)]))
     for h in (1e-3, 0.5, 10.0):
-        assert best_points(partition(np.array([[0.2, 0.1]]), region), Sensing(h))[0] == pytest.approx(
+        assert find_best_points(partition(np.array([[0.2, 0.1]]), region), Sensing(h))[0] == pytest.approx(
             [0.0, 0.0], abs=1e-9
         )

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from robocov.team import Team
 
 from robocov import compiled
 from robocov.compiled import IS_COMPILER_ENABLED, Kernel, cache_folder, interpret_kernels, is_interpreting
@@ -21,7 +22,6 @@ from robocov.kernel_compilation import (
     compile_in_background,
     compile_kernels,
 )
-from robocov.robots import Team
 from robocov.simulation import Simulation
 
 ROOT = Path(__file__).parents[2]

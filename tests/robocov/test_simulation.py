@@ -14,6 +14,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robocov.team import Team
 
 import robocov as rc
 from robocov.conditions import Conditions
@@ -26,7 +27,6 @@ from robocov.mapfile import load_map
 from robocov.metrics import clearances, contacts
 from robocov.observation import Decision, Observations
 from robocov.record import ARRAYS, Record
-from robocov.robots import Team
 from robocov.simulation import Simulation
 
 CONTROLLERS = [Rapf(), Rapf(k_rep=1.0, k_att=3.0, attraction_limit=None), Rpf(), Lloyd()]

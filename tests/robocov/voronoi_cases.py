@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from robocov.locational import Performance, Sensing, SquaredDistance
+from robocov.locational_cost import Performance, Sensing, SquaredDistance
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition

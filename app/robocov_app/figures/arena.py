@@ -112,7 +112,7 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     if record.steering is not None:
         # where robots face, triangles at their discs
         radii, inches = dict(zip(there.tolist(), drawn, strict=True)), figure_of(axes).dpi_scale_trans
-        for robot in working[record.team.turns[working]].tolist():
+        for robot in working[record.team.is_unicycle[working]].tolist():
             heading, off = record.steering[-1, robot, 0], 1.25 * radii[robot] / 72.0
             shift = ScaledTranslation(off * np.cos(heading), off * np.sin(heading), inches)
             style = {"transform": axes.transData + shift, "zorder": 6, "clip_on": False, "ls": ""}

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
+from robocov.team import Team
 
 from robocov.arrays import Array, BoolArray
 from robocov.cost import CoverageCost, CoverageResult, TimeVaryingCost
@@ -17,7 +18,6 @@ from robocov.observation import Decision, Observations, Scanning, Snapshot
 from robocov.observation.neighbours import find_close_pairs
 from robocov.observation.region import Region
 from robocov.record import Record
-from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov_app.learning import task as tasks
 from robocov_app.learning.task import SEEDS, CoverageTask, Rows, Scenarios, changed_task, from_middle
@@ -106,7 +106,7 @@ class SharedSimulation:
     def begin(self, run: int, positions: Array) -> Simulation:
         task, count = self._task, self._count
         if self._simulation is None:  # the others follow
-            starts, team = np.tile(positions, (count, 1)), Team.joined([task.whole_team] * count)
+            starts, team = np.tile(positions, (count, 1)), Team.concatenate([task.whole_team] * count)
             learner = Learner.of(task)
             self._simulation = Simulation(self.environment, learner, starts, team, task.dt, runs=count)
         self._simulation.restart(run, positions)

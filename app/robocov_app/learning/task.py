@@ -9,6 +9,7 @@ from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from robocov.team import Team
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
@@ -27,7 +28,6 @@ from robocov.errors import (
 from robocov.mapfile import load_map
 from robocov.observation import MAX_RAYS, Observations, Scans
 from robocov.observation.region import Region
-from robocov.robots import Team
 from robocov.simulation import DEFAULT_DT, check_dt
 
 Action: TypeAlias = Literal["force", "velocity"]

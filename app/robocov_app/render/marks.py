@@ -83,7 +83,7 @@ def draw_robots(canvas: Canvas, scene: Scene) -> None:
             partial(sprites.nose, min(radius, sprites.LARGE), canvas.theme.ink, canvas.theme.background, turn)
             for radius, turn in zip(radii.tolist(), (turns % sprites.NOSE_TURNS).tolist(), strict=True)
         ]
-        unicycles = np.flatnonzero(scene.team.turns)
+        unicycles = np.flatnonzero(scene.team.is_unicycle)
         canvas.stamps(noses, centers[unicycles], unicycles)
     canvas.stamps(discs, centers, np.array(which, dtype=int))
 

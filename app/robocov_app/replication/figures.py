@@ -21,8 +21,8 @@ from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.errors import format_count
-from robocov.locational import Distance, Sensing, value
-from robocov.locational.best_points import best_points
+from robocov.locational_cost import Distance, Sensing, compute_locational_costs
+from robocov.locational_cost.best_points import find_best_points
 from robocov.metrics import CostHistory
 from robocov.observation.region import Region
 from robocov.record import Record
@@ -421,10 +421,12 @@ def best_at_heights(heights: Sequence[float]) -> list[AtHeight]:
     for height in (0.0, *heights, np.inf):
         place, missed = centroid, float("nan")
         if height < np.inf:
-            place = best_points(cell, Sensing(height or _LIMIT * size))[0]
+            place = find_best_points(cell, Sensing(height or _LIMIT * size))[0]
             if height > 0.0:
                 offsets = np.array([place, centroid])[:, None] - cell.generators
-                best, plain = (value(cell.edges, each, Sensing(height))[0] for each in offsets)
+                best, plain = (
+                    compute_locational_costs(cell.edges, each, Sensing(height))[0] for each in offsets
+                )
                 missed = float(1.0 - plain / best)
         x, y = place.tolist()
         rows.append(AtHeight(height, x, y, float(np.hypot(*(place - centroid))), missed))
@@ -437,7 +439,7 @@ def plot_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
     cell = _cell()
     path = best_at_heights(np.geomspace(_LOW, _HIGH, 240).tolist())
     marked = _apart(best_at_heights([n * 10.0**k for k in (-1, 0, 1) for n in (1, 2, 3, 5)]))
-    median = best_points(cell, Distance())[0]
+    median = find_best_points(cell, Distance())[0]
     page = Page(size, theme, scale)
     wide, high = size
     top, bottom = 44 * scale, 46 * scale

@@ -107,7 +107,7 @@ def embedded_run(run: ReplayRun, on: int, style: CurveStyle, rate: float, *, goa
     life = lives(record) if record.conditions is not None else []
     headings = {}
     if record.steering is not None:
-        angles = np.where(record.team.turns, record.steering[:, :, 0], np.nan)
+        angles = np.where(record.team.is_unicycle, record.steering[:, :, 0], np.nan)
         vectors = np.stack([np.cos(angles), np.sin(angles)], axis=2).reshape(len(record), -1)
         headings = {"headings": quantised(_between(record.time, vectors, times + begin), -1.0, 1.0)}
     return {

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from robocov.team import Team
+
 from robocov.arrays import Array
 from robocov.conditions import Conditions
 from robocov.controllers import Controller, make_controller
@@ -12,7 +14,6 @@ from robocov.controllers.gains import Value
 from robocov.controllers.user_modules import Source, provided
 from robocov.environment import Environment
 from robocov.record import Record, Recorder
-from robocov.robots import Team
 from robocov.simulation import DEFAULT_DT, Simulation, check_joins
 
 MOST_ROWS = 2e7  # largest record, in moments times robots: about 2 GB

@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias, TypeVar, cast, get_args
 
 import numpy as np
+from robocov.team import DEFAULT_RADIUS, KINEMATICS, TURNING_RATE, Team, team_of_groups
+from robocov.team import UNITS as TEAM_UNITS
 
 from robocov.arrays import Array
 from robocov.conditions import LIMITS, Conditions, Failure, Join, parsed_entry
@@ -32,8 +34,6 @@ from robocov.errors import (
     require_type,
 )
 from robocov.mapfile import to_json
-from robocov.robots import DEFAULT_RADIUS, KINEMATICS, TURNING_RATE, Team, team_of_groups
-from robocov.robots import UNITS as TEAM_UNITS
 from robocov.simulation import DEFAULT_DT, check_dt, check_joins
 from robocov_app.runs.spec import MOST_ROWS
 

@@ -4,9 +4,10 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from robocov.team import KINEMATICS, TRACK_PER_RADIUS, UNITS
+
 from robocov.controllers.gains import Option
 from robocov.errors import ParameterError, quote
-from robocov.robots import KINEMATICS, TRACK_PER_RADIUS, UNITS
 from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 
 SPAN = 30.0  # a slider reaches from so many times less than the default to so many times more

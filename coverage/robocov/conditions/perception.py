@@ -19,7 +19,7 @@ from robocov.conditions import LOSS, POSITION, SCANNING, SENSING, SOON, Conditio
 from robocov.conditions.random_streams import Draws
 from robocov.observation import Decision, Observations, Scans
 from robocov.observation.neighbours import Neighbours
-from robocov.robots import Team
+from robocov.team import Team
 
 NEVER = -1
 """The step at which something has not happened."""

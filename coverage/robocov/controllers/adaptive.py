@@ -14,7 +14,7 @@ from robocov.controllers.driving import approach, drive
 from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
-from robocov.robots import Team
+from robocov.team import Team
 from robocov.voronoi.sampled_cells import centroids, own_samples
 
 _SAMPLES = 40  # places along a side of the region at which densities are estimated

@@ -21,7 +21,7 @@ from robocov.observation.region import Region
 from robocov.planning.discovered import DiscoveredMap, Raster
 from robocov.planning.placement import OwnPlace, demand, own_place, team_places, viewpoint
 from robocov.planning.wayfinding import GridPlanner, Window
-from robocov.robots import Team
+from robocov.team import Team
 
 FINEST_CELL, MOST_CELLS = 0.05, 1_000_000  # side of a cell of the maps, m, larger in very large regions
 TEAM_NODES, GROUP_NODES, OWN_NODES = 1000, 500, 2500  # of lattices: for a team, for its group, for itself

@@ -11,7 +11,7 @@ from robocov.controllers.driving import approach, in_rows, last_returns, nearest
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations, Scanning
 from robocov.potential import separation
-from robocov.robots import Team
+from robocov.team import Team
 
 _ROUNDING = 1e-3  # metres over which the braking curve, vertical at the safe distance, is rounded
 _TOGETHER = 1e-9  # distance in metres at which robots in one place are taken to be

@@ -14,7 +14,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, describe_unknown_name, quote
 from robocov.observation import Decision, Observations, to_numbers
 from robocov.observation.region import Region
-from robocov.robots import Team
+from robocov.team import Team
 from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.delaunay import Mesh
 from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition

@@ -8,7 +8,7 @@ from enum import Enum
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray, frozen
+from robocov.arrays import Array, IntArray, freeze
 from robocov.compiled import kernel
 from robocov.controllers.base import Law, Memory
 from robocov.controllers.driving import approach, avoid, drive, last_returns, summed, with_nearest
@@ -57,12 +57,12 @@ class Climb:
         """
         climb = self
         if math.dist(here, self.place) > _STILL:
-            climb = replace(climb, place=frozen(here), since=time)
+            climb = replace(climb, place=freeze(here), since=time)
         if self.mode is Mode.BACK:
             trail = self.trail[:-1] if math.dist(here, self.trail[-1]) < _CRUMB else self.trail
             return replace(climb, trail=trail, mode=Mode.BACK if trail else Mode.GRADIENT)
         if self.trail and math.dist(here, self.trail[-1]) > _CRUMB:
-            climb = replace(climb, trail=(*self.trail, frozen(here)))
+            climb = replace(climb, trail=(*self.trail, freeze(here)))
         settled = time - climb.since >= _SETTLED
         if self.mode is Mode.BOOSTED:
             done = settled or time - self.began >= longest
@@ -74,7 +74,7 @@ class Climb:
         if self.boosts >= most:
             return replace(climb, trail=())
         begun = replace(climb, mode=Mode.BOOSTED, boosts=self.boosts + 1, since=time, began=time)
-        return replace(begun, best=added, trail=(frozen(here),))
+        return replace(begun, best=added, trail=(freeze(here),))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,7 +145,7 @@ class Boosting(Law):
         view = compute_view(seen, memory.view, self.scanning, reach)
         if gradient is None or step is None or seen.scans is not None:
             before = gradient
-            climbs = climbs or tuple(Climb(frozen(place), seen.time) for place in seen.positions)
+            climbs = climbs or tuple(Climb(freeze(place), seen.time) for place in seen.positions)
             added, gradient, boosted = self.slopes(seen, view, reach)
             now = zip(climbs, seen.positions, added.tolist(), strict=True)
             often, longest = int(self.boosts), self.patience

@@ -21,7 +21,7 @@ from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.optimum import find_nearest_inside
-from robocov.robots import Team
+from robocov.team import Team
 from robocov.voronoi.sampled_cells import centroids, own_samples
 
 _ROUNDS = 12  # times that pieces of walls are halved which are no edges of the mesh yet

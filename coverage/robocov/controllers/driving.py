@@ -7,7 +7,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.observation import Observations
-from robocov.robots import Team
+from robocov.team import Team
 
 
 def approach(offset: Array, k_prop: float, speed: Array) -> Array:

@@ -20,7 +20,7 @@ from robocov.geodesic import Geodesics
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.optimum import find_nearest_inside
-from robocov.robots import Team
+from robocov.team import Team
 
 _SEGMENTS = 2  # edges of a quarter circle around corners of walls: they cut 8 % of the clearance off it
 _SIMPLER = 0.005  # metres by which the walls of the room may be simplified: every corner costs time

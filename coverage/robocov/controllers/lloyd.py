@@ -7,7 +7,7 @@ import numpy as np
 from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, drive
 from robocov.controllers.gains import choice, gain, response_time_gain
-from robocov.locational.best_points import HEIGHT, MEANING, TARGETS, targets
+from robocov.locational_cost.best_points import HEIGHT_HELP, TARGET_HELP, TARGETS, find_targets
 from robocov.observation import Decision, Observations
 from robocov.voronoi import disc_limited, disc_polygons
 
@@ -30,12 +30,12 @@ class Lloyd(Law):
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()
     cells: str = choice_of_cells()
-    target: str = choice("centroid", TARGETS, MEANING)
-    height: float = gain(1.0, "m", HEIGHT, low=1e-6)
+    target: str = choice("centroid", TARGETS, TARGET_HELP)
+    height: float = gain(1.0, "m", HEIGHT_HELP, low=1e-6)
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
         cells = cells_seen(seen, self.cells, memory.triangulation)
-        goals = targets(cells, seen.density, self.target, self.height)
+        goals = find_targets(cells, seen.density, self.target, self.height)
         wanted = approach(goals - seen.positions, self.k_prop, memory.team.max_speed)
         forces = drive(wanted, seen, memory.team, self.response_time)
         memory = replace(memory, triangulation=cells.triangulation)

@@ -11,7 +11,7 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.observation import Observations
-from robocov.robots import Team
+from robocov.team import Team
 
 _MEMORY = 2.0  # s, over which fixes are averaged
 _OUTLIER = 6.0  # standard deviations by which a fix is off where the robot was carried away

@@ -8,12 +8,12 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
 from robocov.controllers.driving import avoid, drive, last_returns, summed, with_nearest
 from robocov.controllers.gains import choice, gain, response_time_gain
-from robocov.locational.best_points import HEIGHT, MEANING, TARGETS, targets
+from robocov.locational_cost.best_points import HEIGHT_HELP, TARGET_HELP, TARGETS, find_targets
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.neighbours import NO_INDICES
 from robocov.observation.region import Region
 from robocov.potential import CONTACT_DISTANCE, potential_forces, separation
-from robocov.robots import Team
+from robocov.team import Team
 from robocov.voronoi.delaunay import Mesh
 
 _TOGETHER = 1e-9  # metres at which robots in one place are taken to be
@@ -97,15 +97,15 @@ class Rapf(Law):
         2.0, "N", "cap of the attraction; null is the paper's formula", low=1e-6, optional=True
     )
     cells: str = choice_of_cells()
-    target: str = choice("centroid", TARGETS, MEANING)
-    height: float = gain(1.0, "m", HEIGHT, low=1e-6)
+    target: str = choice("centroid", TARGETS, TARGET_HELP)
+    height: float = gain(1.0, "m", HEIGHT_HELP, low=1e-6)
 
     def begin(self, region: Region, team: Team) -> None:
         """Nothing is remembered yet; later, the triangulation from which the next cells start."""
 
     def decide(self, seen: Observations, memory: Mesh | None) -> Decision:
         cells = cells_seen(seen, self.cells, memory)
-        goals = targets(cells, seen.density, self.target, self.height)
+        goals = find_targets(cells, seen.density, self.target, self.height)
         gains = self.k_rep, self.rho_0, self.k_att, self.attraction_limit
         forces, attraction, robots, obstacle = _potential_forces(seen, goals, *gains)
         terms = {"attraction": attraction, "repulsion_robots": robots, "repulsion_obstacle": obstacle}

@@ -8,7 +8,7 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 from robocov.controllers.driving import approach, avoid, drive, neighbour_offsets, with_nearest
 from robocov.observation import Observations
-from robocov.robots import Team
+from robocov.team import Team
 
 _TURN = 0.2  # metres from a way-point at which it counts as reached
 _BRAKING = 0.4  # part of the acceleration that is counted on: less than half, for the lag of the drive

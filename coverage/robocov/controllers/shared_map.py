@@ -25,7 +25,7 @@ from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.planning.discovered import DiscoveredMap, Raster
 from robocov.planning.wayfinding import GridPlanner, Window
-from robocov.robots import Team
+from robocov.team import Team
 
 FINEST_CELL, MOST_CELLS = 0.05, 1_000_000  # side of a cell of the maps, m, larger in very large regions
 

@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, ComplexArray, frozen
+from robocov.arrays import Array, ComplexArray, freeze
 from robocov.compiled import kernel
 from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, avoid, drive, last_returns, with_nearest
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations, Scanning, compute_headings
-from robocov.robots import Team
+from robocov.team import Team
 
 _GRAIN = 0.1  # side in metres of the squares in which a robot remembers what it has met
 _EAGERNESS = 4.0  # speed in 1/s with which the distance to what is close may fall to the clearance
@@ -65,7 +65,7 @@ class Bug:
         done = math.dist(position, self.aim) < _ARRIVED
         if self.mode is Mode.PROJECTED:
             if self.resting is None and math.dist(position, self.way) < _ARRIVED:
-                return replace(self, resting=frozen(goal))
+                return replace(self, resting=freeze(goal))
             done = done or (self.resting is not None and math.dist(goal, self.resting) > moved * self.tries)
         return Bug(Mode.GOAL, self.turn, self.way, tries=self.tries) if done else self
 
@@ -202,7 +202,7 @@ class Look:
 
     def _off(self, bug: Bug, mode: Mode, way: Array, passing: bool = False) -> Bug:
         """Return the bug on its way through free space."""
-        return replace(bug, mode=mode, way=frozen(way), passing=passing, entered=None, followed=0.0)
+        return replace(bug, mode=mode, way=freeze(way), passing=passing, entered=None, followed=0.0)
 
     def _in_view(self, place: Array) -> bool:
         """Return whether the robot can go straight to a place."""
@@ -234,7 +234,7 @@ class Look:
         if nearer:
             way = self.position + ends[turn].point
             return self._off(replace(bug, turn=turn), Mode.GOAL, way, passing=True)
-        here, goal = frozen(self.position), frozen(self.position + self.goal)
+        here, goal = freeze(self.position), freeze(self.position + self.goal)
         tries = bug.tries + (bug.aim is None)
         patience = np.inf if self.law.detour is None else self.law.detour * distance * _WANES**tries
         bug = replace(bug, mode=Mode.BOUNDARY, turn=turn, passing=True, aim=goal, tries=tries)
@@ -256,10 +256,10 @@ class Look:
         # of a closed contour all is in view
         end = ends[bug.turn].point if bug.turn in ends else np.zeros(2)
         best = self._best(bug, ends)
-        bug = replace(bug, way=frozen(self.position + end), best=best)
+        bug = replace(bug, way=freeze(self.position + end), best=best)
         if bug.mode is Mode.RETURN:
             lost = bug.followed > 3.0 * bug.patience
-            return self._at_best(replace(bug, best=frozen(self.position)) if lost else bug)
+            return self._at_best(replace(bug, best=freeze(self.position)) if lost else bug)
         # every ray where it is nearest to the goal
         along = np.clip((self.directions * self.goal).sum(axis=1), 0.0, self.free)
         left = np.hypot(*(self.goal - along[:, None] * self.directions).T)
@@ -284,7 +284,7 @@ class Look:
         places = self.free[rays, None] * self.directions[rays]
         known = np.zeros(2) if bug.best is None else bug.best - self.position
         places = np.vstack([known, places])
-        return frozen(self.position + places[np.hypot(*(self.goal - places).T).argmin()])
+        return freeze(self.position + places[np.hypot(*(self.goal - places).T).argmin()])
 
     def _at_best(self, bug: Bug) -> Bug:
         """Return the bug on the last piece of its way to the best point, when that is in view."""
@@ -293,7 +293,7 @@ class Look:
         far, free = math.hypot(*there), self._towards(there)
         # seen from here the boundary may be a little closer than it looked
         if far < _ARRIVED or free >= far - self.keep:
-            way = frozen(self.position + there * min(1.0, free / max(far, 1e-300)))
+            way = freeze(self.position + there * min(1.0, free / max(far, 1e-300)))
             return replace(bug, mode=Mode.PROJECTED, way=way, passing=False, entered=None, resting=None)
         return bug if bug.mode is Mode.RETURN else replace(bug, mode=Mode.RETURN)
 

@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from robocov.arrays import Array, BoolArray, IntArray, beginnings, frozen, weighted_mean
+from robocov.arrays import Array, BoolArray, IntArray, compute_weighted_mean, find_run_starts, freeze
 from robocov.cost.site_paths import GROUP, TILE, CornerViews, CostMap, Tiles, Work, corner_views, site_paths
 from robocov.density.base import means_over_squares
 from robocov.drawing import Drawable
@@ -195,7 +195,7 @@ class CoverageCost:
         beat = None if progress is None else partial(progress, 0.0)
         self.geodesics = geodesics = Geodesics(environment, beat) if geodesics is None else geodesics
         self._areas = np.array([part.area for part in environment.free.geoms])
-        self.corners = frozen(geodesics.corners)
+        self.corners = freeze(geodesics.corners)
         self.sites, tiles = _lattice_of(geodesics, self.lattice)
         self.points, self.cells, self.spacing = self.sites.points, self.sites.cells, self.sites.spacing
         rows, spans = geodesics.run_for_corners(partial(corner_views, geodesics.walls, tiles), progress)
@@ -218,7 +218,7 @@ class CoverageCost:
         density, self._masses = self.environment.density, self.environment.free_masses
         self._mass, self.weights = float(self._masses.sum()), None
         if density is not None and not density.uniform:
-            self.weights = frozen(means_over_squares(density, self.points, self.spacing))
+            self.weights = freeze(means_over_squares(density, self.points, self.spacing))
 
     def __call__(self, positions: Array, speeds: Array | None = None) -> CoverageResult:
         """Return the coverage cost of (n, 2) positions in metres.
@@ -281,8 +281,8 @@ class CoverageCost:
             reached, whose = reached[some], whose[some]
             weights = None if weights is None else weights[some]
             mass, uncovered = float(self._masses[covered].sum()), float(self._areas[~covered].sum())
-        mean = weighted_mean(reached, weights)
-        time = None if speeds is None else weighted_mean(reached / speeds[whose], weights)
+        mean = compute_weighted_mean(reached, weights)
+        time = None if speeds is None else compute_weighted_mean(reached / speeds[whose], weights)
         return CoverageResult(
             mean_distance=mean, value=(mean if time is None else time) * mass, uncovered_area=uncovered,
             distances=distances, owner=owner, first_corner=corner, last_corner=last_corner,
@@ -394,11 +394,11 @@ def _lattice_of(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     if not len(cells):
         raise ParameterError(f"lattice: {side}, but none of its sites is free; a finer one was wanted")
     cells.setflags(write=False)
-    sites = Sites(side, spacing, frozen(middles(cells)), cells)
+    sites = Sites(side, spacing, freeze(middles(cells)), cells)
 
     tile = compute_z_order(cells % side // TILE, cells // side // TILE)
     order = np.argsort(tile, kind="stable")
-    begin = beginnings(tile[order])
+    begin = find_run_starts(tile[order])
     slots = np.arange(TILE**2)
     empty = slots >= np.diff(begin, append=len(order))[:, None]
     chosen = order[np.where(empty, 0, slots) + begin[:, None]]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray, frozen
+from robocov.arrays import Array, IntArray, freeze
 from robocov.compiled import kernel
 from robocov.density.base import HEAVIEST, CellEdges, Density
 from robocov.errors import ParameterError, quote
@@ -40,7 +40,7 @@ class Raster(Density):
     interpolation: Interpolation = "bilinear"
 
     def __post_init__(self) -> None:
-        values = frozen(self.values)
+        values = freeze(self.values)
         shape = values.shape
         if values.ndim != 2 or not 1 <= min(shape) <= max(shape) <= FINEST:
             wanted = f"rows and columns, from 1 to {FINEST} each"

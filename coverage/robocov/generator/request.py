@@ -8,7 +8,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.environment import START_GAP, Ring
 from robocov.errors import require_number
-from robocov.robots import DEFAULT_RADIUS
+from robocov.team import DEFAULT_RADIUS
 
 LEAST_GAP = 0.21  # m; robots of the usual size pass it
 assert LEAST_GAP > 2.0 * DEFAULT_RADIUS * (1.0 + START_GAP)

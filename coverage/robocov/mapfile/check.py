@@ -27,7 +27,7 @@ from robocov.environment import (
 )
 from robocov.errors import JsonPath, MapError, Mistake, StartError, format_count, format_path, summarize_names
 from robocov.mapfile.models import LARGEST, SMALLEST
-from robocov.robots import DEFAULT_RADIUS
+from robocov.team import DEFAULT_RADIUS
 
 _FLAT = 1e-9
 """A ring whose area is below this part of its bounding box squared is a line."""

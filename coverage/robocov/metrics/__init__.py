@@ -67,7 +67,7 @@ def cost_history(
     require_type("cost", cost, CoverageCost, "a CoverageCost")
     moments = sample_moments(record, rate)
     rows = np.empty((len(moments), 3))
-    speeds = record.team.max_speed if record.team.mixed_speeds else None
+    speeds = record.team.max_speed if record.team.has_mixed_speeds else None
     times = None if speeds is None else np.full(len(moments), np.nan)
     momentary = TimeVaryingCost(cost)
     for row, k in enumerate(moments):

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from robocov.arrays import Array, BoolArray, frozen
+from robocov.arrays import Array, BoolArray, freeze
 from robocov.errors import InputError
 
 
@@ -43,13 +43,13 @@ class Region:
         offsets = np.einsum("ed,ed->e", normals, ring)
         # the way round being frozen
         vars(self).update(
-            vertices=frozen(ring),
-            edges=frozen(edges),
-            normals=frozen(normals),
-            offsets=frozen(offsets),
-            sides=frozen(np.column_stack([ring, normals, offsets])),
+            vertices=freeze(ring),
+            edges=freeze(edges),
+            normals=freeze(normals),
+            offsets=freeze(offsets),
+            sides=freeze(np.column_stack([ring, normals, offsets])),
             area=float(hull.area),
-            centroid=frozen(hull.centroid.coords[0]),
+            centroid=freeze(hull.centroid.coords[0]),
         )
 
     @property

@@ -11,7 +11,7 @@ from robocov.arrays import Array, BoolArray
 from robocov.conditions import Conditions
 from robocov.environment import Environment
 from robocov.errors import StartError
-from robocov.robots import Team
+from robocov.team import Team
 from robocov.world.free_positions import find_free_position
 from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
 from robocov.world.unicycles import initialize_steering

@@ -14,7 +14,7 @@ import math
 import pymunk
 
 from robocov.arrays import Array, IntArray
-from robocov.robots import Team
+from robocov.team import Team
 from robocov.world.bodies import WALLS_ONLY, BodyArrays, Obstacles, build_obstacle_space, build_robot
 from robocov.world.dynamics import compute_clip_factor
 

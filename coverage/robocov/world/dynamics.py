@@ -15,7 +15,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.compiled import kernel
-from robocov.robots import Team
+from robocov.team import Team
 
 
 class MotionResponse(NamedTuple):

@@ -8,7 +8,7 @@ from robocov.arrays import Array, BoolArray
 from robocov.environment import Environment, Point
 from robocov.errors import StartError
 from robocov.observation.neighbours import find_close_pairs
-from robocov.robots import Team
+from robocov.team import Team
 
 _GAP = 1e-3  # room in metres that is left beside what a robot is moved away from
 _ROUNDS = 300  # after so many the robots that push each other are taken to have no room

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, frozen
+from robocov.arrays import Array, freeze
 from robocov.environment import Environment, ObstaclePath
 
 Corner: TypeAlias = tuple[float, float]
@@ -56,7 +56,7 @@ def split_into_convex_pieces(geometry: BaseGeometry) -> tuple[Array, ...]:
     """Return convex counter-clockwise polygons, (k, 2) m each, that tile the polygons of `geometry`."""
     parts = shapely.get_parts(geometry)
     polygons = (part for part in parts if part.geom_type == "Polygon" and part.area > 0.0)
-    return tuple(frozen(loop) for polygon in polygons for loop in _merged(_triangles(polygon)))
+    return tuple(freeze(loop) for polygon in polygons for loop in _merged(_triangles(polygon)))
 
 
 def _triangles(polygon: BaseGeometry) -> list[Loop]:

@@ -36,9 +36,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, frozen
+from robocov.arrays import Array, BoolArray, freeze
 from robocov.compiled import kernel
-from robocov.robots import Team
+from robocov.team import Team
 from robocov.world.dynamics import MotionResponse, compute_clip_factor
 
 RESPONSE_TIME_S = 0.2
@@ -77,12 +77,12 @@ def initialize_steering(team: Team, velocities: Array, steering: Array | None) -
     (n, 2) array or None, rad and rad/s
         Read-only; None for a team without unicycles.
     """
-    if not team.turns.any():
+    if not team.is_unicycle.any():
         return None
     if steering is None:
         # atan2 from math, not numpy: its results are the same on every processor.
         steering = np.array([(math.atan2(vy, vx), 0.0) for vx, vy in velocities.tolist()])
-    return frozen(steering)
+    return freeze(steering)
 
 
 @kernel

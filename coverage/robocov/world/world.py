@@ -12,7 +12,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray
 from robocov.errors import ParameterError
 from robocov.observation.neighbours import find_close_pairs
-from robocov.robots import Team
+from robocov.team import Team
 from robocov.world.bodies import MAX_TEAMS_PER_SPACE, Obstacles, compute_mover_states
 from robocov.world.contacts import ContactSolver, FreeSpace
 from robocov.world.dynamics import MotionResponse, compute_net_forces, compute_response
@@ -108,7 +108,7 @@ class World:
         self.failed_robots = failed_robots
         self.working: BoolArray = np.ones(len(team), dtype=bool)
         self._obstacles = Obstacles(pieces, movers, failed_robots)
-        self._is_unicycle = team.turns
+        self._is_unicycle = team.is_unicycle
         self._max_team_speed = float(team.max_speed.max())
         self._min_radius = float(team.radius.min())
         self._runs = runs

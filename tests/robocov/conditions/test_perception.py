@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.conditions.perception import NEAREST, of_working
@@ -13,7 +14,6 @@ from robocov.controllers import Lloyd, Rapf
 from robocov.controllers.tangentbug import TangentBug
 from robocov.environment import CircleObstacle, Environment
 from robocov.observation import Decision
-from robocov.robots import Team
 from robocov.simulation import Simulation
 
 HALL = Environment("hall", ((0, 0), (10, 0), (10, 8), (0, 8)), (CircleObstacle((5.0, 4.0), 1.0),))

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from robocov.team import Team
 
 from robocov.arrays import Array
 from robocov.controllers import Adaptive, Lloyd
@@ -14,7 +15,6 @@ from robocov.density.base import CellEdges, Density
 from robocov.environment import Environment
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
-from robocov.robots import Team
 from robocov.simulation import Simulation
 
 SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))

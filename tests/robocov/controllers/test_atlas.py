@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from robocov.team import Team
 
 from robocov.conditions import Conditions, Failure
 from robocov.controllers import Atlas, AtlasShared, Rapf, atlas, information_of, make_controller
@@ -16,7 +17,6 @@ from robocov.errors import ParameterError
 from robocov.mapfile import load_map
 from robocov.metrics import clearances, contacts
 from robocov.planning.discovered import UNKNOWN
-from robocov.robots import Team
 from robocov.simulation import Simulation
 
 SQUARE = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robocov.team import Team
 from scipy.optimize import minimize
 
 from robocov.controllers import Barrier
@@ -17,7 +18,6 @@ from robocov.mapfile import load_map
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.robots import Team
 from robocov.simulation import Simulation
 
 SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))

@@ -5,6 +5,7 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
+from robocov.team import Team
 
 from robocov.controllers import Diffeomorphism, Lloyd
 from robocov.controllers.diffeomorphism import Chart
@@ -14,7 +15,6 @@ from robocov.errors import ParameterError
 from robocov.mapfile import load_map
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
-from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov.voronoi.sampled_cells import centroids, own_samples
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robocov.team import Team
 
 from robocov.controllers import (
     CONTROLLERS,
@@ -27,7 +28,6 @@ from robocov.mapfile import load_map
 from robocov.observation import Decision, Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.optimum import find_nearest_inside
-from robocov.robots import Team
 from robocov.simulation import Simulation
 
 SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from robocov.team import Team
 
 from robocov.arrays import Array
 from robocov.conditions import Conditions
@@ -17,7 +18,6 @@ from robocov.metrics import clearances, contacts
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.robots import Team
 from robocov.simulation import Simulation
 
 SQUARE = np.array([[-99.0, -99.0], [99.0, -99.0], [99.0, 99.0], [-99.0, 99.0]])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robocov.team import Team
 
 from robocov.controllers import Poduri, make_controller
 from robocov.environment import Environment
@@ -13,7 +14,6 @@ from robocov.errors import ParameterError
 from robocov.mapfile import load_map
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
-from robocov.robots import Team
 from robocov.simulation import Simulation
 
 HALL = Environment("hall", ((0, 0), (60, 0), (60, 60), (0, 60)))

@@ -5,6 +5,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robocov.team import Team
 
 from robocov.controllers import Lloyd, RangeLimited
 from robocov.density import Gaussian, Gaussians
@@ -12,7 +13,6 @@ from robocov.environment import Environment
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov.voronoi import disc_limited, disc_polygons, partition
 

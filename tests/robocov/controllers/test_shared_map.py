@@ -4,6 +4,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
+from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Rapf, information_of, make_controller
@@ -17,7 +18,6 @@ from robocov.observation import Observations, Scans
 from robocov.observation.neighbours import Neighbours
 from robocov.planning.discovered import FREE, UNKNOWN, WALL, DiscoveredMap, Raster
 from robocov.planning.wayfinding import GridPlanner, Window
-from robocov.robots import Team
 from robocov.simulation import Simulation
 
 SQUARE = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from robocov.team import Team
 
 from robocov.controllers import Lloyd, TangentBug
 from robocov.controllers.tangentbug import Mode, end_of_contour, free_distances
@@ -14,7 +15,6 @@ from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
 from robocov.metrics import settled_at
 from robocov.observation import compute_headings
-from robocov.robots import Team
 from robocov.simulation import Simulation
 
 SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))

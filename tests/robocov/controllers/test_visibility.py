@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robocov.team import Team
 
 from robocov.controllers import Boosting, Visibility
 from robocov.controllers.boosting import Climb, Mode, undetected
@@ -17,7 +18,6 @@ from robocov.observation import Observations, compute_headings
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.observation.scanned_view import View, compute_step_fractions, find_windows
-from robocov.robots import Team
 from robocov.simulation import Simulation
 
 ROOM = shapely.Polygon(

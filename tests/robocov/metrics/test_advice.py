@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from robocov.team import Team
 
 from robocov.controllers import Lloyd, Rapf
 from robocov.environment import Environment, PolygonObstacle
@@ -11,7 +12,6 @@ from robocov.mapfile import load_map
 from robocov.metrics import clearances
 from robocov.metrics.advice import advise, count_zigzags, find_trembling
 from robocov.record import Record
-from robocov.robots import Team
 from robocov.simulation import Simulation
 
 HALL = Environment("hall", ((0, 0), (6, 0), (6, 4), (0, 4)))

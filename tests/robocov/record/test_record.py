@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.controllers import Individually, Rapf, Rpf, gain_values, make_controller
@@ -19,7 +20,6 @@ from robocov.mapfile import from_json
 from robocov.metrics import sample_moments
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.record import ARRAYS, Record, Recorder
-from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov.voronoi.weighted_cells import weighted_partition
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from robocov.team import Team
 
 from robocov.errors import ParameterError
-from robocov.robots import Team
 
 
 def test_a_homogeneous_team_has_the_papers_limits() -> None:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robocov.team import Team, read_team, team_of_groups
 
 from robocov.errors import InputError, RobocovError
-from robocov.robots import Team, read_team, team_of_groups
 
 TEAM = """
 [[group]]
@@ -37,7 +37,7 @@ def test_groups_become_rows_in_their_order(tmp_path: Path) -> None:
     assert team.radius.tolist() == [0.1, 0.1, 0.2, 0.2, 0.2]
     assert team.communication_range.tolist() == [np.inf, np.inf, 4.0, 4.0, 4.0]
     assert team.mass.tolist() == [1.0] * 5
-    assert team.mixed_speeds
+    assert team.has_mixed_speeds
     assert not Team.homogeneous(3).mixed_speeds
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robocov.team import Team
 from voronoi_cases import (
     FAMILIES,
     PENTAGON,
@@ -30,7 +31,6 @@ from robocov.controllers import Individually, Lloyd, OwnView, Rapf
 from robocov.controllers.base import Controller
 from robocov.environment import Environment, PolygonObstacle
 from robocov.observation.region import Region
-from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.delaunay import Mesh, triangulated

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.controllers import Rapf
@@ -10,7 +11,6 @@ from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError, StartError
 from robocov.metrics import clearances, contacts, cost_history, summarise
 from robocov.record import Record
-from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov.world import ChangingWorld, World
 from robocov.world.obstacle_pieces import build_solid_pieces

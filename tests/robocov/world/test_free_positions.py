@@ -6,11 +6,11 @@ import shapely
 from drawn_maps import KINDS, drawn_map
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from robocov.team import Team
 
 from robocov.controllers import Rapf
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import StartError
-from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov.world.free_positions import relocate_robots
 

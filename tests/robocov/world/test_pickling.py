@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Rapf
 from robocov.environment import Environment, ObstaclePath, PolygonObstacle
-from robocov.robots import Team
 from robocov.simulation import Simulation
 
 WALL = PolygonObstacle(((4, 3), (6, 3), (6, 5), (4, 5)))

@@ -9,13 +9,13 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robocov.team import Team
 
 from robocov.conditions import Conditions, Failure, Join
 from robocov.controllers import Atlas, Barrier, Individually, OwnView, Rapf
 from robocov.environment import Environment
 from robocov.errors import ParameterError, StartError
 from robocov.mapfile import load_map
-from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov.world import World
 from robocov.world.obstacle_pieces import build_solid_pieces

@@ -7,10 +7,10 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robocov.team import Team
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError
-from robocov.robots import Team
 from robocov.world import MAX_PENETRATION, World
 from robocov.world.obstacle_pieces import build_solid_pieces
 
@@ -126,7 +126,7 @@ def test_a_pressed_crowd_neither_overlaps_nor_sinks_into_walls(
 
 def test_masses_whose_contacts_cannot_be_resolved_are_refused(empty: Environment) -> None:
     """The team itself is read all the same, as that of a record is."""
-    team = Team.joined([Team.homogeneous(1, mass=0.5), Team.homogeneous(1, mass=501.0)])
+    team = Team.concatenate([Team.homogeneous(1, mass=0.5), Team.homogeneous(1, mass=501.0)])
     message = r"team.mass: expected .* 1000 times as heavy .* got 0.5 to 501 kg"
     with pytest.raises(ParameterError, match=message):
         World(build_solid_pieces(empty), team, np.array([[2.0, 2.0], [2.0, 6.0]]))
@@ -265,7 +265,9 @@ def test_a_robot_on_a_spring_follows_the_hand_and_is_thrown() -> None:
 
 
 def test_a_robot_that_is_pushed_is_no_faster_than_its_limit(empty: Environment) -> None:
-    team = Team.joined([Team.homogeneous(1, max_speed=2.0, mass=50.0), Team.homogeneous(1, max_speed=0.5)])
+    team = Team.concatenate(
+        [Team.homogeneous(1, max_speed=2.0, mass=50.0), Team.homogeneous(1, max_speed=0.5)]
+    )
     pair = World(
         build_solid_pieces(empty),
         team,

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from robocov.team import Team
 
 from robocov.controllers.geodesic_lloyd import Plan
 from robocov.cost import CoverageCost
 from robocov.environment import DiscStart, Environment, WallObstacle
 from robocov.errors import InputError, ParameterError
-from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.oracle import Oracle, assigned

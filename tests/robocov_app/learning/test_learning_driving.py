@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from robocov.team import Team
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError
-from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov_app.learning.episode import Learner
 from robocov_app.learning.task import (

@@ -120,7 +120,7 @@ def test_who_fails_is_terminated_and_who_joins_appears(empty: Environment) -> No
 
 
 def test_spaces_of_unequal_robots(empty: Environment) -> None:
-    from robocov.robots import Team
+    from robocov.team import Team
 
     fast = Team(*(np.array(pair) for pair in ([0.1, 0.2], [1, 2], [1, 0.5], [2, 1], [2, 4], [3, 1], [9, 9])))
     env = made(empty, team=fast)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.controllers import Rapf
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.record import Record
-from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov_app.figures.runs import plot_trajectories
 from robocov_app.render import scene as module

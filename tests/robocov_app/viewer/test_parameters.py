@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from robocov.team import UNITS
 
 from robocov.controllers import Individually
 from robocov.controllers.gains import Gain, gain, gains_of
 from robocov.errors import ParameterError
-from robocov.robots import UNITS
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
 from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 

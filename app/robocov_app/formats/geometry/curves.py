@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import shapely
 
-from robocov.arrays import Array, IntArray, ranges
+from robocov.arrays import Array, IntArray, concatenate_ranges
 from robocov.environment import SAGITTA
 
 TOLERANCE = SAGITTA  # m between a curve and the line that stands for it at most: as of round obstacles
@@ -28,7 +28,7 @@ def beziers(control: Array, tolerance: float, most: int = MOST_POINTS) -> tuple[
     bend = np.hypot(*np.moveaxis(np.diff(control, 2, axis=1), 2, 0)).max(axis=1, initial=0.0)
     count = _counted(np.sqrt(0.75 * bend / tolerance), most)
     a, b, c, d = (control[:, k].repeat(count, axis=0) for k in range(4))
-    t = ((ranges(np.zeros_like(count), count) + 1) / count.repeat(count))[:, None]
+    t = ((concatenate_ranges(np.zeros_like(count), count) + 1) / count.repeat(count))[:, None]
     s = 1.0 - t
     points = s**3 * a + 3.0 * s**2 * t * b + 3.0 * s * t**2 * c + t**3 * d
     points[np.cumsum(count) - 1] = control[:, 3]
@@ -46,7 +46,7 @@ def arcs(
     step = 4.0 * np.arcsin(np.sqrt(np.minimum(0.5 * tolerance / np.maximum(radius, 1e-300), 0.5)))
     around = np.abs(sweep)
     count = _counted(np.maximum(around / step, _LEAST * around / math.tau), most)
-    part = (ranges(np.zeros_like(count), count) + 1) / count.repeat(count)
+    part = (concatenate_ranges(np.zeros_like(count), count) + 1) / count.repeat(count)
     angle = begin.repeat(count) + sweep.repeat(count) * part
     c, p, q = (vector.repeat(count, axis=0) for vector in (centre, u, v))
     return c + np.cos(angle)[:, None] * p + np.sin(angle)[:, None] * q, count

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import shapely
+from robocov.team import DEFAULT_RADIUS
 from scipy import ndimage
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, BoolArray, IntArray, ranges
+from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges
 from robocov.environment import Environment
 from robocov.errors import ParameterError, format_count
-from robocov.robots import DEFAULT_RADIUS
 from robocov_app.formats.base import ExportReport
 from robocov_app.formats.files import MAX_CELLS
 from robocov_app.formats.geometry.polygons import sides_of
@@ -75,7 +75,7 @@ class Grid:
         # each side crosses the lines from its lower end, that one too, to its upper end
         low = np.ceil(np.minimum(y0, y1)).astype(np.intp)
         count = np.ceil(np.maximum(y0, y1)).astype(np.intp) - low
-        line = ranges(low, count)
+        line = concatenate_ranges(low, count)
         side = np.arange(len(low)).repeat(count)
         slope = np.divide(x1 - x0, y1 - y0, out=np.zeros_like(x0), where=count > 0)
         return line, x0[side] + (line - y0[side]) * slope[side]

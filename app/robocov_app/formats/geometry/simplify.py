@@ -23,7 +23,7 @@ import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, BoolArray, IntArray, beginnings, ranges
+from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges, find_run_starts
 from robocov.errors import format_count
 from robocov_app.formats.geometry.vectorize import NECK
 
@@ -140,7 +140,7 @@ class Rings:
         # each ring from its first vertex that stays, round to that one again
         first = np.minimum.reduceat(np.where(stays, np.arange(len(stays)), len(stays)), begin)
         ring = np.arange(len(begin)).repeat(count + 1)
-        step = ranges(np.zeros_like(count), count + 1)
+        step = concatenate_ranges(np.zeros_like(count), count + 1)
         vertex = begin[ring] + (first[ring] - begin[ring] + step) % count[ring]
         inner = stays[vertex] & (step > 0) & (step < count[ring])
         # a vertex that stays ends one line and begins the next
@@ -149,7 +149,7 @@ class Rings:
         line[:-1] -= twice[:-1] == twice[1:]
         vertex = vertex[twice]
         # all of a line between its ends has one tolerance
-        second = vertex[beginnings(line) + 1]
+        second = vertex[find_run_starts(line) + 1]
         within = np.minimum(allowed[second], most[self.ring[second]])
         lines = shapely.linestrings(np.column_stack([self.points[vertex], vertex]), indices=line)
         simple = shapely.simplify(lines, within, preserve_topology=False)
@@ -378,7 +378,7 @@ class _Check:
             foot = start + np.clip(part, 0.0, 1.0)[:, None] * along
             distance = np.minimum(distance, np.hypot(*(points - foot).T))
         furthest = np.lexsort((-distance, self.side))
-        furthest = furthest[beginnings(self.side[furthest])]
+        furthest = furthest[find_run_starts(self.side[furthest])]
         far = np.zeros(len(distance), dtype=bool)
         far[furthest] = distance[furthest] > allowed[furthest] * (1 + 1e-9)
         far &= allowed > 0.0
@@ -455,7 +455,7 @@ class _Check:
         first, last = drawing.vertex, np.ceil(drawing.source[drawing.after]).astype(np.intp)
         begin, size = outline.begin[drawing.ring], outline.size[drawing.ring]
         count = (last - first - 1) % size + 2
-        at = begin.repeat(count) + (ranges(first - begin, count)) % size.repeat(count)
+        at = begin.repeat(count) + (concatenate_ranges(first - begin, count)) % size.repeat(count)
         runs = shapely.linestrings(outline.points[at], indices=np.arange(len(count)).repeat(count))
         closed = closed_gaps(drawing.ends, runs, parts, self.width, 3 * self.tolerance)
         if closed is None:
@@ -510,7 +510,7 @@ def _stairs(path: Rings, kept: IntArray, drawing: Rings) -> tuple[BoolArray, Arr
     # what lies between each vertex that stays and the next one, round the ring
     length = np.maximum((kept[drawing.after] - kept) % count - 1, 0)
     side = np.arange(len(kept)).repeat(length)
-    inside = first[side] + (ranges(kept + 1, length) - first[side]) % count[side]
+    inside = first[side] + (concatenate_ranges(kept + 1, length) - first[side]) % count[side]
     middle = path.source[inside] % 1.0 != 0.0
     side, inside = side[middle], inside[middle]
     number = np.bincount(side, minlength=len(kept))

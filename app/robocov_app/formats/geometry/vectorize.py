@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from shapely import MultiPolygon, Polygon
 
-from robocov.arrays import Array, BoolArray, IntArray, ranges
+from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges
 from robocov.environment import Point
 from robocov.errors import MapError
 from robocov_app.formats.base import ForeignMap, square_metres
@@ -156,9 +156,9 @@ def traced(free: BoolArray, where: str) -> MultiPolygon:
     # the rings of a part come together; the first of them has its lowest corner: it is the outer one
     rank = np.argsort(part, kind="stable")
     length = np.diff(begin, append=len(order))[rank]
-    vertex, ring = order[ranges(begin[rank], length)], np.arange(len(rank)).repeat(length)
+    vertex, ring = order[concatenate_ranges(begin[rank], length)], np.arange(len(rank)).repeat(length)
     # of a ring every other side is horizontal
-    leaves = (ranges(hole[rank], length) % 2 == 0)[:, None]
+    leaves = (concatenate_ranges(hole[rank], length) % 2 == 0)[:, None]
     beside = np.column_stack([column + np.where(west, -neck, neck), row])[vertex]
     above = np.column_stack([column, row + np.where(north, neck, -neck)])[vertex]
     points = np.stack([np.where(leaves, above, beside), np.where(leaves, beside, above)], axis=1)
@@ -191,7 +191,7 @@ def _corners(free: BoolArray, where: str) -> list[Any]:
         facts = (south_west ^ north_west, north_west ^ north_east, twins, north_east)
         found.append((column, row + low, *(each[corners] for each in facts)))
     column, row, west, north, twin, north_east = map(np.concatenate, zip(*found, strict=True))
-    second = ranges(np.zeros_like(row), 1 + twin) == 1
+    second = concatenate_ranges(np.zeros_like(row), 1 + twin) == 1
     column, row, west, north, twin, north_east = (
         each.repeat(1 + twin) for each in (column, row, west, north, twin, north_east)
     )

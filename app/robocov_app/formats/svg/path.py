@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array, ranges
+from robocov.arrays import Array, concatenate_ranges
 from robocov.errors import MapError
 from robocov_app.formats.colours import Colour, mix_with_white, read_paint
 from robocov_app.formats.geometry.curves import arcs, beziers
@@ -245,7 +245,7 @@ class _Pen:
         end = np.cumsum(count)
         all_points = vertices.repeat(count, axis=0)
         for index, points, _ in curves:
-            all_points[ranges(end[index] - count[index], count[index])] = points
+            all_points[concatenate_ranges(end[index] - count[index], count[index])] = points
         all_points[end - 1] = vertices
         parts = np.split(all_points, (end - count)[self._begins[1:]]) if self._begins else []
         return [(part, closed) for part, closed in zip(parts, self._closed, strict=True) if len(part) > 1]

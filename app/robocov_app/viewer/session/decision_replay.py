@@ -36,7 +36,7 @@ def replayed_snapshot(state: State, time: float, dt: float = DEFAULT_DT) -> Snap
     decision, recorded = _decision(seen, state), state.recorded
     if recorded is not None and not np.allclose(decision.forces, recorded.forces, rtol=1e-9, atol=1e-9):
         decision = recorded  # the controller is not what it was, or not loaded
-        if setup.law.gains.get("cells") == "time" and team.mixed_speeds:
+        if setup.law.gains.get("cells") == "time" and team.has_mixed_speeds:
             cells = weighted_partition(positions, team.max_speed, region, density=density)
             decision = replace(decision, cells=cells)
     return Snapshot(seen, decision, None if perception is None else positions)

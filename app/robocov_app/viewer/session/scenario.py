@@ -8,6 +8,7 @@ from typing import Annotated, Any, Self, TypeAlias
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, GetPydanticSchema, WrapSerializer
 from pydantic_core import PydanticCustomError, core_schema
+from robocov.team import TURNING_RATE, UNITS, Team
 
 from robocov.arrays import Array
 from robocov.conditions import Conditions
@@ -16,7 +17,6 @@ from robocov.controllers.base import Controller
 from robocov.controllers.gains import Gain, Option, Value, value_text
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, quote
-from robocov.robots import TURNING_RATE, UNITS, Team
 from robocov.simulation import DEFAULT_DT
 
 MOST_ROBOTS = 1000  # so many robots can be asked for in the window

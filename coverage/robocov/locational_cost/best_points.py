@@ -19,14 +19,14 @@ from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
 from robocov.density import Density
 from robocov.errors import ParameterError, describe_unknown_name
-from robocov.locational import Distance, Performance, Sensing, SquaredDistance, derivatives
+from robocov.locational_cost import Distance, Performance, Sensing, SquaredDistance, compute_derivatives
 from robocov.observation import Cells
 
 TARGETS = ("centroid", "sensing", "median")
 """The optima for f = r², (12); f = 1/(r²+h²), (14); and f = r, by which the coverage cost (22) counts."""
 
-MEANING = "what a robot heads for in its cell: the optimum for r², for 1/(r²+h²), or for r"
-HEIGHT = "h of (14), for the target sensing: how high the sensor is; what is much farther counts little"
+TARGET_HELP = "what a robot heads for in its cell: the optimum for r², for 1/(r²+h²), or for r"
+HEIGHT_HELP = "h of (14), for the target sensing: how high the sensor is; what is much farther counts little"
 
 _NEAR, _WEIGHED_NEAR = 1e-7, 1e-6  # a step so short, relative to the cell's size, is the last
 _ROUNDS, _WEIGHED_ROUNDS = 80, 30  # evaluations; most need 4, hairs below a low sensor some dozens
@@ -39,7 +39,7 @@ _LEAST, _MOST = 0.1, 0.5  # of a step that went too far, so much is tried next
 _ALONG, _OUTWARD = 16, 12  # nodes along an edge, and from the point to it
 
 
-def targets(cells: Cells, density: Density | None, target: str, height: float) -> Array:
+def find_targets(cells: Cells, density: Density | None, target: str, height: float) -> Array:
     """Return where each robot heads for, (n, 2) m: within its cell, if that is convex.
 
     Centroid and median count how far away places are, f = 1/(r²+h²) counts what is within a few h: in a cell
@@ -54,10 +54,10 @@ def targets(cells: Cells, density: Density | None, target: str, height: float) -
         return cells.centroid
     if target not in TARGETS:
         raise ParameterError(f"target: {describe_unknown_name('target', target, TARGETS)}")
-    return best_points(cells, Distance() if target == "median" else Sensing(height), density)
+    return find_best_points(cells, Distance() if target == "median" else Sensing(height), density)
 
 
-def best_points(cells: Cells, f: Performance, density: Density | None = None) -> Array:
+def find_best_points(cells: Cells, f: Performance, density: Density | None = None) -> Array:
     """Return the points where ∫ f(|q-p|) φ(q) dq over each cell, with that density, is best, (n, 2) m.
 
     With density 1, a convex cell's lies in it, and is its only optimum. Of a cell that is not convex, as
@@ -68,11 +68,11 @@ def best_points(cells: Cells, f: Performance, density: Density | None = None) ->
 
     >>> from robocov import Region, partition
     >>> triangle = Region(np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]]))
-    >>> best_points(partition(np.array([[1.0, 0.5]]), triangle), Distance()).round(4)
+    >>> find_best_points(partition(np.array([[1.0, 0.5]]), triangle), Distance()).round(4)
     array([[0.9733, 0.9733]])
     """
     points = cells.centroid - cells.generators
-    room, size, area = derivatives(cells.edges, points, SquaredDistance())[:, 5:].T
+    room, size, area = compute_derivatives(cells.edges, points, SquaredDistance())[:, 5:].T
     weighed = None if density is None or density.uniform else density
     if weighed is None:
         searching = (room > 0.0) | (area > _FLAT * np.square(size))
@@ -86,7 +86,7 @@ def best_points(cells: Cells, f: Performance, density: Density | None = None) ->
     for _ in range(rounds + 1):
         if not searching.any():
             break
-        slopes = derivatives(cells.edges, there, f)
+        slopes = compute_derivatives(cells.edges, there, f)
         if weighed is not None:
             slopes[:, :5] = _weighed_slopes(cells, weighed, f, size, there, searching)
         _advance(points, there, searching, state, slopes, sign, near)

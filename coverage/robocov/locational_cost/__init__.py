@@ -73,7 +73,7 @@ Performance: TypeAlias = SquaredDistance | Distance | Sensing
 """A function f of the distance, of which (4) is the integral over the cells."""
 
 
-def value(edges: CellEdges, points: Array, f: Performance) -> Array:
+def compute_locational_costs(edges: CellEdges, points: Array, f: Performance) -> Array:
     """Return the locational cost (4) of each cell: ∫ f(|q-p|) dq over it, (n,), with density 1.
 
     The points, p for each cell, (n, 2) m, are relative to the cells' generators: zeros are these themselves.
@@ -81,23 +81,23 @@ def value(edges: CellEdges, points: Array, f: Performance) -> Array:
     >>> from robocov import Region, partition
     >>> square = Region(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]))
     >>> cells = partition(np.array([[1.0, 1.0]]), square)
-    >>> value(cells.edges, np.zeros((1, 2)), SquaredDistance()).round(6)
+    >>> compute_locational_costs(cells.edges, np.zeros((1, 2)), SquaredDistance()).round(6)
     array([2.666667])
     """
     points = np.ascontiguousarray(points, dtype=np.float64)
     return _values(edges.start, edges.end, edges.cell, points, f.kind, f.height, _RULE)
 
 
-def gradient(edges: CellEdges, points: Array, f: Performance) -> Array:
+def compute_gradients(edges: CellEdges, points: Array, f: Performance) -> Array:
     """Return the gradient of `value` with respect to the points, (n, 2): equation (11) at the generators.
 
     As the cells move with their generators, this is also the gradient of the whole cost: what the boundary
     between two cells adds to one it takes from the other, (8)-(10).
     """
-    return derivatives(edges, points, f)[:, :2]
+    return compute_derivatives(edges, points, f)[:, :2]
 
 
-def derivatives(edges: CellEdges, points: Array, f: Performance) -> Array:
+def compute_derivatives(edges: CellEdges, points: Array, f: Performance) -> Array:
     """Return the derivatives of `value` by x, y, xx, xy and yy, and of each cell room, size and area, (n, 8).
 
     The room, m, is how far the point is inside its cell: negative outside, 0 in an empty cell; of a cell that

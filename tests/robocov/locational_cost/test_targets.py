@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from robocov.team import Team
 from voronoi_cases import PENTAGON, scattered
 
 from robocov.controllers import Lloyd, Rapf, make_controller
@@ -11,12 +12,11 @@ from robocov.cost import CoverageCost
 from robocov.density import Uniform
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
-from robocov.locational import Distance, Sensing, value
-from robocov.locational.best_points import TARGETS, best_points, targets
+from robocov.locational_cost import Distance, Sensing, compute_locational_costs
+from robocov.locational_cost.best_points import TARGETS, find_best_points, find_targets
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.robots import Team
 from robocov.simulation import Simulation
 from robocov.voronoi import partition
 
@@ -25,10 +25,14 @@ POINTS = scattered(PENTAGON, 9, np.random.default_rng(2))
 
 def test_each_word_is_an_optimum() -> None:
     cells = partition(POINTS, PENTAGON)
-    assert targets(cells, None, "centroid", 1.0) is cells.centroid
-    np.testing.assert_array_equal(targets(cells, None, "median", 1.0), best_points(cells, Distance()))
-    np.testing.assert_array_equal(targets(cells, None, "sensing", 0.4), best_points(cells, Sensing(0.4)))
-    found = [targets(cells, None, word, 0.4) for word in TARGETS]
+    assert find_targets(cells, None, "centroid", 1.0) is cells.centroid
+    np.testing.assert_array_equal(
+        find_targets(cells, None, "median", 1.0), find_best_points(cells, Distance())
+    )
+    np.testing.assert_array_equal(
+        find_targets(cells, None, "sensing", 0.4), find_best_points(cells, Sensing(0.4))
+    )
+    found = [find_targets(cells, None, word, 0.4) for word in TARGETS]
     assert min(np.abs(found[0] - found[1]).max(), np.abs(found[1] - found[2]).max()) > 1e-3
 
 
@@ -37,8 +41,8 @@ def test_a_density_that_is_the_same_everywhere_changes_nothing() -> None:
         cells = partition(POINTS, PENTAGON, density=density)
         for word in TARGETS:
             np.testing.assert_allclose(
-                targets(cells, density, word, 0.4),
-                targets(partition(POINTS, PENTAGON), None, word, 0.4),
+                find_targets(cells, density, word, 0.4),
+                find_targets(partition(POINTS, PENTAGON), None, word, 0.4),
                 atol=1e-9,
             )
 
@@ -46,9 +50,9 @@ def test_a_density_that_is_the_same_everywhere_changes_nothing() -> None:
 def test_other_words_are_refused() -> None:
     cells = partition(POINTS, PENTAGON)
     with pytest.raises(ParameterError, match="unknown target 'mediane': did you mean 'median'"):
-        targets(cells, None, "mediane", 1.0)
+        find_targets(cells, None, "mediane", 1.0)
     with pytest.raises(ParameterError, match="height: 0"):
-        targets(cells, None, "sensing", 0.0)
+        find_targets(cells, None, "sensing", 0.0)
 
 
 @pytest.mark.parametrize("law", ["rapf", "lloyd"])
@@ -58,7 +62,7 @@ def test_laws_head_for_their_target(law: str, target: str) -> None:
     seen = Observations(POINTS, np.zeros((n, 2)), Neighbours(n), np.full((n, 2), np.nan), PENTAGON)
     controller = make_controller(law, {"target": target, "height": 0.7})
     decision = controller.decide(seen, controller.begin(PENTAGON, Team.homogeneous(n)))
-    expected = targets(partition(POINTS, PENTAGON), None, target, 0.7)
+    expected = find_targets(partition(POINTS, PENTAGON), None, target, 0.7)
     assert decision.goals is not None
     np.testing.assert_allclose(decision.goals, expected, atol=1e-12)
     pull = decision.terms["attraction"]
@@ -73,7 +77,7 @@ def test_at_rest_a_team_is_where_its_targets_are(empty: Environment) -> None:
     for target in TARGETS:
         controller = make_controller("lloyd", {"target": target, "height": 0.5})
         last = Simulation(empty, controller, starts=starts, dt=1 / 30).run(12.0).positions[-1]
-        assert np.abs(last - targets(partition(last, empty.region), None, target, 0.5)).max() < 0.1
+        assert np.abs(last - find_targets(partition(last, empty.region), None, target, 0.5)).max() < 0.1
         ends.append(last)
     assert np.abs(ends[0] - ends[2]).max() > 1e-3
     assert np.abs(ends[0] - ends[1]).max() > 1e-3
@@ -87,7 +91,7 @@ def test_a_sensor_sees_more_from_its_own_target_and_without_walls_the_cost_is_th
         law = Lloyd(target=target, height=height)
         last = Simulation(box, law, starts=starts, dt=1 / 30).run(20.0).positions[-1]
         cells = partition(last, box.region)
-        seen.append(value(cells.edges, np.zeros((5, 2)), Sensing(height)).sum())
+        seen.append(compute_locational_costs(cells.edges, np.zeros((5, 2)), Sensing(height)).sum())
         costs.append(CoverageCost(box, 48)(last).mean_distance)
     assert 1.0002 < seen[1] / seen[0] < 1.01
     assert costs[1] / costs[0] == pytest.approx(1.0, abs=2e-3)
@@ -98,7 +102,7 @@ def test_a_wall_holds_a_robot_whose_goal_has_its_foot_on_it(held: str) -> None:
     """The targets are 1 m apart behind a wall that ends between them; either may be the one that is held."""
     corners = ((0.0, 0.0), (12.0, 0.0), (0.0, 6.0))
     whole = partition(np.array([[3.5, 0.5]]), Region(np.array(corners)))
-    goals = {word: targets(whole, None, word, 1.0)[0] for word in ("centroid", "sensing")}
+    goals = {word: find_targets(whole, None, word, 1.0)[0] for word in ("centroid", "sensing")}
     end = 3.5
     assert goals["sensing"][0] + 0.4 < end < goals["centroid"][0] - 0.4
     wall = WallObstacle(((end, 1.2), (8.0 if held == "centroid" else 0.8, 1.2)), 0.1)

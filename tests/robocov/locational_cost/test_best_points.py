@@ -10,8 +10,15 @@ from scipy.optimize import minimize, minimize_scalar
 from voronoi_cases import FAMILIES, PENTAGON, REGIONS, Family, families, names, performance, scattered, seeds
 
 from robocov.density.base import CellEdges
-from robocov.locational import Distance, Performance, Sensing, SquaredDistance, gradient, value
-from robocov.locational.best_points import _downhill, best_points
+from robocov.locational_cost import (
+    Distance,
+    Performance,
+    Sensing,
+    SquaredDistance,
+    compute_gradients,
+    compute_locational_costs,
+)
+from robocov.locational_cost.best_points import _downhill, find_best_points
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
@@ -28,7 +35,7 @@ def whole(ring: np.ndarray) -> VoronoiPartition:
 
 
 def best(ring: np.ndarray, f: Performance) -> np.ndarray:
-    return best_points(whole(ring), f)[0]
+    return find_best_points(whole(ring), f)[0]
 
 
 def samples(ring: np.ndarray, fine: int) -> tuple[np.ndarray, np.ndarray]:
@@ -69,7 +76,7 @@ def test_it_lies_in_its_cell_and_the_gradient_vanishes_there(
 ) -> None:
     region = REGIONS[name]
     cells = partition(family(region, n, np.random.default_rng(seed)), region)
-    points = best_points(cells, f)
+    points = find_best_points(cells, f)
     offsets = points - cells.generators
     edges, size = cells.edges, region.diameter
     along = edges.end - edges.start
@@ -80,8 +87,8 @@ def test_it_lies_in_its_cell_and_the_gradient_vanishes_there(
     # what the cell's parts pull by, and what is left of it, in cells that are more than a hair
     width = cells.mass / np.maximum(np.bincount(edges.cell, np.hypot(*along.T), len(points)), 1e-300)
     fair = width > 1e-5 * size
-    pull = np.abs(value(edges, offsets, f)) / np.maximum(width, 1e-300)
-    left = np.abs(gradient(edges, offsets, f)).max(axis=1)
+    pull = np.abs(compute_locational_costs(edges, offsets, f)) / np.maximum(width, 1e-300)
+    left = np.abs(compute_gradients(edges, offsets, f)).max(axis=1)
     assert (left[fair] <= 1e-9 * pull[fair]).all()
 
 
@@ -92,7 +99,7 @@ def test_no_point_of_the_cell_is_better(seed: int, name: str, f: Performance, n:
     rng = np.random.default_rng(seed)
     region = REGIONS[name]
     cells = partition(scattered(region, n, rng), region)
-    least = f.sign * value(cells.edges, best_points(cells, f) - cells.generators, f)
+    least = f.sign * compute_locational_costs(cells.edges, find_best_points(cells, f) - cells.generators, f)
     for _ in range(10):
         tried = np.array(
             [
@@ -101,7 +108,8 @@ def test_no_point_of_the_cell_is_better(seed: int, name: str, f: Performance, n:
             ]
         )
         assert (
-            f.sign * value(cells.edges, tried - cells.generators, f) >= least - 1e-12 * np.abs(least)
+            f.sign * compute_locational_costs(cells.edges, tried - cells.generators, f)
+            >= least - 1e-12 * np.abs(least)
         ).all()
 
 
@@ -114,7 +122,7 @@ def test_no_place_of_a_grid_over_the_cell_is_better_for_a_sensor(
     region = REGIONS[name]
     f = Sensing(10.0**height * region.diameter / 10.0)
     cells = partition(family(region, n, np.random.default_rng(seed)), region)
-    most = value(cells.edges, best_points(cells, f) - cells.generators, f)
+    most = compute_locational_costs(cells.edges, find_best_points(cells, f) - cells.generators, f)
     share = np.linspace(0.02, 0.98, 12)
     for k, ring in enumerate(cells.polygons):
         if len(ring) < 3 or cells.mass[k] < 1e-6 * region.area:
@@ -130,7 +138,10 @@ def test_no_place_of_a_grid_over_the_cell_is_better_for_a_sensor(
             np.zeros(own.sum(), dtype=int),
             cells.edges.beyond[own],
         )
-        there = [value(alone, (place - cells.generators[k])[None], f)[0] for place in places[inside]]
+        there = [
+            compute_locational_costs(alone, (place - cells.generators[k])[None], f)[0]
+            for place in places[inside]
+        ]
         assert max(there, default=0.0) <= most[k] * (1.0 + 1e-12)
 
 
@@ -195,26 +206,26 @@ def test_cells_without_area_and_empty_ones_keep_their_generators() -> None:
     cells = partition(points, square)
     assert (cells.mass == 0.0).any()
     for f in FUNCTIONS:
-        found = best_points(cells, f)
+        found = find_best_points(cells, f)
         np.testing.assert_array_equal(found[cells.mass == 0.0], points[cells.mass == 0.0])
     nowhere = partition(np.array([[90.0, 90.0], [-91.0, -91.0], [30.0, 3.0]]), square)
-    assert np.isfinite(best_points(nowhere, Distance())).all()
+    assert np.isfinite(find_best_points(nowhere, Distance())).all()
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda each: each.__name__)
 def test_the_worst_cells_end_in_time(family: Family, monkeypatch: pytest.MonkeyPatch) -> None:
     """Convergence is no accident of the number of rounds: half of them change nothing."""
-    import robocov.locational.best_points as module
+    import robocov.locational_cost.best_points as module
 
     for seed in range(3):
         rng = np.random.default_rng(seed)
         for region in REGIONS.values():
             cells = partition(family(region, 12, rng), region)
             for f in FUNCTIONS:
-                found = best_points(cells, f)
+                found = find_best_points(cells, f)
                 with monkeypatch.context() as patch:
                     patch.setattr(module, "_ROUNDS", module._ROUNDS // 2)
-                    early = best_points(cells, f)
+                    early = find_best_points(cells, f)
                 np.testing.assert_allclose(early, found, rtol=0, atol=1e-6 * region.diameter)
 
 
@@ -226,7 +237,7 @@ def test_a_cell_is_its_own_affair_to_the_last_bit() -> None:
     cells = partition(points, region, Neighbours(len(points)))
     edges = cells.edges
     for f in FUNCTIONS:
-        together = best_points(cells, f)
+        together = find_best_points(cells, f)
         for i in range(len(points)):
             own = edges.cell == i
             alone = CellEdges(
@@ -236,19 +247,19 @@ def test_a_cell_is_its_own_affair_to_the_last_bit() -> None:
             one = VoronoiPartition(
                 cells.generators[row], cells.mass[row], cells.centroid[row], _find_edges=lambda e=alone: e
             )
-            assert best_points(one, f)[0].tobytes() == together[i].tobytes()
+            assert find_best_points(one, f)[0].tobytes() == together[i].tobytes()
 
 
 def test_cells_that_are_not_convex_have_their_median_too() -> None:
     """Of robots of different speeds: a fast one's cell has a hole."""
     region = REGIONS["square"]
     cells = weighted_partition(np.array([[2.0, 3.0], [4.0, 3.0]]), np.array([1.0, 0.3]), region)
-    points = best_points(cells, Distance())
+    points = find_best_points(cells, Distance())
     edges = cells.edges
-    assert np.abs(gradient(edges, points - cells.generators, Distance())).max() < 1e-9
+    assert np.abs(compute_gradients(edges, points - cells.generators, Distance())).max() < 1e-9
     for shift in np.random.default_rng(0).normal(scale=0.3, size=(20, 2)):
-        moved = value(edges, points + shift - cells.generators, Distance())
-        assert (moved > value(edges, points - cells.generators, Distance())).all()
+        moved = compute_locational_costs(edges, points + shift - cells.generators, Distance())
+        assert (moved > compute_locational_costs(edges, points - cells.generators, Distance())).all()
 
 
 @settings(max_examples=200)
@@ -260,9 +271,9 @@ def test_it_is_found_from_anywhere_in_the_cell(seed: int, thin: float, height: f
     ring, centroid = cells.polygons[0], cells.centroid[0]
     start = rng.dirichlet(np.full(len(ring), 0.1)) @ ring
     f = Distance() if height is None else Sensing(10.0**height)
-    usual = best_points(cells, f)
+    usual = find_best_points(cells, f)
     cells.centroid = (start + 1e-4 * (centroid - start))[None]
-    found = best_points(cells, f)
+    found = find_best_points(cells, f)
     np.testing.assert_allclose(found, usual, rtol=0, atol=1e-7 * np.ptp(ring, axis=0).max())
 
 
@@ -278,4 +289,4 @@ def test_steps_go_down_by_the_sizes_of_the_eigenvalues(numbers: list[float]) -> 
 
 def test_the_squares_are_best_at_the_centroid() -> None:
     cells = partition(scattered(PENTAGON, 8, np.random.default_rng(5)), PENTAGON)
-    np.testing.assert_allclose(best_points(cells, SquaredDistance()), cells.centroid, atol=1e-12)
+    np.testing.assert_allclose(find_best_points(cells, SquaredDistance()), cells.centroid, atol=1e-12)

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 from voronoi_cases import performance
 
 from robocov.density import Gaussian, Gaussians, WeightedArea, WeightedPolygons
-from robocov.locational import Distance, Sensing
-from robocov.locational.best_points import best_points, targets
+from robocov.locational_cost import Distance, Sensing
+from robocov.locational_cost.best_points import find_best_points, find_targets
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.voronoi import partition
@@ -31,7 +31,7 @@ def test_sums_over_a_fine_lattice_find_nothing_better(density, within, f):
     """The slope there is nearly nothing of what all places pull, and no other place is better."""
     points, side = np.array([[2.5, 3.0], [6.5, 6.5]]), 500
     cells = partition(points, SQUARE, density=density)
-    for point, ring in zip(best_points(cells, f, density), cells.polygons, strict=True):
+    for point, ring in zip(find_best_points(cells, f, density), cells.polygons, strict=True):
         low, high = ring.min(axis=0), ring.max(axis=0)
         x, y = (low[k] + (np.arange(side) + 0.5) * (high[k] - low[k]) / side for k in (0, 1))
         places = np.column_stack([np.tile(x, side), np.repeat(y, side)])
@@ -54,9 +54,9 @@ def test_with_a_density_that_hardly_varies_it_is_the_closed_form(f):
     points = np.random.default_rng(2).uniform(0.5, 7.5, (12, 2))
     nearly = Gaussians((Gaussian((4.0, 4.0), 1e-9, sigma=2.0),), 1.0)
     cells = partition(points, SQUARE, density=nearly)
-    plain = best_points(partition(points, SQUARE), f)
+    plain = find_best_points(partition(points, SQUARE), f)
     within = 3e-2 if isinstance(f, Sensing) and f.height < 1.0 else 2e-3
-    assert_allclose(best_points(cells, f, nearly), plain, atol=within)
+    assert_allclose(find_best_points(cells, f, nearly), plain, atol=within)
 
 
 @pytest.mark.parametrize("target", ["median", "sensing"])
@@ -64,7 +64,7 @@ def test_with_a_density_that_hardly_varies_it_is_the_closed_form(f):
 def test_targets_lie_in_their_cells(density, target):
     points = np.random.default_rng(4).uniform(0.2, 7.8, (9, 2))
     cells = partition(points, SQUARE, density=density)
-    goals = targets(cells, density, target, 1.0)
+    goals = find_targets(cells, density, target, 1.0)
     for goal, ring in zip(goals, cells.polygons, strict=True):
         assert shapely.Polygon(ring).buffer(1e-6).contains(shapely.Point(goal))
 
@@ -73,7 +73,7 @@ def test_a_heavy_room_holds_the_median():
     room = WeightedArea(((6.0, 6.0), (8.0, 6.0), (8.0, 8.0), (6.0, 8.0)), 100.0)
     density = WeightedPolygons((room,))
     cells = partition(np.array([[2.0, 2.0]]), SQUARE, density=density)
-    x, y = best_points(cells, Distance(), density)[0]
+    x, y = find_best_points(cells, Distance(), density)[0]
     assert 6.0 < x < 8.0 and 6.0 < y < 8.0
 
 
@@ -81,7 +81,7 @@ def test_where_nothing_counts_the_centroid_stays():
     room = WeightedArea(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)), 1.0)
     density = WeightedPolygons((room,), 0.0)
     cells = partition(np.array([[1.0, 4.0], [7.0, 4.0]]), SQUARE, density=density)
-    found = best_points(cells, Distance(), density)
+    found = find_best_points(cells, Distance(), density)
     assert np.array_equal(found[1], cells.centroid[1])
     assert found[0] == pytest.approx([0.5, 0.5], abs=0.2)
 

@@ -14,14 +14,14 @@ from voronoi_cases import PENTAGON, REGIONS, names, performance, scattered, seed
 
 from robocov.density.base import CellEdges
 from robocov.errors import ParameterError
-from robocov.locational import (
+from robocov.locational_cost import (
     Distance,
     Performance,
     Sensing,
     SquaredDistance,
-    derivatives,
-    gradient,
-    value,
+    compute_derivatives,
+    compute_gradients,
+    compute_locational_costs,
 )
 from robocov.observation.region import Region
 from robocov.voronoi import partition
@@ -31,7 +31,7 @@ functions = st.sampled_from(FUNCTIONS)
 
 
 def hessian(edges: CellEdges, points: np.ndarray, f: Performance) -> np.ndarray:
-    return derivatives(edges, points, f)[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
+    return compute_derivatives(edges, points, f)[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
 
 
 def cell(ring: np.ndarray) -> CellEdges:
@@ -70,7 +70,7 @@ def quadrature(ring: np.ndarray, p: np.ndarray, f: Performance, tolerance: float
 @pytest.mark.parametrize("f", FUNCTIONS[:2] + FUNCTIONS[3:], ids=repr)
 @pytest.mark.parametrize("p", [(2.1, 1.7), (-1.0, 1.5), (6.0, -2.0)], ids=["inside", "corner", "outside"])
 def test_values_are_what_quadrature_finds(f: Performance, p: tuple[float, float]) -> None:
-    found = value(cell(PENTAGON.vertices), np.array([p]), f)[0]
+    found = compute_locational_costs(cell(PENTAGON.vertices), np.array([p]), f)[0]
     assert found == pytest.approx(quadrature(PENTAGON.vertices, np.array(p), f, 1e-8), rel=3e-8)
 
 
@@ -101,7 +101,9 @@ def test_sensing_is_a_sum_of_dilogarithms(seed: int, name: str, size: float) -> 
     rng = np.random.default_rng(seed)
     ring = REGIONS[name].vertices - REGIONS[name].centroid
     p, h = rng.normal(scale=3.0, size=2), 10.0**size
-    assert value(cell(ring), p[None], Sensing(h))[0] == pytest.approx(by_dilogarithms(ring, p, h), rel=1e-10)
+    assert compute_locational_costs(cell(ring), p[None], Sensing(h))[0] == pytest.approx(
+        by_dilogarithms(ring, p, h), rel=1e-10
+    )
 
 
 @pytest.mark.parametrize("h", [1e-9, 1e-4, 1.0, 1e4, 1e9])
@@ -118,7 +120,9 @@ def test_sensing_keeps_its_digits_at_every_height_and_in_every_width(h: float, w
     low = np.log(0.5 * min(1.0, h, width)) - 40.0
     points = [np.log(each) for each in (h, width) if np.log(each) > low and each < 0.5]
     expected, _ = quad(strip, low, np.log(0.5), points=points or None, limit=500, epsabs=0.0, epsrel=1e-12)
-    assert value(cell(ring), np.zeros((1, 2)), Sensing(h))[0] == pytest.approx(expected, rel=1e-11)
+    assert compute_locational_costs(cell(ring), np.zeros((1, 2)), Sensing(h))[0] == pytest.approx(
+        expected, rel=1e-11
+    )
 
 
 @settings(max_examples=120)
@@ -134,13 +138,20 @@ def test_gradient_and_hessian_are_finite_differences(seed: int, name: str, f: Pe
     if isinstance(f, Sensing) and f.height < 1.0:
         step = 1e-3 * f.height
     edges, ends = cell(ring), step * np.array([[1.0, 0.0], [0.0, 1.0]])
-    slope = [(value(edges, p + e, f) - value(edges, p - e, f))[0] / (2.0 * step) for e in ends]
-    bend = [(gradient(edges, p + e, f) - gradient(edges, p - e, f))[0] / (2.0 * step) for e in ends]
-    found = value(edges, p, f)[0]
+    slope = [
+        (compute_locational_costs(edges, p + e, f) - compute_locational_costs(edges, p - e, f))[0]
+        / (2.0 * step)
+        for e in ends
+    ]
+    bend = [
+        (compute_gradients(edges, p + e, f) - compute_gradients(edges, p - e, f))[0] / (2.0 * step)
+        for e in ends
+    ]
+    found = compute_locational_costs(edges, p, f)[0]
     size = min(region.diameter, getattr(f, "height", np.inf))
     noise = 1e-13 * found / step
-    steepest, sharpest = np.abs(gradient(edges, p, f)).max(), np.abs(hessian(edges, p, f)).max()
-    np.testing.assert_allclose(gradient(edges, p, f)[0], slope, rtol=0, atol=2e-5 * steepest + noise)
+    steepest, sharpest = np.abs(compute_gradients(edges, p, f)).max(), np.abs(hessian(edges, p, f)).max()
+    np.testing.assert_allclose(compute_gradients(edges, p, f)[0], slope, rtol=0, atol=2e-5 * steepest + noise)
     np.testing.assert_allclose(hessian(edges, p, f)[0], bend, rtol=0, atol=2e-5 * sharpest + noise / size)
 
 
@@ -156,20 +167,24 @@ def test_squares_give_mass_centroid_and_the_parallel_axis(seed: int, name: str, 
     size = region.diameter
     expected = cells.polar_moment_about_centroid + cells.mass * (lever**2).sum(axis=1)
     f = SquaredDistance()
-    np.testing.assert_allclose(value(cells.edges, points, f), expected, rtol=1e-9, atol=1e-12 * size**4)
+    np.testing.assert_allclose(
+        compute_locational_costs(cells.edges, points, f), expected, rtol=1e-9, atol=1e-12 * size**4
+    )
     slope = 2.0 * cells.mass[:, None] * lever
-    np.testing.assert_allclose(gradient(cells.edges, points, f), slope, rtol=1e-9, atol=1e-11 * size**3)
+    np.testing.assert_allclose(
+        compute_gradients(cells.edges, points, f), slope, rtol=1e-9, atol=1e-11 * size**3
+    )
     bend = 2.0 * cells.mass[:, None, None] * np.eye(2)
     np.testing.assert_allclose(hessian(cells.edges, points, f), bend, rtol=1e-9, atol=1e-12 * size**2)
     np.testing.assert_allclose(
-        derivatives(cells.edges, points, f)[:, 7], cells.mass, rtol=1e-9, atol=1e-12 * size**2
+        compute_derivatives(cells.edges, points, f)[:, 7], cells.mass, rtol=1e-9, atol=1e-12 * size**2
     )
 
 
 def cost(points: np.ndarray, borders: np.ndarray, region: Region, f: Performance) -> float:
     """Return (4) for robots at `points` that look after the Voronoi cells of `borders`."""
     cells = partition(borders, region)
-    return float(value(cells.edges, points - cells.generators, f).sum())
+    return float(compute_locational_costs(cells.edges, points - cells.generators, f).sum())
 
 
 @settings(max_examples=60)
@@ -200,7 +215,7 @@ def test_boundary_terms_cancel_and_leave_equation_11(seed: int, name: str, f: Pe
     if isinstance(f, Sensing):
         step = min(step, 1e-2 * f.height)
     edges = partition(points, region).edges
-    slopes = gradient(edges, np.zeros((n, 2)), f)
+    slopes = compute_gradients(edges, np.zeros((n, 2)), f)
     scale = np.abs(cost(points, points, region, f)) / np.sqrt(region.area)
     for i in range(min(n, 3)):
         for axis in range(2):
@@ -220,23 +235,25 @@ def test_far_from_the_origin_nothing_is_lost() -> None:
             partition(np.array([[1.0, 1.0]]) + shift, Region(PENTAGON.vertices + shift))
             for shift in (0.0, 2.0**20)
         )
-        here = value(near.edges, np.full((1, 2), 0.25), f)
-        np.testing.assert_allclose(value(far.edges, np.full((1, 2), 0.25), f), here, rtol=1e-9)
+        here = compute_locational_costs(near.edges, np.full((1, 2), 0.25), f)
+        np.testing.assert_allclose(
+            compute_locational_costs(far.edges, np.full((1, 2), 0.25), f), here, rtol=1e-9
+        )
 
 
 def test_an_edge_of_rounding_does_not_say_where_the_inside_is() -> None:
     corner = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0 + 2e-16, 1.0 - 2e-16], [0.0, 1.0]])
-    assert derivatives(cell(corner), np.full((1, 2), 0.4), Distance())[0, 5] == pytest.approx(0.4)
+    assert compute_derivatives(cell(corner), np.full((1, 2), 0.4), Distance())[0, 5] == pytest.approx(0.4)
 
 
 def test_cells_without_area_cost_nothing() -> None:
     flat = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 0.0]])
     for f in FUNCTIONS:
         for edges in (cell(flat), cell(np.zeros((3, 2)))):
-            assert value(edges, np.zeros((1, 2)), f)[0] == pytest.approx(0.0, abs=1e-15)
-            assert gradient(edges, np.zeros((1, 2)), f)[0] == pytest.approx([0.0, 0.0], abs=1e-12)
+            assert compute_locational_costs(edges, np.zeros((1, 2)), f)[0] == pytest.approx(0.0, abs=1e-15)
+            assert compute_gradients(edges, np.zeros((1, 2)), f)[0] == pytest.approx([0.0, 0.0], abs=1e-12)
         none = CellEdges(np.empty((0, 2)), np.empty((0, 2)), np.empty(0, dtype=int), np.empty(0, dtype=int))
-        assert value(none, np.zeros((2, 2)), f).tolist() == [0.0, 0.0]
+        assert compute_locational_costs(none, np.zeros((2, 2)), f).tolist() == [0.0, 0.0]
         assert hessian(none, np.zeros((2, 2)), f).shape == (2, 2, 2)
 
 
