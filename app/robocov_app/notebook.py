@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike
-from robocov.team import Team
 
 from robocov.controllers.gains import gain_values
 from robocov.cost import DEFAULT_LATTICE, CoverageResult
@@ -23,6 +22,7 @@ from robocov.mapfile import load_map, save_map
 from robocov.metrics import CostHistory, cost_history
 from robocov.record import Record
 from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov.text import escape_controls
 from robocov_app.figures.files import figure_png
 from robocov_app.render.camera import length_label, round_length

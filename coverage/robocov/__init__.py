@@ -46,9 +46,10 @@ if TYPE_CHECKING:  # isort: off
     from robocov.observation.region import Region
     from robocov.optimum import Optimum, find_optimum
     from robocov.record import Record
-    from robocov.team import Team, read_team
     from robocov.sensor import RangeSensor
     from robocov.simulation import Simulation, simulate_many
+    from robocov.team import Team
+    from robocov.team_files import read_team
     from robocov.voronoi import VoronoiPartition, partition
     from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
     from robocov.world import World
@@ -79,9 +80,10 @@ _NAMES = {
     "observation.region": "Region",
     "optimum": "Optimum find_optimum",
     "record": "Record",
-    "robots": "Team read_team",
     "sensor": "RangeSensor",
     "simulation": "Simulation simulate_many",
+    "team": "Team",
+    "team_files": "read_team",
     "voronoi": "VoronoiPartition partition",
     "voronoi.weighted_cells": "WeightedCells weighted_partition",
     "world": "World",

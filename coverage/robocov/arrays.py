@@ -1,4 +1,4 @@
-"""The array types that signatures use, and groups of entries in flat arrays."""
+"""Array types for signatures, and small functions on arrays."""
 
 from typing import TypeAlias
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
-"""Floating point data; the docstring beside it gives shape and unit."""
+"""Floating point data, whose shape and unit are documented where it is used."""
 
 IntArray: TypeAlias = NDArray[np.intp]
 """Indices."""
@@ -18,39 +18,105 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 """Masks."""
 
 
-def frozen(values: object) -> Array:
-    """Return `values` as a read-only C-contiguous float array (a copy)."""
+def freeze(values: object) -> Array:
+    """Copy values into a read-only, C-contiguous array of floats.
+
+    Parameters
+    ----------
+    values : array_like
+
+    Returns
+    -------
+    array
+    """
     array = np.array(values, dtype=np.float64, order="C")
     array.setflags(write=False)
     return array
 
 
-def beginnings(values: IntArray) -> IntArray:
-    """Return where runs of equal values begin, in an array of at least one.
+def compute_lengths(vectors: Array) -> Array:
+    """Compute the Euclidean lengths of plane vectors.
 
-    >>> beginnings(np.array([4, 4, 7, 4]))
+    Parameters
+    ----------
+    vectors : (..., 2) array
+
+    Returns
+    -------
+    (...) array
+        In the unit of the vectors.
+
+    Examples
+    --------
+    >>> compute_lengths(np.array([[3.0, 4.0], [0.0, 2.0]]))
+    array([5., 2.])
+    """
+    return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
+
+
+def find_run_starts(values: IntArray) -> IntArray:
+    """Find the indices at which runs of equal values start.
+
+    Parameters
+    ----------
+    values : (m,) int array
+        At least one value.
+
+    Returns
+    -------
+    (r,) int array
+
+    Examples
+    --------
+    >>> find_run_starts(np.array([4, 4, 7, 4]))
     array([0, 2, 3])
     """
     return np.append(0, np.flatnonzero(values[1:] != values[:-1]) + 1)
 
 
-def ranges(first: IntArray, count: IntArray) -> IntArray:
-    """Return the numbers from first[0] on, count[0] of them, then those from first[1] on, and so forth.
+def concatenate_ranges(starts: IntArray, counts: IntArray) -> IntArray:
+    """Concatenate ranges of consecutive integers.
 
-    >>> ranges(np.array([7, 2]), np.array([3, 2]))
+    Parameters
+    ----------
+    starts : (k,) int array
+        First number of each range.
+    counts : (k,) int array
+        Length of each range, at least 0.
+
+    Returns
+    -------
+    (sum of counts,) int array
+
+    Examples
+    --------
+    >>> concatenate_ranges(np.array([7, 2]), np.array([3, 2]))
     array([7, 8, 9, 2, 3])
     """
-    before = count.cumsum() - count
-    return np.asarray(np.arange(count.sum()) + (first - before).repeat(count))
+    offsets = counts.cumsum() - counts
+    return np.asarray(np.arange(counts.sum()) + (starts - offsets).repeat(counts))
 
 
-def weighted_mean(values: Array, weights: Array | None = None) -> float:
-    """Return the weighted mean of (m,) values, of none, or of none with a weight, nan.
+def compute_weighted_mean(values: Array, weights: Array | None = None) -> float:
+    """Compute the weighted mean of some values.
 
-    >>> weighted_mean(np.array([1.0, 4.0]), np.array([2.0, 1.0]))
+    Parameters
+    ----------
+    values : (m,) array
+    weights : (m,) array or None
+        At least 0. By default all values have the same weight.
+
+    Returns
+    -------
+    float
+        nan if there are no values, or if their total weight is 0.
+
+    Examples
+    --------
+    >>> compute_weighted_mean(np.array([1.0, 4.0]), np.array([2.0, 1.0]))
     2.0
     """
     if weights is None:
-        return float(values.sum()) / len(values) if len(values) else np.nan
+        return float(values.sum()) / len(values) if len(values) > 0 else np.nan
     total = float(weights.sum())
     return float((weights * values).sum()) / total if total > 0.0 else np.nan

@@ -172,7 +172,7 @@ def to_floats(
 
     try:
         return np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise kind(f"{name}: {quote(values)}, but {wanted} was wanted") from None
 
 

@@ -125,7 +125,7 @@ def find_optimum(
         outcomes.append(known[key])
     tell(1.0)
     assert best is not None
-    undescended, costs = map(frozen, zip(*outcomes, strict=True))
+    undescended, costs = map(freeze, zip(*outcomes, strict=True))
     positions = freeze(best.positions[np.lexsort(best.positions.T[::-1])])
     cost_there = best.mean_distance, best.value, best.uncovered_area
     return Optimum(positions, *cost_there, costs, undescended, best_restart)

@@ -38,7 +38,7 @@ from robocov.mapfile import from_json, to_json
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
 from robocov.optional_imports import import_optional
-from robocov.team import MOST_ROBOTS, Team
+from robocov.team import MAX_ROBOTS, Team
 from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
 
@@ -58,7 +58,7 @@ _LARGEST = {"time": 1e9, "positions": 1e7, "velocities": 1e300, "forces": 1e300,
 
 Seconds: TypeAlias = Annotated[float, Field(gt=0, le=1e6), wanted("a number above 0 (s)")]
 Time: TypeAlias = Annotated[float, Field(ge=0, le=1e9), wanted("a number from 0 (s)")]
-Number: TypeAlias = Annotated[int, Field(ge=1, le=MOST_ROBOTS), wanted("the number of a robot, from 1,")]
+Number: TypeAlias = Annotated[int, Field(ge=1, le=MAX_ROBOTS), wanted("the number of a robot, from 1,")]
 Key: TypeAlias = Annotated[str, Field(pattern=r"^[1-9]\d{0,8}$"), wanted("the number of a robot")]
 Point: TypeAlias = Annotated[list[float], Field(min_length=2, max_length=2), wanted("a point [x, y]")]
 Seed: TypeAlias = Annotated[int, Field(ge=0), wanted("a whole number from 0")]

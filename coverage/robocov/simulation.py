@@ -470,10 +470,8 @@ def simulate_many(
         one = Team.homogeneous(size) if team is None else team
         for first in range(0, len(group), _AT_ONCE):
             runs = group[first : first + _AT_ONCE]
-            places, robots = (
-                np.concatenate([starts[run] for run in runs]),
-                Team.concatenate([one] * len(runs)),
-            )
+            places = np.concatenate([starts[run] for run in runs])
+            robots = Team.concatenate([one] * len(runs))
             simulation = Simulation(environment, controller, places, robots, dt, runs=len(runs))
             record = simulation.run(duration, start=start)
             for k, run in enumerate(runs):

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from robocov.team import Team
 from scipy.integrate import quad, solve_ivp
 from voronoi_cases import PENTAGON, REGIONS, names, seeds
 
 from robocov.environment import Environment
 from robocov.locational_cost import Sensing, compute_gradients
 from robocov.locational_cost.best_points import find_best_points
+from robocov.team import Team
 from robocov.voronoi import partition
 from robocov.world import World
 from robocov.world.obstacle_pieces import build_solid_pieces

@@ -95,7 +95,7 @@ STILL = rc.Simulation(ROOMS, rc.Rapf(), ONE).run(0.0)
         (lambda: rc.Simulation(ROOMS, rc.Rapf(), ONE).run("a"), "duration: 'a' s, but a finite number"),
         (lambda: rc.CoverageCost(ROOMS, 4)([["a", 1]]), "positions: [['a', 1]], but [x, y] of each robot"),
         (lambda: rc.Rapf(krep=1), "rapf: unknown gain 'krep': did you mean 'k_rep'?"),
-        (lambda: rc.Team.homogeneous("a"), "robots: 'a', but a whole number of at least 1 was wanted"),
+        (lambda: rc.Team.homogeneous("a"), "robots: expected a whole number of at least 1, got 'a'"),
         (lambda: rc.Team.homogeneous(2, mass="a"), "team.mass: 'a', but a number was wanted"),
         (lambda: rc.load_map(3), "map: 3, but a path, or the name of a bundled map, was wanted"),
         (lambda: rc.Simulation(ROOMS, rc.Rapf, ONE), "controller: <class 'robocov.controllers.rep"),

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from robocov.team import Team
 
 from robocov import compiled
 from robocov.compiled import IS_COMPILER_ENABLED, Kernel, cache_folder, interpret_kernels, is_interpreting
@@ -23,6 +22,7 @@ from robocov.kernel_compilation import (
     compile_kernels,
 )
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 ROOT = Path(__file__).parents[2]
 PATIENCE_S = 120.0

@@ -14,7 +14,6 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 
 import robocov as rc
 from robocov.conditions import Conditions
@@ -28,6 +27,7 @@ from robocov.metrics import clearances, contacts
 from robocov.observation import Decision, Observations
 from robocov.record import ARRAYS, Record
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 CONTROLLERS = [Rapf(), Rapf(k_rep=1.0, k_att=3.0, attraction_limit=None), Rpf(), Lloyd()]
 

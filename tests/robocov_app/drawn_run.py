@@ -1,7 +1,6 @@
 """Maps and made-up runs for the tests of all that draws."""
 
 import numpy as np
-from robocov.team import Team
 
 from robocov.environment import (
     CircleObstacle,
@@ -14,6 +13,7 @@ from robocov.environment import (
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
 from robocov.record import Record
+from robocov.team import Team
 from robocov.voronoi import partition
 from robocov_app.render.scene import Scene
 

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 from hypothesis import strategies as st
-from robocov.team import DEFAULT_RADIUS
 
 from robocov.environment import (
     CircleObstacle,
@@ -14,6 +13,7 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
+from robocov.team import DEFAULT_RADIUS
 from robocov_app.editor.edits import boolean, clipboard, create, properties, transform, vertices
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.selection import Change, Edge, Selection, points_of

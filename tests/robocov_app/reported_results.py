@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 from drawn_run import ROOMS, SQUARE
-from robocov.team import Team
 
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.metrics import CostHistory, cost_history, summarise
 from robocov.record import Record
+from robocov.team import Team
 from robocov_app.report.results import FIGURES, Entry, Result
 from robocov_app.runs.run import Run, save_numbers
 from robocov_app.runs.saved import Saved

@@ -142,7 +142,7 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ("run rooms --robots 5000", "but 5000 were asked for"),
         ("run rooms --robots many", "--robots: 'many', but a whole number was wanted"),
         ("run rooms --start coridor", "did you mean 'corridor'?"),
-        ("run rooms --max-speed -1", "--max-speed: -1.0 m/s, but a number from"),
+        ("run rooms --max-speed -1", "--max-speed: expected a number from"),
         ("run rooms --fail 9@1", "--fail: robot 9, but one of 1 to 6 was wanted"),
         ("run rooms --message-rate -1", "--message-rate: -1.0"),
         ("run rooms --dt 0", "dt: 0.0 s"),

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
-from robocov.team import Team
 from scipy.optimize import linear_sum_assignment
 
 from robocov.arrays import Array, IntArray
@@ -25,6 +24,7 @@ from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.optimum import find_nearest_inside
+from robocov.team import Team
 
 _COARSE = 8  # lattice of the plan, which is asked for ways only
 

@@ -129,9 +129,8 @@ def _begin_lesson(window: Window, options: Arguments) -> None:
 
 
 def session_of(options: Arguments) -> Session:
-    from robocov.team import read_team
-
     from robocov.mapfile import load_map
+    from robocov.team_files import read_team
     from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
     from robocov_app.viewer.session.session import Session
 

@@ -8,13 +8,13 @@ from typing import Annotated, Any
 
 import numpy as np
 import tyro
-from robocov.team import DEFAULT_RADIUS
 
 from robocov.errors import InputError, ParameterError, format_count, require_number
 from robocov.files.writing import replace_file
 from robocov.lower_bound import MIN_PRECISION, LowerBound, compute_lower_bound
 from robocov.mapfile import load_map
 from robocov.optimum import MAX_RESTARTS, MAX_ROBOTS, find_optimum
+from robocov.team import DEFAULT_RADIUS
 from robocov_app.render.density import density_kind, density_lines, mean_label
 from robocov_app.runs.cost import PICTURE_LATTICE, built_cost, draw_distances
 from robocov_app.runs.options import PlotOptions

@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
-from robocov.team import Team
 
 from robocov.arrays import IntArray
 from robocov.environment import Environment
 from robocov.record import Record
+from robocov.team import Team
 from robocov_app.figures import arena
 from robocov_app.figures.curves import DISTANCE, TIME, WEIGHED, Curve, draw_curves, end_label
 from robocov_app.figures.files import plain_style

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
-from robocov.team import Team
 
 from robocov.arrays import Array, BoolArray
 from robocov.cost import CoverageCost, CoverageResult, TimeVaryingCost
@@ -19,6 +18,7 @@ from robocov.observation.neighbours import find_close_pairs
 from robocov.observation.region import Region
 from robocov.record import Record
 from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov_app.learning import task as tasks
 from robocov_app.learning.task import SEEDS, CoverageTask, Rows, Scenarios, changed_task, from_middle
 from robocov_app.runs.spec import RunSpec

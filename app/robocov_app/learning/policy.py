@@ -6,7 +6,6 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from robocov.team import Team
 
 from robocov.arrays import Array
 from robocov.controllers import informed
@@ -15,6 +14,7 @@ from robocov.controllers.gains import gain, validate_gains
 from robocov.errors import ParameterError, require_type
 from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.region import Region
+from robocov.team import Team
 from robocov_app.learning import task as tasks
 from robocov_app.learning.episode import Episode
 from robocov_app.learning.task import Action, ObservationLayout, actions_of, driving_forces

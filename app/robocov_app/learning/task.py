@@ -9,7 +9,6 @@ from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from robocov.team import Team
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
@@ -29,6 +28,7 @@ from robocov.mapfile import load_map
 from robocov.observation import MAX_RAYS, Observations, Scans
 from robocov.observation.region import Region
 from robocov.simulation import DEFAULT_DT, check_dt
+from robocov.team import Team
 
 Action: TypeAlias = Literal["force", "velocity"]
 """A force in N, or a velocity in m/s."""

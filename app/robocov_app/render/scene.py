@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 import shapely.affinity
-from robocov.team import Team
 
 from robocov.arrays import Array, IntArray
 from robocov.environment import Environment
 from robocov.observation import Snapshot
 from robocov.observation.neighbours import Neighbours
 from robocov.record import Record
+from robocov.team import Team
 from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
 from robocov_app.render.distance_field import Field, Fields

@@ -2,14 +2,13 @@
 
 from pathlib import Path
 
-from robocov.team import DEFAULT_RADIUS, Team
-
 from robocov.arrays import Array
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import format_count
 from robocov.geodesic import Geodesics
 from robocov.mapfile.check import MANY_VERTICES, vertex_count
+from robocov.team import DEFAULT_RADIUS, Team
 from robocov_app.terminal.progress import late_progress
 
 PICTURE_LATTICE = 256  # coarsest lattice for maps of distances: its cells are to be narrower than walls

@@ -15,10 +15,9 @@ from robocov_app.terminal.arguments import parsed_size, window_size
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from robocov.team import Team
-
     from robocov.conditions import Conditions
     from robocov.environment import Environment
+    from robocov.team import Team
     from robocov_app.render.theme import Theme
     from robocov_app.runs.spec import RunSpec
 
@@ -281,9 +280,10 @@ class RunOptions(ScenarioOptions, JsonOption):
         return f"; the record, and what is counted in it, is of one step in {every}" if every > 1 else ""
 
     def made_team(self) -> Team:
-        from robocov.team import LIMITS, Team, read_team
+        from robocov.team import PARAMETERS, Team
+        from robocov.team_files import read_team
 
-        said = {name: getattr(self, name) for name in LIMITS if name != "mass"}
+        said = {name: getattr(self, name) for name in PARAMETERS if name != "mass"}
         if self.communication_range is None:
             said["communication_range"] = math.inf
         if self.kinematics == "unicycle":

@@ -5,8 +5,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from robocov.team import Team
-
 from robocov.arrays import Array
 from robocov.conditions import Conditions
 from robocov.controllers import Controller, make_controller
@@ -15,6 +13,7 @@ from robocov.controllers.user_modules import Source, provided
 from robocov.environment import Environment
 from robocov.record import Record, Recorder
 from robocov.simulation import DEFAULT_DT, Simulation, check_joins
+from robocov.team import Team
 
 MOST_ROWS = 2e7  # largest record, in moments times robots: about 2 GB
 COST_RATE = 10.0  # samples of the coverage cost per simulated second

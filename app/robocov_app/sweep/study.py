@@ -14,8 +14,6 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias, TypeVar, cast, get_args
 
 import numpy as np
-from robocov.team import DEFAULT_RADIUS, KINEMATICS, TURNING_RATE, Team, team_of_groups
-from robocov.team import UNITS as TEAM_UNITS
 
 from robocov.arrays import Array
 from robocov.conditions import LIMITS, Conditions, Failure, Join, parsed_entry
@@ -35,6 +33,9 @@ from robocov.errors import (
 )
 from robocov.mapfile import to_json
 from robocov.simulation import DEFAULT_DT, check_dt, check_joins
+from robocov.team import DEFAULT_RADIUS, DEFAULT_TURNING_RATE, KINEMATICS, Team
+from robocov.team import UNITS as TEAM_UNITS
+from robocov.team_files import build_team
 from robocov_app.runs.spec import MOST_ROWS
 
 T = TypeVar("T")
@@ -291,7 +292,7 @@ MAX_MAX_RUNS = 10_000_000
 ALL = "*"  # stands for all starts of a map
 TEAM = ("radius", "max_speed", "max_acceleration", "viscosity", "sensing_range", "communication_range")
 """Parameters of a team that a study may sweep."""
-UNICYCLES = {"kinematics": "point", "track_width": 0.0, "turning_rate": TURNING_RATE}
+UNICYCLES = {"kinematics": "point", "track_width": 0.0, "turning_rate": DEFAULT_TURNING_RATE}
 """More of them, with defaults: what is as by default a study does not tell."""
 _UNLIMITED: dict[str, tuple[object, ...]] = {"message_rate": (None, NO_LIMIT)}  # words for no limit
 _UNLIMITED |= dict.fromkeys(("sensing_range", "communication_range"), (None, NO_LIMIT, math.inf))
@@ -332,7 +333,7 @@ class Study:
     communication_range: Swept = None  # without limit
     kinematics: str | Sequence[str] = "point"
     track_width: Swept = 0.0
-    turning_rate: Swept = TURNING_RATE
+    turning_rate: Swept = DEFAULT_TURNING_RATE
     conditions: Mapping[str, Any] = field(default_factory=dict)  # of lists each is tried
     group: Sequence[Mapping[str, Any]] = ()  # robots that differ, as in a team file
     lattice: int = 64
@@ -351,7 +352,7 @@ class Study:
         for name in ("maps", "controllers", "robots", "starts", "seeds"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         if self.group:
-            size = len(team_of_groups(list(self.group), ("team", "group")))
+            size = len(build_team(list(self.group), ("team", "group")))
             if self.robots not in (Study.robots, (size,)):
                 raise ParameterError(f"robots: {list(self.robots)}, but the groups of the team have {size}")
             object.__setattr__(self, "robots", (size,))
@@ -422,7 +423,7 @@ class Study:
 
     @property
     def mixed_speeds(self) -> bool:
-        return bool(self.group) and any(team_of(self.robots[0], team).mixed_speeds for team in self.teams)
+        return bool(self.group) and any(team_of(self.robots[0], team).has_mixed_speeds for team in self.teams)
 
     def gains_of(self, controller: str) -> Gains:
         return cast("Gains", self.gains[controller])
@@ -577,7 +578,7 @@ def team_of(robots: int, team: Mapping[str, TeamValue]) -> Team:
     values: dict[str, Any] = {name: math.inf if team[name] is None else team[name] for name in TEAM}
     values |= {name: team[name] for name in UNICYCLES if name in team}
     if GROUPS in team:
-        return team_of_groups(json.loads(str(team[GROUPS])), ("team", "group"), values)
+        return build_team(json.loads(str(team[GROUPS])), ("team", "group"), values)
     return Team.homogeneous(robots, **values)
 
 

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from robocov.team import Team
 
 from robocov.arrays import Array
 from robocov.environment import Environment, WallObstacle
 from robocov.metrics import SETTLED_DISTANCE, TOUCHING
 from robocov.observation import Decision, Snapshot
+from robocov.team import Team
 from robocov_app.viewer.presenter import Presenter
 
 SLOW = 0.05  # m/s; who is slower seems to be at rest

@@ -4,10 +4,9 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from robocov.team import KINEMATICS, TRACK_PER_RADIUS, UNITS
-
 from robocov.controllers.gains import Option
 from robocov.errors import ParameterError, quote
+from robocov.team import DEFAULT_TRACK_PER_RADIUS, KINEMATICS, UNITS
 from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 
 SPAN = 30.0  # a slider reaches from so many times less than the default to so many times more
@@ -124,7 +123,9 @@ def limit_parameters(limits: TeamSpec) -> Iterator[Parameter | Pick]:
 def with_limit(limits: TeamSpec, name: str, value: float | str | None) -> TeamSpec:
     name = name.removeprefix("team.")
     if name == "kinematics":
-        name, value = "track_width", TRACK_PER_RADIUS * limits.radius if value == KINEMATICS[1] else 0.0
+        is_unicycle = value == KINEMATICS[1]
+        name = "track_width"
+        value = DEFAULT_TRACK_PER_RADIUS * limits.radius if is_unicycle else 0.0
     number = math.inf if value is None else float(value)
     # set for all: what robots had of their own is gone
     different = {each: values for each, values in limits.different.items() if each != name}

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.conditions import LOSS, Conditions
 from robocov.conditions.perception import Inbox, Perception
@@ -19,6 +18,7 @@ from robocov.errors import InputError
 from robocov.observation import Observations, Scans
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
+from robocov.team import Team
 from robocov.voronoi import partition
 
 DT = 0.1

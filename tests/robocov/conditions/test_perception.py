@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.conditions.perception import NEAREST, of_working
@@ -15,6 +14,7 @@ from robocov.controllers.tangentbug import TangentBug
 from robocov.environment import CircleObstacle, Environment
 from robocov.observation import Decision
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 HALL = Environment("hall", ((0, 0), (10, 0), (10, 8), (0, 8)), (CircleObstacle((5.0, 4.0), 1.0),))
 STARTS = np.array([[1.0, 1.0], [2.0, 1.5], [1.0, 3.0], [3.0, 2.5], [8.0, 6.0]])

@@ -5,7 +5,6 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from robocov.team import Team
 
 from robocov.arrays import Array
 from robocov.controllers import Adaptive, Lloyd
@@ -16,6 +15,7 @@ from robocov.environment import Environment
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
 REGION = SQUARE.region

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from robocov.team import Team
 
 from robocov.conditions import Conditions, Failure
 from robocov.controllers import Atlas, AtlasShared, Rapf, atlas, information_of, make_controller
@@ -18,6 +17,7 @@ from robocov.mapfile import load_map
 from robocov.metrics import clearances, contacts
 from robocov.planning.discovered import UNKNOWN
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 SQUARE = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
 ROOMS = Environment(

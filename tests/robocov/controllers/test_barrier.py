@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 from scipy.optimize import minimize
 
 from robocov.controllers import Barrier
@@ -19,6 +18,7 @@ from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.controllers import (
     CONTROLLERS,
@@ -33,6 +32,7 @@ from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations, Scans
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
+from robocov.team import Team
 
 REGION = Region(np.array([[0.0, 0.0], [11.0, -1.0], [12.0, 8.0], [3.0, 10.0]]))
 

@@ -5,7 +5,6 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.controllers import Diffeomorphism, Lloyd
 from robocov.controllers.diffeomorphism import Chart
@@ -16,6 +15,7 @@ from robocov.mapfile import load_map
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov.voronoi.sampled_cells import centroids, own_samples
 
 PENTAGON = Environment("pentagon", ((0, 0), (10, -1), (12, 6), (5, 9), (-1, 5)))

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.controllers import Dispersion
 from robocov.controllers.driving import approach, drive, limit_approach_speed, neighbour_offsets
@@ -14,6 +13,7 @@ from robocov.metrics import settled_at
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 HALL = Environment("hall", ((0, 0), (60, 0), (60, 60), (0, 60)))
 

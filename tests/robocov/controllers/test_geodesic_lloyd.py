@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.controllers import (
     CONTROLLERS,
@@ -29,6 +28,7 @@ from robocov.observation import Decision, Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.optimum import find_nearest_inside
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
 DOOR = Environment("door", SQUARE.boundary, (WallObstacle(((5, 0), (5, 8)), 0.2),))

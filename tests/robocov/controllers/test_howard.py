@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from robocov.team import Team
 
 from robocov.controllers import Howard
 from robocov.controllers.driving import last_returns, with_nearest
@@ -12,6 +11,7 @@ from robocov.environment import Environment
 from robocov.observation import Observations, Scans, compute_headings
 from robocov.observation.neighbours import Neighbours
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.arrays import Array
 from robocov.conditions import Conditions
@@ -19,6 +18,7 @@ from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 SQUARE = np.array([[-99.0, -99.0], [99.0, -99.0], [99.0, 99.0], [-99.0, 99.0]])
 DT = 0.05

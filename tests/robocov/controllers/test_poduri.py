@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.controllers import Poduri, make_controller
 from robocov.environment import Environment
@@ -15,6 +14,7 @@ from robocov.mapfile import load_map
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 HALL = Environment("hall", ((0, 0), (60, 0), (60, 60), (0, 60)))
 

@@ -5,7 +5,6 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.controllers import Lloyd, RangeLimited
 from robocov.density import Gaussian, Gaussians
@@ -14,6 +13,7 @@ from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov.voronoi import disc_limited, disc_polygons, partition
 
 REGION = Region(np.array([[0.0, 0.0], [11.0, -1.0], [12.0, 8.0], [3.0, 10.0]]))

@@ -4,7 +4,6 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Rapf, information_of, make_controller
@@ -19,6 +18,7 @@ from robocov.observation.neighbours import Neighbours
 from robocov.planning.discovered import FREE, UNKNOWN, WALL, DiscoveredMap, Raster
 from robocov.planning.wayfinding import GridPlanner, Window
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 SQUARE = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
 ROOMS = Environment(

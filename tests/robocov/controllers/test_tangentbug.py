@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.controllers import Lloyd, TangentBug
 from robocov.controllers.tangentbug import Mode, end_of_contour, free_distances
@@ -16,6 +15,7 @@ from robocov.mapfile import load_map
 from robocov.metrics import settled_at
 from robocov.observation import compute_headings
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 DT = 0.05

@@ -7,7 +7,6 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.controllers import Boosting, Visibility
 from robocov.controllers.boosting import Climb, Mode, undetected
@@ -19,6 +18,7 @@ from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.observation.scanned_view import View, compute_step_fractions, find_windows
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 ROOM = shapely.Polygon(
     [(0, 0), (10, 0), (10, 8), (0, 8)],

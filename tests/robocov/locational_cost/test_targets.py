@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from robocov.team import Team
 from voronoi_cases import PENTAGON, scattered
 
 from robocov.controllers import Lloyd, Rapf, make_controller
@@ -18,6 +17,7 @@ from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov.voronoi import partition
 
 POINTS = scattered(PENTAGON, 9, np.random.default_rng(2))

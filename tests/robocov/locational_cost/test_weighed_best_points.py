@@ -95,7 +95,7 @@ def test_a_target_depends_on_nothing_but_what_its_robot_hears(target):
     def row(places):
         neighbours = Neighbours.from_ranges(places, ranges[: len(places)])
         cells = partition(places, SQUARE, neighbours, density=density)
-        return targets(cells, density, target, 1.0)[0].tolist()
+        return find_targets(cells, density, target, 1.0)[0].tolist()
 
     near = np.flatnonzero(np.hypot(*(points - points[0]).T) <= 1.6)
     assert row(points) == row(points[near])

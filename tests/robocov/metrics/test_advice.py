@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from robocov.team import Team
 
 from robocov.controllers import Lloyd, Rapf
 from robocov.environment import Environment, PolygonObstacle
@@ -13,6 +12,7 @@ from robocov.metrics import clearances
 from robocov.metrics.advice import advise, count_zigzags, find_trembling
 from robocov.record import Record
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 HALL = Environment("hall", ((0, 0), (6, 0), (6, 4), (0, 4)))
 CORRIDORS = Environment(

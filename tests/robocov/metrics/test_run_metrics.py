@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.controllers import Rapf
 from robocov.environment import Environment, WallObstacle
@@ -15,6 +14,7 @@ from robocov.metrics import CostHistory
 from robocov.metrics.run_metrics import COLUMNS, connections, figures_of, run_metrics, time_near_final
 from robocov.record import Record
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 ROOM = Environment("room", ((0, 0), (8, 0), (8, 6), (0, 6)), (WallObstacle(((4, 0), (4, 3)), 0.1),))
 

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.controllers import Individually, Rapf, Rpf, gain_values, make_controller
@@ -21,6 +20,7 @@ from robocov.metrics import sample_moments
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.record import ARRAYS, Record, Recorder
 from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov.voronoi.weighted_cells import weighted_partition
 
 
@@ -197,16 +197,19 @@ CONDITIONS = Conditions(loss=0.1, failures=((1, 0.5),), joins=((2, 0.5, (1.0, 1.
         ),
         (
             edited("team", "robots", to=10**12),
-            "run.json: team.robots: 1000000000000, but a whole number from 1",
+            "run.json: team.robots: expected a whole number from 1 to 10000, got 1000000000000",
         ),
-        (edited("team", "mass_kg"), "run.json: team.mass_kg: missing"),
+        (
+            edited("team", "mass_kg"),
+            "run.json: team.mass_kg: expected a number from 1e-06 to 1e+06, or one ",
+        ),
         (
             edited("team", "radius_m", to=-1),
-            "run.json: team.radius_m: -1, but a number from 0.001 to 1000, or one for each of 4 robots, was",
+            "run.json: team.radius_m: expected a number from 0.001 to 1000, or one for each of 4 ",
         ),
         (
             edited("team", "radius_m", to=[0.1] * 3),
-            "run.json: team.radius_m: [0.1, 0.1, 0.1], but a number from",
+            "run.json: team.radius_m: expected a number from 0.001 to 1000, or one for each of 4 ",
         ),
         (edited("team", "mass_kg", to=[1, 1, 1, "1"]), "run.json: team.mass_kg: "),
         (

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 from voronoi_cases import (
     FAMILIES,
     PENTAGON,
@@ -32,6 +31,7 @@ from robocov.controllers.base import Controller
 from robocov.environment import Environment, PolygonObstacle
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.delaunay import Mesh, triangulated
 

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.controllers import Rapf
@@ -12,6 +11,7 @@ from robocov.errors import ParameterError, StartError
 from robocov.metrics import clearances, contacts, cost_history, summarise
 from robocov.record import Record
 from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov.world import ChangingWorld, World
 from robocov.world.obstacle_pieces import build_solid_pieces
 

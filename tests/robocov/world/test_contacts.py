@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from robocov.team import Team
 
+from robocov.team import Team
 from robocov.world import MAX_PENETRATION, World
 
 DT = 1 / 60

@@ -6,12 +6,12 @@ import shapely
 from drawn_maps import KINDS, drawn_map
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.controllers import Rapf
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import StartError
 from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov.world.free_positions import relocate_robots
 
 SQUARE = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Rapf
 from robocov.environment import Environment, ObstaclePath, PolygonObstacle
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 WALL = PolygonObstacle(((4, 3), (6, 3), (6, 5), (4, 5)))
 HALL = Environment("hall", ((0, 0), (10, 0), (10, 8), (0, 8)), (WALL,))

@@ -9,7 +9,6 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.conditions import Conditions, Failure, Join
 from robocov.controllers import Atlas, Barrier, Individually, OwnView, Rapf
@@ -17,6 +16,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, StartError
 from robocov.mapfile import load_map
 from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov.world import World
 from robocov.world.obstacle_pieces import build_solid_pieces
 
@@ -186,8 +186,8 @@ def test_who_fails_keeps_its_heading_and_who_joins_faces_along_x() -> None:
     ("given_team", "message"),
     [
         ({"kinematics": "unicycl"}, r"team.kinematics: 'unicycl'.*unicycle|unknown kinematics"),
-        ({"track_width": -0.1}, r"team.track_width: -0.1 m, but a number from 0"),
-        ({"kinematics": "unicycle", "turning_rate": 0.0}, r"team.turning_rate: 0.0 rad/s, but"),
+        ({"track_width": -0.1}, r"team.track_width: expected a number from 0 to 1000, got -0.1 m"),
+        ({"kinematics": "unicycle", "turning_rate": 0.0}, r"team.turning_rate: expected .* got 0.0 rad/s"),
     ],
 )
 def test_what_is_no_unicycle_is_told(given_team: dict[str, object], message: str) -> None:

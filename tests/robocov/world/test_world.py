@@ -7,10 +7,10 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError
+from robocov.team import Team
 from robocov.world import MAX_PENETRATION, World
 from robocov.world.obstacle_pieces import build_solid_pieces
 
@@ -265,9 +265,9 @@ def test_a_robot_on_a_spring_follows_the_hand_and_is_thrown() -> None:
 
 
 def test_a_robot_that_is_pushed_is_no_faster_than_its_limit(empty: Environment) -> None:
-    team = Team.concatenate(
-        [Team.homogeneous(1, max_speed=2.0, mass=50.0), Team.homogeneous(1, max_speed=0.5)]
-    )
+    heavy = Team.homogeneous(1, max_speed=2.0, mass=50.0)
+    slow = Team.homogeneous(1, max_speed=0.5)
+    team = Team.concatenate([heavy, slow])
     pair = World(
         build_solid_pieces(empty),
         team,

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from robocov.team import Team
 
 from robocov.controllers.geodesic_lloyd import Plan
 from robocov.cost import CoverageCost
 from robocov.environment import DiscStart, Environment, WallObstacle
 from robocov.errors import InputError, ParameterError
 from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.oracle import Oracle, assigned
 from robocov_app.benchmark.references import wanted_references

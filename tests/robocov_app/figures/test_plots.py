@@ -16,10 +16,10 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
-from robocov.team import Team
 
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import ParameterError
+from robocov.team import Team
 from robocov.voronoi import partition
 from robocov_app.figures.curves import end_label, spread
 from robocov_app.figures.files import save_figure

@@ -9,13 +9,13 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import DEFAULT_RADIUS
 from shapely import Polygon
 
 from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, ParameterError
 from robocov.generator import generate_map
 from robocov.mapfile import list_bundled_maps, load_map
+from robocov.team import DEFAULT_RADIUS
 from robocov_app.formats import (
     EXPORTERS,
     ReadOptions,

@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from robocov.team import Team
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov_app.learning.episode import Learner
 from robocov_app.learning.task import (
     ACTIONS,

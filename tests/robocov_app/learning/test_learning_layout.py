@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.errors import ParameterError
 from robocov.observation import Observations, Scans
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
+from robocov.team import Team
 from robocov.voronoi import partition
 from robocov_app.learning import ObservationLayout
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.controllers import Lloyd, Rapf, make_controller
 from robocov.environment import Environment
@@ -19,6 +18,7 @@ from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov_app.cli import main
 from robocov_app.learning import (
     ControllerPolicy,

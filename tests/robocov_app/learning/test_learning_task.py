@@ -3,10 +3,10 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.errors import ParameterError
+from robocov.team import Team
 from robocov_app.learning import CoverageTask
 from robocov_app.learning.task import changed_task
 

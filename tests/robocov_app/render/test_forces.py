@@ -6,9 +6,9 @@ from drawn_pixels import ONE, TWO, changed, drawn, layer_named, nearest
 from drawn_run import explained
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 from written_words import check_glyph, glyphs
 
+from robocov.team import Team
 from robocov_app.render.theme import DARK, LIGHT
 
 

@@ -7,10 +7,10 @@ import pytest
 import shapely
 from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, nearest
 from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
-from robocov.team import Team
 
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle, UniformStart
 from robocov.observation import Snapshot
+from robocov.team import Team
 from robocov.voronoi import partition
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.marks import drawn_radii

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, layer_named, nearest
 from drawn_run import SQUARE, explained
-from robocov.team import Team
 from written_words import check_glyph, glyphs, places
 
+from robocov.team import Team
 from robocov_app.render.picture import Painter
 from robocov_app.render.theme import DARK, LIGHT, contrast, mix
 

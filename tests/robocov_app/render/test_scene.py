@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.controllers import Rapf
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.record import Record
 from robocov.simulation import Simulation
+from robocov.team import Team
 from robocov_app.figures.runs import plot_trajectories
 from robocov_app.render import scene as module
 from robocov_app.render.picture import Painter, standard_layers

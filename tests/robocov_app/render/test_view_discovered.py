@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from drawn_pixels import ONE, distance, drawn
 from drawn_run import SQUARE, explained
-from robocov.team import Team
 
 from robocov.controllers.atlas import Atlas
 from robocov.planning.discovered import FREE, PRESUMED, WALL, DiscoveredMap, Raster
+from robocov.team import Team
 from robocov_app.render.knowledge import discovered_map
 from robocov_app.render.scene import Sensed
 from robocov_app.render.theme import DARK, LIGHT, mix

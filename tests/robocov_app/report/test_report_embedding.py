@@ -10,10 +10,10 @@ from drawn_run import HALL, ROOMS
 from hypothesis import given
 from hypothesis import strategies as st
 from reported_results import HOSTILE, falling, walk
-from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.environment import Environment, ObstaclePath, PolygonObstacle
+from robocov.team import Team
 from robocov.text import escape_controls
 from robocov_app.figures.styles import curve_styles
 from robocov_app.report.pictures import has_path, lives

@@ -6,10 +6,10 @@ from itertools import cycle
 import numpy as np
 import pytest
 from reported_results import entry, falling, result_of, walk
-from robocov.team import Team
 
 from robocov.metrics import CostHistory
 from robocov.metrics.run_metrics import run_metrics
+from robocov.team import Team
 from robocov_app.report.groups import styles
 from robocov_app.report.plots import MOST_MEASURED, MOST_ROBOTS, measure_plots
 from robocov_app.report.replay import ReplayRun

@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from robocov.team import Team
 
 from robocov.conditions import Conditions
 from robocov.environment import Environment
 from robocov.errors import ParameterError, StartError
+from robocov.team import Team
 from robocov_app.runs.options import RunOptions
 from robocov_app.runs.spec import RunSpec
 

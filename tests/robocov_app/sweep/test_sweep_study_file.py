@@ -166,7 +166,7 @@ WRONG = [
     (
         "max_speed = [0.5, 1]",
         "max_speed = [0.5, -1]",
-        "team.max_speed[1]: -1.0 m/s, but a number from 1e-06 to 1000",
+        "team.max_speed[1]: expected a number from 1e-06 to 1000, got -1.0 m/s",
     ),
     ("max_speed = [0.5, 1]", 'max_speed = "null"', "team.max_speed: 'null', but a number was wanted"),
     (
@@ -334,10 +334,14 @@ def test_a_team_of_groups(folder: Path) -> None:
     ("before", "after", "message"),
     [
         ("max_speed = 0.3", "max_sped = 0.3", "team.group[1]: unknown key 'max_sped': did you mean"),
-        ("count = 1\n", "", "team.group[1].count: missing, but a whole number from 1 to 10000 was wanted"),
+        ("count = 1\n", "", "team.group[1].count: expected a whole number from 1 to 10000, got nothing"),
         ("metrics = true", "metrics = 1", "metrics: 1, but true or false was wanted"),
         ("metrics = true", "robots = [4]", "robots: [4], but the groups of the team have 3"),
-        ("max_speed = 1.0", "max_speed = 0", "team.group[0].max_speed: 0.0 m/s, but a number from 1e-06"),
+        (
+            "max_speed = 1.0",
+            "max_speed = 0",
+            "team.group[0].max_speed: expected a number from 1e-06 to 1000, got 0.0 m/s",
+        ),
     ],
 )
 def test_groups_that_are_none(folder: Path, before: str, after: str, message: str) -> None:

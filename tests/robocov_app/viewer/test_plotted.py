@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from driven_window import opened
-from robocov.team import Team
 
 from robocov.cost import CoverageCost
+from robocov.team import Team
 from robocov_app.viewer.session.curves import DISTANCE, TIME
 from robocov_app.viewer.session.scenario import TeamSpec
 
-MIXED = TeamSpec.of(
-    Team.concatenate([Team.homogeneous(2, max_speed=1.0), Team.homogeneous(1, max_speed=0.25)])
-)
+FAST = Team.homogeneous(2, max_speed=1.0)
+SLOW = Team.homogeneous(1, max_speed=0.25)
+MIXED = TeamSpec.of(Team.concatenate([FAST, SLOW]))
 
 
 def test_where_robots_differ_in_speed_there_is_a_curve_of_the_mean_time(tmp_path: Path) -> None:

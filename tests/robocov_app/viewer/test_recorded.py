@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from drawn_run import run_of
 from kept_run import COUNTING, record_of, records_of, same_arrays
-from robocov.team import Team
 from touched_run import HALL, LLOYD, RAPF, RPF, begun, stepped
 
 from robocov.errors import InputError, ParameterError
 from robocov.metrics import CostHistory
 from robocov.record import Record
+from robocov.team import Team
 from robocov.voronoi.weighted_cells import WeightedCells
 from robocov_app.runs.saved import Saved, roster_of
 from robocov_app.viewer.launch import Launcher

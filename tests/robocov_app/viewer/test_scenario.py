@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from robocov.team import Team
 from touched_run import HALL, LLOYD, RAPF, RPF
 
 from robocov.controllers import make_controller
 from robocov.errors import ParameterError, StartError
+from robocov.team import Team
 from robocov_app.viewer.parameters import limit_parameters, with_limit
 from robocov_app.viewer.session.scenario import (
     MOST_PANES,

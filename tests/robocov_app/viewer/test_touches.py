@@ -7,11 +7,11 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robocov.team import Team
 from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, robots_of, stepped, too_deep
 
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import MapError, ParameterError, StartError
+from robocov.team import Team
 from robocov_app.viewer.session import changes as module
 from robocov_app.viewer.session.changes import Join, nearest_free
 from robocov_app.viewer.session.scenario import TeamSpec

@@ -5,11 +5,11 @@ from typing import TypeAlias
 
 import numpy as np
 import shapely
-from robocov.team import DEFAULT_RADIUS
 from shapely import LineString, MultiPolygon, Polygon
 
 from robocov.arrays import Array, IntArray
 from robocov.environment import SAGITTA, Gap, Point, find_narrow_gaps, find_narrowest_gap
+from robocov.team import DEFAULT_RADIUS
 from robocov_app.editor.model.geometry import middle_of
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.model.validation import Problem, examined, place_words

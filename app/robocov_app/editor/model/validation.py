@@ -9,7 +9,6 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 import shapely
-from robocov.team import DEFAULT_RADIUS
 from shapely import LineString, MultiPoint, MultiPolygon, Polygon
 
 from robocov import environment as env
@@ -18,6 +17,7 @@ from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError, StartError, format_count, summarize_names
 from robocov.mapfile.check import check_rules
 from robocov.mapfile.models import FARTHEST, LARGEST, LONGEST_LABEL, SMALLEST, validate
+from robocov.team import DEFAULT_RADIUS
 from robocov_app.editor.model.geometry import as_array
 from robocov_app.editor.model.selection import numbered_name
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch, draft_document

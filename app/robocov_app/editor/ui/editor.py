@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
-from robocov.team import DEFAULT_RADIUS
 
 from robocov.environment import Point
 from robocov.errors import MapError, RobocovError
 from robocov.mapfile.models import SMALLEST
+from robocov.team import DEFAULT_RADIUS
 from robocov_app.editor.model import require
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.measurement import Measurement

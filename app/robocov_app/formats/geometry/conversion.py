@@ -10,7 +10,6 @@ from typing import Literal, NamedTuple, TypeVar
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from robocov.team import DEFAULT_RADIUS
 from shapely import MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
@@ -21,6 +20,7 @@ from robocov.errors import MapError, ParameterError, format_count, quote, to_one
 from robocov.mapfile import from_json, to_json
 from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
 from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST
+from robocov.team import DEFAULT_RADIUS
 from robocov_app.formats.base import ForeignMap, ImportReport, Options, Primitive, square_metres
 from robocov_app.formats.geometry.cleaning import Cleaned, Deviation, measure_deviation, remove_hairs
 from robocov_app.formats.geometry.polygons import (

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from robocov.team import DEFAULT_RADIUS
 from scipy import ndimage
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges
 from robocov.environment import Environment
 from robocov.errors import ParameterError, format_count
+from robocov.team import DEFAULT_RADIUS
 from robocov_app.formats.base import ExportReport
 from robocov_app.formats.files import MAX_CELLS
 from robocov_app.formats.geometry.polygons import sides_of

@@ -9,13 +9,13 @@ from itertools import compress
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from robocov.team import Team
 
 from robocov.arrays import Array
 from robocov.conditions import Conditions
 from robocov.conditions.perception import Inbox
 from robocov.environment import CircleObstacle, Environment, Point
 from robocov.observation import Decision
+from robocov.team import Team
 from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
 
 MOST_BYTES = 24_000_000  # memory that the moments of a window may take

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from robocov.team import Team
 
 from robocov.controllers import CONTROLLERS, informed, remembers
 from robocov.controllers.base import Controller
@@ -16,6 +15,7 @@ from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.record import Record
+from robocov.team import Team
 from robocov_app.runs.saved import Saved, roster_of
 from robocov_app.viewer.session.moments import MOST_BYTES, History, Moment, PaneSetup, State
 from robocov_app.viewer.session.pane import SENSED_EVERY, Pane, resumed

@@ -8,7 +8,6 @@ from typing import Annotated, Any, Self, TypeAlias
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, GetPydanticSchema, WrapSerializer
 from pydantic_core import PydanticCustomError, core_schema
-from robocov.team import TURNING_RATE, UNITS, Team
 
 from robocov.arrays import Array
 from robocov.conditions import Conditions
@@ -18,6 +17,7 @@ from robocov.controllers.gains import Gain, Option, Value, value_text
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, quote
 from robocov.simulation import DEFAULT_DT
+from robocov.team import DEFAULT_TURNING_RATE, UNITS, Team
 
 MOST_ROBOTS = 1000  # so many robots can be asked for in the window
 MOST_THAT_TALK = 100  # so many robots can be asked for where each has messages of its own of every other
@@ -151,7 +151,7 @@ class TeamSpec:
     sensing_range: Limit = 3.0
     communication_range: Limit = np.inf
     track_width: Limit = 0.0
-    turning_rate: Limit = TURNING_RATE
+    turning_rate: Limit = DEFAULT_TURNING_RATE
     different: Mapping[str, Mapping[int, Limit]] = field(default_factory=dict)
 
     def team(self, robots: int | Sequence[int]) -> Team:
@@ -180,7 +180,7 @@ Limits: TypeAlias = Annotated[TeamSpec, WrapSerializer(lambda team, plain: _fill
 
 
 def _filled(plain: dict[str, Any]) -> dict[str, Any]:
-    usual = {"different": {}, "track_width": 0.0, "turning_rate": TURNING_RATE}  # as in older files
+    usual = {"different": {}, "track_width": 0.0, "turning_rate": DEFAULT_TURNING_RATE}  # as in older files
     return {key: value for key, value in plain.items() if value != usual.get(key)}
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from robocov.team import Team
 
 from robocov.errors import ParameterError
+from robocov.team import Team
 
 
 def test_a_homogeneous_team_has_the_papers_limits() -> None:
@@ -42,11 +42,11 @@ def test_a_team_survives_json(robots: list[tuple[float, float]]) -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"radius": 0.0}, r"team.radius: 0.0 m, but a number from 0.001 to 1000 was wanted"),
-        ({"max_speed": -1.0}, r"team.max_speed: -1.0 m/s"),
-        ({"max_speed": float("inf")}, r"team.max_speed: inf m/s"),
-        ({"viscosity": float("nan")}, r"team.viscosity: nan N s/m"),
-        ({"communication_range": -2.0}, r"or null for no limit was wanted"),
+        ({"radius": 0.0}, r"team.radius: expected a number from 0.001 to 1000, got 0.0 m"),
+        ({"max_speed": -1.0}, r"team.max_speed: expected .* got -1.0 m/s"),
+        ({"max_speed": float("inf")}, r"team.max_speed: expected .* got inf m/s"),
+        ({"viscosity": float("nan")}, r"team.viscosity: expected .* got nan N s/m"),
+        ({"communication_range": -2.0}, r"or null for no limit, got -2.0 m"),
     ],
 )
 def test_limits_out_of_range_are_refused(wrong: dict[str, float], message: str) -> None:
@@ -55,12 +55,14 @@ def test_limits_out_of_range_are_refused(wrong: dict[str, float], message: str) 
 
 
 def test_teams_have_robots_and_one_value_for_each() -> None:
-    with pytest.raises(ParameterError, match="robots: 0"):
+    with pytest.raises(ParameterError, match="robots: expected a whole number of at least 1, got 0"):
         Team.homogeneous(0)
     ones = np.ones(2)
-    with pytest.raises(ParameterError, match=r"team.mass: \(3,\) values"):
+    with pytest.raises(
+        ParameterError, match=r"team.mass: expected a value for each of 2 robots, got shape \(3,\)"
+    ):
         Team(ones, np.ones(3), ones, ones, ones, ones, ones)
-    with pytest.raises(ParameterError, match=r"team.radius_m: missing, but a number"):
+    with pytest.raises(ParameterError, match=r"team.radius_m: expected a number .* got nothing"):
         Team.from_dict({"robots": 2})
 
 

@@ -1,0 +1,342 @@
+"""The team: the size, limits and ranges of each robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from numbers import Integral
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray, freeze
+from robocov.errors import (
+    ParameterError,
+    describe_unknown_name,
+    format_count,
+    is_number,
+    quote,
+    quote_json,
+    to_floats,
+)
+
+MAX_ROBOTS = 10_000
+"""Maximum number of robots in a team file or a record."""
+DEFAULT_RADIUS = 0.1
+"""Default radius of a robot, m."""
+DEFAULT_TURNING_RATE = 4.0
+"""Default of the largest turning rate of a unicycle, rad/s."""
+DEFAULT_TRACK_PER_RADIUS = 1.6
+"""Default track width of a unicycle divided by its radius; the wheels are within the disc."""
+KINEMATICS = ("point", "unicycle")
+"""A point moves in any direction; a unicycle has two driven wheels and has to turn."""
+
+
+class TeamParameter(NamedTuple):
+    """Range of one parameter of a robot, and its names in files.
+
+    Attributes
+    ----------
+    minimum, maximum : float
+        Range of finite values.
+    unit : str
+    json_key : str
+        Name in ``run.json``, with the unit.
+    may_be_infinite : bool
+        Whether infinity, which JSON writes as null, means that there is no limit.
+    """
+
+    minimum: float
+    maximum: float
+    unit: str
+    json_key: str
+    may_be_infinite: bool = False
+
+    def describe(self, infinity: str = "null for no limit") -> str:
+        """Return which values are expected, for messages."""
+        text = f"a number from {self.minimum:g} to {self.maximum:g}"
+        return f"{text} or {infinity}" if self.may_be_infinite else text
+
+
+PARAMETERS: dict[str, TeamParameter] = {
+    "radius": TeamParameter(1e-3, 1e3, "m", "radius_m"),
+    "mass": TeamParameter(1e-6, 1e6, "kg", "mass_kg"),
+    "max_speed": TeamParameter(1e-6, 1e3, "m/s", "max_speed_m_per_s"),
+    "max_acceleration": TeamParameter(1e-6, 1e6, "m/s²", "max_acceleration_m_per_s2"),
+    "viscosity": TeamParameter(0.0, 1e6, "N s/m", "viscosity_n_s_per_m"),
+    "sensing_range": TeamParameter(0.0, 1e5, "m", "sensing_range_m", may_be_infinite=True),
+    "communication_range": TeamParameter(0.0, 1e5, "m", "communication_range_m", may_be_infinite=True),
+    "track_width": TeamParameter(0.0, 1e3, "m", "track_width_m"),
+    "turning_rate": TeamParameter(1e-3, 1e3, "rad/s", "turning_rate_rad_per_s"),
+}
+"""The parameters of a robot, in the order of the fields of `Team`."""
+UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
+"""Units of the parameters."""
+
+_POINT_ROBOT_VALUES = {"track_width": 0.0, "turning_rate": DEFAULT_TURNING_RATE}
+"""Parameters that matter for unicycles alone, with their values in a team of points."""
+
+
+def _build_default_column() -> Array:
+    """Return the placeholder for a column of default values, whose length is not known yet."""
+    return np.zeros(0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Team:
+    """Bodies, limits and ranges of n robots.
+
+    Every attribute is a read-only array of shape (n,).
+
+    Attributes
+    ----------
+    radius, mass : m, kg
+        Robots are discs; their mass is the virtual one of the paper, where it is 1.
+    max_speed, max_acceleration : m/s, m/s²
+        The kinematic limits, the same for every controller.
+    viscosity : N s/m
+        nu of equation (28), with the sign that dissipates energy.
+    sensing_range : m
+        Distance from the robot's centre up to which the range sensor detects obstacles.
+    communication_range : m
+        Two robots are neighbours if each is within the range of the other. Infinity: no limit.
+    track_width : m
+        Distance between the two driven wheels of a unicycle, a differential drive. 0, the default, is a point
+        robot, which moves in any direction. No wheel is faster than `max_speed`, or changes its speed by more
+        than `max_acceleration`; see `robocov.world.unicycles`.
+    turning_rate : rad/s
+        Largest turning rate of a unicycle, by default 4. The wheels may allow less:
+        ``2 max_speed / track_width``.
+
+    Raises
+    ------
+    ParameterError
+        If a value is out of range, or an array has another length than `radius`.
+
+    Examples
+    --------
+    >>> team = Team.homogeneous(3, max_speed=0.5)
+    >>> team.max_speed
+    array([0.5, 0.5, 0.5])
+    >>> len(team[:2])
+    2
+    """
+
+    radius: Array
+    mass: Array
+    max_speed: Array
+    max_acceleration: Array
+    viscosity: Array
+    sensing_range: Array
+    communication_range: Array
+    track_width: Array = field(default_factory=_build_default_column)
+    turning_rate: Array = field(default_factory=_build_default_column)
+
+    def __post_init__(self) -> None:
+        size = np.atleast_1d(np.asarray(self.radius)).shape[0]
+        for name in PARAMETERS:
+            given = to_floats(f"team.{name}", getattr(self, name), "a number for each robot")
+            values = freeze(np.atleast_1d(given))
+            if name in _POINT_ROBOT_VALUES and len(values) == 0:
+                values = freeze(np.full(size, _POINT_ROBOT_VALUES[name]))
+            _check_column(name, values, size)
+            object.__setattr__(self, name, values)
+
+    def __reduce__(self) -> tuple[type[Team], tuple[Array, ...]]:
+        """Return how to rebuild the team: pickles do not contain that its arrays are read-only."""
+        return Team, tuple(getattr(self, name) for name in PARAMETERS)
+
+    @classmethod
+    def homogeneous(
+        cls,
+        n: int,
+        *,
+        radius: float = DEFAULT_RADIUS,
+        mass: float = 1.0,
+        max_speed: float = 1.0,
+        max_acceleration: float = 2.0,
+        viscosity: float = 2.0,
+        sensing_range: float = 3.0,
+        communication_range: float = np.inf,
+        track_width: float = 0.0,
+        turning_rate: float = DEFAULT_TURNING_RATE,
+        kinematics: str | None = None,
+    ) -> Team:
+        """Build a team of equal robots, by default those of the paper.
+
+        Parameters
+        ----------
+        n : int
+            Number of robots.
+        radius, mass, max_speed, max_acceleration, viscosity, sensing_range, communication_range : float
+            See the attributes of `Team`.
+        track_width, turning_rate : float, m and rad/s
+            See the attributes of `Team`.
+        kinematics : {"point", "unicycle"} or None
+            "unicycle" stands for a track width of 1.6 radii unless one is given, "point" for none. By default
+            the track width decides.
+
+        Returns
+        -------
+        Team
+
+        Raises
+        ------
+        ParameterError
+            If a value is out of range.
+        """
+        if kinematics not in (None, *KINEMATICS):
+            raise ParameterError(f"team.{describe_unknown_name('kinematics', str(kinematics), KINEMATICS)}")
+        if kinematics == "unicycle" and not track_width:
+            track_width = DEFAULT_TRACK_PER_RADIUS * radius
+        elif kinematics == "point":
+            track_width = 0.0
+        if not is_number(n, Integral) or n < 1:
+            raise ParameterError(f"robots: expected a whole number of at least 1, got {quote(n)}")
+        values = {
+            "radius": radius,
+            "mass": mass,
+            "max_speed": max_speed,
+            "max_acceleration": max_acceleration,
+            "viscosity": viscosity,
+            "sensing_range": sensing_range,
+            "communication_range": communication_range,
+            "track_width": track_width,
+            "turning_rate": turning_rate,
+        }
+        columns = {
+            name: np.full(n, to_floats(f"team.{name}", value, "a number")) for name, value in values.items()
+        }
+        return cls(**columns)
+
+    @classmethod
+    def concatenate(cls, teams: Sequence[Team]) -> Team:
+        """Build one team from the robots of several, in their order.
+
+        Parameters
+        ----------
+        teams : sequence of Team
+            At least one.
+
+        Returns
+        -------
+        Team
+
+        Raises
+        ------
+        ParameterError
+            If there are no teams.
+        """
+        if len(teams) == 0:
+            raise ParameterError("robots: expected a whole number of at least 1, got 0")
+        return cls(**{name: np.concatenate([getattr(team, name) for team in teams]) for name in PARAMETERS})
+
+    @property
+    def has_mixed_speeds(self) -> bool:
+        """Whether some robots are faster than others, so that the nearest may not arrive first."""
+        return bool((self.max_speed != self.max_speed[0]).any())
+
+    @property
+    def is_unicycle(self) -> BoolArray:
+        """Which robots are unicycles, which have to turn, (n,) bool."""
+        return np.asarray(self.track_width > 0.0)
+
+    def _list_relevant_parameters(self) -> list[str]:
+        """Return the parameters that matter: a team of points has neither wheels nor turning rate."""
+        if self.is_unicycle.any():
+            return list(PARAMETERS)
+        return [name for name in PARAMETERS if name not in _POINT_ROBOT_VALUES]
+
+    def __getitem__(self, robots: slice | IntArray) -> Team:
+        """Return some of the robots as a team."""
+        return Team(**{name: getattr(self, name)[robots] for name in PARAMETERS})
+
+    def __len__(self) -> int:
+        return int(self.radius.shape[0])
+
+    def __repr__(self) -> str:
+        descriptions = []
+        for name in self._list_relevant_parameters():
+            values = getattr(self, name)
+            low = float(values.min())
+            high = float(values.max())
+            span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+            descriptions.append(f"{name} {span} {UNITS[name]}")
+        return f"<Team of {format_count(len(self), 'robot')}: {', '.join(descriptions)}>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the team as plain JSON.
+
+        Returns
+        -------
+        dict
+            Null stands for no limit, and a value that all robots share is written once.
+        """
+        plain: dict[str, Any] = {"robots": len(self)}
+        for name in self._list_relevant_parameters():
+            values = [None if np.isinf(value) else float(value) for value in getattr(self, name)]
+            is_shared = len(set(values)) == 1
+            plain[PARAMETERS[name].json_key] = values[0] if is_shared else values
+        return plain
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, Any]) -> Team:
+        """Build the team that `to_dict` returned.
+
+        Parameters
+        ----------
+        plain : mapping
+
+        Returns
+        -------
+        Team
+
+        Raises
+        ------
+        ParameterError
+            If a value is missing or out of range. The message names its key.
+        """
+        n = plain.get("robots")
+        if not is_number(n, int) or not 1 <= n <= MAX_ROBOTS:
+            raise _build_json_error(plain, "robots", expected=f"a whole number from 1 to {MAX_ROBOTS}")
+        columns = {name: _read_column(plain, name, n) for name in PARAMETERS}
+        return cls(**columns)
+
+
+def _check_column(name: str, values: Array, size: int) -> None:
+    """Raise a ParameterError unless there is one value in range for each robot."""
+    if values.shape != (size,):
+        shape = quote(values.shape)
+        raise ParameterError(f"team.{name}: expected a value for each of {size} robots, got shape {shape}")
+    parameter = PARAMETERS[name]
+    is_valid = (values >= parameter.minimum) & (values <= parameter.maximum)
+    if parameter.may_be_infinite:
+        is_valid |= values == np.inf
+    if not is_valid.all():
+        first_wrong = float(values[~is_valid][0])
+        raise ParameterError(
+            f"team.{name}: expected {parameter.describe()}, got {quote(first_wrong)} {parameter.unit}"
+        )
+
+
+def _read_column(plain: Mapping[str, Any], name: str, n: int) -> Array:
+    """Return the values of a parameter for n robots from JSON, where all may share one."""
+    parameter = PARAMETERS[name]
+    value = plain.get(parameter.json_key, _POINT_ROBOT_VALUES.get(name, "missing"))
+    values = value if isinstance(value, list) else [value] * n
+    is_valid = len(values) == n and all(_is_valid_json(parameter, entry) for entry in values)
+    if not is_valid:
+        expected = f"{parameter.describe(infinity='null')}, or one for each of {n} robots"
+        raise _build_json_error(plain, parameter.json_key, expected)
+    return np.array([np.inf if entry is None else entry for entry in values], dtype=float)
+
+
+def _is_valid_json(parameter: TeamParameter, value: object) -> bool:
+    if value is None:
+        return parameter.may_be_infinite
+    return is_number(value) and bool(parameter.minimum <= value <= parameter.maximum)
+
+
+def _build_json_error(plain: Mapping[str, Any], key: str, expected: str) -> ParameterError:
+    got = quote_json(plain[key]) if key in plain else "nothing"
+    return ParameterError(f"team.{key}: expected {expected}, got {got}")
