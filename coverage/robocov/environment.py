@@ -30,12 +30,12 @@ Ring: TypeAlias = tuple[Point, ...]
 Repeat: TypeAlias = Literal["loop", "back-and-forth"]
 """Behaviour at the end of a path: straight to its beginning, or back the way it came."""
 REPEATS: tuple[str, ...] = get_args(Repeat)
-GRID = 1e-6
+GRID_M = 1e-6
 """Derived geometry is computed on a grid of one micrometre, so that unions and differences are
 robust: what touches to within rounding touches exactly, and no sliver survives."""
-SAGITTA = 1e-3
+MAX_SAGITTA_M = 1e-3
 """Largest distance in metres between a circle and the polygon that stands for it."""
-START_GAP = 0.02
+MIN_START_GAP_RADII = 0.02
 """Smallest gap, as a part of a robot's radius, left between two robots and to walls at the start."""
 MAX_COUNTED_ROBOTS = 2000
 """Robots of a start that are counted one by one; the capacity of larger ones is estimated from the area."""
@@ -45,7 +45,7 @@ _LEAST_OVERLAP = 1e-6
 """Area in m² from which an obstacle is in the way: what is less is rounding, of obstacles that touch."""
 MIN_POCKET_AREA_M2 = math.pi * DEFAULT_RADIUS**2
 """A gap to a pocket smaller than this, in m², is none: no robot would go there."""
-_CRACK = 2 * SAGITTA
+_CRACK = 2 * MAX_SAGITTA_M
 """Walls closer than this, in metres, touch: a circle that touches a wall is a polygon that nearly does."""
 _CHUNK = 256
 """Corners that are looked at together, so that memory stays bounded."""
@@ -79,7 +79,7 @@ class ObstaclePath:
         """Seconds until the obstacle is back, and about to go the same way again."""
         return float(self._line[1][-1]) / self.speed
 
-    def shift(self, time: float) -> Array:
+    def compute_displacement(self, time: float) -> Array:
         """Return by how much the obstacle has moved at a time, s; (2,) m."""
         line, along = self._line
         place = (time * self.speed) % along[-1]
@@ -103,7 +103,7 @@ class PolygonObstacle:
 
 @dataclass(frozen=True)
 class CircleObstacle:
-    """A round pillar: the inscribed regular polygon of at most `SAGITTA` for physics and cost alike."""
+    """A round pillar: the inscribed regular polygon of at most `MAX_SAGITTA_M` for physics and cost alike."""
 
     center: Point
     radius: float
@@ -114,8 +114,8 @@ class CircleObstacle:
     def polygon(self) -> Polygon:
         """The polygon that stands for it."""
         sides = 12
-        if self.radius > SAGITTA:
-            sides = max(sides, math.ceil(math.pi / math.acos(1.0 - SAGITTA / self.radius)))
+        if self.radius > MAX_SAGITTA_M:
+            sides = max(sides, math.ceil(math.pi / math.acos(1.0 - MAX_SAGITTA_M / self.radius)))
         angle = np.arange(sides) * (2.0 * np.pi / sides)
         return Polygon(np.column_stack([np.cos(angle), np.sin(angle)]) * self.radius + self.center)
 
@@ -215,20 +215,20 @@ class Environment(Drawable):
     @cached_property
     def free(self) -> MultiPolygon:
         """The parts of the free space, inside the boundary and outside every obstacle, the largest first."""
-        inside = shapely.set_precision(self.boundary_polygon, GRID)
+        inside = shapely.set_precision(self.boundary_polygon, GRID_M)
         if self.obstacles:
             solid = _united(np.array([shape.polygon for shape in self.obstacles]))
-            inside = shapely.difference(inside, solid, grid_size=GRID)
+            inside = shapely.difference(inside, solid, grid_size=GRID_M)
         return _polygons(inside)
 
     @cached_property
     def blocked(self) -> MultiPolygon:
         """The part of the region that is not free: obstacles, and the outside of a non-convex boundary."""
-        region = shapely.set_precision(self.region.polygon, GRID)
-        return _polygons(shapely.difference(region, self.free, grid_size=GRID))
+        region = shapely.set_precision(self.region.polygon, GRID_M)
+        return _polygons(shapely.difference(region, self.free, grid_size=GRID_M))
 
     @cached_property
-    def moves(self) -> bool:
+    def has_moving_obstacles(self) -> bool:
         """Whether an obstacle moves."""
         return any(shape.path is not None for shape in self.obstacles)
 
@@ -236,15 +236,17 @@ class Environment(Drawable):
     def static(self) -> Environment:
         """The map without the obstacles that move; this one where none does."""
         still = tuple(shape for shape in self.obstacles if shape.path is None)
-        return replace(self, obstacles=still) if self.moves else self
+        return replace(self, obstacles=still) if self.has_moving_obstacles else self
 
     def at(self, time: float) -> Environment:
         """Return the map as it is at a time, s, with all obstacles standing; this one where none moves."""
-        if not self.moves:
+        if not self.has_moving_obstacles:
             return self
         obstacles = tuple(
             # to the nanometre, so that an obstacle that comes by again stands in the very same place
-            shape if shape.path is None else shift_obstacle(shape, np.round(shape.path.shift(time), 9))
+            shape
+            if shape.path is None
+            else shift_obstacle(shape, np.round(shape.path.compute_displacement(time), 9))
             for shape in self.obstacles
         )
         return replace(self, obstacles=obstacles)
@@ -275,7 +277,7 @@ class Environment(Drawable):
         twin.__dict__.update({name: self.__dict__[name] for name in kept if name in self.__dict__})
         return twin
 
-    def same_place(self, other: Environment) -> bool:
+    def has_same_geometry(self, other: Environment) -> bool:
         """Return whether another map has the same boundary and obstacles."""
         return self.boundary == other.boundary and self.obstacles == other.obstacles
 
@@ -316,8 +318,8 @@ class Start:
             raise self._error(f"radius: {radius!r} m, but a number above 0 was wanted")
         if isinstance(self.spec, PointsStart):
             return self._given(n, radius, self.spec.positions)
-        spacing = 2.0 * radius * (1.0 + START_GAP)
-        room = self.room(radius)
+        spacing = 2.0 * radius * (1.0 + MIN_START_GAP_RADII)
+        room = self.compute_center_area(radius)
         if room.is_empty:
             raise self._error(f"no room for a robot of radius {radius:g} m; a wider start was wanted")
         rng = np.random.default_rng([seed, n])
@@ -334,7 +336,7 @@ class Start:
             raise self._error(self._describe_lack_of_space(n, radius))
         return points
 
-    def capacity(self, radius: float = DEFAULT_RADIUS) -> int:
+    def estimate_capacity(self, radius: float = DEFAULT_RADIUS) -> int:
         """Return about how many robots of a radius fit.
 
         It depends on the start and the radius alone: the number of robots in the densest packing that is
@@ -353,28 +355,27 @@ class Start:
         """
         if isinstance(self.spec, PointsStart):
             return len(self.spec.positions)
-        room = self.room(radius)
+        room = self.compute_center_area(radius)
         if room.is_empty:
             return 0
-        spacing = 2.0 * radius * (1.0 + START_GAP)
+        spacing = 2.0 * radius * (1.0 + MIN_START_GAP_RADII)
         if _max_packed(room, spacing) > MAX_COUNTED_ROBOTS:
             # each robot of a hexagonal packing takes a cell of this area
             return max(1, int(room.area / (spacing**2 * math.sqrt(3) / 2)))
         return len(_densest(room, spacing))
 
     def _describe_lack_of_space(self, n: int, radius: float) -> str:
-        found = (
-            f"room for about {self.capacity(radius)} robots of radius {radius:g} m, but {n} were asked for"
-        )
+        capacity = self.estimate_capacity(radius)
+        found = f"room for about {capacity} robots of radius {radius:g} m, but {n} were asked for"
         ways = ["fewer or smaller robots", "another map"]
         if not isinstance(self.spec, UniformStart):
-            everywhere = Start("uniform", UniformStart(), self.free).capacity(radius)
+            everywhere = Start("uniform", UniformStart(), self.free).estimate_capacity(radius)
             ways.insert(1, f"start 'uniform' (room for about {everywhere})")
         return f"{found}. Try {', '.join(ways[:-1])} or {ways[-1]}."
 
-    def room(self, radius: float) -> BaseGeometry:
+    def compute_center_area(self, radius: float) -> BaseGeometry:
         """Return where the centre of a robot of that radius may be, unless positions are given."""
-        room = self.free.buffer(-radius * (1.0 + START_GAP))
+        room = self.free.buffer(-radius * (1.0 + MIN_START_GAP_RADII))
         if isinstance(self.spec, DiscStart):
             # the disc holds the centres; robots may stick out of it by their radius
             room = room.intersection(shapely.Point(self.spec.center).buffer(self.spec.radius, quad_segs=64))
@@ -524,9 +525,11 @@ def shift_obstacle(obstacle: Obstacle, by: Array) -> Obstacle:
 
 def _united(shapes: NDArray[np.object_]) -> BaseGeometry:
     """Return shapes as one, on the grid; only those that meet are united, which takes most of the time."""
-    meets = np.bincount(STRtree(shapes).query(shapes, "dwithin", 2.0 * GRID)[0]) > 1
-    alone = shapely.get_parts(shapely.set_precision(shapes[~meets], GRID))
-    return shapely.multipolygons([*alone, *_polygons(shapely.union_all(shapes[meets], grid_size=GRID)).geoms])
+    meets = np.bincount(STRtree(shapes).query(shapes, "dwithin", 2.0 * GRID_M)[0]) > 1
+    alone = shapely.get_parts(shapely.set_precision(shapes[~meets], GRID_M))
+    return shapely.multipolygons(
+        [*alone, *_polygons(shapely.union_all(shapes[meets], grid_size=GRID_M)).geoms]
+    )
 
 
 def _polygons(geometry: BaseGeometry) -> MultiPolygon:
@@ -658,7 +661,7 @@ def _without_cracks(free: MultiPolygon) -> MultiPolygon:
     """
     for distance in (-_CRACK / 2, _CRACK / 2 - 1e-9):
         free = free.buffer(distance, join_style="mitre", mitre_limit=100.0)
-    free = free.simplify(GRID)
+    free = free.simplify(GRID_M)
     return MultiPolygon([shapely.orient_polygons(part) for part in shapely.get_parts(free)])
 
 

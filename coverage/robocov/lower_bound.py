@@ -34,7 +34,7 @@ from scipy.optimize import Bounds, minimize
 from robocov.arrays import Array, IntArray, freeze
 from robocov.compiled import kernel
 from robocov.cost import CoverageCost
-from robocov.environment import GRID, Environment
+from robocov.environment import GRID_M, Environment
 from robocov.errors import ParameterError, require_number
 from robocov.geodesic import BINS, seen_corners
 from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_visible
@@ -102,7 +102,7 @@ def compute_lower_bound(
     >>> bound.gap < 0.001
     True
     """
-    require_number("radius", radius, GRID, math.inf, "m")
+    require_number("radius", radius, GRID_M, math.inf, "m")
     require_number("precision", precision, MIN_PRECISION, 1.0)
     tell = progress or (lambda part: None)
     cost = CoverageCost(environment, lattice, progress=lambda part: tell(_BUILT / 2.0 * part))

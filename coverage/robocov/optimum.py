@@ -23,7 +23,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, BoolArray, IntArray, freeze
 from robocov.cost import CoverageCost, CoverageResult
-from robocov.environment import START_GAP, Environment
+from robocov.environment import MIN_START_GAP_RADII, Environment
 from robocov.errors import ParameterError, is_number, quote, require_number
 from robocov.k_median import Beat, best_swaps, lloyd_iterations, seeded
 from robocov.team import DEFAULT_RADIUS
@@ -219,7 +219,10 @@ class ConfigurationSpace:
     """
 
     def __init__(self, free: MultiPolygon, radius: float) -> None:
-        self.clearance, self.spacing = radius * (1.0 + START_GAP), 2.0 * radius * (1.0 + START_GAP)
+        self.clearance, self.spacing = (
+            radius * (1.0 + MIN_START_GAP_RADII),
+            2.0 * radius * (1.0 + MIN_START_GAP_RADII),
+        )
         parts = [part.buffer(-self.clearance, quad_segs=_SEGMENTS) for part in free.geoms]
         self.parts: tuple[BaseGeometry, ...] = tuple(parts)
         shapely.prepare(list(self.parts))

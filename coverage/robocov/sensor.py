@@ -73,7 +73,7 @@ class RangeSensor:
             x, y and radius of the robots that have failed by then, and are obstacles.
         """
         for body, mover in zip(self._mover_bodies, self._movers, strict=True):
-            body.position = tuple(mover.path.shift(time).tolist())
+            body.position = tuple(mover.path.compute_displacement(time).tolist())
             self._space.reindex_shapes_for_body(body)
         failed = set() if failed_robots is None else set(map(tuple, failed_robots.tolist()))
         for robot in self._failed_robots.keys() - failed:

@@ -122,7 +122,7 @@ class Simulation:
         if len(self.team) != len(positions):
             raise ParameterError(f"team: {len(self.team)} robots, but {len(positions)} starts")
         each, rest = divmod(len(positions), runs)
-        if runs > 1 and (rest or environment.moves or conditions is not None):
+        if runs > 1 and (rest or environment.has_moving_obstacles or conditions is not None):
             wanted = "equal teams, no conditions and obstacles that stand still were wanted"
             raise ParameterError(f"runs: {runs} of {len(positions)} robots, but {wanted}")
         self._each_run = [slice(k * each, (k + 1) * each) for k in range(runs)]
@@ -458,7 +458,11 @@ def simulate_many(
     own_seeds = [None] * len(starts) if seeds is None else seeds
     together: dict[int, list[int]] = {}
     records: dict[int, Record] = {}
-    by_itself = environment.moves or remembers(controller) or type(controller) not in CONTROLLERS.values()
+    by_itself = (
+        environment.has_moving_obstacles
+        or remembers(controller)
+        or type(controller) not in CONTROLLERS.values()
+    )
     by_itself = by_itself or (team is not None and bool(team.is_unicycle.any()))
     for run, (positions, under) in enumerate(zip(starts, each, strict=True)):
         if by_itself or len(positions) > _LARGEST_TEAM or not (under is None or under.ideal):

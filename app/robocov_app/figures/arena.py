@@ -186,7 +186,7 @@ def map_handles(environment: Environment, theme: Theme, *, density: bool = True)
     handles: list[Artist] = [Line2D([], [], color=tone(theme.boundary), linewidth=1.6, label="known region")]
     if not environment.blocked.is_empty:
         handles.append(Patch(label="obstacle (unknown to robots)", **_static_style(theme)))
-    if environment.moves:
+    if environment.has_moving_obstacles:
         mark: Any = {"marker": "s", "markersize": 7.0, "markerfacecolor": tone(theme.moving_obstacle)}
         mark["markeredgecolor"] = tone(theme.obstacle_edge)
         handles.append(Line2D([], [], label="moving obstacle and its path", **mark, **_path_style(theme)))

@@ -195,7 +195,7 @@ def export_map(
     dropped = list(report.dropped)
     if environment.density is not None:
         dropped.append(f"the density ({environment.density.kind})")
-    if environment.moves:
+    if environment.has_moving_obstacles:
         count = sum(shape.path is not None for shape in environment.obstacles)
         dropped.append(
             f"the {format_count(count, 'path')} of obstacles, which stand where they are at time zero"

@@ -159,7 +159,7 @@ class Episode:
             self.simulation = spec.simulation(Learner.of(task))
         self.working = self.simulation.working[self._rows]
         self.cost, self._cost = cost, TimeVaryingCost(cost)
-        self._all_count = spec.conditions is None and not environment.moves
+        self._all_count = spec.conditions is None and not environment.has_moving_obstacles
         self._counted = self._cost.find_counted_robots(0.0, self.positions, self.working)
         result = self._cost(0.0, self.positions, self.working)
         if result is None or not result.mean_distance > 0.0:

@@ -105,7 +105,12 @@ class CoverageVectorEnv(SyncVectorEnv):
         self._teams = cast("list[CoverageEnv]", self.envs)
         ideal = self.task.conditions is None or self.task.conditions.ideal
         self._shared: SharedSimulation | None = None
-        if scenarios.only is not None and not scenarios.only.moves and ideal and not self.task.recording:
+        if (
+            scenarios.only is not None
+            and not scenarios.only.has_moving_obstacles
+            and ideal
+            and not self.task.recording
+        ):
             self._shared = SharedSimulation(self.task, scenarios.only, num_envs)
             for run, env in enumerate(self._teams):
                 env.place = self._shared, run

@@ -89,8 +89,8 @@ def moving_obstacles(environment: Environment, time: float) -> list[MovingObstac
     for obstacle in environment.obstacles:
         if (path := obstacle.path) is None:
             continue
-        shift = path.shift(time)
-        ahead = path.shift(time + 1e-3 * min(path.period, 1.0)) - shift
+        shift = path.compute_displacement(time)
+        ahead = path.compute_displacement(time + 1e-3 * min(path.period, 1.0)) - shift
         ahead /= max(float(np.hypot(*ahead)), 1e-12)
         middle = np.array(obstacle.polygon.envelope.centroid.coords[0])
         polygon = shapely.affinity.translate(obstacle.polygon, *shift.tolist())

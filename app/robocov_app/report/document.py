@@ -91,7 +91,7 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
         "settings": len(grouped.settings(result)),
         "choice": choice.words if len(replayed) > 1 else "",
         "sparse": any(not has_path(run.record) for run in replayed),
-        "moving": any(run.record.environment.moves for run in replayed),
+        "moving": any(run.record.environment.has_moving_obstacles for run in replayed),
         "changing": any(failed is not None for record in changing for _, failed in lives(record)),
         "thumbnails": [
             {

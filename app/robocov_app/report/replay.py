@@ -121,7 +121,7 @@ def embedded_run(run: ReplayRun, on: int, style: CurveStyle, rate: float, *, goa
         "radius": radius[0] if len(set(radius)) == 1 else radius,
         **({"speeds": record.team.max_speed.tolist()} if record.by_time else {}),
         "numbers": list(roster_of(record).numbers),
-        **({"begin": begin} if begin and record.environment.moves else {}),
+        **({"begin": begin} if begin and record.environment.has_moving_obstacles else {}),
         **({"lives": life} if any(each != (0.0, None) for each in life) else {}),
         "path": has_path(record),
         "step": 1.0 / rate if has_path(record) else max(end - begin, 1e-9),

@@ -169,7 +169,7 @@ def with_references(result: Result, *, search: bool, tell: Callable[[int], None]
     for done, (setting, entry) in enumerate(first.items(), start=1):
         record = result.record(entry)
         everybody = record.present.all() and record.working.all()
-        if isinstance(lattice, int) and everybody and not record.environment.moves:
+        if isinstance(lattice, int) and everybody and not record.environment.has_moving_obstacles:
             reference = _reference(record, lattice, search=search)
             if reference is not None:
                 found[setting] = reference

@@ -221,7 +221,7 @@ class CostService:
                 line.tell((done, (now - began) * (1.0 - done) / done))
 
         self._momentary = None
-        if before and before.lattice == asked.lattice and before.environment.same_place(environment):
+        if before and before.lattice == asked.lattice and before.environment.has_same_geometry(environment):
             self._cost = before.with_density(environment)
         else:
             self._cost = CoverageCost(environment, asked.lattice, progress=tell)

@@ -255,7 +255,7 @@ class Window(BaseWindow):
 
     def look(self) -> object:
         viewer, session, tour = self.viewer, self.viewer.session, self.tour
-        at_rest = session.settled and session.live and not session.environment.moves
+        at_rest = session.settled and session.live and not session.environment.has_moving_obstacles
         if (session.playing and not at_rest) or self.film is not None:
             return None
         told = viewer.version, viewer.message, viewer.trouble, session.time, session.serial, session.playing

@@ -321,7 +321,7 @@ class TimeVaryingCost:
     def get_cost(self, time: float) -> CoverageCost:
         """Return the coverage cost of the map as it is at a time, s; the given one where nothing moves."""
         environment = self._cost.environment
-        if not environment.moves:
+        if not environment.has_moving_obstacles:
             return self._cost
         now = environment.at(time)
         key = now.free.wkb
@@ -336,7 +336,7 @@ class TimeVaryingCost:
     ) -> BoolArray:
         """Return which robots at (n, 2) m count at a time, s, (n,); all work if `working`, (n,), is None."""
         counted = np.ones(len(positions), dtype=bool) if working is None else working.copy()
-        if self._cost.environment.moves:
+        if self._cost.environment.has_moving_obstacles:
             counted &= shapely.contains_properly(
                 self.get_cost(time).environment.free, shapely.points(positions)
             )

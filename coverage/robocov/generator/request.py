@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.environment import START_GAP, Ring
+from robocov.environment import MIN_START_GAP_RADII, Ring
 from robocov.errors import require_number
 from robocov.team import DEFAULT_RADIUS
 
 LEAST_GAP = 0.21  # m; robots of the usual size pass it
-assert LEAST_GAP > 2.0 * DEFAULT_RADIUS * (1.0 + START_GAP)
+assert LEAST_GAP > 2.0 * DEFAULT_RADIUS * (1.0 + MIN_START_GAP_RADII)
 
 AREA_TOLERANCE = 0.005
 """Blocked area of a generated map, as a part of its area, differs by at most so much from what was asked."""

@@ -15,7 +15,7 @@ import shapely
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
-from robocov.environment import GRID, Environment
+from robocov.environment import GRID_M, Environment
 from robocov.errors import InputError
 from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_box_hidden, is_visible
 from robocov.geodesic.walls import (
@@ -257,7 +257,7 @@ class Geodesics:
                 raise InputError(f"{place}: finite numbers were wanted")
             moved = self._nearest_free(places[i])
             depth = float(np.hypot(*(moved - places[i]))) * self.grid.unit
-            if depth > 2.0 * GRID + 1e-9 * self.size:
+            if depth > 2.0 * GRID_M + 1e-9 * self.size:
                 raise InputError(
                     f"{place} is {depth:.3g} m outside the free space of map {self._name!r}; "
                     f"a point inside the boundary and outside every obstacle was wanted"

@@ -12,7 +12,7 @@ from shapely import Polygon
 from robocov.arrays import Array
 from robocov.density import Density, Gaussians, WeightedArea, WeightedPolygons
 from robocov.environment import (
-    START_GAP,
+    MIN_START_GAP_RADII,
     DiscStart,
     Environment,
     Gap,
@@ -178,7 +178,7 @@ def _plainly_has_room(environment: Environment, spec: DiscStart | UniformStart) 
     centres = shapely.points(np.reshape(given, (-1, 2)))
     inside = shapely.contains_properly(environment.free, centres)
     clearance = shapely.distance(environment.free.boundary, centres)
-    return bool((inside & (clearance > DEFAULT_RADIUS * (1 + START_GAP) + 0.01)).any())
+    return bool((inside & (clearance > DEFAULT_RADIUS * (1 + MIN_START_GAP_RADII) + 0.01)).any())
 
 
 class StartReport(NamedTuple):
@@ -374,4 +374,4 @@ def _start_report(environment: Environment, name: str, radius: float) -> StartRe
     if isinstance(spec, PointsStart):
         return StartReport(name, "points", len(spec.positions))
     kind = "disc" if isinstance(spec, DiscStart) else "uniform"
-    return StartReport(name, kind, environment.start(name).capacity(radius))
+    return StartReport(name, kind, environment.start(name).estimate_capacity(radius))

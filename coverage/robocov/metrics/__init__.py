@@ -86,7 +86,7 @@ def sample_moments(record: Record, rate: float) -> list[int]:
 
     Where obstacles move, the rate is `MOVING_RATE` at most: each moment then has a map of its own.
     """
-    rate = min(rate, MOVING_RATE) if record.environment.moves else rate
+    rate = min(rate, MOVING_RATE) if record.environment.has_moving_obstacles else rate
     return [int(k) for k in nearest_moments(record.time, rate)]
 
 
@@ -162,7 +162,7 @@ def clearances(record: Record) -> Array:
     What the robots sensed is used where they sensed something, and that was right; the rest is asked for
     here. Of robots that do not work there is none: inf.
     """
-    if record.conditions is not None or record.environment.moves:
+    if record.conditions is not None or record.environment.has_moving_obstacles:
         return _clearances_asked_for(record)
     positions = record.positions.reshape(-1, 2)
     nearest = record.obstacle_points.reshape(-1, 2).copy()

@@ -211,7 +211,7 @@ def compute_mover_states(movers: tuple[Mover, ...], time: float, dt: float) -> A
     """
     states = np.empty((len(movers), 4))
     for row, mover in enumerate(movers):
-        displacement = mover.path.shift(time)
+        displacement = mover.path.compute_displacement(time)
         states[row, :2] = displacement
-        states[row, 2:] = (mover.path.shift(time + dt) - displacement) / dt
+        states[row, 2:] = (mover.path.compute_displacement(time + dt) - displacement) / dt
     return states

@@ -72,5 +72,5 @@ def test_weighed_maps_keep_their_geometry():
     region, free = plain.region, plain.free
     twin = plain.with_density(Uniform(2.0))
     assert twin.region is region and twin.free is free and twin.density == Uniform(2.0)
-    assert twin != plain and twin.same_place(plain) and twin.with_density(None) == plain
-    assert not plain.same_place(Environment("other", ring))
+    assert twin != plain and twin.has_same_geometry(plain) and twin.with_density(None) == plain
+    assert not plain.has_same_geometry(Environment("other", ring))

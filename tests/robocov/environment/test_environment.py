@@ -72,8 +72,8 @@ def test_another_density_has_other_masses_and_the_same_geometry() -> None:
     assert plain.free_masses.tolist() == [100.0]
     twin = plain.with_density(Uniform(3.0))
     assert twin.free is plain.free and twin.free_masses.tolist() == [300.0]
-    assert plain.same_place(twin)
-    assert not plain.same_place(Environment("plain", SQUARE, (CircleObstacle((5.0, 5.0), 1.0),)))
+    assert plain.has_same_geometry(twin)
+    assert not plain.has_same_geometry(Environment("plain", SQUARE, (CircleObstacle((5.0, 5.0), 1.0),)))
 
 
 @settings(max_examples=60)

@@ -30,14 +30,14 @@ repeats = st.sampled_from(["loop", "back-and-forth"])
 def test_a_loop_closes_and_a_line_turns_back() -> None:
     square = ObstaclePath(((0, 0), (2, 0), (2, 1), (0, 1)), 0.5)
     assert square.period == 12.0
-    assert square.shift(0.0).tolist() == [0, 0]
-    assert square.shift(5.0).tolist() == [2, 0.5]
-    assert square.shift(11.0).tolist() == [0, 0.5]
-    assert square.shift(12.0).tolist() == [0, 0]
+    assert square.compute_displacement(0.0).tolist() == [0, 0]
+    assert square.compute_displacement(5.0).tolist() == [2, 0.5]
+    assert square.compute_displacement(11.0).tolist() == [0, 0.5]
+    assert square.compute_displacement(12.0).tolist() == [0, 0]
     line = ObstaclePath(((1, 1), (4, 5)), 1.0, "back-and-forth")
     assert line.period == 10.0
-    assert line.shift(5.0).tolist() == [3, 4]
-    np.testing.assert_allclose(line.shift(7.5), [1.5, 2.0])
+    assert line.compute_displacement(5.0).tolist() == [3, 4]
+    np.testing.assert_allclose(line.compute_displacement(7.5), [1.5, 2.0])
 
 
 @given(lines, st.floats(0.01, 5), repeats, st.floats(0, 1e4), st.floats(0, 10))
@@ -45,11 +45,13 @@ def test_it_never_goes_faster_than_its_speed_and_comes_back(
     points: list[tuple[float, float]], speed: float, repeat: Repeat, time: float, later: float
 ) -> None:
     path = ObstaclePath(tuple(points), speed, repeat)
-    moved = path.shift(time + later) - path.shift(time)
+    moved = path.compute_displacement(time + later) - path.compute_displacement(time)
     assert math.hypot(*moved) <= speed * later + 1e-8
-    np.testing.assert_allclose(path.shift(time + path.period), path.shift(time), atol=1e-6)
+    np.testing.assert_allclose(
+        path.compute_displacement(time + path.period), path.compute_displacement(time), atol=1e-6
+    )
     # it is on its line
-    at = path.shift(time) + points[0]
+    at = path.compute_displacement(time) + points[0]
     ends = [*points, points[0]] if repeat == "loop" else points
     nearest = min(_distance(at, np.array(a), np.array(b)) for a, b in pairwise(ends))
     assert nearest < 1e-8
@@ -77,9 +79,9 @@ def moving() -> Environment:
 
 def test_the_map_at_a_time_has_all_obstacles_standing_where_they_are() -> None:
     environment = moving()
-    assert environment.moves
+    assert environment.has_moving_obstacles
     now = environment.at(4.0)
-    assert not now.moves
+    assert not now.has_moving_obstacles
     assert now.obstacles[0] == environment.obstacles[0]
     cart = now.obstacles[1]
     assert isinstance(cart, CircleObstacle)
@@ -103,13 +105,13 @@ def test_what_comes_by_again_stands_in_the_very_same_place_holes_and_all() -> No
     for turns in range(1, 30):
         assert hall.at(1.0 + turns * path.period) == hall.at(1.0)
     (shape,) = hall.at(1.0).obstacles
-    by = np.round(path.shift(1.0), 9)
+    by = np.round(path.compute_displacement(1.0), 9)
     assert shape.holes == (tuple((x + by[0], y + by[1]) for x, y in hole),)
 
 
 def test_where_nothing_moves_the_map_is_always_itself() -> None:
     hall = Environment("hall", HALL, (CircleObstacle((2, 1), 0.5),))
-    assert not hall.moves
+    assert not hall.has_moving_obstacles
     assert hall.at(7.0) is hall
     assert hall.static is hall
 

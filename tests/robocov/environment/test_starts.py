@@ -104,8 +104,8 @@ def test_a_start_without_room_says_so() -> None:
 @pytest.mark.parametrize("spec", [DiscStart((5.0, 5.0), 0.9), DiscStart((0.0, 0.0), 1.5)])
 def test_one_number_says_how_many_fit_whatever_was_asked_for(spec: DiscStart) -> None:
     start = Start("tight", spec, SQUARE)
-    capacity = start.capacity(0.1)
-    assert Start("tight", spec, SQUARE).capacity(0.1) == capacity
+    capacity = start.estimate_capacity(0.1)
+    assert Start("tight", spec, SQUARE).estimate_capacity(0.1) == capacity
     told = set()
     for n, seed in ((capacity + 10, 0), (capacity + 10, 1), (2 * capacity, 0), (5000, 3)):
         with pytest.raises(StartError, match=f"room for about {capacity} robots") as refused:
@@ -120,7 +120,7 @@ def test_one_number_says_how_many_fit_whatever_was_asked_for(spec: DiscStart) ->
 def test_in_a_narrow_passage_darts_are_counted() -> None:
     """Lattices lose there; the number is what can be drawn."""
     start = Start("slit", DiscStart((5.0, 5.0), 4.0), shapely.box(0, 4.85, 10, 5.15))
-    capacity = start.capacity(0.1)
+    capacity = start.estimate_capacity(0.1)
     assert capacity >= 20
     assert len(start.sample(capacity, seed=7)) == capacity
 

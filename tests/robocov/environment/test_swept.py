@@ -30,7 +30,9 @@ def test_it_is_where_the_obstacle_comes_by(points, repeat) -> None:
     path = ObstaclePath(points, 0.5, repeat)
     area = compute_swept_area(FRAME.polygon, path)
     times = np.linspace(0.0, path.period, 200)
-    met = shapely.union_all([shift_obstacle(FRAME, path.shift(time)).polygon for time in times])
+    met = shapely.union_all(
+        [shift_obstacle(FRAME, path.compute_displacement(time)).polygon for time in times]
+    )
     assert met.difference(area.buffer(1e-6)).area < 1e-6  # nothing is missing
     step = 0.5 * path.period / 199
     assert area.difference(met.buffer(step + 1e-6)).area < 1e-6  # nor is there more

@@ -130,7 +130,7 @@ def test_it_is_kept_in_the_file() -> None:
     sketch = paths.way_point_added(sheet(DESK), 0, (1.0, 3.0)).sketch
     again = parse_sketch(sketch_text(sketch), "map")
     assert led(again) == led(sketch)
-    assert again.environment().moves
+    assert again.environment().has_moving_obstacles
 
 
 # the tool
@@ -203,7 +203,7 @@ def test_paths_are_seen_and_obstacles_shown_moving(tmp_path: Path, theme: str) -
         hands.key("l")
         hands.editor.message = ""
         hands.frames(1, 4.0)
-        (shift,) = [led(hands.sketch).shift(hands.editor.now - hands.editor.moves_since)]
+        (shift,) = [led(hands.sketch).compute_displacement(hands.editor.now - hands.editor.moves_since)]
         assert shift[0] > 1.0
         x, y = map(round, hands.pixel((2.0 + float(shift[0]), 2.2)))
         assert (hands.picture()[y, x] != with_path[y, x]).any()

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapely import MultiPolygon, box
 
-from robocov.environment import SAGITTA, Environment
+from robocov.environment import MAX_SAGITTA_M, Environment
 from robocov.errors import RobocovError
 from robocov.mapfile import parse_map
 from robocov.mapfile.check import check_map
@@ -31,7 +31,7 @@ def require_clean(environment: Environment, report: ImportReport) -> None:
     warnings = check_map(environment).warnings
     assert not [each for each in warnings if "same place" in each or "pocket" in each]
     # a circle may be drawn with another number of sides
-    assert report.moved <= report.tolerance + GRID + SAGITTA
+    assert report.moved <= report.tolerance + GRID + MAX_SAGITTA_M
 
 
 def imported(case: Case, name: str, folder: Path, **options: Any) -> tuple[Environment, ImportReport]:

@@ -409,7 +409,7 @@ def test_obstacles_are_where_they_are_in_the_run(browser, repeat) -> None:
     mover["line"] = [0.001 * value for value in mover["line"]]
     for seconds in (0.0, 1.0, 4.5, 7.3, 20.0, 1234.5):
         shift = browser.js(asset("data.js") + "return shiftOf(...arguments)", mover, seconds)
-        assert shift == pytest.approx(path.shift(seconds).tolist(), abs=1e-6)
+        assert shift == pytest.approx(path.compute_displacement(seconds).tolist(), abs=1e-6)
 
 
 def test_who_fails_is_crossed_out_from_then_on_and_who_joins_is_there_from_then_on(browser, tmp_path) -> None:

@@ -259,7 +259,7 @@ class EditorCanvas:
             chosen = key in self.editor.selection.items
             overlay.draw_path(canvas, path, theme.final if chosen else mix(theme.background, theme.ink, 0.6))
             if since is not None and paths.goes(path):
-                shift = path.shift(self.editor.now - since)
+                shift = path.compute_displacement(self.editor.now - since)
                 moved = shapely.transform(item.geometry, lambda places, by=shift: places + by)
                 overlay.draw_ghost(canvas, moved)
 

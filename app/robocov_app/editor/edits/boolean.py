@@ -7,7 +7,7 @@ from typing import Any
 
 import shapely
 
-from robocov.environment import GRID, CircleObstacle, Obstacle, PolygonObstacle
+from robocov.environment import GRID_M, CircleObstacle, Obstacle, PolygonObstacle
 from robocov.errors import MapError, format_count
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.model import require
@@ -15,8 +15,8 @@ from robocov_app.editor.model.geometry import outlines, tenths
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import Item, Sketch
 
-_difference = partial(shapely.difference, grid_size=GRID)
-_intersection = partial(shapely.intersection, grid_size=GRID)
+_difference = partial(shapely.difference, grid_size=GRID_M)
+_intersection = partial(shapely.intersection, grid_size=GRID_M)
 
 
 def united(sketch: Sketch, selection: Selection) -> Change:
@@ -105,7 +105,7 @@ def repaired(sketch: Sketch, selection: Selection) -> Change:
 
 
 def _union(items: Sequence[Item]) -> shapely.Geometry:
-    return shapely.union_all([item.geometry for item in items], grid_size=GRID)
+    return shapely.union_all([item.geometry for item in items], grid_size=GRID_M)
 
 
 def _chosen(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:

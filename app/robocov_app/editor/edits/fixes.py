@@ -10,7 +10,7 @@ import shapely
 from shapely import Geometry, LineString, MultiPolygon
 from shapely.ops import substring
 
-from robocov.environment import SAGITTA, Obstacle, Point, PointsStart, WallObstacle
+from robocov.environment import MAX_SAGITTA_M, Obstacle, Point, PointsStart, WallObstacle
 from robocov.errors import MapError
 from robocov_app.editor.edits import boolean, properties, transform, vertices
 from robocov_app.editor.model import require
@@ -79,8 +79,10 @@ def _filled(sketch: Sketch, where: Geometry) -> Change:
 
 def _beyond(free: MultiPolygon, largest: Geometry, others: list[Geometry]) -> Geometry:
     """Return those parts of the free space that hold any of some places, without the largest part."""
-    parts = shapely.get_parts(free - largest.buffer(SAGITTA))
-    return shapely.union_all(parts[shapely.intersects(parts, shapely.union_all(others).buffer(-SAGITTA))])
+    parts = shapely.get_parts(free - largest.buffer(MAX_SAGITTA_M))
+    return shapely.union_all(
+        parts[shapely.intersects(parts, shapely.union_all(others).buffer(-MAX_SAGITTA_M))]
+    )
 
 
 def _start_moved(sketch: Sketch, name: str, where: Geometry, radius: float) -> Change:
@@ -106,7 +108,7 @@ def _widened(sketch: Sketch, gap: LineString, width: float) -> Change:
     ends = [(gap.coords[0], gap.coords[-1]), (gap.coords[-1], gap.coords[0])]
     sides = []
     for a, b in ends:
-        near = sketch.tree.query(shapely.Point(a), predicate="dwithin", distance=SAGITTA).tolist()
+        near = sketch.tree.query(shapely.Point(a), predicate="dwithin", distance=MAX_SAGITTA_M).tolist()
         sides += [(sketch.obstacles[k], a, b) for k in near if not sketch.obstacles[k].locked]
     for item, a, _ in sides:
         if shorter := _shortened(item.shape, a, lack):
@@ -127,6 +129,6 @@ def _shortened(wall: Obstacle, end: Point, by: float) -> WallObstacle | None:
         return None
     line = LineString(wall.points)
     for at, low, high in ((wall.points[0], by, line.length), (wall.points[-1], 0.0, line.length - by)):
-        if math.dist(at, end) <= wall.width / 2 + SAGITTA and high - low > wall.width:
+        if math.dist(at, end) <= wall.width / 2 + MAX_SAGITTA_M and high - low > wall.width:
             return replace(wall, points=tuple(map(rounded, substring(line, low, high).coords)))
     return None

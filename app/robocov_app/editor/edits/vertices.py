@@ -122,7 +122,7 @@ def rounded_off(sketch: Sketch, selection: Selection, radius: float) -> Change:
     require(0.0 < radius < math.inf, "a radius above 0 m was wanted")
 
     def cut(turn: float) -> tuple[float, int]:
-        step = 2.0 * math.acos(max(1.0 - env.SAGITTA / radius, 0.0))
+        step = 2.0 * math.acos(max(1.0 - env.MAX_SAGITTA_M / radius, 0.0))
         return radius * math.tan(turn / 2.0), min(_MOST_SEGMENTS, math.ceil(turn / step))
 
     return _cut(sketch, selection, cut, "rounded")

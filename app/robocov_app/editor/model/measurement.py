@@ -8,7 +8,7 @@ import shapely
 from shapely import LineString, MultiPolygon, Polygon
 
 from robocov.arrays import Array, IntArray
-from robocov.environment import SAGITTA, Gap, Point, find_narrow_gaps, find_narrowest_gap
+from robocov.environment import MAX_SAGITTA_M, Gap, Point, find_narrow_gaps, find_narrowest_gap
 from robocov.team import DEFAULT_RADIUS
 from robocov_app.editor.model.geometry import middle_of
 from robocov_app.editor.model.sketch import Item, Sketch
@@ -74,7 +74,7 @@ def reach_of(free: MultiPolygon, radius: float) -> tuple[tuple[shapely.Geometry,
     centres = [part for part in _polygons(free.buffer(_EXACTLY - radius)) if part.area > 0.0]
     swept = sorted((part.buffer(radius) & free for part in centres), key=lambda part: -part.area)
     opened = shapely.union_all(swept)
-    left = free - opened.buffer(SAGITTA / 2)
+    left = free - opened.buffer(MAX_SAGITTA_M / 2)
     parts = np.array([part for part in _polygons(left) if part.area > 0.0], dtype=object)
     if not len(parts):
         return tuple(swept), MultiPolygon()
@@ -86,7 +86,7 @@ def reach_of(free: MultiPolygon, radius: float) -> tuple[tuple[shapely.Geometry,
         np.logical_or.at(deep, of, ~shapely.dwithin(opened, shapely.points(points), radius))
     wanted = deep | (_arcs(parts, free) != 1)
     # what is no wider than a crack is taken for touching
-    wide = ~shapely.is_empty(shapely.buffer(parts, -SAGITTA, quad_segs=2))
+    wide = ~shapely.is_empty(shapely.buffer(parts, -MAX_SAGITTA_M, quad_segs=2))
     return tuple(swept), MultiPolygon(list(parts[wanted & wide]))
 
 

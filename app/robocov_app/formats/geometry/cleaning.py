@@ -14,12 +14,12 @@ from shapely import MultiPolygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
-from robocov.environment import GRID
+from robocov.environment import GRID_M
 from robocov_app.formats.geometry.polygons import polygons_of, sides_of, united
 
 _MITRE_LIMIT = 5.0
 _DIGITS = 9  # of distances in metres: what is less comes of rounding
-_OVERLAP_M = 2 * GRID  # by how much what is filled or cut reaches beyond a hair
+_OVERLAP_M = 2 * GRID_M  # by how much what is filled or cut reaches beyond a hair
 _MAX_SAMPLES = 4_000  # places along walls whose distances are measured
 
 
@@ -97,7 +97,7 @@ def _select_long(geometry: BaseGeometry, length: float) -> Array:
     """Return the polygons of a geometry that are longer than so many metres."""
     pieces = np.array(polygons_of(geometry).geoms, dtype=object)
     x, y, right, top = shapely.bounds(pieces).reshape(-1, 4).T
-    is_rounding = shapely.area(pieces) < 1e-3 * GRID * shapely.length(pieces)
+    is_rounding = shapely.area(pieces) < 1e-3 * GRID_M * shapely.length(pieces)
     return np.asarray(pieces[(np.hypot(right - x, top - y) > length) & ~is_rounding])
 
 
@@ -119,4 +119,4 @@ def _grow(pieces: Array) -> Sequence[BaseGeometry]:
 
 
 def _round(area: BaseGeometry) -> MultiPolygon:
-    return polygons_of(shapely.set_precision(area, GRID))
+    return polygons_of(shapely.set_precision(area, GRID_M))

@@ -118,9 +118,9 @@ class _Plan(NamedTuple):
     def find_free(self) -> MultiPolygon:
         """Return what is free, as `Environment` has it, m."""
         blocked = shapely.union_all(
-            [*self.solid, *(primitive.polygon for primitive in self.primitives)], grid_size=env.GRID
+            [*self.solid, *(primitive.polygon for primitive in self.primitives)], grid_size=env.GRID_M
         )
-        return polygons_of(shapely.difference(self.boundary, blocked, grid_size=env.GRID))
+        return polygons_of(shapely.difference(self.boundary, blocked, grid_size=env.GRID_M))
 
 
 class _Shaper:
@@ -134,7 +134,7 @@ class _Shaper:
         self.others: list[tuple[float, float]] = []
         self.specks = foreign.specks if shaping.specks is None else shaping.specks
         # how far from walls a robot starts, m: the rules of maps want room for the usual one
-        self.clearance = max(DEFAULT_RADIUS, self.radius) * (1 + env.START_GAP)
+        self.clearance = max(DEFAULT_RADIUS, self.radius) * (1 + env.MIN_START_GAP_RADII)
         grid = _GRID if foreign.cell is None else min(_GRID, foreign.cell / 100)
         self.digits = -math.floor(math.log10(grid) + 1e-9)
 
@@ -448,7 +448,7 @@ class _Shaper:
                 widest = max(widest, roomiest(part, self.clearance / 50, self.clearance)[1])
             if widest >= self.clearance:
                 return
-        wanted, most = self.clearance / (1 + env.START_GAP), widest / (1 + env.START_GAP)
+        wanted, most = self.clearance / (1 + env.MIN_START_GAP_RADII), widest / (1 + env.MIN_START_GAP_RADII)
         found = f"(the widest is for one of {most:.3g} m): is the scale right?"
         raise MapError(f"{self.where}: no place is wide enough for a robot of radius {wanted:g} m {found}")
 
@@ -517,7 +517,7 @@ class _Shaper:
                 boundary = rounded(found.boundary.simplify(0.0), self.digits).geoms[0]
                 deviation = measure_deviation(before, found.find_free())
                 # a circle stays within its sagitta, whatever number of sides it is drawn with
-                limit = self._tolerance() + 10.0**-self.digits + env.SAGITTA
+                limit = self._tolerance() + 10.0**-self.digits + env.MAX_SAGITTA_M
                 if deviation.distance > max(limit, plan.deviation.distance):
                     return plan
                 return found._replace(boundary=boundary, deviation=deviation)

@@ -7,9 +7,9 @@ import numpy as np
 import shapely
 
 from robocov.arrays import Array, IntArray, concatenate_ranges
-from robocov.environment import SAGITTA
+from robocov.environment import MAX_SAGITTA_M
 
-TOLERANCE = SAGITTA  # m between a curve and the line that stands for it at most: as of round obstacles
+TOLERANCE = MAX_SAGITTA_M  # m between a curve and the line that stands for it at most: as of round obstacles
 # steps between two breaks at first; and what of the tolerance the middle of a step may be away, which need
 # not be where the curve is farthest
 _FIRST, _SAFE = 8, 0.8

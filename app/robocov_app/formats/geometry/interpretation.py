@@ -33,7 +33,7 @@ from shapely import LineString, MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
-from robocov.environment import GRID, CircleObstacle
+from robocov.environment import GRID_M, CircleObstacle
 from robocov.errors import MapError, format_count, quote
 from robocov.mapfile.models import LARGEST
 from robocov_app.formats.base import Primitive, ReadOptions, square_metres
@@ -609,7 +609,7 @@ def _find_obstacles(
 def _subtract(region: MultiPolygon, solids: Sequence[BaseGeometry]) -> MultiPolygon:
     if not solids:
         return region
-    return polygons_of(shapely.difference(region, united(solids), grid_size=GRID))
+    return polygons_of(shapely.difference(region, united(solids), grid_size=GRID_M))
 
 
 def _choose_outer(

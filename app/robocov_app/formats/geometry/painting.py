@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.environment import GRID
+from robocov.environment import GRID_M
 from robocov_app.formats.colours import DARK, PALE, Colour, luminance
 from robocov_app.formats.geometry.polygons import enclosed, polygons_of, united
 
@@ -95,7 +95,7 @@ def uncover(solids: Sequence[Coat], floors: Sequence[Coat]) -> list[BaseGeometry
         area = solid.area
         if len(above):
             covers = united([floors[k].area for k in above])
-            area = shapely.difference(area, covers, grid_size=GRID)
+            area = shapely.difference(area, covers, grid_size=GRID_M)
         if not area.is_empty:
             left.append(area)
     return left
@@ -107,4 +107,4 @@ def alternate(areas: Sequence[BaseGeometry]) -> tuple[MultiPolygon, MultiPolygon
     rings = [shapely.get_coordinates(ring)[:-1] for ring in shapely.get_rings(parts)]
     odd, _, _ = enclosed(rings, "evenodd")
     whole = united([Polygon(part.exterior) for part in parts])
-    return odd, polygons_of(shapely.difference(whole, odd, grid_size=GRID))
+    return odd, polygons_of(shapely.difference(whole, odd, grid_size=GRID_M))

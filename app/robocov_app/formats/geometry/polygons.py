@@ -11,7 +11,7 @@ from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, BoolArray
-from robocov.environment import GRID
+from robocov.environment import GRID_M
 from robocov.errors import MapError
 
 Rule: TypeAlias = Literal["holes", "evenodd", "nonzero"]  # holes in the first ring, or SVG's ``fill-rule``
@@ -111,7 +111,9 @@ def united(areas: Sequence[BaseGeometry]) -> BaseGeometry:
     union = shapely.union_all(areas)
     corners = shapely.points(shapely.get_coordinates(areas))
     shapely.prepare(union)
-    return union if shapely.dwithin(union, corners, GRID).all() else shapely.union_all(areas, grid_size=GRID)
+    return (
+        union if shapely.dwithin(union, corners, GRID_M).all() else shapely.union_all(areas, grid_size=GRID_M)
+    )
 
 
 def _has_three(ring: Array) -> bool:
@@ -133,7 +135,7 @@ def _filled(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
     try:
         return polygons_of(shapely.coverage_union_all(faces))
     except shapely.GEOSException:  # faces so thin that rounding has folded them over others
-        return polygons_of(shapely.union_all(faces, grid_size=GRID))
+        return polygons_of(shapely.union_all(faces, grid_size=GRID_M))
 
 
 def _is_filled(points: Array, edges: Array, tree: shapely.STRtree, rule: Rule) -> BoolArray:
@@ -283,5 +285,5 @@ def rings(polygon: Polygon) -> list[list[tuple[float, float]]]:
 
 def free_area(boundary: BaseGeometry, obstacles: Iterable[BaseGeometry]) -> float:
     """Return the area inside of a boundary and outside of obstacles, as `Environment.free` has it, m²."""
-    blocked = shapely.union_all(list(obstacles), grid_size=GRID)
-    return float(shapely.difference(boundary, blocked, grid_size=GRID).area)
+    blocked = shapely.union_all(list(obstacles), grid_size=GRID_M)
+    return float(shapely.difference(boundary, blocked, grid_size=GRID_M).area)

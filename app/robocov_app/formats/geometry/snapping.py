@@ -20,14 +20,14 @@ from shapely import LineString, MultiPolygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
-from robocov.environment import GRID
+from robocov.environment import GRID_M
 from robocov.errors import format_count
 from robocov.mapfile.models import SMALLEST
 from robocov_app.formats.geometry.polygons import polygons_of, united
 
 DEFAULT_SNAP_M = 0.01  # thinner than any wall of a building
 MAX_DEFAULT_SNAP = 1e-3  # as a fraction of the larger side of a drawing: a table-top arena has thin walls
-_OVERLAP_M = 2 * GRID  # by how much what fills a gap reaches into what is beside it
+_OVERLAP_M = 2 * GRID_M  # by how much what fills a gap reaches into what is beside it
 _MITRE_LIMIT = 5.0
 _REACH = 1.01  # in tolerances: how far beside an outline its neighbours are looked for
 _MIN_LENGTH = 3.0  # of a gap, in tolerances: beside a corner not more than two of them are near
@@ -96,14 +96,14 @@ class _Gaps(NamedTuple):
 def union_on_grid(areas: Sequence[BaseGeometry]) -> MultiPolygon:
     """Return the union of areas, m, to the micrometre."""
     # to unite first and round then takes a tenth of the time
-    return polygons_of(shapely.set_precision(united(areas), GRID))
+    return polygons_of(shapely.set_precision(united(areas), GRID_M))
 
 
 def are_edge_to_edge(one: BaseGeometry, other: BaseGeometry, tolerance: float) -> bool:
     """Return whether two areas that do not overlap touch along an edge, or nearly do."""
     if shapely.relate_pattern(one, other, "2********"):
         return False
-    wall = shapely.intersection(shapely.boundary(one), shapely.buffer(other, _REACH * tolerance + GRID))
+    wall = shapely.intersection(shapely.boundary(one), shapely.buffer(other, _REACH * tolerance + GRID_M))
     return bool(_find_longest(wall).length > _MIN_LENGTH * tolerance)
 
 
@@ -169,7 +169,7 @@ def _find_narrow(area: MultiPolygon, width: float) -> Array:
     grown = shapely.buffer(area, width / 2, join_style="mitre", mitre_limit=_MITRE_LIMIT)
     closed = shapely.buffer(grown, -width / 2, join_style="mitre", mitre_limit=_MITRE_LIMIT)
     pieces = shapely.get_parts(shapely.difference(closed, area))
-    return np.asarray(pieces[shapely.area(pieces) > GRID * GRID])
+    return np.asarray(pieces[shapely.area(pieces) > GRID_M * GRID_M])
 
 
 def _fill(area: MultiPolygon, gaps: _Gaps, width: float) -> MultiPolygon:

@@ -92,7 +92,7 @@ class Pane:
         controller = None if goes_on else setup.law.made()
         known = attrgetter("law", "limits", "numbers", "failed")
         alike = wanted.positions is None and known(self.setup) == known(setup)
-        if alike and setup.environment.same_place(self.setup.environment):
+        if alike and setup.environment.has_same_geometry(self.setup.environment):
             return old.with_density(environment)  # all else stays, as when it is painted
         row_of = {number: row for row, number in enumerate(self.numbers)}  # who stays keeps what is its own
         rows = np.array([row_of.get(number, -1) for number in setup.numbers], dtype=np.intp)
