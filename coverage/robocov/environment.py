@@ -19,7 +19,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, IntArray, freeze
 from robocov.density import Density
-from robocov.density.base import masses_of_polygons
+from robocov.density.base import compute_polygon_masses
 from robocov.drawing import Drawable
 from robocov.errors import StartError, describe_unknown_name, format_count, is_number, require_type
 from robocov.observation.region import Region
@@ -265,10 +265,10 @@ class Environment(Drawable):
     def free_masses(self) -> Array:
         """Integral of φ over each component of the free space, m²: their areas without a density."""
         parts = self.free.geoms
-        if self.density is None or self.density.uniform:
-            weight = 1.0 if self.density is None else self.density.highest
+        if self.density is None or self.density.is_uniform:
+            weight = 1.0 if self.density is None else self.density.max_value
             return freeze([part.area * weight for part in parts])
-        return freeze(masses_of_polygons(self.density, list(parts)))
+        return freeze(compute_polygon_masses(self.density, list(parts)))
 
     def with_density(self, density: Density | None) -> Environment:
         """Return the same map with another density; what is derived from its geometry is kept."""

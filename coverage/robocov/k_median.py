@@ -18,13 +18,13 @@ Beat: TypeAlias = Callable[[], None]
 """Called once a pass; it may raise, to give up."""
 
 _FALL = 1e-9  # part of the cost by which a step must lower it, far more than rounding: none is undone
-_PASSES = 60  # rounds of `improved`; a few are usual
-_HARDLY = 1e-4  # part of the sum that a round of `improved` must save
+_PASSES = 60  # rounds of `improve_sources`; a few are usual
+_HARDLY = 1e-4  # part of the sum that a round of `improve_sources` must save
 _REMOVED = (2, 3)  # so many sources are taken away at once
 _TRIED = 4  # so many ways to put them back are tried to the end
 
 
-def seeded(table: Array, count: int, rng: np.random.Generator) -> IntArray:
+def seed_sources(table: Array, count: int, rng: np.random.Generator) -> IntArray:
     """Return (count,) sources by k-means++ (Arthur and Vassilvitskii 2007), with distances for squares."""
     chosen: list[int] = []
     nearest = np.ones(len(table))
@@ -41,7 +41,7 @@ def seeded(table: Array, count: int, rng: np.random.Generator) -> IntArray:
     return np.array(chosen, dtype=np.intp)
 
 
-def greedy(table: Array, count: int) -> IntArray:
+def choose_greedily(table: Array, count: int) -> IntArray:
     """Return (count,) sources: one after another that which lowers the sum the most.
 
     What k sources save, against one that is far from everything, is at least 1 - 1/e of what the best k save
@@ -51,7 +51,7 @@ def greedy(table: Array, count: int) -> IntArray:
     return _put_back(table, np.zeros(count, dtype=np.intp), order, 0)[1]
 
 
-def lloyd_iterations(
+def run_lloyd(
     table: Array, sources: IntArray, fixed: BoolArray | None = None, beat: Beat = lambda: None
 ) -> IntArray:
     """Return (k,) sources after Lloyd's iteration; those that are `fixed` stay."""
@@ -113,7 +113,7 @@ def _least(sums: Array, taken: BoolArray) -> int:
     return best
 
 
-def best_swap(table: Array, sources: IntArray, fixed: BoolArray, threshold: float) -> IntArray:
+def apply_best_swap(table: Array, sources: IntArray, fixed: BoolArray, threshold: float) -> IntArray:
     """Return the sources after the best swap; the same array where none lowers the sum by the threshold."""
     before, after, swapped = _best_swap(table, sources, fixed)
     return swapped if after < before * (1.0 - threshold) else sources
@@ -150,16 +150,16 @@ def _best_swap(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[float
     return total, least, swapped
 
 
-def best_swaps(table: Array, sources: IntArray, beat: Beat = lambda: None) -> IntArray:
+def apply_best_swaps(table: Array, sources: IntArray, beat: Beat = lambda: None) -> IntArray:
     """Return the sources after the best swaps, as long as these lower the cost."""
     fixed, former = np.zeros(len(sources), dtype=bool), None
     while sources is not former:
         beat()
-        former, sources = sources, best_swap(table, sources, fixed, _FALL)
+        former, sources = sources, apply_best_swap(table, sources, fixed, _FALL)
     return sources
 
 
-def improved(
+def improve_sources(
     table: Array, sources: IntArray, fixed: BoolArray, threshold: float, *, removals: bool = True
 ) -> IntArray:
     """Return (k,) sources for which the sum over the targets of the distances to the nearest is low.
@@ -169,20 +169,20 @@ def improved(
     `fixed` stay. What all this saves must be more than the part `threshold` of the sum after Lloyd's
     iteration alone; that one is returned else.
     """
-    near = best = lloyd_iterations(table, sources, fixed)
+    near = best = run_lloyd(table, sources, fixed)
     if not threshold < 1.0:
         return near
     for _ in range(_PASSES):
-        after = best_swap(table, best, fixed, _HARDLY)
+        after = apply_best_swap(table, best, fixed, _HARDLY)
         if after is best and removals:
-            after = rebuilt(table, best, fixed, _HARDLY)
+            after = rebuild_sources(table, best, fixed, _HARDLY)
         if after is best:
             break
-        best = lloyd_iterations(table, after, fixed)
+        best = run_lloyd(table, after, fixed)
     return best if _total(table, best) < (1.0 - threshold) * _total(table, near) else near
 
 
-def moved(table: Array, sources: IntArray, among: BoolArray, threshold: float) -> IntArray:
+def move_first_source(table: Array, sources: IntArray, among: BoolArray, threshold: float) -> IntArray:
     """Return the sources with the best one of some, (c,), in the place of the first, the others staying.
 
     What this saves must be more than `threshold` of the sum; the same array is returned else. Unlike Lloyd's
@@ -196,7 +196,7 @@ def moved(table: Array, sources: IntArray, among: BoolArray, threshold: float) -
     return np.concatenate([[best], sources[1:]])
 
 
-def rebuilt(table: Array, sources: IntArray, fixed: BoolArray, threshold: float) -> IntArray:
+def rebuild_sources(table: Array, sources: IntArray, fixed: BoolArray, threshold: float) -> IntArray:
     """Return the sources after some were taken away at once, and put back one by one where each helps most.
 
     Of all pairs and triples the most promising few are tried to the end, with Lloyd's iteration. The same
@@ -210,7 +210,7 @@ def rebuilt(table: Array, sources: IntArray, fixed: BoolArray, threshold: float)
     found.sort(key=lambda each: each[0])
     least, chosen = _total(table, sources) * (1.0 - threshold), sources
     for _, after in found[:_TRIED]:
-        after = lloyd_iterations(table, after, fixed)
+        after = run_lloyd(table, after, fixed)
         total = _total(table, after)
         if total < least:
             least, chosen = total, after

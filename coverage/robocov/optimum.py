@@ -25,7 +25,7 @@ from robocov.arrays import Array, BoolArray, IntArray, freeze
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.environment import MIN_START_GAP_RADII, Environment
 from robocov.errors import ParameterError, is_number, quote, require_number
-from robocov.k_median import Beat, best_swaps, lloyd_iterations, seeded
+from robocov.k_median import Beat, apply_best_swaps, run_lloyd, seed_sources
 from robocov.team import DEFAULT_RADIUS
 
 MAX_ROBOTS = 500
@@ -182,9 +182,9 @@ class _Search:
 
         The table knows the cost only about: what came before stays where the exact cost says so.
         """
-        drawn = seeded(self.table, self.robots, rng)
-        lloyd = lloyd_iterations(self.table, drawn, beat=beat)
-        stages = best_swaps(self.table, lloyd, beat), lloyd, drawn
+        drawn = seed_sources(self.table, self.robots, rng)
+        lloyd = run_lloyd(self.table, drawn, beat=beat)
+        stages = apply_best_swaps(self.table, lloyd, beat), lloyd, drawn
         return min(map(np.sort, stages), key=lambda some: _rank(self.cost(self.places[some])))
 
 

@@ -40,7 +40,7 @@ def _attraction(square: float, k_att: float, limit: float) -> float:
 
 
 @kernel
-def potential_forces(
+def compute_potential_forces(
     positions: Array, reported: Array, indptr: IntArray, indices: IntArray, team: int, obstacle_points: Array,
     goals: Array, k_rep: float, rho_0: float, k_att: float, limit: float,
 ) -> Array:  # fmt: skip
@@ -112,7 +112,7 @@ def _apart(i: int, j: int) -> tuple[float, float]:
 
 
 @kernel
-def separation(robot: IntArray, neighbour: IntArray) -> Array:
+def compute_separations(robot: IntArray, neighbour: IntArray) -> Array:
     """Return unit vectors, (m, 2), along which robots in one place are told apart."""
     directions = np.empty((len(robot), 2))
     for k in range(len(robot)):

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field, create_model
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.conditions import LIMITS, Conditions, Joined
+from robocov.conditions import LIMITS, Conditions, JoinedRobot
 from robocov.controllers import Controller, gain_values, short_name
 from robocov.controllers.gains import Value
 from robocov.drawing import Drawable
@@ -170,7 +170,7 @@ class Record(Drawable):
         Heading, from +x, and turning rate of unicycles; None in a team of points.
     session : dict
         Where a run comes from that is a part of a session in the window.
-    joined : tuple of Joined
+    joined : tuple of JoinedRobot
         The robots that joined during the run, and where.
     """
 
@@ -193,17 +193,17 @@ class Record(Drawable):
     session: Mapping[str, Any] = field(default_factory=dict)
     conditions: Conditions | None = None  # ideal ones
     steering: Array | None = None
-    joined: tuple[Joined, ...] = ()
+    joined: tuple[JoinedRobot, ...] = ()
 
     @cached_property
     def working(self) -> BoolArray:
         """Mask of robots present and not failed, (T, n) bool; read-only."""
-        return self._of_robots(Conditions.working)
+        return self._of_robots(Conditions.find_working)
 
     @cached_property
     def present(self) -> BoolArray:
         """Mask of robots present, failed ones included, (T, n) bool; read-only."""
-        return self._of_robots(Conditions.present)
+        return self._of_robots(Conditions.find_present)
 
     @cached_property
     def travelled(self) -> BoolArray:
@@ -393,15 +393,15 @@ class Record(Drawable):
         return cls(**known, **_arrays_of(folder / "record.npz", team))
 
 
-def _event_json(joined: Joined) -> dict[str, Any]:
+def _event_json(joined: JoinedRobot) -> dict[str, Any]:
     place, requested = list(joined.place), list(joined.requested)
     times = {"kind": "join", "robot": joined.robot, "time_s": joined.time}
     return {**times, "place_m": place, "requested_m": requested}
 
 
-def _joined_from(event: _Event) -> Joined:
+def _joined_from(event: _Event) -> JoinedRobot:
     place, requested = (event.place_m[0], event.place_m[1]), (event.requested_m[0], event.requested_m[1])
-    return Joined(event.robot, event.time_s, place, requested)
+    return JoinedRobot(event.robot, event.time_s, place, requested)
 
 
 @dataclass(eq=False)
@@ -439,7 +439,7 @@ class Recorder:
         arrays += [] if snapshot.steering is None else [snapshot.steering]
         self._moments.append((seen.time, *(array.copy() for array in arrays)))
 
-    def record(self, joined: tuple[Joined, ...] = ()) -> Record:
+    def record(self, joined: tuple[JoinedRobot, ...] = ()) -> Record:
         """Return what was collected so far; `joined` are the robots that joined in the simulation."""
         names = (*ARRAYS, TURNING) if self.team.is_unicycle.any() else ARRAYS
         columns = zip(*self._moments, strict=True) if self._moments else [()] * len(names)

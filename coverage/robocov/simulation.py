@@ -13,8 +13,8 @@ import numpy as np
 import shapely
 
 from robocov.arrays import Array, BoolArray
-from robocov.conditions import SOON, Conditions, Joined
-from robocov.conditions.perception import Inbox, Perception, of_working
+from robocov.conditions import TIME_TOLERANCE_S, Conditions, JoinedRobot
+from robocov.conditions.perception import Inbox, Perception, ignore_idle_robots
 from robocov.controllers import CONTROLLERS, informed, remembers
 from robocov.controllers.base import Controller, IndividualController, Individually, for_team
 from robocov.controllers.user_modules import fault_of, location_of
@@ -144,22 +144,22 @@ class Simulation:
         if conditions is not None:
             require_type("conditions", conditions, Conditions, "Conditions")
             conditions.check_team(len(positions))
-            conditions = None if conditions.ideal else conditions
+            conditions = None if conditions.is_ideal else conditions
             if not resumed:
                 check_joins(environment, conditions)
-        self.joined: tuple[Joined, ...] = ()
+        self.joined: tuple[JoinedRobot, ...] = ()
         self.environment, self.controller, self.dt = environment, controller, dt
         self.deciding = 0.0  # seconds of processor time that the controller has taken to decide so far
         self._began, self._steps = time, steps
         # who moves may lean on something, and sink in a little
         slack = 1e-6 if velocities is None else 2.0 * MAX_PENETRATION
-        there = None if conditions is None else conditions.working(self.time, len(positions))
+        there = None if conditions is None else conditions.find_working(self.time, len(positions))
         for run in self._each_run if not resumed else ():
             require_free_starts(environment.at(self.time), positions[run], self.team[run], slack, there)
         self._built_in = type(controller) in CONTROLLERS.values()
         self.conditions = conditions
         walls, moving = build_solid_pieces(environment), build_movers(environment)
-        changes = conditions is not None and conditions.team_changes
+        changes = conditions is not None and conditions.has_team_changes
         self._obstacles_change = bool(moving) or changes
         self.sensor = RangeSensor(walls, moving)
         self._world: World | ChangingWorld
@@ -170,7 +170,7 @@ class Simulation:
             given_state = walls, self.team, positions, velocities
             self._world = World(*given_state, steering=steering, movers=moving, runs=runs)
         self._perception = None if conditions is None else Perception(conditions, self.team, dt)
-        self.inbox = None if self._perception is None else self._perception.begin()
+        self.inbox = None if self._perception is None else self._perception.create_inbox()
         self._everybody = None
         if np.isinf(self.team.communication_range).all():
             self._everybody = Neighbours.combine([Neighbours(each)] * runs)
@@ -231,7 +231,7 @@ class Simulation:
             self._snapshot = Snapshot(seen, self._decided(seen))
             self.deciding += process_time() - began
             if self._perception is not None:
-                decision = of_working(self._snapshot.decision, self.working)
+                decision = ignore_idle_robots(self._snapshot.decision, self.working)
                 self._snapshot = Snapshot(seen, decision, self.positions, self.working, inbox)
         return self._snapshot
 
@@ -260,7 +260,7 @@ class Simulation:
             if self._perception is None:
                 self._observation = seen, None
             else:
-                self._observation = self._perception.known(seen, self.inbox, self.working)
+                self._observation = self._perception.perceive(seen, self.inbox, self.working)
         return self._observation
 
     def _decided(self, seen: Observations) -> Decision:
@@ -314,12 +314,14 @@ class Simulation:
             self.joined += self._find_joined(before)
         self._begin_step()
 
-    def _find_joined(self, before: Array) -> tuple[Joined, ...]:
+    def _find_joined(self, before: Array) -> tuple[JoinedRobot, ...]:
         """Return the robots that joined in the last step; positions `before` it are where they were to."""
         assert self.conditions is not None
-        earlier, now = self.conditions.present(np.array([self.time - self.dt, self.time]), len(self.team))
+        earlier, now = self.conditions.find_present(
+            np.array([self.time - self.dt, self.time]), len(self.team)
+        )
         return tuple(
-            Joined(
+            JoinedRobot(
                 robot=robot + 1,
                 time=self.time,
                 place=(float(self.positions[robot, 0]), float(self.positions[robot, 1])),
@@ -465,7 +467,7 @@ def simulate_many(
     )
     by_itself = by_itself or (team is not None and bool(team.is_unicycle.any()))
     for run, (positions, under) in enumerate(zip(starts, each, strict=True)):
-        if by_itself or len(positions) > _LARGEST_TEAM or not (under is None or under.ideal):
+        if by_itself or len(positions) > _LARGEST_TEAM or not (under is None or under.is_ideal):
             simulation = Simulation(environment, controller, positions, team, dt, conditions=under)
             records[run] = simulation.run(duration, start=start, seed=own_seeds[run])
         else:
@@ -505,7 +507,7 @@ def check_joins(environment: Environment, conditions: Conditions | None) -> None
             continue
         x, y = join.place
         where = f"conditions.joins[{k}]"
-        if join.time <= SOON:
+        if join.time <= TIME_TOLERANCE_S:
             expected = "expected a time above 0 s for a robot that joins at a place of its own"
             raise ParameterError(f"{where}: {expected}, got robot {join.robot} at {join.time:g} s")
         if not environment.boundary_polygon.covers(shapely.Point(x, y)):

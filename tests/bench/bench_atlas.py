@@ -182,7 +182,7 @@ def remaining(name: str, seed: int) -> float:
     some, cost = Simulation(field, make_controller(name), start, team), CoverageCost(field, 128)
     while some.time < 120.0:
         some.step()
-    weights = field.density.value(cost.points)
+    weights = field.density.evaluate(cost.points)
     ends, begins = (weights @ cost(each).distances ** 2 for each in (some.positions, start))
     return float(ends / begins)
 

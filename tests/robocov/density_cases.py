@@ -58,7 +58,7 @@ def fine_integrals(
     points = np.column_stack([np.tile(x, side), np.repeat(y, side)])
     polygon = shapely.Polygon(ring)
     points = points[shapely.contains_xy(polygon, *points.T)]
-    weights = density.value(points)
+    weights = density.evaluate(points)
     # what the lattice misses of the cell's area is spread evenly
     weights = weights * (polygon.area / len(points))
     offset = points - origin

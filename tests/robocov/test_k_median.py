@@ -8,7 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov import k_median
-from robocov.k_median import best_swap, best_swaps, greedy, improved, lloyd_iterations, moved, rebuilt, seeded
+from robocov.k_median import (
+    apply_best_swap,
+    apply_best_swaps,
+    choose_greedily,
+    improve_sources,
+    move_first_source,
+    rebuild_sources,
+    run_lloyd,
+    seed_sources,
+)
 
 
 def table(seed: int, sources: int = 12, targets: int = 30) -> np.ndarray:
@@ -27,9 +36,9 @@ def test_plans_get_better_and_keep_what_is_given(seed: int, k: int, given_: int)
     distance = table(seed)
     begin = np.random.default_rng(seed).permutation(12)[:k]
     stays = np.arange(k) < min(given_, k)
-    for step in (lloyd_iterations(distance, begin, stays), best_swap(distance, begin, stays, 0.0)):
+    for step in (run_lloyd(distance, begin, stays), apply_best_swap(distance, begin, stays, 0.0)):
         assert total(distance, step) <= total(distance, begin) + 1e-9
-    after = improved(distance, begin, stays, 0.0)
+    after = improve_sources(distance, begin, stays, 0.0)
     assert len(set(after.tolist())) == k
     assert np.array_equal(after[stays], begin[stays])
     assert total(distance, after) <= total(distance, begin) + 1e-9
@@ -48,7 +57,7 @@ def test_a_swap_is_the_best_of_all(seed: int, k: int) -> None:
         if source not in begin
     ]
     np.testing.assert_allclose(
-        total(distance, best_swap(distance, begin, free, 0.0)),
+        total(distance, apply_best_swap(distance, begin, free, 0.0)),
         min([*every, total(distance, begin)]),
         rtol=1e-12,
     )
@@ -58,11 +67,11 @@ def test_a_swap_must_be_worth_it() -> None:
     distance = table(3)
     begin = np.array([0, 1, 2])
     free = np.zeros(3, dtype=bool)
-    part = 1.0 - total(distance, best_swap(distance, begin, free, 0.0)) / total(distance, begin)
+    part = 1.0 - total(distance, apply_best_swap(distance, begin, free, 0.0)) / total(distance, begin)
     assert part > 0.0
-    assert best_swap(distance, begin, free, part * 1.01) is begin
-    assert best_swap(distance, begin, free, part * 0.99) is not begin
-    assert best_swap(distance, begin, ~free, 0.0) is begin
+    assert apply_best_swap(distance, begin, free, part * 1.01) is begin
+    assert apply_best_swap(distance, begin, free, part * 0.99) is not begin
+    assert apply_best_swap(distance, begin, ~free, 0.0) is begin
 
 
 @settings(max_examples=40)
@@ -71,7 +80,7 @@ def test_rebuilding_helps_or_changes_nothing(seed: int, k: int, given_: int) -> 
     distance = table(seed)
     begin = np.random.default_rng(seed).permutation(12)[:k]
     stays = np.arange(k) < given_
-    after = rebuilt(distance, begin, stays, 0.05)
+    after = rebuild_sources(distance, begin, stays, 0.05)
     assert len(set(after.tolist())) == k
     assert np.array_equal(after[stays], begin[stays])
     assert after is begin or total(distance, after) < 0.95 * total(distance, begin)
@@ -81,9 +90,9 @@ def test_rebuilding_helps_or_changes_nothing(seed: int, k: int, given_: int) -> 
 def test_two_or_three_at_once_help_where_no_swap_does(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     distance, begin, free = table(seed), np.arange(4), np.zeros(4, dtype=bool)
     best = min(total(distance, np.array(some)) for some in combinations(range(12), 4))
-    assert total(distance, improved(distance, begin, free, 0.0)) == pytest.approx(best)
-    monkeypatch.setattr(k_median, "rebuilt", lambda table, sources, fixed, threshold: sources)
-    assert total(distance, improved(distance, begin, free, 0.0)) > 1.01 * best
+    assert total(distance, improve_sources(distance, begin, free, 0.0)) == pytest.approx(best)
+    monkeypatch.setattr(k_median, "rebuild_sources", lambda table, sources, fixed, threshold: sources)
+    assert total(distance, improve_sources(distance, begin, free, 0.0)) > 1.01 * best
 
 
 @settings(max_examples=40)
@@ -93,7 +102,7 @@ def test_one_moves_to_the_best_of_some(seed: int, k: int) -> None:
     begin = np.random.default_rng(seed).permutation(12)[:k]
     among = np.random.default_rng(seed + 1).random(12) < 0.5
     others = begin[1:]
-    after = moved(distance, begin, among, 0.02)
+    after = move_first_source(distance, begin, among, 0.02)
     every = [total(distance, np.append(others, some)) for some in among.nonzero()[0]]
     before, least = total(distance, begin), min(every, default=np.inf)
     np.testing.assert_allclose(total(distance, after), least if least < 0.98 * before else before)
@@ -103,18 +112,18 @@ def test_one_moves_to_the_best_of_some(seed: int, k: int) -> None:
 def test_what_a_plan_saves_must_be_worth_it_as_a_whole() -> None:
     for seed in range(20):
         distance, begin, free = table(seed), np.arange(3), np.zeros(3, dtype=bool)
-        near, best = lloyd_iterations(distance, begin, free), improved(distance, begin, free, 0.0)
+        near, best = run_lloyd(distance, begin, free), improve_sources(distance, begin, free, 0.0)
         part = 1.0 - total(distance, best) / total(distance, near)
-        assert np.array_equal(improved(distance, begin, free, part + 1e-6), near)
+        assert np.array_equal(improve_sources(distance, begin, free, part + 1e-6), near)
         if part > 1e-3:
-            assert np.array_equal(improved(distance, begin, free, part - 1e-6), best)
+            assert np.array_equal(improve_sources(distance, begin, free, part - 1e-6), best)
 
 
 def test_plans_are_near_the_best_there_is() -> None:
     ratios = []
     for seed in range(30):
         distance = table(seed)
-        found = improved(distance, np.arange(3), np.zeros(3, dtype=bool), 0.0)
+        found = improve_sources(distance, np.arange(3), np.zeros(3, dtype=bool), 0.0)
         best = min(total(distance, np.array(some)) for some in combinations(range(12), 3))
         ratios.append(total(distance, found) / best)
     assert np.median(ratios) < 1.0 + 1e-9
@@ -138,7 +147,7 @@ def tables(draw):
 @given(tables())
 def test_seeds_are_different_sources(drawn):
     table, count, rng = drawn
-    sources = seeded(table, count, rng)
+    sources = seed_sources(table, count, rng)
     assert sources.shape == (count,)
     assert len(set(sources.tolist())) == count
 
@@ -148,10 +157,10 @@ def test_seeds_are_far_from_each_other():
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.random((20, 2)), rng.random((20, 2)) + 1000.0])
     table = np.hypot(*np.moveaxis(points[:, None] - points, -1, 0))
-    both = [len(set(seeded(table, 2, np.random.default_rng(k)) < 20)) - 1 for k in range(200)]
+    both = [len(set(seed_sources(table, 2, np.random.default_rng(k)) < 20)) - 1 for k in range(200)]
     assert sum(both) > 195
     # and a first seed is anywhere
-    first = [int(seeded(table, 1, np.random.default_rng(k))[0]) for k in range(400)]
+    first = [int(seed_sources(table, 1, np.random.default_rng(k))[0]) for k in range(400)]
     assert len(set(first)) == 40
 
 
@@ -160,7 +169,7 @@ def test_neither_iteration_ever_raises_the_cost(drawn):
     table, count, rng = drawn
     start = rng.choice(table.shape[1], count, replace=False)
     given_ = start.copy()
-    for iteration in (lloyd_iterations, best_swaps):
+    for iteration in (run_lloyd, apply_best_swaps):
         end = iteration(table, start)
         assert len(set(end.tolist())) == count
         assert total(table, end) <= total(table, start) * (1.0 + 1e-12)
@@ -170,7 +179,7 @@ def test_neither_iteration_ever_raises_the_cost(drawn):
 @given(tables())
 def test_no_swap_is_left_that_would_lower_the_cost(drawn):
     table, count, rng = drawn
-    end = best_swaps(table, rng.choice(table.shape[1], count, replace=False)).tolist()
+    end = apply_best_swaps(table, rng.choice(table.shape[1], count, replace=False)).tolist()
     reached = total(table, end)
     for place in range(count):
         for source in range(table.shape[1]):
@@ -181,7 +190,7 @@ def test_no_swap_is_left_that_would_lower_the_cost(drawn):
 @given(tables())
 def test_alternation_ends_where_each_source_is_the_best_of_its_own_targets(drawn):
     table, count, rng = drawn
-    end = lloyd_iterations(table, rng.choice(table.shape[1], count, replace=False))
+    end = run_lloyd(table, rng.choice(table.shape[1], count, replace=False))
     owner = table[:, end].argmin(axis=1)
     fresh = []
     for place in range(count):
@@ -198,7 +207,7 @@ def test_interchange_from_some_starts_finds_the_best_of_all(count):
     one, other = rng.random((40, 1, 2)), rng.random((12, 2))
     table = np.hypot(*np.moveaxis(one - other, -1, 0))
     best = min(total(table, some) for some in combinations(range(12), count))
-    found = [total(table, best_swaps(table, seeded(table, count, rng))) for _ in range(10)]
+    found = [total(table, apply_best_swaps(table, seed_sources(table, count, rng))) for _ in range(10)]
     assert min(found) == pytest.approx(best, abs=1e-12)
 
 
@@ -208,7 +217,7 @@ def test_giving_up():
     def stop():
         raise KeyboardInterrupt
 
-    for iteration in (lloyd_iterations, best_swaps):
+    for iteration in (run_lloyd, apply_best_swaps):
         with pytest.raises(KeyboardInterrupt):
             iteration(table, np.arange(3), beat=stop)
 
@@ -217,7 +226,7 @@ def test_giving_up():
 def test_greedy_places_gain_most_of_what_the_best_ones_do(seed: int, k: int) -> None:
     """Nemhauser, Wolsey and Fisher (1978): 1 - 1/e of it; and each is the best beside the earlier ones."""
     distance = table(seed, sources=9)
-    chosen = greedy(distance, k)
+    chosen = choose_greedily(distance, k)
     assert len(set(chosen.tolist())) == k
     for number in range(k):
         sums = [total(distance, np.append(chosen[:number], source)) for source in range(9)]

@@ -13,7 +13,7 @@ from robocov.cost import CoverageCost
 from robocov.density.gaussians import Gaussian, Gaussians
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import InputError, ParameterError
-from robocov.k_median import best_swaps, lloyd_iterations
+from robocov.k_median import apply_best_swaps, run_lloyd
 from robocov.lower_bound import _Dual, _halves, compute_lower_bound
 from robocov.mapfile import load_map
 from robocov.optimum import find_optimum
@@ -120,7 +120,7 @@ def test_no_team_costs_less(kind, seed, robots):
     table = np.ascontiguousarray(cost.geodesics.compute_distances(inside, cost.points[counted]).T)
     teams = [rng.choice(len(inside), robots) for _ in range(200)]
     finite = np.where(np.isinf(table), 1e6, table)
-    teams += [best_swaps(finite, lloyd_iterations(finite, team)) for team in teams[:5]]
+    teams += [apply_best_swaps(finite, run_lloyd(finite, team)) for team in teams[:5]]
     assert min(table[:, team].min(axis=1).mean() for team in teams) >= bound.mean_distance
 
 

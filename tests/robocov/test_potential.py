@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.observation.neighbours import NO_INDICES, Neighbours
-from robocov.potential import CONTACT_DISTANCE, potential_forces, separation
+from robocov.potential import CONTACT_DISTANCE, compute_potential_forces, compute_separations
 
 coordinate = st.floats(-5, 5)
 strength = st.floats(0.01, 100)
@@ -24,7 +24,7 @@ def forces(
     points = np.full_like(positions, np.nan) if obstacle_points is None else obstacle_points
     reported = np.empty((0, 2)) if reported is None else reported
     goals = positions if goals is None else goals
-    return potential_forces(positions, reported, *links, len(positions), points, goals, *k)
+    return compute_potential_forces(positions, reported, *links, len(positions), points, goals, *k)
 
 
 def repulsive_force(offset: np.ndarray, k_rep: float, rho_0: float) -> np.ndarray:
@@ -125,8 +125,8 @@ def test_the_limit_caps_the_attraction_and_keeps_its_direction(
 @given(st.lists(st.integers(0, 500), min_size=2, max_size=2, unique=True))
 def test_robots_in_one_place_are_pushed_apart_in_opposite_directions(pair: list[int]) -> None:
     i, j = np.array([pair[0]]), np.array([pair[1]])
-    np.testing.assert_array_equal(separation(i, j), -separation(j, i))
-    np.testing.assert_allclose(np.hypot(*separation(i, j)[0]), 1.0)
+    np.testing.assert_array_equal(compute_separations(i, j), -compute_separations(j, i))
+    np.testing.assert_allclose(np.hypot(*compute_separations(i, j)[0]), 1.0)
 
 
 @given(

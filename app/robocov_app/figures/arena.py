@@ -49,7 +49,7 @@ def _path_style(theme: Theme) -> dict[str, Any]:
 def draw_map(
     axes: Axes, environment: Environment, theme: Theme, *, density: bool = True, time: float = 0.0
 ) -> None:
-    if density and environment.density is not None and not environment.density.uniform:
+    if density and environment.density is not None and not environment.density.is_uniform:
         low_x, low_y, high_x, high_y = environment.region.bounds
         # limits stay as they are, which imshow would change
         extent = low_x, high_x, low_y, high_y

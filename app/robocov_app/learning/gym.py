@@ -103,7 +103,7 @@ class CoverageVectorEnv(SyncVectorEnv):
         make = partial(CoverageEnv, self.task, scenarios=scenarios, render_mode=render_mode)
         super().__init__([make] * num_envs, autoreset_mode=autoreset_mode)
         self._teams = cast("list[CoverageEnv]", self.envs)
-        ideal = self.task.conditions is None or self.task.conditions.ideal
+        ideal = self.task.conditions is None or self.task.conditions.is_ideal
         self._shared: SharedSimulation | None = None
         if (
             scenarios.only is not None

@@ -37,7 +37,7 @@ def dots(environment: Environment, most: int) -> tuple[Array, Array]:
 def parts(density: Density, bounds: Bounds, x: Array, y: Array) -> Array:
     """Return how far the density at (w,) x and (h,) y, m, is from the least to the most, (h, w), 0 to 1."""
     low, high = value_range(density, bounds)
-    value = density.value(_grid(x, y)).reshape(len(y), len(x))
+    value = density.evaluate(_grid(x, y)).reshape(len(y), len(x))
     return np.clip((value - low) / (high - low), 0.0, 1.0) if high > low else np.zeros_like(value)
 
 
@@ -63,7 +63,7 @@ def value_range(density: Density, bounds: Bounds) -> tuple[float, float]:
     if isinstance(density, Gaussians):  # between samples a narrow one is missed
         centers = np.array([peak.center for peak in density.peaks]).reshape(-1, 2)
         points = np.concatenate([points, centers[((low <= centers) & (centers <= high)).all(axis=1)]])
-    value = density.value(points)
+    value = density.evaluate(points)
     return float(value.min()), float(value.max())
 
 
@@ -73,7 +73,7 @@ def _grid(x: Array, y: Array) -> Array:
 
 def density_label(environment: Environment) -> str:
     density = environment.density
-    return "" if density is None or density.uniform else range_label(density_range(environment))
+    return "" if density is None or density.is_uniform else range_label(density_range(environment))
 
 
 def range_label(span: tuple[float, float]) -> str:
@@ -100,6 +100,6 @@ def density_kind(environment: Environment) -> str | None:
 
 def density_lines(environment: Environment) -> Iterator[str]:
     """Yield the line that says by what the figures above it are weighed; none where nothing weighs them."""
-    if environment.density is not None and not environment.density.uniform:
+    if environment.density is not None and not environment.density.is_uniform:
         low, high = density_range(environment)
         yield f"weighed by φ    {environment.density.kind}, {low:.3g} to {high:.3g}"

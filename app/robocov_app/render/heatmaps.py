@@ -24,7 +24,7 @@ _DOTS = 60_000  # about so many places of a surface at most where the density is
 
 def draw_density(canvas: Canvas, scene: Scene) -> None:
     density, hidden = scene.environment.density, scene.field is not None and "distances" in canvas.shown
-    if density is not None and not density.uniform and not hidden:
+    if density is not None and not density.is_uniform and not hidden:
         draw_shading(canvas, density, scene.environment.region.vertices)
 
 

@@ -47,7 +47,7 @@ class Frame:
 
 def density_picture(environment: Environment) -> str:
     """Return a ``data:image/png`` of the density over the region's box, clear outside; empty without one."""
-    if environment.density is None or environment.density.uniform:
+    if environment.density is None or environment.density.is_uniform:
         return ""
     picture = shading(environment, _DOTS, LIGHT)
     # one colour for light and dark: it is between the two

@@ -136,18 +136,18 @@ class ConditionOptions:
         """Return the conditions for a team, None where they are ideal; raises ParameterError."""
         if self == ConditionOptions():
             return None
-        from robocov.conditions import LIMITS, Conditions, Failure, Join, parsed_entry
+        from robocov.conditions import LIMITS, Conditions, Failure, Join, parse_event
 
         events: dict[str, Any] = {}
         for option, kind, texts in (("fail", Failure, self.fail), ("join", Join, self.join)):
             try:
-                events[option] = tuple(parsed_entry(kind, text) for text in texts)
+                events[option] = tuple(parse_event(kind, text) for text in texts)
             except ParameterError as error:
                 raise ParameterError(f"--{option}: {error}") from None
         limits = {name: getattr(self, name) for name in LIMITS}
         conditions = Conditions(**limits, failures=events["fail"], joins=events["join"], seed=seed)
         conditions.check_team(robots)
-        return None if conditions.ideal else conditions
+        return None if conditions.is_ideal else conditions
 
 
 @dataclass

@@ -16,7 +16,7 @@ from typing import Any, Literal, TypeAlias, TypeVar, cast, get_args
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.conditions import LIMITS, Conditions, Failure, Join, parsed_entry
+from robocov.conditions import LIMITS, Conditions, Failure, Join, parse_event
 from robocov.conditions import UNITS as CONDITION_UNITS
 from robocov.controllers import controller_kind, gain_values, gains_of
 from robocov.controllers.gains import Gain, Option, Value, with_gains
@@ -278,11 +278,11 @@ def conditions_of(parameters: Mapping[str, TeamValue], seed: int, robots: int) -
     """Return the conditions among what a study varies; None where they are ideal."""
     values: dict[str, Any] = {name: parameters[name] for name in LIMITS if name in parameters}
     fail, join = (str(parameters.get(name, "")).split() for name in EVENTS)
-    values["failures"] = tuple(parsed_entry(Failure, word) for word in fail)
-    values["joins"] = tuple(parsed_entry(Join, word) for word in join)
+    values["failures"] = tuple(parse_event(Failure, word) for word in fail)
+    values["joins"] = tuple(parse_event(Join, word) for word in join)
     conditions = Conditions(**values, seed=seed)
     conditions.check_team(robots)
-    return None if conditions.ideal else conditions
+    return None if conditions.is_ideal else conditions
 
 
 DEFAULT_MAX_RUNS = 100_000
@@ -558,7 +558,7 @@ def _value_of(name: str, value: object, path: Place) -> TeamValue:
     if name in EVENTS:
         require_type(format_path(path), value, str, 'a text, as in "3@20",')
         try:
-            return " ".join(str(parsed_entry(EVENTS[name], word)) for word in str(value).split())
+            return " ".join(str(parse_event(EVENTS[name], word)) for word in str(value).split())
         except ParameterError as error:
             raise ParameterError(f"{format_path(path)}: {error}") from None
     if value in _UNLIMITED.get(name, ()):

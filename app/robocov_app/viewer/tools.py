@@ -357,7 +357,7 @@ class Brush(Tool):
         turn, radius = np.linspace(0.0, 2.0 * np.pi, _RING + 1), self.size(session)
         x, y = self._at[0] + radius * np.cos(turn), self._at[1] + radius * np.sin(turn)
         outline, density = tuple(zip(x.tolist(), y.tolist(), strict=True)), session.environment.density
-        value = 1.0 if density is None else float(density.value(np.array([self._at]))[0])
+        value = 1.0 if density is None else float(density.evaluate(np.array([self._at]))[0])
         return Preview(outline, False, None, f"φ {value:.2g}", marks=False)
 
     def _show(self, session: Session) -> None:

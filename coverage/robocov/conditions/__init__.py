@@ -22,7 +22,7 @@ from robocov.errors import ParameterError, is_number, quote, require_number
 
 LOSS, POSITION, SENSING, SCANNING, FAILING = range(5)
 """The independent streams of random numbers of a run."""
-SOON = 1e-9
+TIME_TOLERANCE_S = 1e-9
 """Seconds by which two moments may differ and still be one: what sums of steps miss."""
 _LONGEST = 1e6
 
@@ -63,7 +63,7 @@ class Join(NamedTuple):
         return f"{self.robot}@{self.time:g}{place}"
 
 
-class Joined(NamedTuple):
+class JoinedRobot(NamedTuple):
     """A robot, numbered from 1, that has joined: when, s, where, and where it was to join, (x, y) m."""
 
     robot: int
@@ -129,24 +129,24 @@ class Conditions:
                 raise ParameterError(f"{joins}, but it has failed at {fails[join.robot]:g} s")
 
     @property
-    def ideal(self) -> bool:
+    def is_ideal(self) -> bool:
         """Whether this is as good as no conditions."""
-        return not (self.talks or self.sensing_noise or self.team_changes)
+        return not (self.uses_messages or self.sensing_noise or self.has_team_changes)
 
     @property
-    def talks(self) -> bool:
+    def uses_messages(self) -> bool:
         """Whether robots know of each other by messages only."""
         return bool(self.loss or self.delay or self.message_rate is not None or self.position_noise)
 
     @property
-    def team_changes(self) -> bool:
+    def has_team_changes(self) -> bool:
         """Whether robots may fail or join."""
         return bool(self.failure_rate or self.failures or self.joins)
 
-    def of_robots_that_stay(self) -> Conditions | None:
+    def drop_team_changes(self) -> Conditions | None:
         """Return the conditions without failing and joining; None where ideal ones are left."""
         rest = replace(self, failure_rate=0.0, failures=(), joins=())
-        return None if rest.ideal else rest
+        return None if rest.is_ideal else rest
 
     def check_team(self, count: int) -> None:
         """Raise ParameterError unless `count` robots have all that fail or join, and one from the start."""
@@ -158,7 +158,7 @@ class Conditions:
         if len(self.joins) == count and min(each.time for each in self.joins) > 0.0:
             raise ParameterError("conditions.joins: all robots, but at least one from the start was wanted")
 
-    def lives(self, count: int) -> tuple[Array, Array]:
+    def compute_working_periods(self, count: int) -> tuple[Array, Array]:
         """Return from when and until when each robot works, (n,) s each; -inf and inf without limit."""
         begins, ends = np.full(count, -np.inf), np.full(count, np.inf)
         for join in self.joins:
@@ -170,17 +170,21 @@ class Conditions:
             ends[failure.robot - 1] = min(ends[failure.robot - 1], failure.time)
         return begins, ends
 
-    def working(self, time: float | Array, count: int) -> BoolArray:
+    def find_working(self, time: float | Array, count: int) -> BoolArray:
         """Return which robots are there and have not failed at times (...), s: (..., n) bool."""
-        return self.present(time, count) & ~self.failed(time, count)
+        return self.find_present(time, count) & ~self.find_failed(time, count)
 
-    def failed(self, time: float | Array, count: int) -> BoolArray:
+    def find_failed(self, time: float | Array, count: int) -> BoolArray:
         """Return which robots have failed, as `working` does."""
-        return np.asarray(self.lives(count)[1] <= np.asarray(time)[..., None] + SOON)
+        return np.asarray(
+            self.compute_working_periods(count)[1] <= np.asarray(time)[..., None] + TIME_TOLERANCE_S
+        )
 
-    def present(self, time: float | Array, count: int) -> BoolArray:
+    def find_present(self, time: float | Array, count: int) -> BoolArray:
         """Return which robots are there, working or failed, as `working` does."""
-        return np.asarray(self.lives(count)[0] <= np.asarray(time)[..., None] + SOON)
+        return np.asarray(
+            self.compute_working_periods(count)[0] <= np.asarray(time)[..., None] + TIME_TOLERANCE_S
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the conditions as plain JSON, units in the key names."""
@@ -214,7 +218,7 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d{1,3})?"
 _ENTRY = re.compile(rf"(\d{{1,9}})@({_NUMBER})(?::({_NUMBER}),({_NUMBER}))?", re.ASCII)
 
 
-def parsed_entry(kind: type[Entry], text: str) -> Entry:
+def parse_event(kind: type[Entry], text: str) -> Entry:
     """Return what a text says: a failure ``3@20``, of robot 3 after 20 s, or a join ``5@30``, ``5@30:2.5,1``.
 
     Raises ParameterError when it says none.

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.conditions import LOSS, POSITION, SCANNING, SENSING, SOON, Conditions
+from robocov.conditions import LOSS, POSITION, SCANNING, SENSING, TIME_TOLERANCE_S, Conditions
 from robocov.conditions.random_streams import Draws
 from robocov.observation import Decision, Observations, Scans
 from robocov.observation.neighbours import Neighbours
@@ -23,7 +23,7 @@ from robocov.team import Team
 
 NEVER = -1
 """The step at which something has not happened."""
-NEAREST = 1e-3
+MIN_MEASURED_DISTANCE_M = 1e-3
 """The shortest distance in metres that a noisy range sensor measures."""
 
 
@@ -33,16 +33,16 @@ class Perception:
     def __init__(self, conditions: Conditions, team: Team, dt: float) -> None:
         self._conditions, self._ranges, self._dt = conditions, team.communication_range, dt
         self._robots = np.arange(len(team))
-        self._delay = math.ceil(conditions.delay / dt - SOON)
+        self._delay = math.ceil(conditions.delay / dt - TIME_TOLERANCE_S)
         streams = POSITION, SENSING, SCANNING, LOSS
         chances = [Draws(conditions.seed, stream) for stream in streams]
         self._position_chance, self._sensing_chance, self._scanning_chance, self._loss_chance = chances
 
-    def begin(self) -> Inbox | None:
+    def create_inbox(self) -> Inbox | None:
         """Return what the robots have heard before the first step; None where communication is ideal."""
-        return Inbox.empty(len(self._robots)) if self._conditions.talks else None
+        return Inbox.create_empty(len(self._robots)) if self._conditions.uses_messages else None
 
-    def known(
+    def perceive(
         self, seen: Observations, inbox: Inbox | None, working: BoolArray
     ) -> tuple[Observations, Inbox | None]:
         """Return what the robots that work, (n,) bool, know of what is `seen` in truth, and their inbox."""
@@ -53,10 +53,10 @@ class Perception:
             points = np.where(working[:, None], points, np.nan)
         points.setflags(write=False)
         seen = replace(seen, positions=positions, obstacle_points=points, scans=self._scanned(step, seen))
-        if inbox is None or not self._conditions.talks:
+        if inbox is None or not self._conditions.uses_messages:
             return replace(seen, neighbours=seen.neighbours.keep_working(working)), None
-        inbox = self.exchange(inbox, step, positions, truth, working)
-        neighbours, places, ages = self.reports(inbox, step, working)
+        inbox = self.exchange_messages(inbox, step, positions, truth, working)
+        neighbours, places, ages = self.read_reports(inbox, step, working)
         return replace(seen, neighbours=neighbours, reported_positions=places, report_ages=ages), inbox
 
     def _estimated(self, step: int, positions: Array) -> Array:
@@ -79,7 +79,9 @@ class Perception:
             noisy = distance + sigma * self._sensing_chance.normal(step, self._robots)[:, 0]
             # towards where the point is; one that is touched lies in no direction
             away = np.where(distance > 0.0, distance, 1.0)
-            offset *= np.where(distance > 0.0, np.maximum(noisy, NEAREST) / away, 1.0)[:, None]
+            offset *= np.where(distance > 0.0, np.maximum(noisy, MIN_MEASURED_DISTANCE_M) / away, 1.0)[
+                :, None
+            ]
         return np.asarray(positions + offset)
 
     def _scanned(self, step: int, seen: Observations) -> Scans | None:
@@ -89,11 +91,15 @@ class Perception:
             return scans
         rays = np.arange(scans.rays)
         error = sigma * self._scanning_chance.normal(step, self._robots[:, None], rays)[..., 0]
-        distances = np.where(scans.hit, np.maximum(scans.distances + error, NEAREST), scans.distances)
+        distances = np.where(
+            scans.hit, np.maximum(scans.distances + error, MIN_MEASURED_DISTANCE_M), scans.distances
+        )
         distances.setflags(write=False)
         return replace(scans, distances=distances)
 
-    def exchange(self, inbox: Inbox, step: int, told: Array, positions: Array, working: BoolArray) -> Inbox:
+    def exchange_messages(
+        self, inbox: Inbox, step: int, told: Array, positions: Array, working: BoolArray
+    ) -> Inbox:
         """Return what the robots have once messages were sent and delivered at a step since time zero.
 
         Robots tell where they believe themselves to be, (n, 2) m; where they are says who is in range.
@@ -112,13 +118,13 @@ class Perception:
             places[receiver, sender] = each.places[sender]
         return Inbox(sent, arrived, places, on_the_way[len(due) :])
 
-    def reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbours, Array, Array]:
+    def read_reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbours, Array, Array]:
         """Return of whom robots that work have a message that is not forgotten, what it said, and its age.
 
         These are (m, 2) m and (m,) s, in the order of the neighbours' ``indices``.
         """
         silence = (step - inbox.arrived) * self._dt
-        known = (inbox.arrived >= 0) & (silence <= self._conditions.forget_after + SOON)
+        known = (inbox.arrived >= 0) & (silence <= self._conditions.forget_after + TIME_TOLERANCE_S)
         robot, neighbour = np.nonzero(known & working[:, None])
         neighbours = Neighbours.from_pairs(len(known), robot, neighbour, self._ranges)
         ages = (step - inbox.sent[robot, neighbour]) * self._dt
@@ -130,7 +136,9 @@ class Perception:
         if rate is None:
             return True
         period = self._dt * rate
-        return math.floor(step * period + SOON) > math.floor((step - 1) * period + SOON)
+        return math.floor(step * period + TIME_TOLERANCE_S) > math.floor(
+            (step - 1) * period + TIME_TOLERANCE_S
+        )
 
     def _reached(self, step: int, positions: Array, working: BoolArray) -> BoolArray:
         """Return whom a message of each robot gets to, (receiver, sender) bool."""
@@ -143,7 +151,7 @@ class Perception:
         return reaches
 
 
-def of_working(decision: Decision, working: BoolArray) -> Decision:
+def ignore_idle_robots(decision: Decision, working: BoolArray) -> Decision:
     """Return a decision in which robots that do not work, (n,) bool, want nothing."""
     if working.all():
         return decision
@@ -177,12 +185,12 @@ class Inbox:
     """In the order in which they arrive."""
 
     @classmethod
-    def empty(cls, count: int) -> Inbox:
+    def create_empty(cls, count: int) -> Inbox:
         """Return what `count` robots know that have heard nothing yet."""
         sent, arrived = np.full((2, count, count), NEVER, dtype=np.intp)
         return cls(sent, arrived, np.zeros((count, count, 2)))
 
-    def rearranged(self, rows: IntArray) -> Inbox:
+    def select_robots(self, rows: IntArray) -> Inbox:
         """Return what remains for a team in which robot i was that of `rows[i]`; -1 is one that is new."""
         old, new = np.maximum(rows, 0), np.asarray(rows) < 0
         strange, pairs = new[:, None] | new, np.ix_(old, old)

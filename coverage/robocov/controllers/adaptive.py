@@ -193,7 +193,7 @@ def _solved(systems: Array, right: Array) -> Array:
 
 def _measured(seen: Observations) -> Array:
     """Return φ where the robots are, (n,): all that they may know of it."""
-    return np.ones(len(seen.positions)) if seen.density is None else seen.density.value(seen.positions)
+    return np.ones(len(seen.positions)) if seen.density is None else seen.density.evaluate(seen.positions)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

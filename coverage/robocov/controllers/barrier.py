@@ -10,7 +10,7 @@ from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
 from robocov.controllers.driving import approach, in_rows, last_returns, nearest_allowed, with_nearest
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations, Scanning
-from robocov.potential import separation
+from robocov.potential import compute_separations
 from robocov.team import Team
 
 _ROUNDING = 1e-3  # metres over which the braking curve, vertical at the safe distance, is rounded
@@ -111,7 +111,7 @@ class Barrier(Law):
         closing = seen.velocities[robot] - _derived(heard, memory.heard, team.max_speed[neighbour])
         together = distance < _TOGETHER
         normal = offset / np.maximum(distance, _TOGETHER)[:, None]
-        normal[together] = separation(robot[together], neighbour[together])
+        normal[together] = compute_separations(robot[together], neighbour[together])
         power = alpha[robot] + alpha[neighbour]
         gap = distance - team.radius[robot] - team.radius[neighbour] - self.safe_gap
         along = (normal * closing).sum(axis=1)

@@ -149,7 +149,7 @@ class Chart:
         some = mass > 0.0
         self.samples, self.mass = after[some].mean(axis=1), mass[some]
         if environment.density is not None:
-            self.mass *= environment.density.value(middles[some])
+            self.mass *= environment.density.evaluate(middles[some])
 
     def at(self, positions: Array) -> tuple[Array, Array]:
         """Return F at the nearest places in the room, (n, 2) m, and its Jacobian there, (n, 2, 2)."""

@@ -10,7 +10,7 @@ from scipy import ndimage
 from robocov.arrays import Array
 from robocov.controllers.gains import gain
 from robocov.controllers.shared_map import Candidates, SharedMapLaw, Situation, assigned
-from robocov.k_median import greedy, improved
+from robocov.k_median import choose_greedily, improve_sources
 from robocov.planning.discovered import FREE, UNKNOWN
 
 _LOOKED, _THERE = 0.5, 0.3  # metres around a place from where somebody has looked, and to it when he does
@@ -110,6 +110,6 @@ class FrontierMedian(SharedMapLaw):
         if len(among.places) < len(now.at):
             return now.at
         kept = now.former is not None and now.former.final and np.isfinite(now.begin).all()
-        begin = among.nearest(now.begin) if kept else greedy(among.table, len(now.at))
-        chosen = improved(among.table, begin, np.zeros(len(begin), dtype=bool), self.threshold * kept)
+        begin = among.nearest(now.begin) if kept else choose_greedily(among.table, len(now.at))
+        chosen = improve_sources(among.table, begin, np.zeros(len(begin), dtype=bool), self.threshold * kept)
         return assigned(now, among.refined(now, weights, chosen))

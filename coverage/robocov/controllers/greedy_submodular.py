@@ -9,7 +9,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.controllers.gains import gain
 from robocov.controllers.shared_map import Candidates, SharedMapLaw, Situation, assigned
-from robocov.k_median import greedy, lloyd_iterations
+from robocov.k_median import choose_greedily, run_lloyd
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,9 @@ class GreedySubmodular(SharedMapLaw):
         among = Candidates.at_nodes(now, weights, now.ways.sources)
         if len(among.places) < len(now.at):
             return now.at, False, notes
-        chosen = lloyd_iterations(among.table, greedy(among.table, len(now.at)))
+        chosen = run_lloyd(among.table, choose_greedily(among.table, len(now.at)))
         if np.isfinite(now.begin).all():
-            kept = lloyd_iterations(among.table, among.nearest(now.begin))
+            kept = run_lloyd(among.table, among.nearest(now.begin))
             if not among.total(chosen) < (1.0 - self.threshold) * among.total(kept):
                 chosen = kept
         return assigned(now, among.refined(now, weights, chosen)), True, notes

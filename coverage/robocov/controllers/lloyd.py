@@ -76,10 +76,10 @@ class RangeLimited(Law):
         reach = np.inf if self.interaction_range is None else self.interaction_range
         radius = 0.5 * np.minimum(memory.team.communication_range, reach)
         area, offset = disc_limited(cells.edges, radius)
-        if seen.density is not None and not seen.density.uniform:
+        if seen.density is not None and not seen.density.is_uniform:
             limited = disc_polygons(cells.edges, radius)
             uniform = seen.positions + offset
-            _, centroid = seen.density.mass_and_centroid(limited, seen.positions, area, uniform)
+            _, centroid = seen.density.compute_mass_and_centroid(limited, seen.positions, area, uniform)
             offset = centroid - seen.positions
         wanted = approach(offset, self.k_prop, memory.team.max_speed)
         forces = drive(wanted, seen, memory.team, self.response_time)

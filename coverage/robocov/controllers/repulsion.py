@@ -12,7 +12,7 @@ from robocov.locational_cost.best_points import HEIGHT_HELP, TARGET_HELP, TARGET
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.neighbours import NO_INDICES
 from robocov.observation.region import Region
-from robocov.potential import CONTACT_DISTANCE, potential_forces, separation
+from robocov.potential import CONTACT_DISTANCE, compute_potential_forces, compute_separations
 from robocov.team import Team
 from robocov.voronoi.delaunay import Mesh
 
@@ -24,11 +24,11 @@ _STILL = 0.01  # speed in m/s below which a robot has no direction in which it c
 _NOT_REPORTED = np.empty((0, 2))
 
 
-def _potential_forces(
+def _compute_potential_forces(
     seen: Observations, goals: Array, k_rep: float, rho_0: float,
     k_att: float = 0.0, limit: float | None = None, *, from_robots: bool = True,
 ) -> Array:  # fmt: skip
-    """Return what `potential_forces` does, of what the robots see; no `limit` is None."""
+    """Return what `compute_potential_forces` does, of what the robots see; no `limit` is None."""
     n, links = len(seen.positions), seen.neighbours
     if from_robots:
         indptr = NO_INDICES if links.indptr is None else links.indptr
@@ -37,14 +37,14 @@ def _potential_forces(
     indices = NO_INDICES if links.indices is None else links.indices
     reported = _NOT_REPORTED if seen.reported_positions is None else seen.reported_positions
     known = seen.positions, reported, indptr, indices, n, seen.obstacle_points
-    return potential_forces(*known, goals, k_rep, rho_0, k_att, np.inf if limit is None else limit)
+    return compute_potential_forces(*known, goals, k_rep, rho_0, k_att, np.inf if limit is None else limit)
 
 
 def _close_pairs(seen: Observations, reach: float) -> tuple[IntArray, IntArray, Array, Array]:
     """Return `find_near_neighbours`, with a direction apart for robots in one place, too."""
     robot, neighbour, offset, distance = seen.find_near_neighbours(reach)
     together = distance < _TOGETHER
-    offset[together] = _TOGETHER * separation(robot[together], neighbour[together])
+    offset[together] = _TOGETHER * compute_separations(robot[together], neighbour[together])
     return robot, neighbour, offset, distance
 
 
@@ -67,7 +67,7 @@ class Rpf(Law):
     rho_0: float = gain(4.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)
 
     def decide(self, seen: Observations, memory: object) -> Decision:
-        forces, _, robots, obstacle = _potential_forces(seen, seen.positions, self.k_rep, self.rho_0)
+        forces, _, robots, obstacle = _compute_potential_forces(seen, seen.positions, self.k_rep, self.rho_0)
         terms = {"repulsion_robots": robots, "repulsion_obstacle": obstacle}
         return Decision(forces, terms=terms, memory=memory)
 
@@ -107,7 +107,7 @@ class Rapf(Law):
         cells = cells_seen(seen, self.cells, memory)
         goals = find_targets(cells, seen.density, self.target, self.height)
         gains = self.k_rep, self.rho_0, self.k_att, self.attraction_limit
-        forces, attraction, robots, obstacle = _potential_forces(seen, goals, *gains)
+        forces, attraction, robots, obstacle = _compute_potential_forces(seen, goals, *gains)
         terms = {"attraction": attraction, "repulsion_robots": robots, "repulsion_obstacle": obstacle}
         return Decision(forces, goals, terms, cells, cells.triangulation)
 
@@ -207,7 +207,9 @@ class Poduri(Law):
         spare = reach - np.minimum(distance, _STRETCHED * reach)
         degree = np.where(critical, self.k_cover * (1.0 / self.eta - 1.0) ** 2 / spare**2, 0.0)
         apart, held = summed(robot, way * cover[:, None], n), summed(robot, way * -degree[:, None], n)
-        obstacle = _potential_forces(seen, seen.positions, self.k_obs, self.rho_obs, from_robots=False)[3]
+        obstacle = _compute_potential_forces(
+            seen, seen.positions, self.k_obs, self.rho_obs, from_robots=False
+        )[3]
         terms = {"repulsion_robots": apart, "attraction": held, "repulsion_obstacle": obstacle}
         return Decision(apart + held + obstacle, terms=terms, memory=memory)
 

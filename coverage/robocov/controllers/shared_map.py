@@ -19,7 +19,7 @@ from robocov.controllers.driving import last_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.route_following import follow_routes
 from robocov.density import Density
-from robocov.k_median import lloyd_iterations
+from robocov.k_median import run_lloyd
 from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
@@ -72,8 +72,8 @@ class Situation(NamedTuple):
         """Return the number of these cells that each node stands for, times φ, (m,); 0 where no way leads."""
         weights = self.ways.sums(self.ways.window.cut(cells, False))
         weights = weights * np.isfinite(self.ways.from_places(self.at))
-        if self.density is not None and not self.density.uniform:
-            weights = weights * self.density.value(self.ways.nodes)
+        if self.density is not None and not self.density.is_uniform:
+            weights = weights * self.density.evaluate(self.ways.nodes)
         return np.asarray(weights, dtype=np.float64)
 
 
@@ -105,7 +105,7 @@ class Candidates(NamedTuple):
         apart = ways.spacing * math.sqrt(np.count_nonzero(weights) / len(self.places))
         square = ((ways.nodes[:, None] - places) ** 2).sum(axis=2).min(axis=1)
         fine = Candidates.at_nodes(now, weights, np.flatnonzero(ways.roomy & (square < (1.5 * apart) ** 2)))
-        return fine.places[lloyd_iterations(fine.table, fine.nearest(places))]
+        return fine.places[run_lloyd(fine.table, fine.nearest(places))]
 
 
 def assigned(now: Situation, places: Array) -> Array:

@@ -11,7 +11,7 @@ from scipy import ndimage
 from robocov.arrays import Array
 from robocov.controllers.gains import gain
 from robocov.controllers.shared_map import Candidates, SharedMapLaw, Situation, assigned
-from robocov.k_median import best_swap
+from robocov.k_median import apply_best_swap
 from robocov.planning.voronoi_graph import VoronoiGraph
 from robocov.planning.wayfinding import Window
 
@@ -52,7 +52,7 @@ class VoronoiGraphCoverage(SharedMapLaw):
             return now.at, False, notes
         begin = np.where(np.isfinite(now.begin), now.begin, now.at)
         chosen, fixed, worth = among.nearest(begin), np.zeros(len(begin), dtype=bool), self.threshold
-        while (after := best_swap(among.table, chosen, fixed, worth)) is not chosen:
+        while (after := apply_best_swap(among.table, chosen, fixed, worth)) is not chosen:
             chosen, worth = after, _FALL
         return assigned(now, among.places[chosen]), True, notes
 
@@ -72,8 +72,8 @@ class VoronoiGraphCoverage(SharedMapLaw):
         graph = VoronoiGraph.of(room, free > 0, _SPACING / side, MOST_VERTICES)
         places = np.asarray(raster.origin) + (graph.vertices[:, ::-1] + 0.5) * side
         mass = free.astype(np.float64)
-        if now.density is not None and not now.density.uniform:
-            mass *= now.density.value(window.nodes(raster)).reshape(mass.shape)
+        if now.density is not None and not now.density.is_uniform:
+            mass *= now.density.evaluate(window.nodes(raster)).reshape(mass.shape)
         inside = graph.region >= 0
         weights = np.bincount(graph.region[inside], mass[inside], minlength=len(places))
         away = np.minimum(graph.distances * side, 1e9)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray, compute_weighted_mean, find_run_starts, freeze
 from robocov.cost.site_paths import GROUP, TILE, CornerViews, CostMap, Tiles, Work, corner_views, site_paths
-from robocov.density.base import means_over_squares
+from robocov.density.base import compute_square_means
 from robocov.drawing import Drawable
 from robocov.environment import Environment, require_environment
 from robocov.errors import InputError, ParameterError, format_count, quote, require_number, to_floats
@@ -217,8 +217,8 @@ class CoverageCost:
     def _weigh(self) -> None:
         density, self._masses = self.environment.density, self.environment.free_masses
         self._mass, self.weights = float(self._masses.sum()), None
-        if density is not None and not density.uniform:
-            self.weights = freeze(means_over_squares(density, self.points, self.spacing))
+        if density is not None and not density.is_uniform:
+            self.weights = freeze(compute_square_means(density, self.points, self.spacing))
 
     def __call__(self, positions: Array, speeds: Array | None = None) -> CoverageResult:
         """Return the coverage cost of (n, 2) positions in metres.

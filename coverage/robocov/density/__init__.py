@@ -4,14 +4,14 @@ Every density integrates over all Voronoi cells at once, in closed form or exact
 divergence theorem an integral over a cell is a sum over its edges, so that no cell is ever clipped.
 """
 
-from robocov.density.base import HEAVIEST, Density, Uniform
+from robocov.density.base import MAX_WEIGHT, Density, Uniform
 from robocov.density.gaussians import Gaussian, Gaussians
 from robocov.density.polygons import WeightedArea, WeightedPolygons
-from robocov.density.raster import FINEST, Interpolation, Raster, sampled
+from robocov.density.raster import MAX_RASTER_SIZE, Interpolation, Raster, sample_density
 
 __all__ = [
-    "FINEST",
-    "HEAVIEST",
+    "MAX_RASTER_SIZE",
+    "MAX_WEIGHT",
     "Density",
     "Gaussian",
     "Gaussians",
@@ -20,5 +20,5 @@ __all__ = [
     "Uniform",
     "WeightedArea",
     "WeightedPolygons",
-    "sampled",
+    "sample_density",
 ]

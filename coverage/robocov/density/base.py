@@ -16,7 +16,7 @@ from robocov.errors import ParameterError, quote
 REGION = -1
 """Neighbour of an edge of a cell that is a piece of the region's boundary."""
 
-HEAVIEST = 1e6
+MAX_WEIGHT = 1e6
 """Largest value that a weight may have."""
 
 _NOTHING = 1e-9
@@ -40,7 +40,7 @@ class CellEdges:
     beyond: IntArray
     """(s,) The robot on the other side, or `REGION`."""
 
-    def polygons(self, generators: Array) -> list[Array]:
+    def build_polygons(self, generators: Array) -> list[Array]:
         """Return one counter-clockwise ring a cell, (k, 2) m, the first vertex not repeated.
 
         Edges of no length are left out; an empty cell is a (0, 2) array.
@@ -51,14 +51,14 @@ class CellEdges:
         stops = np.cumsum(np.bincount(cell, minlength=len(generators))).tolist()
         return [vertices[start:stop] for start, stop in pairwise([0, *stops])]
 
-    def moments(self, count: int) -> Array:
+    def compute_moments(self, count: int) -> Array:
         """Return area, first moments and polar moment of `count` cells about their generators, (n, 4).
 
         In m², m³ and m⁴: each edge adds the triangle that it spans with the generator.
         """
         return _moments(self.start, self.end, self.cell, count)
 
-    def adjacency(self) -> IntArray:
+    def list_adjacent_pairs(self) -> IntArray:
         """Return the pairs (i, j), i < j, of cells with an edge between them, (m, 2), ascending."""
         between = (self.beyond != REGION) & self._long()
         one, other = self.cell[between], self.beyond[between]
@@ -94,20 +94,20 @@ class Density(ABC):
 
     @property
     @abstractmethod
-    def lowest(self) -> float:
+    def min_value(self) -> float:
         """A bound that no value falls below."""
 
     @property
     @abstractmethod
-    def highest(self) -> float:
+    def max_value(self) -> float:
         """A bound that no value exceeds."""
 
     @abstractmethod
-    def value(self, points: Array) -> Array:
+    def evaluate(self, points: Array) -> Array:
         """Return φ at (k, 2) points in metres, (k,)."""
 
     @abstractmethod
-    def moments(self, edges: CellEdges, origins: Array) -> Array:
+    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
         """Return the integrals of φ, φ (q - o) and ``φ |q - o|²`` over n cells with origins o, (n, 4).
 
         The cells are any closed polygons, holes clockwise, their edges relative to the origins, (n, 2) m;
@@ -115,11 +115,11 @@ class Density(ABC):
         """
 
     @property
-    def uniform(self) -> bool:
+    def is_uniform(self) -> bool:
         """Whether every place counts the same."""
-        return self.lowest == self.highest
+        return self.min_value == self.max_value
 
-    def mass_and_centroid(
+    def compute_mass_and_centroid(
         self, edges: CellEdges, origins: Array, area: Array, centroid: Array
     ) -> tuple[Array, Array]:
         """Return M and C of equation (2), (n,) m² and (n, 2) m, with this density.
@@ -127,9 +127,9 @@ class Density(ABC):
         `area` and `centroid` are the same with density 1. Where a cell has no area, or φ is zero all over it,
         the centroid is that one: a cell whose mean density is below 1e-9 of the highest is filled up to that.
         """
-        moments = self.moments(edges, origins)
+        moments = self.compute_moments(edges, origins)
         mass = np.maximum(moments[:, 0], 0.0)
-        filling = np.maximum(_NOTHING * self.highest * area - mass, 0.0)
+        filling = np.maximum(_NOTHING * self.max_value * area - mass, 0.0)
         weight = mass + filling
         first = moments[:, 1:3] + filling[:, None] * (centroid - origins)
         full = weight > 0.0
@@ -137,10 +137,10 @@ class Density(ABC):
         return mass, np.where(full[:, None], origins + offset, centroid)
 
 
-def check_weight(name: str, value: float, *, above: bool = False) -> None:
+def require_weight(name: str, value: float, *, above: bool = False) -> None:
     """Raise a ParameterError when a weight is out of range."""
-    if not ((value > 0.0 if above else value >= 0.0) and value <= HEAVIEST):
-        wanted = f"a number {'above' if above else 'from'} 0 to {HEAVIEST:.0f}"
+    if not ((value > 0.0 if above else value >= 0.0) and value <= MAX_WEIGHT):
+        wanted = f"a number {'above' if above else 'from'} 0 to {MAX_WEIGHT:.0f}"
         raise ParameterError(f"{name}: {quote(value)}, but {wanted} was wanted")
 
 
@@ -153,26 +153,26 @@ class Uniform(Density):
     weight: float = 1.0
 
     def __post_init__(self) -> None:
-        check_weight("weight", self.weight, above=True)
+        require_weight("weight", self.weight, above=True)
 
     @property
-    def lowest(self) -> float:  # noqa: D102
+    def min_value(self) -> float:  # noqa: D102
         return self.weight
 
     @property
-    def highest(self) -> float:  # noqa: D102
+    def max_value(self) -> float:  # noqa: D102
         return self.weight
 
-    def value(self, points: Array) -> Array:
+    def evaluate(self, points: Array) -> Array:
         """Return φ at (k, 2) points in metres, (k,)."""
         return np.full(len(points), float(self.weight))
 
-    def moments(self, edges: CellEdges, origins: Array) -> Array:
+    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
         """Return mass, first and polar moments of cells about their origins."""
-        return self.weight * edges.moments(len(origins))
+        return self.weight * edges.compute_moments(len(origins))
 
 
-def masses_of_polygons(density: Density, polygons: Sequence[shapely.Polygon]) -> Array:
+def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]) -> Array:
     """Return the integral of φ over each of some valid polygons, (k,) m², their holes left out."""
     polygons = shapely.orient_polygons(polygons)
     rings, owners = shapely.get_rings(polygons, return_index=True)
@@ -181,10 +181,10 @@ def masses_of_polygons(density: Density, polygons: Sequence[shapely.Polygon]) ->
     points -= origins[owners[ring]]
     along = ring[1:] == ring[:-1]
     edges = _edges(points[:-1][along], points[1:][along], owners[ring][:-1][along])
-    return np.maximum(density.moments(edges, origins)[:, 0], 0.0)
+    return np.maximum(density.compute_moments(edges, origins)[:, 0], 0.0)
 
 
-def means_over_squares(density: Density, middles: Array, side: float) -> Array:
+def compute_square_means(density: Density, middles: Array, side: float) -> Array:
     """Return the mean of φ over axis-parallel squares, (k,), from their middles, (k, 2) m."""
     corners = 0.5 * side * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     means = np.empty(len(middles))
@@ -192,9 +192,9 @@ def means_over_squares(density: Density, middles: Array, side: float) -> Array:
         some = middles[k : k + _AT_ONCE]
         start, end = (np.tile(ring, (len(some), 1)) for ring in (corners, np.roll(corners, -1, axis=0)))
         edges = _edges(start, end, np.repeat(np.arange(len(some)), 4))
-        means[k : k + len(some)] = density.moments(edges, some)[:, 0]
+        means[k : k + len(some)] = density.compute_moments(edges, some)[:, 0]
     # what rounding makes of nothing
-    return np.clip(means / (side * side), density.lowest, density.highest)
+    return np.clip(means / (side * side), density.min_value, density.max_value)
 
 
 def _edges(start: Array, end: Array, cell: Array) -> CellEdges:

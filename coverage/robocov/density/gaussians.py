@@ -17,7 +17,7 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.density.base import CellEdges, Density, check_weight
+from robocov.density.base import CellEdges, Density, require_weight
 from robocov.errors import ParameterError, quote
 
 Point: TypeAlias = tuple[float, float]
@@ -37,7 +37,7 @@ class Gaussian:
     covariance: Matrix | None = None
 
     def __post_init__(self) -> None:
-        check_weight("weight", self.weight)
+        require_weight("weight", self.weight)
         if (self.sigma is None) == (self.covariance is None):
             raise ParameterError("sigma and covariance: either one of them was wanted")
         if self.sigma is not None and not 0.0 < self.sigma < math.inf:
@@ -87,7 +87,7 @@ class Gaussians(Density):
     """A sum of hot spots over a floor, from 0. Its integrals are closed forms of erf and Owen's T function.
 
     >>> density = Gaussians((Gaussian((2.0, 0.0), weight=3.0, sigma=1.0),), floor=0.5)
-    >>> density.value(np.array([[2.0, 0.0], [9.0, 0.0]])).round(6)
+    >>> density.evaluate(np.array([[2.0, 0.0], [9.0, 0.0]])).round(6)
     array([3.5, 0.5])
     """
 
@@ -97,27 +97,27 @@ class Gaussians(Density):
     floor: float = 0.0
 
     def __post_init__(self) -> None:
-        check_weight("floor", self.floor)
+        require_weight("floor", self.floor)
         if not self.floor + sum(peak.weight for peak in self.peaks) > 0.0:
             raise ParameterError("floor: 0, and no peak of a weight above 0, but some weight was wanted")
 
     @property
-    def lowest(self) -> float:
+    def min_value(self) -> float:
         return self.floor
 
     @property
-    def highest(self) -> float:
+    def max_value(self) -> float:
         return self.floor + sum(peak.weight for peak in self.peaks)
 
-    def value(self, points: Array) -> Array:
+    def evaluate(self, points: Array) -> Array:
         points, total = np.asarray(points, dtype=float), np.full(len(points), float(self.floor))
         for peak in self.peaks:
             x, y = peak._standard(points - np.array(peak.center)).T
             total += peak.weight * np.exp(-0.5 * (x * x + y * y))
         return total
 
-    def moments(self, edges: CellEdges, origins: Array) -> Array:
-        total = self.floor * edges.moments(len(origins))
+    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+        total = self.floor * edges.compute_moments(len(origins))
         for peak in self.peaks:
             total += peak._moments(edges, origins)
         return total

@@ -21,7 +21,7 @@ import shapely
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.density.base import CellEdges, Density, check_weight
+from robocov.density.base import CellEdges, Density, require_weight
 from robocov.errors import ParameterError
 
 Ring: TypeAlias = tuple[tuple[float, float], ...]
@@ -43,7 +43,7 @@ class WeightedArea:
     name: str | None = None
 
     def __post_init__(self) -> None:
-        check_weight("weight", self.weight)
+        require_weight("weight", self.weight)
 
     @cached_property
     def polygon(self) -> shapely.Polygon:
@@ -64,16 +64,16 @@ class WeightedPolygons(Density):
     background: float = 1.0
 
     def __post_init__(self) -> None:
-        check_weight("background", self.background)
-        if not self.highest > 0.0:
+        require_weight("background", self.background)
+        if not self.max_value > 0.0:
             raise ParameterError("background: 0, and no area of a weight above 0, but some weight was wanted")
 
     @property
-    def lowest(self) -> float:
+    def min_value(self) -> float:
         return min([self.background, *(area.weight for area in self.areas)])
 
     @property
-    def highest(self) -> float:
+    def max_value(self) -> float:
         return max([self.background, *(area.weight for area in self.areas)])
 
     @cached_property
@@ -95,15 +95,15 @@ class WeightedPolygons(Density):
         jumps = np.concatenate(pieces)
         return np.asarray(jumps[(jumps[:, 1] < jumps[:, 3]) & (jumps[:, 4] != 0.0)])
 
-    def value(self, points: Array) -> Array:
+    def evaluate(self, points: Array) -> Array:
         x, y = np.asarray(points, dtype=float).T
         value = np.full(len(x), float(self.background))
         for area in self.areas:
             value[shapely.contains_xy(area.polygon, x, y)] = area.weight
         return value
 
-    def moments(self, edges: CellEdges, origins: Array) -> Array:
-        total = self.background * edges.moments(len(origins))
+    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+        total = self.background * edges.compute_moments(len(origins))
         _add_steps(self._jumps, edges.start, edges.end, edges.cell, np.ascontiguousarray(origins), total)
         return total
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray, freeze
 from robocov.compiled import kernel
-from robocov.density.base import HEAVIEST, CellEdges, Density
+from robocov.density.base import MAX_WEIGHT, CellEdges, Density
 from robocov.errors import ParameterError, quote
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _NODE = 0.5 * 0.6**0.5
 """Distance of the outer nodes of Gauss's rule with three points from the middle one."""
 
-FINEST = 1024
+MAX_RASTER_SIZE = 1024
 """Most rows, and most columns, of a raster."""
 
 Interpolation: TypeAlias = Literal["cells", "bilinear"]
@@ -42,11 +42,11 @@ class Raster(Density):
     def __post_init__(self) -> None:
         values = freeze(self.values)
         shape = values.shape
-        if values.ndim != 2 or not 1 <= min(shape) <= max(shape) <= FINEST:
-            wanted = f"rows and columns, from 1 to {FINEST} each"
+        if values.ndim != 2 or not 1 <= min(shape) <= max(shape) <= MAX_RASTER_SIZE:
+            wanted = f"rows and columns, from 1 to {MAX_RASTER_SIZE} each"
             raise ParameterError(f"values: an array of shape {shape}, but {wanted}, were wanted")
-        if not (np.isfinite(values) & (values >= 0.0) & (values <= HEAVIEST)).all():
-            raise ParameterError(f"values: numbers from 0 to {HEAVIEST:.0f} were wanted")
+        if not (np.isfinite(values) & (values >= 0.0) & (values <= MAX_WEIGHT)).all():
+            raise ParameterError(f"values: numbers from 0 to {MAX_WEIGHT:.0f} were wanted")
         if not values.max() > 0.0:
             raise ParameterError("values: all are 0, but some weight was wanted")
         x_min, y_min, x_max, y_max = self.extent
@@ -72,14 +72,14 @@ class Raster(Density):
         return hash((self.extent, self.interpolation, self.values.shape, self.values.tobytes()))
 
     @property
-    def lowest(self) -> float:
+    def min_value(self) -> float:
         return float(self.values.min())
 
     @property
-    def highest(self) -> float:
+    def max_value(self) -> float:
         return float(self.values.max())
 
-    def value(self, points: Array) -> Array:
+    def evaluate(self, points: Array) -> Array:
         grid = _grid(self)
         u, v = ((np.asarray(points, dtype=float) - grid.origin) / grid.step).T
         rows, columns = grid.coefficients.shape[1:]
@@ -89,7 +89,7 @@ class Raster(Density):
         xi, eta = u - column, v - row
         return np.asarray(a + b * xi + (c + d * xi) * eta)
 
-    def moments(self, edges: CellEdges, origins: Array) -> Array:
+    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
         grid = _grid(self)
         at = (origins - grid.origin)[edges.cell]
         start, end = (edges.start + at) / grid.step, (edges.end + at) / grid.step
@@ -206,7 +206,7 @@ def _crossed(line: int, begin: float, along: float, lines: int) -> float:
     return (line - begin) / along if 0 < line < lines and along != 0.0 else np.inf
 
 
-def sampled(density: Density | None, extent: Iterable[float], columns: int, rows: int) -> Raster:
+def sample_density(density: Density | None, extent: Iterable[float], columns: int, rows: int) -> Raster:
     """Return a bilinear raster with the values of a density at the middles of its cells.
 
     No density counts as 1 everywhere. The extent is (x_min, y_min, x_max, y_max) in metres.
@@ -215,5 +215,5 @@ def sampled(density: Density | None, extent: Iterable[float], columns: int, rows
     x = x_min + (np.arange(columns) + 0.5) * ((x_max - x_min) / columns)
     y = y_min + (np.arange(rows) + 0.5) * ((y_max - y_min) / rows)
     points = np.column_stack([np.tile(x, rows), np.repeat(y, columns)])
-    values = np.ones(len(points)) if density is None else density.value(points)
+    values = np.ones(len(points)) if density is None else density.evaluate(points)
     return Raster(values.reshape(rows, columns), (x_min, y_min, x_max, y_max))

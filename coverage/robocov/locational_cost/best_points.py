@@ -73,12 +73,12 @@ def find_best_points(cells: Cells, f: Performance, density: Density | None = Non
     """
     points = cells.centroid - cells.generators
     room, size, area = compute_derivatives(cells.edges, points, SquaredDistance())[:, 5:].T
-    weighed = None if density is None or density.uniform else density
+    weighed = None if density is None or density.is_uniform else density
     if weighed is None:
         searching = (room > 0.0) | (area > _FLAT * np.square(size))
         sign, near, rounds = f.sign, _NEAR, _ROUNDS
     else:
-        searching = (room > 1e-9 * size) & (cells.mass > _EMPTY * weighed.highest * area)
+        searching = (room > 1e-9 * size) & (cells.mass > _EMPTY * weighed.max_value * area)
         sign, near, rounds = 1.0, _WEIGHED_NEAR, _WEIGHED_ROUNDS
     there = points.copy()
     # room, step in full, slope along it, part of it that is tried
@@ -180,7 +180,7 @@ def _weighed_slopes(
     double = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
     weight = double[:, None, None] * t_weights[:, None] * u_weights
     places = off + (cells.generators + points)[cell][:, None, None]
-    weight = weight * density.value(places.reshape(-1, 2)).reshape(weight.shape)
+    weight = weight * density.evaluate(places.reshape(-1, 2)).reshape(weight.shape)
     dx, dy = off[..., 0], off[..., 1]
     square = dx * dx + dy * dy
     if isinstance(f, Sensing):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.density import FINEST, Density, Raster
+from robocov.density import MAX_RASTER_SIZE, Density, Raster
 from robocov.environment import Environment, Ring
 from robocov.errors import (
     InputError,
@@ -275,9 +275,9 @@ def _greys(content: bytes) -> Array:
     try:
         with Image.open(io.BytesIO(content), formats=("PNG", "PPM")) as image:
             width, height = image.size
-            if not 1 <= min(width, height) <= max(width, height) <= FINEST:
+            if not 1 <= min(width, height) <= max(width, height) <= MAX_RASTER_SIZE:
                 found = f"{width} x {height} pixels"
-                raise InputError(f"{found}, but at most {FINEST} each way were wanted")
+                raise InputError(f"{found}, but at most {MAX_RASTER_SIZE} each way were wanted")
             if image.mode.startswith("I"):  # 16 bits
                 return np.clip(np.asarray(image, dtype=float) / 65535.0, 0.0, 1.0)
             return np.asarray(image.convert("L"), dtype=float) / 255.0

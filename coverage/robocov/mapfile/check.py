@@ -140,7 +140,7 @@ def _space_mistakes(environment: Environment) -> Iterator[Mistake]:
         return
     density = environment.density
     # integrals take a second to load what they need
-    if density is not None and not (density.lowest > 0.0 or environment.free_masses.sum() > 0.0):
+    if density is not None and not (density.min_value > 0.0 or environment.free_masses.sum() > 0.0):
         what = "all places in the free space count 0, but a weight above 0 was wanted"
         yield Mistake.at(("density",), what)
     for name in environment.starts:
@@ -270,7 +270,7 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS) -> MapRe
         starts=tuple(_start_report(environment, name, radius) for name in environment.starts),
         warnings=tuple(warnings),
         density=None if density is None else density.kind,
-        density_range=None if density is None else (density.lowest, _highest(density)),
+        density_range=None if density is None else (density.min_value, _highest(density)),
         mean_density=float(environment.free_masses.sum()) / environment.free_area,
     )
 
@@ -278,11 +278,11 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS) -> MapRe
 def _highest(density: Density) -> float:
     """Return the largest value of a density: of overlapping peaks less than the bound that `highest` is."""
     if not isinstance(density, Gaussians) or len(density.peaks) < 2:
-        return density.highest
+        return density.max_value
     from scipy.optimize import minimize  # which takes longer to load than most maps to check
 
     def depth(at: Array) -> float:
-        return -float(density.value(at[None])[0])
+        return -float(density.evaluate(at[None])[0])
 
     return -float(min(minimize(depth, peak.center).fun for peak in density.peaks))
 

@@ -14,7 +14,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from pydantic_core import ErrorDetails
 
 from robocov import density, environment
-from robocov.density import FINEST, HEAVIEST, Interpolation
+from robocov.density import MAX_RASTER_SIZE, MAX_WEIGHT, Interpolation
 from robocov.environment import Repeat
 from robocov.errors import JsonPath, MapError, Mistake, describe_unknown_name, format_path, quote_json
 from robocov.files.strictjson import check_header, refused
@@ -60,12 +60,12 @@ Text: TypeAlias = Annotated[str, Field(strict=True)]
 Sentence: TypeAlias = Annotated[Text, Field(max_length=10_000)]
 FileName: TypeAlias = Annotated[Text, Field(min_length=1, max_length=500)]
 Label: TypeAlias = Annotated[str, Field(strict=True, min_length=1, max_length=LONGEST_LABEL, pattern=_NAME)]
-Entry: TypeAlias = Annotated[float, _between(0.0, HEAVIEST)]
+Entry: TypeAlias = Annotated[float, _between(0.0, MAX_WEIGHT)]
 Weight: TypeAlias = Annotated[Entry, AfterValidator(lambda weight: weight if weight >= LIGHTEST else 0.0)]
 Line: TypeAlias = Annotated[list[Vertex], Field(min_length=2)]
 Places: TypeAlias = Annotated[list[Vertex], Field(min_length=1)]
-Row: TypeAlias = Annotated[list[Entry], Field(min_length=1, max_length=FINEST)]
-Rows: TypeAlias = Annotated[list[Row], Field(min_length=1, max_length=FINEST)]
+Row: TypeAlias = Annotated[list[Entry], Field(min_length=1, max_length=MAX_RASTER_SIZE)]
+Rows: TypeAlias = Annotated[list[Row], Field(min_length=1, max_length=MAX_RASTER_SIZE)]
 Extent: TypeAlias = Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
 Variance: TypeAlias = Annotated[float, _between(-1e8, 1e8)]
 Variances: TypeAlias = Annotated[list[Variance], Field(min_length=2, max_length=2)]
@@ -96,7 +96,7 @@ def _field(description: str, example: Any, default: Any = ..., **limits: Any) ->
 
 
 _LABEL = f"a text of 1 to {LONGEST_LABEL} characters on one line"
-_WEIGHT = f"a number from 0 to {HEAVIEST:.0f}"
+_WEIGHT = f"a number from 0 to {MAX_WEIGHT:.0f}"
 _SIZE = f"a number from {SMALLEST:g} to {LARGEST:.0f} (m)"
 _SPEED = f"a number from {SLOWEST:g} to {FASTEST:g} (m/s)"
 _REPEAT = '"loop" or "back-and-forth"'
@@ -311,7 +311,7 @@ _WANTED = {name: key.wanted for name, key in _KEYS.items()} | {
     "starts": ("an object of named starts",),
     "extent": ("[x_min, y_min, x_max, y_max] in metres", _POINT[1]),
     "interpolation": ("bilinear or cells",),
-    "rows": (f"a list of 1 to {FINEST} rows", f"a list of 1 to {FINEST} numbers", _WEIGHT),
+    "rows": (f"a list of 1 to {MAX_RASTER_SIZE} rows", f"a list of 1 to {MAX_RASTER_SIZE} numbers", _WEIGHT),
     "picture": ("the name of a file",),
     **dict.fromkeys(("black", "white"), (_WEIGHT,)),
 }

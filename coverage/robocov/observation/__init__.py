@@ -226,12 +226,12 @@ class Cells(ABC):
         Where communication is limited, cells overlap: i and j are then a pair when the border
         between them is an edge of either.
         """
-        return self.edges.adjacency()
+        return self.edges.list_adjacent_pairs()
 
     @cached_property
     def polar_moment(self) -> Array:
         """J_{V,p} of equation (2), (n,) m⁴: the polar moments of the cells about their generators."""
-        return (self.density or Uniform()).moments(self.edges, self.generators)[:, 3]
+        return (self.density or Uniform()).compute_moments(self.edges, self.generators)[:, 3]
 
     @property
     def polar_moment_about_centroid(self) -> Array:

@@ -71,7 +71,7 @@ def evaluate_density(density: Density | None, points: Array) -> Array:
     """Return φ at (..., 2) points (m), as an array of their shape."""
     if density is None:
         return np.ones(points.shape[:-1])
-    return density.value(points.reshape(-1, 2)).reshape(points.shape[:-1])
+    return density.evaluate(points.reshape(-1, 2)).reshape(points.shape[:-1])
 
 
 def compute_step_fractions(gradient: Array, before: Array | None, step: Array | None) -> Array:

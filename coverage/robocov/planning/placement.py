@@ -15,7 +15,7 @@ import scipy
 
 from robocov.arrays import Array, BoolArray
 from robocov.density import Density
-from robocov.k_median import improved, moved
+from robocov.k_median import improve_sources, move_first_source
 from robocov.planning.wayfinding import GridPlanner
 
 _FAR = 1e9  # metres that stand for "nobody is there"
@@ -30,8 +30,8 @@ def demand(ways: GridPlanner, density: Density | None = None, *, sure: bool = Fa
     Unknown cells count by their openness; if `sure`, not at all.
     """
     weights = ways.free_cells if sure else ways.expected_cells
-    if density is not None and not density.uniform:
-        weights = weights * density.value(ways.nodes)
+    if density is not None and not density.is_uniform:
+        weights = weights * density.evaluate(ways.nodes)
     return weights
 
 
@@ -74,8 +74,8 @@ def team_places(
     """Return where the robots of a team should be, (k, 2) m: a low sum of distances, by few relocations.
 
     From `begin` (k, 2) m on, the former plan, Lloyd's iteration in turn with interchange
-    (`k_median.improved`). The robots are at `now`; the first one plans. Those that are `fixed`, (k,), never
-    the first, stay where `begin` says, and `others`, (o, 2) m, where they are; where all but the first stay,
+    (`k_median.improve_sources`). The robots are at `now`; the first one plans. Those that are `fixed`, (k,),
+    never the first, stay where `begin` says, and `others`, (o, 2) m, where they are; where all but the first stay,
     it goes to the best place of its own cell. What a relocation must save is the part `threshold` of the
     cost, one in the own cell the part `nearby`. Who goes to which of the places is such that the sum of the
     squared ways is least: then the choice stays the same while the robots are on their way, and their ways
@@ -105,11 +105,11 @@ def team_places(
     # in an order that does not depend on who plans: of two equal plans all take the same
     order, outside = np.lexsort(begin.T), len(sources)
     team = np.append(chosen[order], outside), np.append(fixed[order], True)
-    chosen[order] = improved(weighted, *team, threshold, removals=len(now) <= _FEW)[:-1]
+    chosen[order] = improve_sources(weighted, *team, threshold, removals=len(now) <= _FEW)[:-1]
     if fixed[1:].all():
         from_team = np.column_stack([distance[:, sources[chosen]], away[sources]])
         own = np.append(from_team.argmin(axis=1) == 0, False)
-        chosen = moved(weighted, np.append(chosen, outside), own, nearby)[:-1]
+        chosen = move_first_source(weighted, np.append(chosen, outside), own, nearby)[:-1]
 
     mobile = np.flatnonzero(~fixed)
     entry = [int(((nodes - now[k]) ** 2).sum(axis=1).argmin()) for k in mobile]

@@ -53,7 +53,7 @@ class VoronoiPartition(Cells):
     @cached_property
     def polygons(self) -> list[Array]:
         """The cells, (k, 2) m each, counter-clockwise; (0, 2) where a cell is empty."""
-        return self.edges.polygons(self.generators)
+        return self.edges.build_polygons(self.generators)
 
     @property
     def outlines(self) -> tuple[list[Array], IntArray]:
@@ -143,11 +143,11 @@ def generators_of(values: object) -> Array:
 def weighted(cells: _AnyCells, density: Density | None) -> _AnyCells:
     """Give cells that are being made mass and centroid by a density; return them, now read-only."""
     cells.density = density
-    if density is not None and density.uniform:
-        cells.mass = cells.mass * density.highest
+    if density is not None and density.is_uniform:
+        cells.mass = cells.mass * density.max_value
     elif density is not None:
         places = cells.generators
-        cells.mass, cells.centroid = density.mass_and_centroid(
+        cells.mass, cells.centroid = density.compute_mass_and_centroid(
             cells.edges, places, cells.mass, cells.centroid
         )
     for values in (cells.generators, cells.mass, cells.centroid):

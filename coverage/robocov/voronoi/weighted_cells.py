@@ -106,9 +106,9 @@ class WeightedCells(Cells):
 
     @cached_property
     def polar_moment(self) -> Array:
-        if self.density is not None and not self.density.uniform:
+        if self.density is not None and not self.density.is_uniform:
             return super().polar_moment
-        weight = 1.0 if self.density is None else self.density.highest
+        weight = 1.0 if self.density is None else self.density.max_value
         polar = moments(self.pieces, len(self.generators))[:, 3]
         return np.where(self.mass > 0.0, weight * polar, 0.0)
 

@@ -65,8 +65,8 @@ class ChangingWorld:
         self.positions = np.array(positions, dtype=float)
         self.velocities = np.zeros_like(self.positions) if velocities is None else np.array(velocities)
         self.steering = initialize_steering(team, self.velocities, steering)
-        self.working = conditions.working(time, len(team))
-        self._failed = conditions.failed(time, len(team))
+        self.working = conditions.find_working(time, len(team))
+        self._failed = conditions.find_failed(time, len(team))
         is_absent = ~(self.working | self._failed)
         for join in conditions.joins:
             if join.place is not None and is_absent[join.robot - 1]:
@@ -120,8 +120,8 @@ class ChangingWorld:
 
     def _change_team(self, time: float) -> None:
         """Let robots fail and join that do so until `time`."""
-        working = self._conditions.working(time, len(self.team))
-        failed = self._conditions.failed(time, len(self.team))
+        working = self._conditions.find_working(time, len(self.team))
+        failed = self._conditions.find_failed(time, len(self.team))
         if (working == self.working).all() and (failed == self._failed).all():
             return
         is_present = self.working | self._failed

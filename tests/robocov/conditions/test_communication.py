@@ -87,11 +87,11 @@ def test_what_is_heard_equals_what_was_told_one_by_one(
     ranges[0] *= 0.7
     working = np.ones((25, n), dtype=bool)
     working[12:, 1] = False
-    radio, inbox = radio_of(conditions, ranges, DT), Inbox.empty(n)
+    radio, inbox = radio_of(conditions, ranges, DT), Inbox.create_empty(n)
     expected = told_one_by_one(conditions, ranges, places, working)
     for step, now in enumerate(places):
-        inbox = radio.exchange(inbox, step, now, now, working[step])
-        neighbours, heard, ages = radio.reports(inbox, step, working[step])
+        inbox = radio.exchange_messages(inbox, step, now, now, working[step])
+        neighbours, heard, ages = radio.read_reports(inbox, step, working[step])
         robot, other = neighbours.list_pairs()
         assert list(zip(robot.tolist(), other.tolist(), strict=True)) == sorted(expected[step])
         for k, pair in enumerate(sorted(expected[step])):
@@ -104,18 +104,18 @@ def test_what_is_heard_equals_what_was_told_one_by_one(
 def test_a_delay_of_whole_steps_is_that_many_and_silence_as_well(delay: float, dt: float, steps: int) -> None:
     """Also where 0.14 / 0.02 is more than 7, and 3 x 0.1 more than 0.3."""
     radio = radio_of(Conditions(delay=delay, forget_after=round(3 * dt, 2)), np.ones(2), dt)
-    inbox, working, heard = Inbox.empty(2), np.ones(2, dtype=bool), []
+    inbox, working, heard = Inbox.create_empty(2), np.ones(2, dtype=bool), []
     for step in range(16):
         places = np.array([[0.0, 0.0], [9.0 * step, 0.0]])  # out of range after the first message
-        inbox = radio.exchange(inbox, step, places, places, working)
-        heard.append(len(radio.reports(inbox, step, working)[1]) > 0)
+        inbox = radio.exchange_messages(inbox, step, places, places, working)
+        heard.append(len(radio.read_reports(inbox, step, working)[1]) > 0)
     assert np.flatnonzero(heard).tolist() == list(range(steps, steps + 4))
 
 
 def test_an_inbox_is_replaced_and_never_changed() -> None:
     """So that a copy of a run can hold the same one."""
     radio = radio_of(Conditions(delay=0.2, loss=0.2), np.full(3, np.inf), DT)
-    inbox, working = Inbox.empty(3), np.ones(3, dtype=bool)
+    inbox, working = Inbox.create_empty(3), np.ones(3, dtype=bool)
     for step, now in enumerate(walks(3, 12, 4)):
         before = [
             inbox.sent.tobytes(),
@@ -123,8 +123,8 @@ def test_an_inbox_is_replaced_and_never_changed() -> None:
             inbox.places.tobytes(),
             len(inbox.on_the_way),
         ]
-        once = radio.exchange(inbox, step, now, now, working)
-        again = radio.exchange(inbox, step, now, now, working)
+        once = radio.exchange_messages(inbox, step, now, now, working)
+        again = radio.exchange_messages(inbox, step, now, now, working)
         assert once.places.tobytes() == again.places.tobytes()
         assert [
             inbox.sent.tobytes(),
@@ -138,10 +138,10 @@ def test_an_inbox_is_replaced_and_never_changed() -> None:
 def test_loss_is_as_often_as_it_says() -> None:
     n, steps = 40, 30
     radio = radio_of(Conditions(loss=0.3, forget_after=0.01, seed=1), np.full(n, np.inf), DT)
-    inbox, working, got = Inbox.empty(n), np.ones(n, dtype=bool), 0
+    inbox, working, got = Inbox.create_empty(n), np.ones(n, dtype=bool), 0
     for step, now in enumerate(walks(n, steps, 1)):
-        inbox = radio.exchange(inbox, step, now, now, working)
-        got += len(radio.reports(inbox, step, working)[1])
+        inbox = radio.exchange_messages(inbox, step, now, now, working)
+        got += len(radio.read_reports(inbox, step, working)[1])
     sent = steps * n * (n - 1)
     assert abs(got / sent - 0.7) < 5 * np.sqrt(0.21 / sent)
 
@@ -298,11 +298,11 @@ def test_heard_without_neighbours_is_refused() -> None:
 
 
 def test_an_inbox_follows_robots_that_come_and_go() -> None:
-    radio, inbox = radio_of(Conditions(delay=0.2), np.full(3, np.inf), DT), Inbox.empty(3)
+    radio, inbox = radio_of(Conditions(delay=0.2), np.full(3, np.inf), DT), Inbox.create_empty(3)
     working = np.ones(3, dtype=bool)
     for step, now in enumerate(walks(3, 6, 2)):
-        inbox = radio.exchange(inbox, step, now, now, working)
-    other = inbox.rearranged(np.array([2, -1, 0]))
+        inbox = radio.exchange_messages(inbox, step, now, now, working)
+    other = inbox.select_robots(np.array([2, -1, 0]))
     assert other.sent[0, 2] == inbox.sent[2, 0]
     assert (other.places[0, 2] == inbox.places[2, 0]).all()
     assert (other.sent[1] == -1).all()

@@ -8,24 +8,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.conditions import Conditions, Failure, Join, parsed_entry
+from robocov.conditions import Conditions, Failure, Join, parse_event
 from robocov.errors import ParameterError
 
 
 def test_without_anything_they_are_ideal() -> None:
-    assert Conditions().ideal
-    assert Conditions(seed=4, forget_after=1.0).ideal
+    assert Conditions().is_ideal
+    assert Conditions(seed=4, forget_after=1.0).is_ideal
     for given_ in ({"loss": 0.1}, {"delay": 0.1}, {"message_rate": 2.0}, {"position_noise": 0.1}):
-        assert Conditions(**given_).talks
-        assert not Conditions(**given_).ideal
+        assert Conditions(**given_).uses_messages
+        assert not Conditions(**given_).is_ideal
     for given_ in (
         {"sensing_noise": 0.1},
         {"failure_rate": 0.1},
         {"failures": ((1, 2),)},
         {"joins": ((1, 2),)},
     ):
-        assert not Conditions(**given_).talks
-        assert not Conditions(**given_).ideal
+        assert not Conditions(**given_).uses_messages
+        assert not Conditions(**given_).is_ideal
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_a_team_must_have_the_robots_and_one_from_the_start() -> None:
 
 def test_who_works_when() -> None:
     conditions = Conditions(failures=((1, 5.0), (3, 7.0)), joins=((2, 4.0), (3, 6.0)))
-    found = conditions.working(np.array([0.0, 3.99, 4.0, 5.0, 6.5, 7.0]), 4)
+    found = conditions.find_working(np.array([0.0, 3.99, 4.0, 5.0, 6.5, 7.0]), 4)
     assert found.astype(int).tolist() == [
         [1, 0, 0, 1],
         [1, 0, 0, 1],
@@ -76,8 +76,8 @@ def test_who_works_when() -> None:
         [0, 1, 1, 1],
         [0, 1, 0, 1],
     ]
-    assert conditions.failed(7.0, 4).tolist() == [True, False, True, False]
-    assert conditions.present(5.0, 4).tolist() == [True, True, False, True]
+    assert conditions.find_failed(7.0, 4).tolist() == [True, False, True, False]
+    assert conditions.find_present(5.0, 4).tolist() == [True, True, False, True]
 
 
 def test_a_moment_is_the_same_whatever_steps_lead_there() -> None:
@@ -85,23 +85,24 @@ def test_a_moment_is_the_same_whatever_steps_lead_there() -> None:
     conditions = Conditions(failures=((1, 0.8),))
     steps = np.add.accumulate(np.full(8, 0.1))
     assert steps[-1] < 0.8
-    assert conditions.failed(float(steps[-1]), 1).all()
-    assert not conditions.failed(0.79, 1).any()
-    assert Conditions(joins=((1, 0.8),)).working(float(steps[-1]), 2).all()
+    assert conditions.find_failed(float(steps[-1]), 1).all()
+    assert not conditions.find_failed(0.79, 1).any()
+    assert Conditions(joins=((1, 0.8),)).find_working(float(steps[-1]), 2).all()
 
 
 def test_lifetimes_are_exponential() -> None:
     count, rate = 20_000, 0.02
-    begins, ends = Conditions(failure_rate=rate, seed=5, joins=((1, 30.0),)).lives(count)
+    begins, ends = Conditions(failure_rate=rate, seed=5, joins=((1, 30.0),)).compute_working_periods(count)
     lives = ends - np.maximum(begins, 0.0)
     assert abs(lives.mean() * rate - 1.0) < 5 / math.sqrt(count)
     assert abs((lives > 50.0).mean() - math.exp(-1.0)) < 5 * 0.5 / math.sqrt(count)
-    late = Conditions(failure_rate=rate, seed=5, joins=((1, 1e5),)).lives(1)[1]
+    late = Conditions(failure_rate=rate, seed=5, joins=((1, 1e5),)).compute_working_periods(1)[1]
     assert late[0] - 1e5 == pytest.approx(ends[0] - 30.0), "it lives as long wherever it begins"
     # each robot's own, whatever the size of the team
-    assert (Conditions(failure_rate=rate, seed=5).lives(3)[1][1:] == ends[1:3]).all()
+    assert (Conditions(failure_rate=rate, seed=5).compute_working_periods(3)[1][1:] == ends[1:3]).all()
     assert (
-        Conditions(failure_rate=rate, seed=6).lives(3)[1] != Conditions(failure_rate=rate).lives(3)[1]
+        Conditions(failure_rate=rate, seed=6).compute_working_periods(3)[1]
+        != Conditions(failure_rate=rate).compute_working_periods(3)[1]
     ).all()
 
 
@@ -141,25 +142,25 @@ def test_what_is_not_conditions_is_refused() -> None:
 
 
 def test_failures_and_joins_can_be_typed() -> None:
-    assert parsed_entry(Failure, "3@20") == (3, 20.0)
-    assert parsed_entry(Join, "5@30") == (5, 30.0, None)
-    assert parsed_entry(Join, "5@1.5:2.5,-1") == (5, 1.5, (2.5, -1.0))
+    assert parse_event(Failure, "3@20") == (3, 20.0)
+    assert parse_event(Join, "5@30") == (5, 30.0, None)
+    assert parse_event(Join, "5@1.5:2.5,-1") == (5, 1.5, (2.5, -1.0))
     for text in ("3", "3@", "@20", "a@20", "3@x", "3@20s", "-1@2", "3@inf", "3@1@2"):
         with pytest.raises(ParameterError, match="but ROBOT@SECONDS, as in 3@20, was wanted"):
-            parsed_entry(Failure, text)
+            parse_event(Failure, text)
     for text in ("3@2:", "3@2:1", "3@2:1,", "3@2:1,2,3", "3@2:a,b", "3@2:nan,1"):
         with pytest.raises(ParameterError, match="ROBOT@SECONDS or ROBOT@SECONDS:X,Y was wanted"):
-            parsed_entry(Join, text)
+            parse_event(Join, text)
 
 
 @given(st.text("0123456789@:,.-+e x", max_size=12))
 def test_any_text_is_a_join_or_one_clear_line(text: str) -> None:
     try:
-        join = parsed_entry(Join, text)
+        join = parse_event(Join, text)
     except ParameterError as error:
         assert "\n" not in str(error)
     else:
-        assert parsed_entry(Join, text) == join
+        assert parse_event(Join, text) == join
 
 
 def test_a_repr_says_what_differs() -> None:
@@ -168,6 +169,8 @@ def test_a_repr_says_what_differs() -> None:
 
 
 def test_the_earlier_of_two_failures_counts() -> None:
-    by_chance = Conditions(failure_rate=1.0, seed=5).lives(2)[1]
-    given_ = Conditions(failure_rate=1.0, seed=5, failures=((1, 500.0), (2, 1e-6))).lives(2)[1]
+    by_chance = Conditions(failure_rate=1.0, seed=5).compute_working_periods(2)[1]
+    given_ = Conditions(failure_rate=1.0, seed=5, failures=((1, 500.0), (2, 1e-6))).compute_working_periods(
+        2
+    )[1]
     assert given_.tolist() == [by_chance[0], 1e-6]

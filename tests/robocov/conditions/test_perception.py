@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.conditions import Conditions
-from robocov.conditions.perception import NEAREST, of_working
+from robocov.conditions.perception import MIN_MEASURED_DISTANCE_M, ignore_idle_robots
 from robocov.controllers import Lloyd, Rapf
 from robocov.controllers.tangentbug import TangentBug
 from robocov.environment import CircleObstacle, Environment
@@ -115,7 +115,7 @@ def test_a_distance_is_never_measured_as_none_and_always_towards_the_point() -> 
     ideal, noisy = simulation(None).observe(), simulation(Conditions(sensing_noise=50.0)).observe()
     true, found = (each.obstacle_points - STARTS for each in (ideal, noisy))
     lengths = np.hypot(*found.T)
-    assert lengths.min() == pytest.approx(NEAREST) and lengths.max() > 10.0
+    assert lengths.min() == pytest.approx(MIN_MEASURED_DISTANCE_M) and lengths.max() > 10.0
     np.testing.assert_allclose(found / lengths[:, None], true / np.hypot(*true.T)[:, None], atol=1e-9)
 
 
@@ -163,7 +163,7 @@ def test_a_sensed_point_keeps_its_bearing_and_goes_along_with_the_belief() -> No
     felt, there = seen.obstacle_points - seen.positions, true - one.positions
     np.testing.assert_allclose(felt[:, 0] * there[:, 1], felt[:, 1] * there[:, 0], atol=1e-12)
     assert ((felt * there).sum(axis=1) > 0).all()
-    assert (np.hypot(*felt.T) >= NEAREST - 1e-12).all()
+    assert (np.hypot(*felt.T) >= MIN_MEASURED_DISTANCE_M - 1e-12).all()
 
 
 def test_scans_are_noisy_where_they_meet_something() -> None:
@@ -231,12 +231,12 @@ def test_who_fails_is_forgotten_after_a_while_where_messages_are_not_ideal() -> 
 
 def test_who_does_not_work_wants_nothing() -> None:
     decision = Decision(np.ones((3, 2)), np.ones((3, 2)), {"attraction": np.ones((3, 2))})
-    found = of_working(decision, np.array([True, False, True]))
+    found = ignore_idle_robots(decision, np.array([True, False, True]))
     assert found.goals is not None
     assert (found.forces[:, 0] == [1, 0, 1]).all()
     assert (found.terms["attraction"][:, 0] == [1, 0, 1]).all()
     assert np.isnan(found.goals[1]).all()
-    assert of_working(decision, np.ones(3, dtype=bool)) is decision
+    assert ignore_idle_robots(decision, np.ones(3, dtype=bool)) is decision
 
 
 def test_a_change_in_the_window_keeps_the_messages() -> None:

@@ -26,17 +26,17 @@ class Probed(Density):
     """A density that notes where it is asked for, and has no integrals."""
 
     kind: ClassVar[str] = "probed"
-    lowest = 0.3
-    highest = 7.0
+    min_value = 0.3
+    max_value = 7.0
 
     def __init__(self) -> None:
         self.asked: list[Array] = []
 
-    def value(self, points: Array) -> Array:
+    def evaluate(self, points: Array) -> Array:
         self.asked.append(points.copy())
-        return HOT.value(points)
+        return HOT.evaluate(points)
 
-    def moments(self, edges: CellEdges, origins: Array) -> Array:
+    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
         raise AssertionError("nobody knows it but where it is")
 
 
@@ -47,7 +47,7 @@ class OfBasis(Probed):
     lattice: Lattice
     parameters: Array
 
-    def value(self, points: Array) -> Array:
+    def evaluate(self, points: Array) -> Array:
         return self.lattice.basis(points) @ self.parameters
 
 
@@ -142,4 +142,4 @@ def hot_cost(places: Array) -> float:
     x, y = np.meshgrid(np.linspace(0.05, 9.95, 100), np.linspace(0.05, 9.95, 100))
     points = np.column_stack([x.ravel(), y.ravel()])
     square = ((points[:, None] - places) ** 2).sum(axis=2).min(axis=1)
-    return float((HOT.value(points) * square).mean())
+    return float((HOT.evaluate(points) * square).mean())

@@ -29,12 +29,12 @@ def driven(paths: Array, conditions: Conditions) -> tuple[Observations, Estimate
     n = paths.shape[1]
     team = Team.homogeneous(n)
     perception = Perception(conditions, team, DT)
-    inbox, estimates, errors = perception.begin(), Estimates.nothing(n), []
+    inbox, estimates, errors = perception.create_inbox(), Estimates.nothing(n), []
     speeds = np.gradient(paths, DT, axis=0)
     for k, (places, velocities) in enumerate(zip(paths, speeds, strict=True)):
         walls = places + [1.0, 0.0]
         truth = Observations(places, velocities, Neighbours(n), walls, Region(SQUARE), k * DT)
-        seen, inbox = perception.known(truth, inbox, np.ones(n, dtype=bool))
+        seen, inbox = perception.perceive(truth, inbox, np.ones(n, dtype=bool))
         known, estimates = localized(seen, estimates, team)
         assert np.allclose(known.obstacle_points - known.positions, [1.0, 0.0])
         errors.append(np.hypot(*(known.positions - places).T))
@@ -84,11 +84,11 @@ def test_who_is_carried_away_notices_it_at_once() -> None:
     conditions = Conditions(position_noise=0.02)
     team = Team.homogeneous(2)
     perception, estimates = Perception(conditions, team, DT), Estimates.nothing(2)
-    inbox = perception.begin()
+    inbox = perception.create_inbox()
     for k in range(62):
         velocities = (paths[1] - paths[0]) / DT
         truth = Observations(paths[k], velocities, Neighbours(2), paths[k], Region(SQUARE), k * DT)
-        seen, inbox = perception.known(truth, inbox, np.ones(2, dtype=bool))
+        seen, inbox = perception.perceive(truth, inbox, np.ones(2, dtype=bool))
         known, estimates = localized(seen, estimates, team)
     assert np.hypot(*(known.positions - paths[61]).T).max() < 0.1
 
@@ -100,11 +100,11 @@ def test_a_robot_knows_nothing_of_what_it_does_not_hear(seed: int) -> None:
     perception = Perception(Conditions(position_noise=0.1, loss=0.2), team, DT)
     found = []
     for far in (50.0, 70.0):
-        estimates, inbox = Estimates.nothing(4), perception.begin()
+        estimates, inbox = Estimates.nothing(4), perception.create_inbox()
         for k, places in enumerate(lines(4, 20, seed) * 0.05 + [[0, 0], [1, 0], [far, 0], [far, 1]]):
             near = Neighbours.from_ranges(places, team.communication_range)
             truth = Observations(places, places * 0.0, near, places, Region(SQUARE), k * DT)
-            seen, inbox = perception.known(truth, inbox, np.ones(4, dtype=bool))
+            seen, inbox = perception.perceive(truth, inbox, np.ones(4, dtype=bool))
             known, estimates = localized(seen, estimates, team)
         close = wary(known, estimates)
         assert close.reported_positions is not None

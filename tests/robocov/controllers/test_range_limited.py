@@ -137,6 +137,6 @@ def test_a_density_draws_the_centroid_of_what_is_in_range() -> None:
     )
     inside = np.hypot(x - 5, y - 4) < 2
     places = np.column_stack([x, y])[inside]
-    weight = bell.value(places)
+    weight = bell.evaluate(places)
     assert goals is not None
     np.testing.assert_allclose(goals[0], (places * weight[:, None]).sum(axis=0) / weight.sum(), atol=3e-3)

@@ -57,7 +57,7 @@ def worth(place: np.ndarray, reach: float, decay: float | None, density: Gaussia
     values = np.ones_like(along) if decay is None else np.exp(-decay * along)
     if density is not None:
         points = place + along[..., None] * compute_headings(rays)[:, None]
-        values = values * density.value(points.reshape(-1, 2)).reshape(along.shape)
+        values = values * density.evaluate(points.reshape(-1, 2)).reshape(along.shape)
     return float((values * along * distances[:, None]).sum() / rings * 2.0 * np.pi / rays)
 
 

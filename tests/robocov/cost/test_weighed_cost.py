@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from robocov.controllers import Lloyd, Rapf
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians, Uniform, WeightedArea, WeightedPolygons
-from robocov.density.base import means_over_squares
+from robocov.density.base import compute_square_means
 from robocov.environment import CircleObstacle, Environment, WallObstacle
 from robocov.optimum import find_optimum
 from robocov.simulation import Simulation
@@ -27,11 +27,11 @@ HALVES = Environment("halves", RING, (WallObstacle(((4.0, -1.0), (4.0, 9.0)), 0.
 def test_it_is_the_mean_with_the_weights_of_the_sites(density):
     cost = CoverageCost(ROOMS.with_density(density), 40)
     result = cost(ROBOTS)
-    weights = means_over_squares(density, cost.points, cost.spacing)
+    weights = compute_square_means(density, cost.points, cost.spacing)
     assert result.mean_distance == pytest.approx(np.average(result.distances, weights=weights), rel=1e-12)
     mass = float(cost.environment.free_masses.sum())
     assert result.value == pytest.approx(result.mean_distance * mass, rel=1e-12)
-    if density.uniform:
+    if density.is_uniform:
         assert result.weights is None
     else:
         assert_allclose(result.weights, weights)

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from robocov.density import (
-    FINEST,
+    MAX_RASTER_SIZE,
     Gaussian,
     Gaussians,
     Raster,
     Uniform,
     WeightedArea,
     WeightedPolygons,
-    sampled,
+    sample_density,
 )
 from robocov.errors import ParameterError
 from robocov.observation.neighbours import Neighbours
@@ -117,34 +117,34 @@ def test_one_everywhere_is_as_no_density_to_the_last_bit(count):
 def test_values_of_all_kinds():
     points = np.array([[3.0, 3.0], [0.5, 0.5]])
     peak = Gaussian((3.0, 3.0), 2.0, covariance=((2.0, 0.5), (0.5, 1.0)))
-    assert Gaussians((peak, peak), 0.25).value(points)[0] == pytest.approx(4.25)
+    assert Gaussians((peak, peak), 0.25).evaluate(points)[0] == pytest.approx(4.25)
     away = np.array([[-2.5, -2.5]])
     square = float((away @ np.linalg.inv(np.array(peak.matrix)) @ away.T)[0, 0])
-    assert Gaussians((peak,)).value(points)[1] == pytest.approx(2.0 * np.exp(-0.5 * square))
-    assert Uniform(2.0).value(points).tolist() == [2.0, 2.0]
+    assert Gaussians((peak,)).evaluate(points)[1] == pytest.approx(2.0 * np.exp(-0.5 * square))
+    assert Uniform(2.0).evaluate(points).tolist() == [2.0, 2.0]
     room = WeightedArea(((2.0, 2.0), (4.0, 2.0), (4.0, 4.0), (2.0, 4.0)), 5.0)
     on_top = WeightedArea(((2.5, 2.5), (3.5, 2.5), (3.5, 3.5), (2.5, 3.5)), 0.5)
-    assert WeightedPolygons((room, on_top)).value(points).tolist() == [0.5, 1.0]
-    assert WeightedPolygons((on_top, room)).value(points).tolist() == [5.0, 1.0]
+    assert WeightedPolygons((room, on_top)).evaluate(points).tolist() == [0.5, 1.0]
+    assert WeightedPolygons((on_top, room)).evaluate(points).tolist() == [5.0, 1.0]
 
 
 def test_a_raster_has_its_lowest_row_first_and_goes_on_beyond_its_border():
     values = [[1.0, 2.0], [3.0, 4.0]]
     flat = Raster(np.array(values), (0.0, 0.0, 4.0, 2.0), "cells")
     points = np.array([[1.0, 0.5], [3.0, 0.5], [1.0, 1.5], [3.0, 1.5], [9.0, -3.0]])
-    assert flat.value(points).tolist() == [1.0, 2.0, 3.0, 4.0, 2.0]
+    assert flat.evaluate(points).tolist() == [1.0, 2.0, 3.0, 4.0, 2.0]
     smooth = Raster(np.array(values), (0.0, 0.0, 4.0, 2.0))
-    assert smooth.value(points).tolist() == [1.0, 2.0, 3.0, 4.0, 2.0]
-    assert smooth.value(np.array([[2.0, 1.0]])).tolist() == [2.5]
+    assert smooth.evaluate(points).tolist() == [1.0, 2.0, 3.0, 4.0, 2.0]
+    assert smooth.evaluate(np.array([[2.0, 1.0]])).tolist() == [2.5]
 
 
 def test_sampled_keeps_what_is_linear():
     values = np.arange(6.0)[None, :] + 2.0 * np.arange(4.0)[:, None] + 1.0
     raster = Raster(values, (0.0, 0.0, 6.0, 4.0))
-    finer = sampled(raster, (0.5, 0.5, 5.5, 3.5), 50, 30)
+    finer = sample_density(raster, (0.5, 0.5, 5.5, 3.5), 50, 30)
     inside = np.random.default_rng(0).uniform((1.0, 1.0), (5.0, 3.0), (100, 2))
-    assert_allclose(finer.value(inside), raster.value(inside), rtol=1e-12)
-    assert sampled(None, (0.0, 0.0, 1.0, 1.0), 3, 3).values.tolist() == [[1.0] * 3] * 3
+    assert_allclose(finer.evaluate(inside), raster.evaluate(inside), rtol=1e-12)
+    assert sample_density(None, (0.0, 0.0, 1.0, 1.0), 3, 3).values.tolist() == [[1.0] * 3] * 3
 
 
 def test_where_nothing_counts_the_centroid_is_that_of_the_area():
@@ -252,8 +252,8 @@ def test_densities_are_values():
     assert a == b
     with pytest.raises(ValueError, match="read-only"):
         a.values[0, 0] = 2.0
-    assert a.uniform and Uniform().uniform and not GAUSSIANS["two"].uniform
-    assert (a.lowest, a.highest) == (1.0, 1.0)
+    assert a.is_uniform and Uniform().is_uniform and not GAUSSIANS["two"].is_uniform
+    assert (a.min_value, a.max_value) == (1.0, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -270,7 +270,7 @@ def test_densities_are_values():
         (lambda: WeightedPolygons((), 0.0), "some weight was wanted"),
         (lambda: Raster(np.zeros((2, 2)), (0.0, 0.0, 1.0, 1.0)), "all are 0"),
         (lambda: Raster(np.ones(3), (0.0, 0.0, 1.0, 1.0)), "shape"),
-        (lambda: Raster(np.ones((1, FINEST + 1)), (0.0, 0.0, 1.0, 1.0)), "shape"),
+        (lambda: Raster(np.ones((1, MAX_RASTER_SIZE + 1)), (0.0, 0.0, 1.0, 1.0)), "shape"),
         (lambda: Raster(-np.ones((2, 2)), (0.0, 0.0, 1.0, 1.0)), "from 0 to"),
         (lambda: Raster(np.ones((2, 2)), (0.0, 0.0, 0.0, 1.0)), "a width and a height"),
         (lambda: Raster(np.ones((2, 2)), (0.0, 0.0, 1.0, 1.0), "cubic"), "bilinear or cells"),  # type: ignore[arg-type]

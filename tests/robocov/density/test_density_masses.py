@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from shapely import Polygon
 
 from robocov.density import Gaussian, Gaussians, Uniform
-from robocov.density.base import masses_of_polygons, means_over_squares
+from robocov.density.base import compute_polygon_masses, compute_square_means
 from robocov.environment import CircleObstacle, Environment
 
 HOLED = Polygon([(0, 0), (8, 0), (8, 8), (0, 8)], [[(2, 2), (5, 2), (5, 5)]])
@@ -23,36 +23,36 @@ def test_polygons_with_holes_either_way_round(density):
     side = 600
     x = (np.arange(side) + 0.5) * 8.0 / side
     points = np.column_stack([np.tile(x, side), np.repeat(x, side)])
-    values = density.value(points) * (8.0 / side) ** 2
-    masses = masses_of_polygons(density, parts)
+    values = density.evaluate(points) * (8.0 / side) ** 2
+    masses = compute_polygon_masses(density, parts)
     wanted = [values[shapely.contains_xy(part, *points.T)].sum() for part in parts]
     assert_allclose(masses, wanted, rtol=1e-2)
     assert masses[0] == pytest.approx(masses[1], rel=1e-12)
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(HOLED))
-    assert masses_of_polygons(density, list(triangles)).sum() == pytest.approx(masses[0], rel=1e-11)
-    assert masses_of_polygons(density, []).shape == (0,)
+    assert compute_polygon_masses(density, list(triangles)).sum() == pytest.approx(masses[0], rel=1e-11)
+    assert compute_polygon_masses(density, []).shape == (0,)
 
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
 def test_squares_have_the_mean_of_their_polygons(density):
     middles, side = np.random.default_rng(1).uniform(0.0, 8.0, (40, 2)), 0.7
     boxes = [Polygon(shapely.box(x - 0.35, y - 0.35, x + 0.35, y + 0.35)) for x, y in middles]
-    means = means_over_squares(density, middles, side)
-    assert_allclose(means, masses_of_polygons(density, boxes) / side**2, rtol=1e-9)
-    assert (density.lowest <= means).all() and (means <= density.highest).all()
+    means = compute_square_means(density, middles, side)
+    assert_allclose(means, compute_polygon_masses(density, boxes) / side**2, rtol=1e-9)
+    assert (density.min_value <= means).all() and (means <= density.max_value).all()
 
 
 def test_many_squares_are_taken_some_at_a_time(monkeypatch):
     density = Gaussians((Gaussian((3.0, 3.0), 2.0, sigma=1.0),), 0.5)
     middles = np.random.default_rng(1).uniform(0.0, 8.0, (50, 2))
-    whole = means_over_squares(density, middles, 0.5)
+    whole = compute_square_means(density, middles, 0.5)
     monkeypatch.setattr("robocov.density.base._AT_ONCE", 7)
-    assert_allclose(means_over_squares(density, middles, 0.5), whole, rtol=1e-13)
+    assert_allclose(compute_square_means(density, middles, 0.5), whole, rtol=1e-13)
 
 
 def test_far_away_rounding_makes_nothing_negative():
     peak = Gaussians((Gaussian((0.0, 0.0), 1.0, sigma=1.0),))
-    means = means_over_squares(peak, np.random.default_rng(0).uniform(5.0, 50.0, (500, 2)), 0.3)
+    means = compute_square_means(peak, np.random.default_rng(0).uniform(5.0, 50.0, (500, 2)), 0.3)
     assert (means >= 0.0).all()
 
 

@@ -36,7 +36,7 @@ def test_sums_over_a_fine_lattice_find_nothing_better(density, within, f):
         x, y = (low[k] + (np.arange(side) + 0.5) * (high[k] - low[k]) / side for k in (0, 1))
         places = np.column_stack([np.tile(x, side), np.repeat(y, side)])
         places = places[shapely.contains_xy(shapely.Polygon(ring), *places.T)]
-        weights = density.value(places)
+        weights = density.evaluate(places)
         off = places - point
         r = np.hypot(*off.T)
         pull = weights * (1.0 if isinstance(f, Distance) else 2.0 * r / (r**2 + f.height**2) ** 2)

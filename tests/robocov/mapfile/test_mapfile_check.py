@@ -172,7 +172,7 @@ def test_overlapping_peaks_are_told_by_their_largest_value_not_by_a_bound():
     near = Gaussians((Gaussian((3.0, 3.0), 2.0, sigma=1.0), Gaussian((4.0, 3.0), 2.0, sigma=1.0)), 0.5)
     x = np.linspace(0.0, 10.0, 1001)
     points = np.column_stack([x, np.full(1001, 3.0)])
-    for density, largest in ((near, near.value(points).max()), (Gaussians(near.peaks[:1], 0.5), 2.5)):
+    for density, largest in ((near, near.evaluate(points).max()), (Gaussians(near.peaks[:1], 0.5), 2.5)):
         ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
         report = check_map(Environment("heavy", ring, density=density))
         assert report.density_range == pytest.approx((0.5, largest), abs=1e-5)

@@ -11,7 +11,7 @@ from density_cases import KINDS
 from example_map import SCHEMA
 from PIL import Image
 
-from robocov.density import FINEST, Gaussians, Raster, Uniform, WeightedPolygons
+from robocov.density import MAX_RASTER_SIZE, Gaussians, Raster, Uniform, WeightedPolygons
 from robocov.environment import Environment
 from robocov.errors import MapError
 from robocov.mapfile import MOST_BYTES, dump_map, from_json, load_map, parse_map, save_map, to_json
@@ -113,8 +113,11 @@ AREA = {"vertices": [[1, 1], [2, 1], [2, 3]], "weight": 5}
         ),
         ({"kind": "raster"}, "density: neither of rows and picture"),
         ({"kind": "raster", "rows": [[1]], "picture": "a.png"}, "density: both of rows and picture"),
-        ({"kind": "raster", "rows": []}, f"density.rows: [], but a list of 1 to {FINEST} rows"),
-        ({"kind": "raster", "rows": [[1] * (FINEST + 1)]}, f"but a list of 1 to {FINEST} numbers was"),
+        ({"kind": "raster", "rows": []}, f"density.rows: [], but a list of 1 to {MAX_RASTER_SIZE} rows"),
+        (
+            {"kind": "raster", "rows": [[1] * (MAX_RASTER_SIZE + 1)]},
+            f"but a list of 1 to {MAX_RASTER_SIZE} numbers was",
+        ),
         ({"kind": "raster", "rows": [[1, 2], [1]]}, "density.rows[1]: 1 numbers, but 2, as in the first"),
         ({"kind": "raster", "rows": [[1, -1]]}, "density.rows[0][1]: -1, but a number from 0"),
         ({"kind": "raster", "rows": [[0, 0]]}, "density.rows: all places count 0"),
@@ -152,7 +155,7 @@ def test_what_is_nearly_nothing_is_nothing():
         with pytest.raises(MapError, match="all places count 0"):
             from_json(with_density(density))
     tiny = from_json(with_density({"kind": "raster", "rows": [[1e-12, 1]]}))
-    assert tiny.density.lowest == 0.0 and parse_map(dump_map(tiny), "again") == tiny
+    assert tiny.density.min_value == 0.0 and parse_map(dump_map(tiny), "again") == tiny
     flat = {"kind": "polygons", "areas": [{**AREA, "vertices": [[0, 0], [9, 0], [9, 5], [0, 1e-320]]}]}
     assert from_json(with_density(flat)).free_masses.sum() == pytest.approx(60.0 + 4.0 * 22.5)
 
@@ -230,7 +233,7 @@ def test_pictures_that_cannot_be_used(tmp_path):
     (tmp_path / "cut.png").write_bytes((tmp_path / "whole.png").read_bytes()[:-2000])
     assert "cannot be read as PNG or PGM" in refused("cut.png")
     (tmp_path / "wide.pgm").write_bytes(b"P5 1025 1 255\n" + bytes(1025))
-    assert f"1025 x 1 pixels, but at most {FINEST} each way" in refused("wide.pgm")
+    assert f"1025 x 1 pixels, but at most {MAX_RASTER_SIZE} each way" in refused("wide.pgm")
     (tmp_path / "bomb.pgm").write_bytes(b"P5 100000 100000 255\n")
     assert "100000 x 100000 pixels" in refused("bomb.pgm") or "PNG or PGM" in refused("bomb.pgm")
     with (tmp_path / "heavy.png").open("wb") as file:

@@ -16,7 +16,7 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.errors import ParameterError
 from robocov.generator import generate_map
-from robocov.k_median import seeded
+from robocov.k_median import seed_sources
 from robocov.mapfile import load_map
 from robocov.optimum import _Search, find_optimum
 
@@ -129,7 +129,7 @@ def test_it_never_ends_above_its_seeds_nor_above_lloyds_iteration_from_them(name
     search = _Search(where, CoverageCost(where, lattice), 5, 0.1)
     ends = []
     for restart in range(restarts):
-        drawn = seeded(search.table, 5, np.random.default_rng([3, restart]))
+        drawn = seed_sources(search.table, 5, np.random.default_rng([3, restart]))
         begin = search.places[drawn]
         assert best.costs[restart] <= best.undescended[restart] <= search.cost(begin).mean_distance
         ends.append(lloyds(search.cost, begin))

@@ -44,7 +44,7 @@ def test_what_counts_more_weighs_more() -> None:
     plain, dense = demand(some), demand(some, spot)
     assert (dense >= plain).all()
     near = some.standing(np.array([6.0, 2.0]))
-    np.testing.assert_allclose(dense[near] / plain[near], spot.value(some.nodes[[near]])[0])
+    np.testing.assert_allclose(dense[near] / plain[near], spot.evaluate(some.nodes[[near]])[0])
 
 
 def test_unknown_insides_hardly_count_and_shadows_do() -> None:

@@ -272,7 +272,7 @@ def test_mass_and_centroid_by_a_density(name: str) -> None:
     x, y = (part.ravel() for part in np.meshgrid(middles, middles))
     places = np.column_stack([x, y])
     owner = (np.hypot(*(places[:, None] - points).transpose(2, 0, 1)) / speeds).argmin(axis=1)
-    weight = density.value(places) * 1e-4
+    weight = density.evaluate(places) * 1e-4
     for i in range(5):
         own = owner == i
         mass = weight[own].sum()

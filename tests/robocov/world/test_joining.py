@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robocov.conditions import Conditions, Joined
+from robocov.conditions import Conditions, JoinedRobot
 from robocov.controllers import Lloyd
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import ParameterError
@@ -53,7 +53,7 @@ def test_a_robot_that_joins_beside_a_wall_is_moved_and_that_is_recorded(tmp_path
 
 def test_a_robot_with_space_joins_where_it_is_to() -> None:
     (joined,) = run_with((3, 1.0, (19.0, 9.0))).joined
-    assert joined == Joined(3, pytest.approx(1.0), (19.0, 9.0), (19.0, 9.0))
+    assert joined == JoinedRobot(3, pytest.approx(1.0), (19.0, 9.0), (19.0, 9.0))
     assert joined.offset == 0.0
     (joined,) = run_with((3, 1.0)).joined
     assert joined.place == joined.requested == (3.0, 1.0)

@@ -39,7 +39,7 @@ def test_the_more_the_stronger():
     x = np.linspace(0.1, 7.9, 60)
     picture = colours(parts(GAUSSIANS["one"], BOUNDS, x, x), LIGHT)
     assert picture.shape == (60, 60, 4) and (picture[..., :3] == LIGHT.density).all()
-    values = GAUSSIANS["one"].value(np.column_stack([np.tile(x, 60), np.repeat(x, 60)])).reshape(60, 60)
+    values = GAUSSIANS["one"].evaluate(np.column_stack([np.tile(x, 60), np.repeat(x, 60)])).reshape(60, 60)
     order = np.argsort(values.ravel())
     assert (np.diff(picture[..., 3].ravel()[order].astype(int)) >= 0).all()
     assert picture[..., 3].min() == 0

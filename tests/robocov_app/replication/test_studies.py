@@ -100,8 +100,8 @@ class TestMaps:
         (first, *_), (again, *_) = studies.density_maps(QUICK), studies.density_maps(QUICK)
         assert first.environment == again.environment
         density = first.environment.density
-        assert density is not None and not density.uniform
-        assert (density.lowest, density.highest) == (1.0, 41.0)
+        assert density is not None and not density.is_uniform
+        assert (density.min_value, density.max_value) == (1.0, 41.0)
 
     @both
     def test_gains_are_tuned_on_other_maps_and_starts_than_they_are_tested_on(self, plan):

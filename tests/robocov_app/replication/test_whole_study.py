@@ -230,7 +230,7 @@ class TestBeyond:
 
     def test_both_runs_are_judged_by_the_density(self, folder, beyond):
         known, ignored = beyond.density.pictures
-        assert not known.record.environment.density.uniform
+        assert not known.record.environment.density.is_uniform
         assert ignored.record.environment.density is None
         assert known.record.positions[0] == pytest.approx(ignored.record.positions[0])
         judge = CoverageCost(known.record.environment, TINY.lattice)

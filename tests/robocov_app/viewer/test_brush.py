@@ -31,7 +31,7 @@ def stroke(brush, session, *points, lowers=False) -> str | None:
 
 def value_at(session, point) -> float:
     density = session.environment.density
-    return 1.0 if density is None else float(density.value(np.array([point]))[0])
+    return 1.0 if density is None else float(density.evaluate(np.array([point]))[0])
 
 
 def test_left_raises_and_right_lowers():

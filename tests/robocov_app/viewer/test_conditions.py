@@ -180,7 +180,7 @@ def test_a_saved_run_is_looked_at_again_and_gone_on_from(tmp_path: Path) -> None
     assert session.numbers == (1, 2, 4)
     states(session, 12)
     assert session.numbers == (1, 3, 4)
-    assert pane.simulation.conditions == BAD.of_robots_that_stay()
+    assert pane.simulation.conditions == BAD.drop_team_changes()
 
 
 @pytest.mark.slow

@@ -91,7 +91,7 @@ class EditorCanvas:
             standing = "robots" in editor.shown and self.team is not None and bool(self.team.places)
             found = editor.measurement if "impassable" in editor.shown else None
             self.entries = legend_entries(found, starts=bool(sketch.starts), team=standing, unfree=unfree)
-            if density is not None and not density.uniform and sketch.boundary:
+            if density is not None and not density.is_uniform and sketch.boundary:
                 x, y = zip(*sketch.boundary, strict=True)
                 span = value_range(density, (min(x), min(y), max(x), max(y)))
                 self.entries.append(heatmaps.density_entry(range_label(span)))

@@ -275,7 +275,12 @@ class Sheet:
         if "grid" in view.shown:
             self._grid(page, view, box, fine=picture is None or not picture.shown)
         density = sketch.density
-        if density is not None and not density.uniform and sketch.boundary is not None and ring is not None:
+        if (
+            density is not None
+            and not density.is_uniform
+            and sketch.boundary is not None
+            and ring is not None
+        ):
             heatmaps.draw_shading(canvas, density, np.asarray(sketch.boundary, dtype=float))
         # what robots take for free although it lies outside the boundary: it is in their hull
         fill = mix(outside_colour(theme), theme.obstacle, 0.55)

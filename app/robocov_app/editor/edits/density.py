@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 import shapely
 
-from robocov.density import HEAVIEST, Density, Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
+from robocov.density import MAX_WEIGHT, Density, Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
 from robocov.environment import Point, PolygonObstacle
 from robocov.errors import MapError, format_count
 from robocov.mapfile.models import LARGEST
@@ -35,7 +35,7 @@ def spread_of(peak: Gaussian) -> float:
 
 def peak_added(sketch: Sketch, center: Point, sigma: float, weight: float) -> Change:
     """Add a hot spot; without a density, to one that is 1 everywhere."""
-    if isinstance(sketch.density, WeightedPolygons | Raster) and not sketch.density.uniform:
+    if isinstance(sketch.density, WeightedPolygons | Raster) and not sketch.density.is_uniform:
         raise _other_kind(sketch.density, ", hot spots are not")
     peak = Gaussian(point_near(center), _weight(weight, least=LIGHTEST), _sigma(sigma))
     return _put(sketch, (*features_of(sketch), peak), "hot spot added")
@@ -127,7 +127,7 @@ def density_label(density: Density | None) -> str:
         rows, columns = density.values.shape
         return f"picture, {columns} x {rows}"
     kind = format_count(len(density.areas), "area") if isinstance(density, WeightedPolygons) else density.kind
-    return f"{kind}, {density.lowest:g} to {density.highest:g}"
+    return f"{kind}, {density.min_value:g} to {density.max_value:g}"
 
 
 def _other_kind(density: Density, wanted: str = "") -> MapError:
@@ -141,8 +141,8 @@ def _put(sketch: Sketch, features: Sequence[Feature], words: str, base: float | 
         now = density.floor
     elif isinstance(density, WeightedPolygons):
         now = density.background
-    elif density is None or density.uniform:
-        now = 1.0 if density is None else density.highest
+    elif density is None or density.is_uniform:
+        now = 1.0 if density is None else density.max_value
     else:
         raise _other_kind(density)
     base = now if base is None else base
@@ -185,6 +185,6 @@ def _sigma(sigma: float) -> float:
 
 
 def _weight(weight: float, *, least: float) -> float:
-    if not least <= weight <= HEAVIEST:
+    if not least <= weight <= MAX_WEIGHT:
         raise MapError(f"weight: {weight:g}, but a number {'above' if least else 'from'} 0 was wanted")
     return float(weight)

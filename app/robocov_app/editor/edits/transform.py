@@ -220,7 +220,7 @@ def levelled(sketch: Sketch, a: Point, b: Point) -> Change:
     density = sketch.density
     if isinstance(density, Gaussians | WeightedPolygons):
         density = affine.thing(density)
-    elif density is not None and not density.uniform:
+    elif density is not None and not density.is_uniform:
         what = f"a density that is a {density.kind} cannot be turned"
         raise MapError(f"{what}: “density none” takes it away first")
     after = replace(_placed(sketch, everything, affine), background=picture, density=density)

@@ -31,8 +31,8 @@ def replayed_snapshot(state: State, time: float, dt: float = DEFAULT_DT) -> Snap
     seen = Observations(positions, state.velocities, neighbours, points, region, time, team.max_speed)
     seen = replace(seen, density=density, steering=state.steering)
     if (perception := _perception(setup, dt)) is not None:
-        inbox = perception.begin() if state.inbox is None else state.inbox
-        seen, _ = perception.known(seen, inbox, np.ones(len(positions), dtype=bool))
+        inbox = perception.create_inbox() if state.inbox is None else state.inbox
+        seen, _ = perception.perceive(seen, inbox, np.ones(len(positions), dtype=bool))
     decision, recorded = _decision(seen, state), state.recorded
     if recorded is not None and not np.allclose(decision.forces, recorded.forces, rtol=1e-9, atol=1e-9):
         decision = recorded  # the controller is not what it was, or not loaded

@@ -7,7 +7,7 @@ from typing import Self, TypeAlias
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.conditions import SOON
+from robocov.conditions import TIME_TOLERANCE_S
 from robocov.environment import Point
 from robocov.errors import ParameterError
 from robocov.simulation import check_joins
@@ -31,8 +31,8 @@ class Lockstep:
         if conditions is not None:
             conditions.check_team(len(positions))
             check_joins(scenario.environment, conditions)
-            working = conditions.working(0.0, len(positions))
-            conditions = conditions.of_robots_that_stay()
+            working = conditions.find_working(0.0, len(positions))
+            conditions = conditions.drop_team_changes()
         numbers = tuple((np.flatnonzero(working) + 1).tolist())
         moving = None if scenario.given is None or scenario.moving is None else scenario.moving[working]
         self.scenario = scenario  # with controllers, gains, limits and map as they were last chosen
@@ -117,10 +117,10 @@ class Lockstep:
 
     def _come_and_go(self) -> Iterator[Happening]:
         conditions = self.scenario.conditions
-        if conditions is None or not conditions.team_changes:
+        if conditions is None or not conditions.has_team_changes:
             return
-        begins, ends = conditions.lives(self.scenario.robots)
-        now, before = self.time + SOON, self.time - self.scenario.dt + SOON
+        begins, ends = conditions.compute_working_periods(self.scenario.robots)
+        now, before = self.time + TIME_TOLERANCE_S, self.time - self.scenario.dt + TIME_TOLERANCE_S
         for number in (np.flatnonzero((begins > before) & (begins <= now)) + 1).tolist():
             if number not in self.panes[0].setup.there:
                 place = next(join.place for join in conditions.joins if join.robot == number)

@@ -8,7 +8,7 @@ from itertools import groupby
 import numpy as np
 import shapely
 
-from robocov.density import Raster, sampled
+from robocov.density import Raster, sample_density
 from robocov.environment import CircleObstacle, Environment, Obstacle, Point, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, format_path
 from robocov.mapfile import from_json, to_json
@@ -124,4 +124,4 @@ def painted_raster(environment: Environment) -> Raster:
         return density
     sides = np.ptp(np.reshape(environment.region.bounds, (2, 2)), axis=0).tolist()
     columns, rows = (max(round(side / (max(sides) / CELLS)), 2) for side in sides)
-    return sampled(density, environment.region.bounds, columns, rows)
+    return sample_density(density, environment.region.bounds, columns, rows)

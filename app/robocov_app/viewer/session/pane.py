@@ -108,7 +108,7 @@ class Pane:
             moved = np.hypot(*(placed - positions).T) > 1e-3
             changed = make(positions=placed, velocities=np.where(moved[:, None], 0.0, velocities))
         if old.inbox is not None and setup.numbers != self.numbers:
-            changed = changed.remembering(changed.memory, old.inbox.rearranged(rows))
+            changed = changed.remembering(changed.memory, old.inbox.select_robots(rows))
         return changed
 
     def take(self, setup: PaneSetup, simulation: Simulation) -> None:

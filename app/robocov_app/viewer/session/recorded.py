@@ -172,7 +172,7 @@ def _circumstances_of(record: Record, cast: PaneSetup) -> Iterator[PaneSetup]:
         yield from [cast] * len(record)
         return
     known: dict[bytes, PaneSetup] = {}
-    rest = record.conditions.of_robots_that_stay()
+    rest = record.conditions.drop_team_changes()
     for places, working, there in zip(record.positions, record.working, record.present, strict=True):
         key = working.tobytes() + there.tobytes()
         if key not in known:

@@ -210,7 +210,7 @@ class Scenario:
         if not 1 <= self.robots <= MOST_ROBOTS:
             wanted = f"a whole number from 1 to {MOST_ROBOTS} was wanted"
             raise ParameterError(f"robots: {quote(self.robots)}, but {wanted}")
-        if self.conditions is not None and self.conditions.talks and self.robots > MOST_THAT_TALK:
+        if self.conditions is not None and self.conditions.uses_messages and self.robots > MOST_THAT_TALK:
             why = "where messages may be lost or late: the window remembers all of them, of all moments"
             raise ParameterError(f"robots: {self.robots}, but at most {MOST_THAT_TALK} were wanted {why}")
         if not 1 <= len(self.laws) <= MOST_PANES:
