@@ -75,7 +75,7 @@ def test_uniform_starts_cover_the_free_space(cluttered: Environment) -> None:
 @pytest.mark.parametrize(
     ("positions", "n", "message"),
     [
-        (((1.0, 1.0),), 2, "has 1 positions, but 2 robots were asked for"),
+        (((1.0, 1.0),), 2, "expected at most 1 robot, one for each of its positions, got 2"),
         (((1.0, 1.0), (1.1, 1.0)), 2, r"positions\[0\] and positions\[1\] are 0.1 m apart"),
         (((0.05, 1.0),), 1, r"positions\[0\] = \[0.05, 1\] is 0.05 m from a wall"),
         (((11.0, 1.0),), 1, "inside an obstacle or outside the boundary"),

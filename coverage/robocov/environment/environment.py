@@ -1,0 +1,235 @@
+"""The environment: a map with its boundary, obstacles, starts and density."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
+
+from robocov.arrays import Array, freeze
+from robocov.density import Density
+from robocov.density.base import compute_polygon_masses
+from robocov.drawing import Drawable
+from robocov.environment.obstacles import Obstacle, shift_obstacle
+from robocov.environment.polygons import GRID_M, Ring, extract_polygons, unite_shapes
+from robocov.environment.starts import Start, StartSpec, UniformStart
+from robocov.errors import StartError, describe_unknown_name, format_count, require_type
+from robocov.observation.region import Region
+
+_DISPLACEMENT_DIGITS = 9
+"""Displacements are rounded to the nanometre, so that an obstacle that returns is exactly where it was."""
+_GEOMETRY_PROPERTIES = ("region", "boundary_polygon", "free", "blocked")
+"""Cached properties that do not depend on the density."""
+
+
+@dataclass(frozen=True)
+class Environment(Drawable):
+    """A map: its boundary and obstacles, where teams may start, and how much each point counts.
+
+    Environments are immutable, and equal if their contents are equal. Only the physics, the sensor and the
+    evaluation know the obstacles. Controllers know `region`, the convex hull of the boundary, and what their
+    robots sense.
+
+    Attributes
+    ----------
+    name : str
+    boundary : (k, 2) sequence, m
+        As given: clockwise or counter-clockwise, convex or not.
+    obstacles : tuple of Obstacle
+        Moving ones at time zero. They may overlap, touch and extend beyond the boundary.
+    starts : mapping of str to DiscStart, UniformStart or PointsStart
+        Named starts; the first is the default.
+    description : str
+    extra : mapping
+        Free keys of the map file, kept unchanged.
+    schema : str or None
+        ``$schema`` of the map file, kept unchanged.
+    density : Density or None
+        φ, how much each point counts. It is part of the task, and robots know it. None if all points count
+        the same.
+
+    Examples
+    --------
+    >>> from robocov.environment import CircleObstacle
+    >>> square = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+    >>> environment = Environment("pillar", square, (CircleObstacle((5.0, 5.0), radius=1.0),))
+    >>> environment
+    <Environment pillar, 10 x 10 m, 1 obstacle>
+    >>> round(environment.free_area, 2)
+    96.86
+    """
+
+    _drawn_as = "environment"
+
+    name: str
+    boundary: Ring
+    obstacles: tuple[Obstacle, ...] = ()
+    starts: Mapping[str, StartSpec] = field(default_factory=dict)
+    description: str = ""
+    extra: Mapping[str, Any] = field(default_factory=dict)
+    schema: str | None = None
+    density: Density | None = None
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.boundary, self.obstacles))
+
+    def __repr__(self) -> str:
+        width, height = np.ptp(np.asarray(self.boundary, dtype=float), axis=0).tolist()
+        obstacles = format_count(len(self.obstacles), "obstacle")
+        return f"<Environment {self.name}, {width:.4g} x {height:.4g} m, {obstacles}>"
+
+    @cached_property
+    def region(self) -> Region:
+        """Convex hull of the boundary: all that robots know of the map."""
+        return Region(np.asarray(self.boundary, dtype=float))
+
+    @cached_property
+    def boundary_polygon(self) -> Polygon:
+        """Boundary as a counter-clockwise polygon."""
+        return shapely.orient_polygons(Polygon(self.boundary))
+
+    @cached_property
+    def free(self) -> MultiPolygon:
+        """Components of the free space, inside the boundary and outside every obstacle, the largest first."""
+        inside = shapely.set_precision(self.boundary_polygon, GRID_M)
+        if self.obstacles:
+            solid = unite_shapes(np.array([obstacle.polygon for obstacle in self.obstacles]))
+            inside = shapely.difference(inside, solid, grid_size=GRID_M)
+        return extract_polygons(inside)
+
+    @cached_property
+    def blocked(self) -> MultiPolygon:
+        """Part of the region that is not free: obstacles, and the outside of a non-convex boundary."""
+        region = shapely.set_precision(self.region.polygon, GRID_M)
+        return extract_polygons(shapely.difference(region, self.free, grid_size=GRID_M))
+
+    @cached_property
+    def has_moving_obstacles(self) -> bool:
+        """Whether an obstacle moves."""
+        return any(obstacle.path is not None for obstacle in self.obstacles)
+
+    @cached_property
+    def static(self) -> Environment:
+        """Map without the moving obstacles; this one if there are none."""
+        if not self.has_moving_obstacles:
+            return self
+        still_obstacles = tuple(obstacle for obstacle in self.obstacles if obstacle.path is None)
+        return replace(self, obstacles=still_obstacles)
+
+    def at(self, time: float) -> Environment:
+        """Return the map at a time, with all obstacles at rest; this one if no obstacle moves.
+
+        Parameters
+        ----------
+        time : float, s
+
+        Returns
+        -------
+        Environment
+        """
+        if not self.has_moving_obstacles:
+            return self
+        obstacles = []
+        for obstacle in self.obstacles:
+            if obstacle.path is not None:
+                displacement = np.round(obstacle.path.compute_displacement(time), _DISPLACEMENT_DIGITS)
+                obstacle = shift_obstacle(obstacle, displacement)
+            obstacles.append(obstacle)
+        return replace(self, obstacles=tuple(obstacles))
+
+    @property
+    def area(self) -> float:
+        """Area inside the boundary, m²."""
+        return float(self.boundary_polygon.area)
+
+    @property
+    def free_area(self) -> float:
+        """Area of the free space, m²."""
+        return float(self.free.area)
+
+    @cached_property
+    def free_masses(self) -> Array:
+        """Integral of φ over each component of the free space, m²: their areas without a density."""
+        components = self.free.geoms
+        if self.density is None:
+            return freeze([component.area for component in components])
+        if self.density.is_uniform:
+            return freeze([component.area * self.density.max_value for component in components])
+        return freeze(compute_polygon_masses(self.density, list(components)))
+
+    def with_density(self, density: Density | None) -> Environment:
+        """Return the same map with another density, without computing its geometry again.
+
+        Parameters
+        ----------
+        density : Density or None
+
+        Returns
+        -------
+        Environment
+        """
+        twin = replace(self, density=density)
+        for name in _GEOMETRY_PROPERTIES:
+            if name in vars(self):
+                vars(twin)[name] = vars(self)[name]
+        return twin
+
+    def has_same_geometry(self, other: Environment) -> bool:
+        """Return whether another map has the same boundary and obstacles.
+
+        Parameters
+        ----------
+        other : Environment
+
+        Returns
+        -------
+        bool
+        """
+        return self.boundary == other.boundary and self.obstacles == other.obstacles
+
+    def start(self, name: str | None = None) -> Start:
+        """Return a start of the map.
+
+        Every map has a start ``uniform``, anywhere in the free space, even if the file does not name it.
+
+        Parameters
+        ----------
+        name : str or None
+            By default the first start of the map.
+
+        Returns
+        -------
+        Start
+
+        Raises
+        ------
+        StartError
+            If there is no start with this name.
+        """
+        starts = dict(self.starts)
+        starts.setdefault("uniform", UniformStart())
+        if name is None:
+            name = next(iter(starts))
+        if name not in starts:
+            raise StartError(f"map {self.name!r}: {describe_unknown_name('start', name, starts)}")
+        return Start(name, starts[name], self.free)
+
+
+def require_environment(value: object) -> None:
+    """Raise an error unless a value is a map.
+
+    Parameters
+    ----------
+    value : object
+
+    Raises
+    ------
+    ParameterError
+        If the value is not an `Environment`.
+    """
+    require_type("environment", value, Environment, 'a map, as in load_map("rooms"),')

@@ -1,0 +1,121 @@
+"""Paths along which obstacles move, and the area that they sweep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+import shapely
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from robocov.arrays import Array
+from robocov.environment.polygons import Ring
+
+Repeat: TypeAlias = Literal["loop", "back-and-forth"]
+"""Behaviour at the end of a path: straight to its first point, or back along the path."""
+REPEATS: tuple[str, ...] = get_args(Repeat)
+_PARALLEL_TOLERANCE_M2 = 1e-12
+"""Cross product up to which an edge counts as parallel to the motion, and sweeps no area."""
+
+
+@dataclass(frozen=True)
+class ObstaclePath:
+    """A poly-line, (x, y) m, along which an obstacle is shifted at a constant speed, m/s, without turning.
+
+    At time zero the obstacle is where its map has it, and the path's point is the first of `points`. Later
+    the obstacle is displaced by as much as the path's point.
+
+    Attributes
+    ----------
+    points : (k, 2) sequence, m
+    speed : float, m/s
+    repeat : {"loop", "back-and-forth"}
+
+    Examples
+    --------
+    >>> path = ObstaclePath(((0.0, 0.0), (4.0, 0.0)), speed=2.0, repeat="back-and-forth")
+    >>> path.period
+    4.0
+    >>> path.compute_displacement(3.0)
+    array([2., 0.])
+    """
+
+    points: Ring
+    speed: float
+    repeat: Repeat = "loop"
+
+    @cached_property
+    def _round_trip(self) -> tuple[Array, Array]:
+        """Points of one round trip, (k, 2) m, and the path length to each of them, (k,) m."""
+        outward = np.array(self.points, dtype=float)
+        back = outward[:1] if self.repeat == "loop" else outward[-2::-1]
+        points = np.concatenate([outward, back])
+        lengths = np.hypot(*np.diff(points, axis=0).T)
+        return points, np.concatenate([[0.0], np.cumsum(lengths)])
+
+    @property
+    def period(self) -> float:
+        """Duration of one round trip, s."""
+        _, path_lengths = self._round_trip
+        return float(path_lengths[-1]) / self.speed
+
+    def compute_displacement(self, time: float) -> Array:
+        """Compute by how much the obstacle has moved since time zero.
+
+        Parameters
+        ----------
+        time : float, s
+
+        Returns
+        -------
+        (2,) array, m
+        """
+        points, path_lengths = self._round_trip
+        path_length = (time * self.speed) % path_lengths[-1]
+        x = np.interp(path_length, path_lengths, points[:, 0])
+        y = np.interp(path_length, path_lengths, points[:, 1])
+        return np.asarray(np.array([x, y]) - points[0])
+
+
+def compute_swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
+    """Compute the area that an obstacle sweeps on its path.
+
+    Parameters
+    ----------
+    polygon : Polygon, m
+        The obstacle at time zero.
+    path : ObstaclePath
+
+    Returns
+    -------
+    geometry, m
+    """
+    points = [*path.points]
+    if path.repeat == "loop":
+        points += path.points[:1]
+    displacements = np.array(points, dtype=float)
+    displacements = displacements - displacements[:1]
+    swept = [_sweep(polygon, start, end) for start, end in pairwise(displacements)]
+    return shapely.union_all([polygon, *swept])
+
+
+def _sweep(polygon: Polygon, start: Array, end: Array) -> BaseGeometry:
+    """Return the Minkowski sum of a polygon and a line: both end positions, and what the edges sweep."""
+    parts: list[BaseGeometry] = []
+    motion = end - start
+    for ring in (polygon.exterior, *polygon.interiors):
+        corners = shapely.get_coordinates(ring)
+        here = corners[:-1]
+        after = corners[1:]
+        edges = after - here
+        quadrilaterals = np.stack([here + start, after + start, after + end, here + end], axis=1)
+        cross_products = edges[:, 0] * motion[1] - edges[:, 1] * motion[0]
+        is_parallel = np.abs(cross_products) < _PARALLEL_TOLERANCE_M2
+        parts += shapely.polygons(quadrilaterals[~is_parallel]).tolist()
+    for displacement in (start, end):
+        parts.append(shapely.transform(polygon, lambda points, by=displacement: points + by))
+    return shapely.union_all(parts)

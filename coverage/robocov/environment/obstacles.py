@@ -1,0 +1,140 @@
+"""Obstacles: polygons, round pillars and walls."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+from shapely import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from robocov.arrays import Array
+from robocov.environment.obstacle_paths import ObstaclePath
+from robocov.environment.polygons import Point, Ring
+
+MAX_SAGITTA_M = 1e-3
+"""Largest distance between a circle and the polygon that represents it."""
+_MIN_SIDES = 12
+"""Sides of the polygon that represents the smallest circles."""
+_MITRE_LIMIT = 4.0
+"""Corners of walls reach out by at most so many half widths."""
+
+
+@dataclass(frozen=True)
+class PolygonObstacle:
+    """A solid polygon, with holes where given (a courtyard).
+
+    Attributes
+    ----------
+    vertices : (k, 2) sequence, m
+    holes : sequence of (k, 2) sequences, m
+    name : str or None
+    path : ObstaclePath or None
+        How it moves; None if it does not.
+    """
+
+    vertices: Ring
+    holes: tuple[Ring, ...] = ()
+    name: str | None = None
+    path: ObstaclePath | None = None
+
+    @cached_property
+    def polygon(self) -> Polygon:
+        """Shape of the obstacle."""
+        return Polygon(self.vertices, self.holes)
+
+
+@dataclass(frozen=True)
+class CircleObstacle:
+    """A round pillar, for physics and cost alike an inscribed regular polygon.
+
+    Attributes
+    ----------
+    center : (2,) sequence, m
+    radius : float, m
+    name : str or None
+    path : ObstaclePath or None
+        How it moves; None if it does not.
+
+    Notes
+    -----
+    The polygon is nowhere further than `MAX_SAGITTA_M` from the circle.
+    """
+
+    center: Point
+    radius: float
+    name: str | None = None
+    path: ObstaclePath | None = None
+
+    @cached_property
+    def polygon(self) -> Polygon:
+        """Polygon that represents the circle."""
+        sides = _MIN_SIDES
+        if self.radius > MAX_SAGITTA_M:
+            half_angle = math.acos(1.0 - MAX_SAGITTA_M / self.radius)
+            sides = max(sides, math.ceil(math.pi / half_angle))
+        angles = np.arange(sides) * (2.0 * np.pi / sides)
+        unit_circle = np.column_stack([np.cos(angles), np.sin(angles)])
+        return Polygon(unit_circle * self.radius + self.center)
+
+
+@dataclass(frozen=True)
+class WallObstacle:
+    """A poly-line of some width, with flat ends at its first and last point and mitred corners.
+
+    Attributes
+    ----------
+    points : (k, 2) sequence, m
+    width : float, m
+    name : str or None
+    path : ObstaclePath or None
+        How it moves; None if it does not.
+    """
+
+    points: Ring
+    width: float
+    name: str | None = None
+    path: ObstaclePath | None = None
+
+    @cached_property
+    def polygon(self) -> BaseGeometry:
+        """Shape of the obstacle: several polygons if the line doubles back."""
+        return LineString(self.points).buffer(
+            self.width / 2, cap_style="flat", join_style="mitre", mitre_limit=_MITRE_LIMIT
+        )
+
+
+Obstacle: TypeAlias = PolygonObstacle | CircleObstacle | WallObstacle
+
+
+def shift_obstacle(obstacle: Obstacle, displacement: Array) -> Obstacle:
+    """Return an obstacle at another position, without a path.
+
+    Parameters
+    ----------
+    obstacle : Obstacle
+    displacement : (2,) array, m
+
+    Returns
+    -------
+    Obstacle
+    """
+    dx, dy = displacement.tolist()
+
+    def shift_points(points: Ring) -> Ring:
+        return tuple((x + dx, y + dy) for x, y in points)
+
+    if isinstance(obstacle, PolygonObstacle):
+        return replace(
+            obstacle,
+            vertices=shift_points(obstacle.vertices),
+            holes=tuple(shift_points(hole) for hole in obstacle.holes),
+            path=None,
+        )
+    if isinstance(obstacle, WallObstacle):
+        return replace(obstacle, points=shift_points(obstacle.points), path=None)
+    x, y = obstacle.center
+    return replace(obstacle, center=(x + dx, y + dy), path=None)

@@ -1,0 +1,198 @@
+"""Random and dense packings of points that keep a distance from each other."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+from shapely.geometry.base import BaseGeometry
+
+from robocov.arrays import Array
+
+_CELL_AREA = math.sqrt(3) / 2
+"""Area per point of the hexagonal lattice of spacing 1, the densest packing of the plane."""
+_PACKING_TRIALS = 6
+"""Random packings that are tried where there is room for at most `_MAX_FEW_POINTS`; otherwise one is."""
+_MAX_FEW_POINTS = 300
+_LATTICE_TRIALS = 20
+"""Random positions and directions that are tried of a lattice."""
+_MAX_LATTICE_STEPS = 2000
+"""Larger lattices are not tried: darts fill such areas well enough."""
+_MIN_DARTS = 64
+"""Darts that are thrown at a time at least."""
+_DARTS_PER_POINT = 4
+"""Darts inside the area that are thrown for each missing point."""
+_MAX_DARTS_PER_HIT = 100
+"""Throwing darts ends when more of those inside the area are needed for one that finds room."""
+_MIN_AREA_FRACTION = 1e-3
+"""The fraction of the bounding box that an area fills is taken to be at least this."""
+
+
+def compute_max_points(area: BaseGeometry, spacing: float) -> int:
+    """Compute a number of points that no packing in an area exceeds.
+
+    Parameters
+    ----------
+    area : geometry, m
+    spacing : float, m
+
+    Returns
+    -------
+    int
+    """
+    return 1 + int(area.buffer(spacing / 2).area / (spacing**2 * _CELL_AREA))
+
+
+def estimate_max_points(area: BaseGeometry, spacing: float) -> int:
+    """Estimate from its size how many points the densest packing in a large area has, at least 1.
+
+    Parameters
+    ----------
+    area : geometry, m
+    spacing : float, m
+
+    Returns
+    -------
+    int
+    """
+    return max(1, int(area.area / (spacing**2 * _CELL_AREA)))
+
+
+def pack_densely(area: BaseGeometry, spacing: float) -> Array:
+    """Pack as many points as possible into an area; the same ones for the same area.
+
+    Parameters
+    ----------
+    area : geometry, m
+    spacing : float, m
+        Smallest distance between two points.
+
+    Returns
+    -------
+    (k, 2) array, m
+    """
+    best = np.empty((0, 2))
+    max_points = compute_max_points(area, spacing)
+    trials = _PACKING_TRIALS if max_points <= _MAX_FEW_POINTS else 1
+    for trial in range(trials):
+        rng = np.random.default_rng(trial)
+        lattice = pack_lattice(rng, area, max_points, spacing)
+        # In passages that are hardly wider than a robot, darts are denser than lattices.
+        darts = throw_darts(rng, area, max_points, spacing)
+        for points in (lattice, darts):
+            if len(points) > len(best):
+                best = points
+    return best
+
+
+def throw_darts(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
+    """Choose up to n random points one after the other, until hardly any further one finds room.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    area : geometry, m
+    n : int
+    spacing : float, m
+        Smallest distance between two points.
+
+    Returns
+    -------
+    (k, 2) array, m
+    """
+    low_x, low_y, high_x, high_y = area.bounds
+    bounding_box_area = (high_x - low_x) * (high_y - low_y)
+    # Most darts at the bounding box of a thin area miss it.
+    area_fraction = max(area.area / bounding_box_area, _MIN_AREA_FRACTION)
+    points = np.empty((0, 2))
+    shapely.prepare(area)
+    while len(points) < n:
+        missing = n - len(points)
+        count = max(_MIN_DARTS, int(_DARTS_PER_POINT * missing / area_fraction))
+        darts = rng.uniform((low_x, low_y), (high_x, high_y), size=(count, 2))
+        darts = darts[shapely.contains_xy(area, darts[:, 0], darts[:, 1])]
+        if len(points) > 0:
+            distances, _ = cKDTree(points).query(darts)
+            darts = darts[distances >= spacing]
+        new_points = _drop_close_points(darts, spacing)
+        points = np.concatenate([points, new_points])
+        if len(new_points) < count * area_fraction / _MAX_DARTS_PER_HIT:
+            break
+    return points[:n]
+
+
+def _drop_close_points(points: Array, spacing: float) -> Array:
+    """Return the points that are at least `spacing` from each returned point before them."""
+    if len(points) == 0:
+        return points
+    is_kept = np.ones(len(points), dtype=bool)
+    pairs = cKDTree(points).query_pairs(spacing, output_type="ndarray")
+    in_order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    for first, second in pairs[in_order].tolist():
+        if is_kept[first]:
+            is_kept[second] = False
+    return points[is_kept]
+
+
+def pack_lattice(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
+    """Choose up to n points of a hexagonal lattice, the best of some in random positions and directions.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    area : geometry, m
+    n : int
+    spacing : float, m
+        Smallest distance between two points.
+
+    Returns
+    -------
+    (k, 2) array, m
+        Empty for areas that are too large for a lattice.
+    """
+    low_x, low_y, high_x, high_y = area.bounds
+    max_distance = float(np.hypot(high_x - low_x, high_y - low_y)) / 2 + 2 * spacing
+    steps = int(np.ceil(max_distance / (spacing * np.sqrt(3) / 2))) + 1
+    if steps > _MAX_LATTICE_STEPS:
+        return np.empty((0, 2))
+    lattice = _build_lattice(steps) * spacing
+    middle = np.array([(low_x + high_x) / 2, (low_y + high_y) / 2])
+    best = np.empty((0, 2))
+    shapely.prepare(area)
+    for _ in range(_LATTICE_TRIALS):
+        angle = rng.uniform(0, np.pi / 3)
+        rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        points = lattice @ rotation.T + middle + rng.uniform(-spacing, spacing, size=2)
+        points = points[shapely.contains_xy(area, points[:, 0], points[:, 1])]
+        if len(points) > len(best):
+            best = points
+        if len(best) >= n:
+            return choose_points(rng, best, n)
+    return best
+
+
+def _build_lattice(steps: int) -> Array:
+    """Return the hexagonal lattice of spacing 1 round the origin, so many rows and columns each way."""
+    columns, rows = np.meshgrid(np.arange(-steps, steps + 1), np.arange(-steps, steps + 1))
+    x = (columns + 0.5 * (rows % 2)).ravel()
+    y = (rows * np.sqrt(3) / 2).ravel()
+    return np.column_stack([x, y])
+
+
+def choose_points(rng: np.random.Generator, points: Array, n: int) -> Array:
+    """Choose n of some points at random, in their order.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    points : (k, 2) array, m
+    n : int
+
+    Returns
+    -------
+    (n, 2) array, m
+    """
+    chosen = rng.choice(len(points), size=n, replace=False)
+    return points[np.sort(chosen)]

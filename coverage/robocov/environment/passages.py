@@ -1,0 +1,272 @@
+"""Passages of the free space: where walls face each other, and how wide a disc fits through."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.environment.obstacles import MAX_SAGITTA_M
+from robocov.environment.polygons import GRID_M, Point
+from robocov.team import DEFAULT_RADIUS
+
+MIN_POCKET_AREA_M2 = math.pi * DEFAULT_RADIUS**2
+"""Gaps to smaller pockets are no passages: no robot would go there."""
+_MAX_CRACK_M = 2 * MAX_SAGITTA_M
+"""Walls closer than this touch: a circle that touches a wall is a polygon that nearly does."""
+_FUSED_CRACK_M = 1e-9
+"""Width of what remains of a crack, so that walls do not touch in a single point."""
+_MITRE_LIMIT = 100.0
+"""Corners of less than about a degree are cut off."""
+_CORNERS_AT_ONCE = 256
+"""Corners that are examined together, so that memory stays bounded."""
+_CANDIDATES_AT_ONCE = 512
+_FIRST_RANGE_FRACTION = 1 / 4096
+"""The search starts in this fraction of the diagonal round each corner, and doubles it."""
+_LEAN_TOLERANCE = 1e-9
+_DISC_RELATIVE_TOLERANCE = 1e-9
+_DISC_TOLERANCE_M = 1e-12
+_DIGITS = 6
+"""Results are rounded to the grid of the derived geometry, a micrometre."""
+
+
+class Gap(NamedTuple):
+    """A passage between two walls.
+
+    Attributes
+    ----------
+    width : float, m
+        Diameter of the largest disc that passes.
+    between : pair of (x, y), m
+        Where the walls face each other.
+    """
+
+    width: float
+    between: tuple[Point, Point]
+
+
+def find_narrowest_gap(free: MultiPolygon) -> Gap | None:
+    """Find the narrowest passage of a free space.
+
+    A passage leads round an obstacle, or to a part of the free space that is larger than
+    `MIN_POCKET_AREA_M2` and than the square over the gap: neither a niche that is shallower than wide is one,
+    nor an acute corner.
+
+    Parameters
+    ----------
+    free : MultiPolygon, m
+        Counter-clockwise polygons.
+
+    Returns
+    -------
+    Gap or None
+        None if there is no passage.
+
+    Examples
+    --------
+    >>> rooms = shapely.box(0, 0, 10, 4) - shapely.box(4.9, 0, 5.1, 3.2)
+    >>> find_narrowest_gap(MultiPolygon([shapely.orient_polygons(rooms)])).width
+    0.8
+    """
+    search = _PassageSearch(free)
+    diagonal = math.dist(search.free.bounds[:2], search.free.bounds[2:])
+    narrowest: Gap | None = None
+    low = _MAX_CRACK_M / 2
+    high = diagonal * _FIRST_RANGE_FRACTION
+    # The gap of most maps is far narrower than the map is wide: search near each corner first.
+    while narrowest is None and low < diagonal:
+        for corners in search.split_corners():
+            limit = high if narrowest is None else narrowest.width
+            gap = next(search.list_gaps(corners, low, limit), None)
+            if gap is not None:
+                narrowest = gap
+        low = high
+        high = 2 * high
+    return narrowest
+
+
+def find_narrow_gaps(free: MultiPolygon, width: float) -> tuple[Gap, ...]:
+    """Find all passages of a free space that are narrower than a width.
+
+    Parameters
+    ----------
+    free : MultiPolygon, m
+        Counter-clockwise polygons.
+    width : float, m
+
+    Returns
+    -------
+    tuple of Gap
+        The narrowest first. One passage may be several gaps, as at all corners of a door.
+    """
+    search = _PassageSearch(free)
+    gaps: set[Gap] = set()
+    for corners in search.split_corners():
+        gaps.update(search.list_gaps(corners, _MAX_CRACK_M / 2, width))
+    return tuple(sorted(gaps, key=lambda gap: (gap.width, gap.between)))
+
+
+class _Candidates(NamedTuple):
+    """Pairs of a corner p and the nearest point q of an edge that may face it.
+
+    Attributes
+    ----------
+    corner, edge : (k,) int arrays
+    p, q : (k, 2) arrays, m
+    width : (k,) array, m
+        Distance between p and q.
+    """
+
+    corner: IntArray
+    edge: IntArray
+    p: Array
+    q: Array
+    width: Array
+
+    def select(self, rows: IntArray | BoolArray) -> _Candidates:
+        """Return the pairs of some rows."""
+        return _Candidates(
+            corner=self.corner[rows],
+            edge=self.edge[rows],
+            p=self.p[rows],
+            q=self.q[rows],
+            width=self.width[rows],
+        )
+
+
+class _PassageSearch:
+    """The edges of a free space, which lies to the left of each, and the search for passages among them.
+
+    A disc of growing radius can reach the same points along the same routes until its diameter exceeds the
+    width of a gap. There two wall points face each other, and the disc over the segment between them contains
+    no other wall point. One of the two is a corner that juts into the free space.
+    """
+
+    def __init__(self, free: MultiPolygon) -> None:
+        self.free = _close_cracks(free)
+        self._boundary = self.free.boundary
+        shapely.prepare(self._boundary)
+        shapely.prepare(self.free)
+        all_rings = shapely.get_rings(shapely.get_parts(self.free))
+        rings = [shapely.get_coordinates(ring)[:-1] for ring in all_rings]
+        sizes = np.array([len(ring) for ring in rings], dtype=np.intp)
+        self._ring = np.repeat(np.arange(len(rings)), sizes)
+        self._start = np.concatenate([np.empty((0, 2)), *rings])
+        self._end = np.concatenate([np.empty((0, 2)), *(np.roll(ring, -1, axis=0) for ring in rings)])
+        # The edges of ring r are those from `_first[r]` until `_stop[r]`.
+        self._stop = np.cumsum(sizes)
+        self._first = self._stop - sizes
+        # The edge that ends where each edge starts.
+        self._previous = np.arange(len(self._start)) - 1
+        self._previous[self._first] = self._stop - 1
+        turns = _cross(self._start - self._start[self._previous], self._end - self._start)
+        self._jutting_corners = np.flatnonzero(turns < 0)
+        # Bounding boxes are all that the index needs, and they are built in one call.
+        low = np.minimum(self._start, self._end)
+        high = np.maximum(self._start, self._end)
+        self._tree = shapely.STRtree(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
+
+    def split_corners(self) -> list[IntArray]:
+        """Return the corners that jut into the free space, in groups of bounded size."""
+        groups = math.ceil(len(self._jutting_corners) / _CORNERS_AT_ONCE)
+        return np.array_split(self._jutting_corners, max(groups, 1))
+
+    def list_gaps(self, corners: IntArray, low: float, high: float) -> Iterator[Gap]:
+        """Yield the passages at some corners that are wider than `low` and narrower than `high`, by width."""
+        candidates = self._find_candidates(corners, low, high)
+        batches = max(1, len(candidates.width) // _CANDIDATES_AT_ONCE)
+        for rows in np.array_split(np.arange(len(candidates.width)), batches):
+            batch = candidates.select(rows)
+            is_empty = self._has_empty_disc(batch)
+            for k in np.flatnonzero(is_empty).tolist():
+                width = float(batch.width[k])
+                if self._leads_somewhere(batch.corner[k], batch.edge[k], batch.q[k], width):
+                    # Adding zero turns minus zero into zero.
+                    ends = np.round([batch.p[k], batch.q[k]], _DIGITS) + 0.0
+                    first, second = sorted((x, y) for x, y in ends.tolist())
+                    yield Gap(round(width, _DIGITS), (first, second))
+
+    def _find_candidates(self, corners: IntArray, low: float, high: float) -> _Candidates:
+        """Return pairs of a corner and an edge whose distance is between two limits, by distance."""
+        box_low = self._start[corners] - high
+        box_high = self._start[corners] + high
+        boxes = shapely.box(box_low[:, 0], box_low[:, 1], box_high[:, 0], box_high[:, 1])
+        row, edge = self._tree.query(boxes)
+        corner = corners[row]
+        p = self._start[corner]
+        edge_start = self._start[edge]
+        along = self._end[edge] - edge_start
+        fraction = _dot(p - edge_start, along) / _dot(along, along)
+        q = edge_start + np.clip(fraction, 0.0, 1.0)[:, None] * along
+        offset = q - p
+        width = np.hypot(offset[:, 0], offset[:, 1])
+        is_candidate = (width > low) & (width < high)
+        # The disc does not contain a part of the corner's own sides.
+        for side_end in (self._start[self._previous[corner]], self._end[corner]):
+            side = side_end - p
+            side_length = np.hypot(side[:, 0], side[:, 1])
+            is_candidate &= _dot(side, offset) <= _LEAN_TOLERANCE * width * side_length
+        rows = np.flatnonzero(is_candidate)
+        rows = rows[np.argsort(width[rows], kind="stable")]
+        return _Candidates(corner, edge, p, q, width).select(rows)
+
+    def _has_empty_disc(self, candidates: _Candidates) -> BoolArray:
+        """Return for each pair whether the disc over its segment lies in the free space, (k,)."""
+        middles = shapely.points((candidates.p + candidates.q) / 2)
+        radii = candidates.width / 2 * (1 - _DISC_RELATIVE_TOLERANCE) - _DISC_TOLERANCE_M
+        # Unlike `shapely.distance`, this uses the prepared boundary, which matters with thousands of walls.
+        is_empty: BoolArray = ~shapely.dwithin(self._boundary, middles, radii)
+        is_empty[is_empty] = shapely.contains_properly(self.free, middles[is_empty])
+        return is_empty
+
+    def _leads_somewhere(self, corner: int, edge: int, q: Array, width: float) -> bool:
+        """Return whether the gap from a corner to the point q of an edge leads to more than a pocket.
+
+        A cut between two rings separates nothing; one from a ring to itself separates what it encloses.
+        """
+        ring = self._ring[corner]
+        if ring != self._ring[edge]:
+            return True
+        first = self._first[ring]
+        points = np.roll(self._start[first : self._stop[ring]], first - corner, axis=0)
+        cut = (edge - corner) % len(points) + 1
+        near_side = np.vstack([points[:cut], q])
+        far_side = np.vstack([q, points[cut:], points[:1]])
+        areas = np.array([_compute_ring_area(near_side), _compute_ring_area(far_side)])
+        # Outside of a hole there is no pocket: only a side of positive area is one.
+        pocket_area = areas.min(where=areas > 0, initial=np.inf)
+        return bool(pocket_area >= max(MIN_POCKET_AREA_M2, width * width))
+
+
+def _close_cracks(free: MultiPolygon) -> MultiPolygon:
+    """Return the free space without parts that are narrower than `_MAX_CRACK_M`.
+
+    Walls that nearly touch become one, with a nanometre between them. Corners of less than a degree are cut,
+    and vertices that bend a wall by less than a micrometre are removed.
+    """
+    for distance in (-_MAX_CRACK_M / 2, _MAX_CRACK_M / 2 - _FUSED_CRACK_M):
+        free = free.buffer(distance, join_style="mitre", mitre_limit=_MITRE_LIMIT)
+    free = free.simplify(GRID_M)
+    return MultiPolygon([shapely.orient_polygons(polygon) for polygon in shapely.get_parts(free)])
+
+
+def _dot(a: Array, b: Array) -> Array:
+    """Return the dot products of two lists of vectors, (k,)."""
+    products: Array = np.einsum("kd,kd->k", a, b)
+    return products
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Return the cross products of two lists of vectors, (k,)."""
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def _compute_ring_area(ring: Array) -> float:
+    """Return the area of a ring, m², negative if it is clockwise."""
+    points = ring - ring[0]
+    return float(_cross(points[:-1], points[1:]).sum()) / 2

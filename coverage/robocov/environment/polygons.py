@@ -1,0 +1,87 @@
+"""Operations on polygons that are robust against rounding."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from typing import TypeAlias, TypeVar
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import MultiPolygon, Polygon, STRtree
+from shapely.geometry.base import BaseGeometry
+
+Point: TypeAlias = tuple[float, float]
+"""x and y, m."""
+Ring: TypeAlias = tuple[Point, ...]
+"""Points of a closed ring, of which the first is not repeated, or of a poly-line."""
+GRID_M = 1e-6
+"""Derived geometry is computed on a grid of one micrometre, so that unions and differences are robust: shapes
+that touch to within rounding touch exactly, and no sliver survives."""
+_MIN_OVERLAP_M2 = 1e-6
+"""Smaller overlaps are rounding errors of shapes that touch."""
+
+Name = TypeVar("Name", bound=Hashable)
+
+
+def find_overlaps(
+    area: BaseGeometry, others: Mapping[Name, BaseGeometry], inside: BaseGeometry | None = None
+) -> tuple[dict[Name, BaseGeometry], BaseGeometry | None]:
+    """Find which shapes overlap an area, apart from touching it, and where the area leaves another.
+
+    Parameters
+    ----------
+    area : geometry, m
+    others : mapping of name to geometry, m
+    inside : geometry or None, m
+        Area that should contain the first one.
+
+    Returns
+    -------
+    overlaps : dict of name to geometry, m
+        Intersections of the area with the shapes that overlap it.
+    excess : geometry or None, m
+        The part of the area that is outside of `inside`; None if there is no such part.
+    """
+    intersections = {name: area.intersection(shape) for name, shape in others.items()}
+    overlaps = {name: shape for name, shape in intersections.items() if shape.area > _MIN_OVERLAP_M2}
+    if inside is None:
+        return overlaps, None
+    excess = area.difference(inside)
+    return overlaps, excess if excess.area > _MIN_OVERLAP_M2 else None
+
+
+def unite_shapes(shapes: NDArray[np.object_]) -> BaseGeometry:
+    """Return the union of shapes, on the grid.
+
+    Parameters
+    ----------
+    shapes : (n,) array of geometries, m
+
+    Returns
+    -------
+    geometry, m
+    """
+    pairs = STRtree(shapes).query(shapes, "dwithin", 2.0 * GRID_M)
+    # Every shape meets itself. Uniting takes most of the time, and only those that meet others need it.
+    meets_others = np.bincount(pairs[0]) > 1
+    alone = shapely.get_parts(shapely.set_precision(shapes[~meets_others], GRID_M))
+    united = shapely.union_all(shapes[meets_others], grid_size=GRID_M)
+    return shapely.multipolygons([*alone, *extract_polygons(united).geoms])
+
+
+def extract_polygons(geometry: BaseGeometry) -> MultiPolygon:
+    """Return the polygons of a geometry, counter-clockwise, the largest first, without lines and points.
+
+    Parameters
+    ----------
+    geometry : geometry, m
+
+    Returns
+    -------
+    MultiPolygon, m
+    """
+    parts = shapely.get_parts(geometry)
+    polygons = [part for part in parts if isinstance(part, Polygon) and part.area > 0.0]
+    polygons.sort(key=lambda polygon: (-polygon.area, polygon.bounds))
+    return MultiPolygon([shapely.orient_polygons(polygon) for polygon in polygons])

@@ -1,0 +1,249 @@
+"""Starts: where the robots of a team begin."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from numbers import Integral
+from typing import TypeAlias
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from robocov.arrays import Array
+from robocov.environment.packing import (
+    choose_points,
+    compute_max_points,
+    estimate_max_points,
+    pack_densely,
+    pack_lattice,
+    throw_darts,
+)
+from robocov.environment.polygons import Point, Ring
+from robocov.errors import StartError, format_count, is_number, quote
+from robocov.team import DEFAULT_RADIUS
+
+MIN_START_GAP_RADII = 0.02
+"""Smallest gap, in radii of a robot, between two robots and to walls at the start."""
+MAX_COUNTED_ROBOTS = 2000
+"""Robots of a start that are counted one by one; the capacity of larger ones is estimated from the area."""
+_DISC_QUADRANT_SEGMENTS = 64
+"""Edges per quadrant of the polygon that represents the disc of a start."""
+
+
+@dataclass(frozen=True)
+class DiscStart:
+    """The robots start somewhere in a disc: a team that was unloaded in one place.
+
+    Attributes
+    ----------
+    center : (2,) sequence, m
+    radius : float, m
+    """
+
+    center: Point
+    radius: float
+
+
+@dataclass(frozen=True)
+class UniformStart:
+    """The robots start anywhere in the free space."""
+
+
+@dataclass(frozen=True)
+class PointsStart:
+    """The robots start at given positions; at most as many robots as there are positions.
+
+    Attributes
+    ----------
+    positions : (k, 2) sequence, m
+    """
+
+    positions: Ring
+
+
+StartSpec: TypeAlias = DiscStart | UniformStart | PointsStart
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A named start of one environment, ready to sample positions from.
+
+    Positions depend on the start, the number of robots, their radius and the seed only, so that every
+    controller gets the same positions for the same seed.
+
+    Attributes
+    ----------
+    name : str
+    spec : DiscStart, UniformStart or PointsStart
+    free : geometry, m
+        Free space of the environment.
+    """
+
+    name: str
+    spec: StartSpec
+    free: BaseGeometry
+
+    def sample(self, n: int, seed: int = 0, radius: float = DEFAULT_RADIUS) -> Array:
+        """Sample positions of robots that touch neither walls nor each other.
+
+        Parameters
+        ----------
+        n : int
+            Number of robots.
+        seed : int
+            Not used if the start has given positions.
+        radius : float, m
+            Radius of the robots.
+
+        Returns
+        -------
+        (n, 2) array, m
+
+        Raises
+        ------
+        StartError
+            If the robots do not fit, or a parameter is out of range.
+
+        Examples
+        --------
+        >>> square = shapely.box(0.0, 0.0, 10.0, 10.0)
+        >>> Start("corner", DiscStart((1.0, 1.0), 0.8), square).sample(6, seed=3).shape
+        (6, 2)
+        """
+        self._require_whole_number("robots", n, 1)
+        self._require_whole_number("seed", seed, 0)
+        if not 0.0 < radius < math.inf:
+            raise self._build_error(f"radius: expected a number above 0 (m), got {radius!r}")
+        if isinstance(self.spec, PointsStart):
+            return self._take_given_positions(n, radius, self.spec.positions)
+        area = self.compute_center_area(radius)
+        if area.is_empty:
+            raise self._build_error(f"no room for a robot of radius {radius:g} m. Try a wider start.")
+        points = _sample_apart(np.random.default_rng([seed, n]), area, n, _compute_spacing(radius))
+        if len(points) < n:
+            raise self._build_error(self._describe_lack_of_space(n, radius))
+        return points
+
+    def estimate_capacity(self, radius: float = DEFAULT_RADIUS) -> int:
+        """Estimate how many robots of a radius fit.
+
+        The result depends on the start and the radius alone: it is the number of robots in the densest
+        packing that is found, with the gaps that `sample` leaves. `sample` finds positions for that many
+        robots with any seed; by chance, one or two more may fit. Where there is room for thousands, the
+        result is estimated from the area. Given positions are counted.
+
+        Parameters
+        ----------
+        radius : float, m
+
+        Returns
+        -------
+        int
+            0 if not even one robot fits.
+        """
+        if isinstance(self.spec, PointsStart):
+            return len(self.spec.positions)
+        area = self.compute_center_area(radius)
+        if area.is_empty:
+            return 0
+        spacing = _compute_spacing(radius)
+        if compute_max_points(area, spacing) > MAX_COUNTED_ROBOTS:
+            return estimate_max_points(area, spacing)
+        return len(pack_densely(area, spacing))
+
+    def compute_center_area(self, radius: float) -> BaseGeometry:
+        """Compute where the centre of a robot may start, unless positions are given.
+
+        Parameters
+        ----------
+        radius : float, m
+
+        Returns
+        -------
+        geometry, m
+        """
+        area = self.free.buffer(-radius * (1.0 + MIN_START_GAP_RADII))
+        if isinstance(self.spec, DiscStart):
+            # The disc contains the centres; robots may stick out of it by their radius.
+            center = shapely.Point(self.spec.center)
+            area = area.intersection(center.buffer(self.spec.radius, quad_segs=_DISC_QUADRANT_SEGMENTS))
+        return area
+
+    def _require_whole_number(self, name: str, value: object, minimum: int) -> None:
+        if not is_number(value, Integral) or value < minimum:
+            raise self._build_error(
+                f"{name}: expected a whole number of at least {minimum}, got {quote(value)}"
+            )
+
+    def _describe_lack_of_space(self, n: int, radius: float) -> str:
+        capacity = self.estimate_capacity(radius)
+        ways_out = ["fewer or smaller robots"]
+        if not isinstance(self.spec, UniformStart):
+            capacity_everywhere = Start("uniform", UniformStart(), self.free).estimate_capacity(radius)
+            ways_out.append(f"start 'uniform' (room for about {capacity_everywhere})")
+        return (
+            f"room for about {capacity} robots of radius {radius:g} m, but {n} were asked for. "
+            f"Try {', '.join(ways_out)} or another map."
+        )
+
+    def _take_given_positions(self, n: int, radius: float, positions: Ring) -> Array:
+        if n > len(positions):
+            raise self._build_error(
+                f"expected at most {format_count(len(positions), 'robot')}, one for each of its positions, "
+                f"got {n}. Try fewer robots or another start."
+            )
+        points = np.array(positions[:n], dtype=float)
+        self._require_free(points, radius)
+        self._require_apart(points, radius)
+        return points
+
+    def _require_free(self, points: Array, radius: float) -> None:
+        distances = shapely.distance(shapely.points(points), self.free.boundary)
+        is_inside = shapely.contains_properly(self.free, shapely.points(points))
+        for k in np.flatnonzero(~is_inside | (distances < radius)).tolist():
+            location = f"positions[{k}] = [{points[k, 0]:g}, {points[k, 1]:g}]"
+            if not is_inside[k]:
+                raise self._build_error(f"{location} is inside an obstacle or outside the boundary")
+            raise self._build_error(
+                f"{location} is {distances[k]:.3g} m from a wall, "
+                f"expected at least the radius of the robot, {radius:g} m"
+            )
+
+    def _require_apart(self, points: Array, radius: float) -> None:
+        offsets = points[:, None] - points[None]
+        distances = np.hypot(offsets[:, :, 0], offsets[:, :, 1])
+        np.fill_diagonal(distances, np.inf)
+        if distances.min() < 2 * radius:
+            first, second = sorted(np.unravel_index(int(distances.argmin()), distances.shape))
+            raise self._build_error(
+                f"positions[{first}] and positions[{second}] are {distances.min():.3g} m apart, "
+                f"expected at least the diameter of a robot, {2 * radius:g} m"
+            )
+
+    def _build_error(self, message: str) -> StartError:
+        return StartError(f"start {self.name!r}: {message}")
+
+
+def _compute_spacing(radius: float) -> float:
+    """Return the smallest distance between the centres of two robots, m."""
+    return 2.0 * radius * (1.0 + MIN_START_GAP_RADII)
+
+
+def _sample_apart(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
+    """Return n random points at least `spacing` apart, or fewer if no more are found.
+
+    Darts are the most random; where they leave too little room, lattices are denser, and at last the
+    densest packing is tried that `Start.estimate_capacity` counts.
+    """
+    if n > compute_max_points(area, spacing):
+        return np.empty((0, 2))
+    points = throw_darts(rng, area, n, spacing)
+    if len(points) < n:
+        points = pack_lattice(rng, area, n, spacing)
+    if len(points) < n <= MAX_COUNTED_ROBOTS:
+        packed = pack_densely(area, spacing)
+        if len(packed) >= n:
+            points = choose_points(rng, packed, n)
+    return points
