@@ -1,4 +1,4 @@
-"""Packages that only some parts need, and that are not installed with the rest."""
+"""Modules of optional dependencies, which ``pip install robocov`` does not install."""
 
 import importlib
 from typing import Any
@@ -6,11 +6,36 @@ from typing import Any
 from robocov.errors import RobocovError
 
 
-def import_optional(module: str, name: str, where: str = "") -> Any:
-    """Return a module that the extra ``robocov[name]`` brings; raise RobocovError where it is missing."""
+def import_optional(module: str, extra: str, prefix: str = "") -> Any:
+    """Import a module that an optional dependency provides.
+
+    Parameters
+    ----------
+    module : str
+        Full name of the module.
+    extra : str
+        Name of the extra, as in ``pip install "robocov[extra]"``, that installs it.
+    prefix : str
+        Beginning of the error message, such as ``"--parquet: "``.
+
+    Returns
+    -------
+    module
+
+    Raises
+    ------
+    RobocovError
+        If the dependency is not installed.
+
+    Examples
+    --------
+    >>> import_optional("json", "any").dumps([1, 2])
+    '[1, 2]'
+    """
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:
-        if error.name != module.partition(".")[0]:  # it is there, and misses something itself
-            raise
-        raise RobocovError(f'{where}{module} is not installed: pip install "robocov[{name}]"') from error
+        package = module.partition(".")[0]
+        if error.name != package:
+            raise  # The package is installed, and misses another one itself.
+        raise RobocovError(f'{prefix}{module} is not installed: pip install "robocov[{extra}]"') from error

@@ -1,99 +1,199 @@
-"""Room for robots: whether they fit, where they go when an obstacle appears on them, where one more fits."""
+"""Free positions for robots: whether they fit, where they move when walls change, where one more fits."""
 
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, BoolArray
+from robocov.arrays import Array, BoolArray, IntArray
 from robocov.environment import Environment, Point
 from robocov.errors import StartError
 from robocov.observation.neighbours import find_close_pairs
 from robocov.team import Team
 
-_GAP = 1e-3  # room in metres that is left beside what a robot is moved away from
-_ROUNDS = 300  # after so many the robots that push each other are taken to have no room
+_CLEARANCE_M = 1e-3
+"""Clearance of a robot from what it is moved away from."""
+_MAX_ROUNDS = 300
+"""Robots that still overlap after this number of rounds have no room next to each other."""
+_GOLDEN_ANGLE_RAD = 2.399963
+_QUADRANT_SEGMENTS = 16
+"""Edges per quadrant of the polygons that represent the discs of other robots."""
 
 
 def relocate_robots(environment: Environment, positions: Array, team: Team) -> Array:
-    """Return places, (n, 2) m, where all robots fit, near where they are; StartError where there is none."""
-    places = np.array(positions, dtype=float)
-    room = {radius: _room(environment, radius) for radius in np.unique(team.radius).tolist()}
-    for radius, inset in room.items():
-        if inset.is_empty:
+    """Move robots as little as needed, so that all of them fit.
+
+    Parameters
+    ----------
+    environment : Environment
+    positions : (n, 2) array, m
+    team : Team
+        The n robots.
+
+    Returns
+    -------
+    (n, 2) array, m
+
+    Raises
+    ------
+    StartError
+        If they do not fit.
+    """
+    positions = np.array(positions, dtype=float)
+    areas = _compute_center_areas(environment, team)
+    for _ in range(_MAX_ROUNDS):
+        _leave_walls(environment, positions, team, areas)
+        first, second, distance = find_close_pairs(positions, 2.0 * float(team.radius.max()))
+        overlap = team.radius[first] + team.radius[second] - distance
+        rows = np.flatnonzero((overlap > 0.0) & (first < second))
+        if len(rows) == 0:
+            return positions
+        first = first[rows]
+        second = second[rows]
+        direction = _compute_directions(positions, first, second, distance[rows])
+        step = 0.5 * (overlap[rows] + _CLEARANCE_M)[:, None] * direction
+        np.add.at(positions, first, -step)
+        np.add.at(positions, second, step)
+    raise StartError(
+        f"robots {first[0] + 1} and {second[0] + 1} have no room next to each other "
+        f"in map {environment.name!r}"
+    )
+
+
+def _compute_center_areas(environment: Environment, team: Team) -> dict[float, BaseGeometry]:
+    """Return where the centres of robots may be, by their radius."""
+    areas = {}
+    for radius in np.unique(team.radius).tolist():
+        areas[radius] = _compute_center_area(environment, radius)
+        if areas[radius].is_empty:
             robot = int(np.argmax(team.radius == radius)) + 1
             raise StartError(f"robot {robot} of radius {radius:g} m fits nowhere in map {environment.name!r}")
-    for _ in range(_ROUNDS):
-        for robot in np.flatnonzero(_wall_distance(environment, places) < team.radius).tolist():
-            line = shapely.shortest_line(room[float(team.radius[robot])], shapely.Point(places[robot]))
-            places[robot] = line.coords[0]
-        first, second, distance = find_close_pairs(places, 2.0 * float(team.radius.max()))
-        missing = team.radius[first] + team.radius[second] - distance
-        clash = np.flatnonzero((missing > 0.0) & (first < second))
-        if not len(clash):
-            return places
-        first, second, missing, distance = first[clash], second[clash], missing[clash], distance[clash]
-        apart = (places[second] - places[first]) / np.where(distance > 0.0, distance, 1.0)[:, None]
-        # robots in one place have no direction apart: one of their own each
-        angle = 2.399963 * (first + second)
-        apart[distance == 0.0] = np.column_stack([np.cos(angle), np.sin(angle)])[distance == 0.0]
-        step = 0.5 * (missing + _GAP)[:, None] * apart
-        np.add.at(places, first, -step)
-        np.add.at(places, second, step)
-    pair = f"robots {first[0] + 1} and {second[0] + 1}"
-    raise StartError(f"{pair} have no room beside each other in map {environment.name!r}")
+    return areas
+
+
+def _leave_walls(
+    environment: Environment, positions: Array, team: Team, areas: dict[float, BaseGeometry]
+) -> None:
+    """Move the robots that are in walls to the nearest positions where they fit."""
+    is_in_wall = _compute_wall_distances(environment, positions) < team.radius
+    for robot in np.flatnonzero(is_in_wall).tolist():
+        area = areas[float(team.radius[robot])]
+        line = shapely.shortest_line(area, shapely.Point(positions[robot]))
+        positions[robot] = line.coords[0]
+
+
+def _compute_directions(positions: Array, first: IntArray, second: IntArray, distance: Array) -> Array:
+    """Return unit vectors from the first robots of pairs to the second ones, (k, 2)."""
+    is_same_point = distance == 0.0
+    divisor = np.where(is_same_point, 1.0, distance)
+    directions: Array = (positions[second] - positions[first]) / divisor[:, None]
+    # Robots at the same point have no direction apart. Each pair gets one of its own.
+    angle = _GOLDEN_ANGLE_RAD * (first + second)
+    own_directions = np.column_stack([np.cos(angle), np.sin(angle)])
+    directions[is_same_point] = own_directions[is_same_point]
+    return directions
 
 
 def find_free_position(
     environment: Environment, radius: float, others: Array, point: Point, radii: Array | None = None
 ) -> Point:
-    """Return the place nearest to a point where a robot fits beside others, (n, 2) m, by default as large.
+    """Find the position nearest to a point at which one more robot fits.
 
-    Raises StartError when there is none.
+    Parameters
+    ----------
+    environment : Environment
+    radius : float, m
+        Radius of the robot.
+    others : (n, 2) array, m
+        Positions of the other robots.
+    point : (x, y), m
+    radii : (n,) array or None, m
+        Radii of the other robots; by default they have the same one.
+
+    Returns
+    -------
+    (x, y), m
+
+    Raises
+    ------
+    StartError
+        If the robot fits nowhere.
     """
-    beside = np.full(len(others), radius) if radii is None else radii
-    apart = np.hypot(*(others - point).T)
-    if _wall_distance(environment, np.array([point]))[0] >= radius and (apart >= radius + beside).all():
+    if radii is None:
+        radii = np.full(len(others), radius)
+    offsets = others - point
+    distances = np.hypot(offsets[:, 0], offsets[:, 1])
+    wall_distance = _compute_wall_distances(environment, np.array([point]))[0]
+    if wall_distance >= radius and (distances >= radius + radii).all():
         return float(point[0]), float(point[1])
-    room = _room(environment, radius)
-    if len(others):
-        # a buffer's polygon is inscribed, and room is wanted all round
-        reach = (radius + beside + _GAP) / np.cos(np.pi / 64)
-        room = room.difference(shapely.union_all(shapely.buffer(shapely.points(others), reach, quad_segs=16)))
-    if room.is_empty:
+    area = _compute_center_area(environment, radius)
+    if len(others) > 0:
+        # The polygon of a buffer is inscribed into it: a larger one keeps the clearance all around.
+        enlargement = np.cos(np.pi / (4 * _QUADRANT_SEGMENTS))
+        reach = (radius + radii + _CLEARANCE_M) / enlargement
+        discs = shapely.buffer(shapely.points(others), reach, quad_segs=_QUADRANT_SEGMENTS)
+        area = area.difference(shapely.union_all(discs))
+    if area.is_empty:
         raise StartError("there is no room for a robot there")
-    x, y = shapely.shortest_line(room, shapely.Point(point)).coords[0]
+    x, y = shapely.shortest_line(area, shapely.Point(point)).coords[0]
     return x, y
 
 
 def require_free_starts(
-    environment: Environment, positions: Array, team: Team, slack: float, there: BoolArray | None = None
+    environment: Environment,
+    positions: Array,
+    team: Team,
+    tolerance: float,
+    is_present: BoolArray | None = None,
 ) -> None:
-    """Raise StartError when a robot that is there is in a wall or another one by more than `slack` metres."""
-    there = np.ones(len(positions), dtype=bool) if there is None else there
+    """Raise an error if a robot starts inside a wall or inside another robot.
+
+    Parameters
+    ----------
+    environment : Environment
+    positions : (n, 2) array, m
+    team : Team
+        The n robots.
+    tolerance : float, m
+        Overlaps up to this depth are accepted.
+    is_present : (n,) bool array or None
+        Which robots are checked; by default all.
+
+    Raises
+    ------
+    StartError
+        If a position is not finite, or a robot that is present overlaps a wall or another one.
+    """
+    if is_present is None:
+        is_present = np.ones(len(positions), dtype=bool)
     for i in np.flatnonzero(~np.isfinite(positions).all(axis=1)).tolist():
-        raise StartError(f"starts[{i}] = {positions[i].tolist()}: finite numbers were wanted")
-    wall = _wall_distance(environment, positions)
-    for i in np.flatnonzero(there & (wall < team.radius - slack)).tolist():
-        place = f"starts[{i}] = [{positions[i, 0]:g}, {positions[i, 1]:g}]"
-        wrong = f"{wall[i]:.3g} m from a wall, but a robot of radius {team.radius[i]:g} m must fit"
-        if wall[i] < 0.0:
-            wrong = f"inside an obstacle or outside the boundary of map {environment.name!r}"
-        raise StartError(f"{place} is {wrong}")
+        raise StartError(f"starts[{i}]: expected finite numbers, got {positions[i].tolist()}")
+    wall_distances = _compute_wall_distances(environment, positions)
+    for i in np.flatnonzero(is_present & (wall_distances < team.radius - tolerance)).tolist():
+        start = f"starts[{i}] = [{positions[i, 0]:g}, {positions[i, 1]:g}]"
+        if wall_distances[i] < 0.0:
+            raise StartError(
+                f"{start} is inside an obstacle or outside the boundary of map {environment.name!r}"
+            )
+        raise StartError(
+            f"{start} is {wall_distances[i]:.3g} m from a wall, "
+            f"expected at least the radius of the robot, {team.radius[i]:g} m"
+        )
     first, second, distance = find_close_pairs(positions, 2.0 * float(team.radius.max()))
-    clash = distance < team.radius[first] + team.radius[second] - slack
-    for k in np.flatnonzero(clash & there[first] & there[second]).tolist():
-        pair = f"starts[{first[k]}] and starts[{second[k]}]"
-        raise StartError(f"{pair} are {distance[k]:.3g} m apart: the robots overlap")
+    overlaps = distance < team.radius[first] + team.radius[second] - tolerance
+    for k in np.flatnonzero(overlaps & is_present[first] & is_present[second]).tolist():
+        raise StartError(
+            f"starts[{first[k]}] and starts[{second[k]}] are {distance[k]:.3g} m apart: the robots overlap"
+        )
 
 
-def _room(environment: Environment, radius: float) -> BaseGeometry:
-    """Return where a robot fits beside the walls."""
-    return environment.free.buffer(-(radius + _GAP), join_style="round")
+def _compute_center_area(environment: Environment, radius: float) -> BaseGeometry:
+    """Return where the centre of a robot may be, away from walls."""
+    return environment.free.buffer(-(radius + _CLEARANCE_M), join_style="round")
 
 
-def _wall_distance(environment: Environment, places: Array) -> Array:
-    """Return how far places are from a wall, (n,) m; -inf within one."""
-    points = shapely.points(places)
+def _compute_wall_distances(environment: Environment, positions: Array) -> Array:
+    """Return the distances of positions from the nearest wall, (n,) m; -inf inside of one."""
+    points = shapely.points(positions)
     shapely.prepare(environment.free)
-    inside = shapely.contains_properly(environment.free, points)
-    return np.where(inside, shapely.distance(environment.free.boundary, points), -np.inf)
+    is_free = shapely.contains_properly(environment.free, points)
+    return np.where(is_free, shapely.distance(environment.free.boundary, points), -np.inf)

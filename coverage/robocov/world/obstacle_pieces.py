@@ -1,98 +1,163 @@
-"""The solid part of the world as convex pieces, which is what the physics engine can hold.
+"""Everything that is solid as convex pieces, which is what the physics engine can represent.
 
-pymunk silently replaces a concave polygon by its hull; therefore everything that is not free is
-triangulated and the triangles are merged to larger convex pieces as long as they stay convex
-(Hertel and Mehlhorn 1983: at most four times as many pieces as an optimal decomposition).
+pymunk silently replaces a concave polygon by its hull. Therefore everything that is not free is triangulated,
+and the triangles are merged to larger convex pieces as long as they stay convex (Hertel and Mehlhorn 1983: at
+most four times as many pieces as in an optimal decomposition).
 """
 
+import weakref
+from itertools import chain
 from typing import NamedTuple, TypeAlias
 
 import shapely
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, freeze
-from robocov.environment import Environment, ObstaclePath
+from robocov.environment import Environment, ObstaclePath, Point
 
-Corner: TypeAlias = tuple[float, float]
-Loop: TypeAlias = list[Corner]
+Loop: TypeAlias = list[Point]
+"""Corners of a convex polygon, counter-clockwise, (x, y) m."""
 
-FRAME = 2.0
-"""Thickness in metres of the wall that stands around the region."""
+FRAME_WIDTH_M = 2.0
+"""Thickness of the wall around the region."""
 
-
-def build_solid_pieces(environment: Environment) -> tuple[Array, ...]:
-    """Return convex counter-clockwise polygons, (k, 2) m each, that tile all that is not free.
-
-    That are obstacles that stand still, the outside of the boundary, and a `FRAME` around the region.
-    """
-    static = environment.static
-    # kept as a cached property would, which an environment, that knows of no engine, cannot have
-    pieces: tuple[Array, ...] | None = vars(static).get("_solid_pieces")
-    if pieces is None:
-        low_x, low_y, high_x, high_y = environment.region.bounds
-        frame = shapely.box(low_x - FRAME, low_y - FRAME, high_x + FRAME, high_y + FRAME)
-        pieces = vars(static)["_solid_pieces"] = split_into_convex_pieces(
-            shapely.difference(frame, static.free)
-        )
-    return pieces
+_pieces_by_environment: dict[int, tuple[Array, ...]] = {}
+"""Pieces of the static environments that are in use, by `id`."""
 
 
 class Mover(NamedTuple):
-    """An obstacle that moves: convex polygons, (k, 2) m each, where it is at time zero, and its path."""
+    """A moving obstacle.
+
+    Attributes
+    ----------
+    pieces : tuple of (k, 2) arrays, m
+        Convex polygons at time zero.
+    path : ObstaclePath
+    """
 
     pieces: tuple[Array, ...]
     path: ObstaclePath
 
 
+def build_solid_pieces(environment: Environment) -> tuple[Array, ...]:
+    """Build convex polygons that tile everything that is not free and does not move.
+
+    These are obstacles at rest, the outside of the boundary, and a frame around the region.
+
+    Parameters
+    ----------
+    environment : Environment
+
+    Returns
+    -------
+    tuple of (k, 2) arrays, m
+        Counter-clockwise. They are computed once for each environment.
+    """
+    static = environment.static
+    pieces = _pieces_by_environment.get(id(static))
+    if pieces is None:
+        low_x, low_y, high_x, high_y = environment.region.bounds
+        frame = shapely.box(
+            low_x - FRAME_WIDTH_M,
+            low_y - FRAME_WIDTH_M,
+            high_x + FRAME_WIDTH_M,
+            high_y + FRAME_WIDTH_M,
+        )
+        pieces = split_into_convex_pieces(shapely.difference(frame, static.free))
+        _pieces_by_environment[id(static)] = pieces
+        weakref.finalize(static, _pieces_by_environment.pop, id(static), None)
+    return pieces
+
+
 def build_movers(environment: Environment) -> tuple[Mover, ...]:
-    """Return the obstacles that move."""
-    moving = ((shape.polygon, shape.path) for shape in environment.obstacles)
+    """Build the moving obstacles of an environment.
+
+    Parameters
+    ----------
+    environment : Environment
+
+    Returns
+    -------
+    tuple of Mover
+        In the order of the obstacles.
+    """
     return tuple(
-        Mover(split_into_convex_pieces(polygon), path) for polygon, path in moving if path is not None
+        Mover(split_into_convex_pieces(obstacle.polygon), obstacle.path)
+        for obstacle in environment.obstacles
+        if obstacle.path is not None
     )
 
 
 def split_into_convex_pieces(geometry: BaseGeometry) -> tuple[Array, ...]:
-    """Return convex counter-clockwise polygons, (k, 2) m each, that tile the polygons of `geometry`."""
+    """Split the polygons of a geometry into convex ones.
+
+    Parameters
+    ----------
+    geometry : geometry, m
+
+    Returns
+    -------
+    tuple of (k, 2) arrays, m
+        Counter-clockwise polygons that tile those of the geometry.
+    """
     parts = shapely.get_parts(geometry)
-    polygons = (part for part in parts if part.geom_type == "Polygon" and part.area > 0.0)
-    return tuple(freeze(loop) for polygon in polygons for loop in _merged(_triangles(polygon)))
+    polygons = [part for part in parts if part.geom_type == "Polygon" and part.area > 0.0]
+    loops = chain.from_iterable(_merge_loops(_triangulate(polygon)) for polygon in polygons)
+    return tuple(freeze(loop) for loop in loops)
 
 
-def _triangles(polygon: BaseGeometry) -> list[Loop]:
-    triangles = shapely.get_coordinates(shapely.constrained_delaunay_triangles(polygon)).reshape(-1, 4, 2)
-    loops: list[Loop] = [[(x, y) for x, y in corners] for corners in triangles[:, :3].tolist()]
-    turned = ((loop, _turn(*loop)) for loop in loops)
-    return [loop if turn > 0.0 else [loop[0], loop[2], loop[1]] for loop, turn in turned if turn != 0.0]
+def _triangulate(polygon: BaseGeometry) -> list[Loop]:
+    """Return counter-clockwise triangles that tile a polygon."""
+    rings = shapely.get_coordinates(shapely.constrained_delaunay_triangles(polygon)).reshape(-1, 4, 2)
+    triangles: list[Loop] = []
+    for corners in rings[:, :3].tolist():
+        a, b, c = ((x, y) for x, y in corners)
+        doubled_area = _compute_doubled_area(a, b, c)
+        if doubled_area > 0.0:
+            triangles.append([a, b, c])
+        elif doubled_area < 0.0:
+            triangles.append([a, c, b])
+    return triangles
 
 
-def _merged(loops: list[Loop]) -> list[Loop]:
+def _merge_loops(loops: list[Loop]) -> list[Loop]:
     """Remove the diagonals between convex loops as long as what remains is convex."""
-    pieces: dict[int, Loop] = dict(enumerate(loops))
-    owner = {(loop[k - 1], loop[k]): n for n, loop in pieces.items() for k in (1, 2, 0)}
-    for a, b in list(owner):
-        first, second = owner.get((a, b)), owner.get((b, a))
+    pieces = dict(enumerate(loops))
+    piece_of_edge: dict[tuple[Point, Point], int] = {}
+    for number, (a, b, c) in pieces.items():
+        piece_of_edge[a, b] = number
+        piece_of_edge[b, c] = number
+        piece_of_edge[c, a] = number
+    for a, b in list(piece_of_edge):
+        first = piece_of_edge.get((a, b))
+        second = piece_of_edge.get((b, a))
         if first is None or second is None or first == second:
             continue
-        joined = _joined(pieces[first], pieces[second], a, b)
-        if joined is not None:
-            for k, corner in enumerate(pieces[second]):
-                owner[pieces[second][k - 1], corner] = first
-            del pieces[second], owner[a, b], owner[b, a]
-            pieces[first] = joined
+        union = _unite_if_convex(pieces[first], pieces[second], a, b)
+        if union is None:
+            continue
+        for k, corner in enumerate(pieces[second]):
+            piece_of_edge[pieces[second][k - 1], corner] = first
+        del pieces[second]
+        del piece_of_edge[a, b]
+        del piece_of_edge[b, a]
+        pieces[first] = union
     return list(pieces.values())
 
 
-def _joined(first: Loop, second: Loop, a: Corner, b: Corner) -> Loop | None:
-    """Return the union of two loops across the edge a→b of `first`, or None when it is not convex."""
-    start, other = first.index(b), second.index(a)
-    around = first[start:] + first[:start]  # b … a
-    beyond = second[other:] + second[:other]  # a … b
-    joined = around + beyond[1:-1]
-    convex = _turn(around[-2], a, beyond[1]) > 0.0 and _turn(beyond[-2], b, around[1]) > 0.0
-    return joined if convex else None
+def _unite_if_convex(first: Loop, second: Loop, a: Point, b: Point) -> Loop | None:
+    """Return the union of two loops across the edge a→b of `first`, or None if it is not convex."""
+    from_b = first.index(b)
+    from_a = second.index(a)
+    b_to_a = first[from_b:] + first[:from_b]
+    a_to_b = second[from_a:] + second[:from_a]
+    is_convex_at_a = _compute_doubled_area(b_to_a[-2], a, a_to_b[1]) > 0.0
+    is_convex_at_b = _compute_doubled_area(a_to_b[-2], b, b_to_a[1]) > 0.0
+    if is_convex_at_a and is_convex_at_b:
+        return b_to_a + a_to_b[1:-1]
+    return None
 
 
-def _turn(a: Corner, b: Corner, c: Corner) -> float:
-    """Return twice the signed area of the triangle; positive when counter-clockwise."""
+def _compute_doubled_area(a: Point, b: Point, c: Point) -> float:
+    """Return twice the signed area of a triangle, m²; positive if it is counter-clockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

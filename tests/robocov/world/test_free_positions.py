@@ -66,7 +66,7 @@ def test_robots_outside_come_in():
 def test_where_there_is_no_room_a_robot_is_named():
     with pytest.raises(StartError, match=r"robot 2 of radius 5 m fits nowhere in map 'empty'"):
         relocate_robots(EMPTY, np.ones((2, 2)), Team(**_radii([0.1, 5.0])))
-    with pytest.raises(StartError, match="have no room beside each other"):
+    with pytest.raises(StartError, match="have no room next to each other"):
         relocate_robots(EMPTY, np.full((40, 2), 4.0), Team.homogeneous(40, radius=1.0))
 
 
