@@ -50,8 +50,7 @@ if TYPE_CHECKING:  # isort: off
     from robocov.simulation import Simulation, simulate_many
     from robocov.team import Team
     from robocov.team_files import read_team
-    from robocov.voronoi import VoronoiPartition, partition
-    from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
+    from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
     from robocov.world import World
 
 __version__ = "0.1.0"
@@ -84,8 +83,7 @@ _NAMES = {
     "simulation": "Simulation simulate_many",
     "team": "Team",
     "team_files": "read_team",
-    "voronoi": "VoronoiPartition partition",
-    "voronoi.weighted_cells": "WeightedCells weighted_partition",
+    "voronoi": "VoronoiPartition WeightedCells partition partition_by_travel_time",
     "world": "World",
 }
 """Public names by the module that has them."""
@@ -102,8 +100,9 @@ __all__ = [
     "Snapshot", "StartError", "Team", "TimeVaryingCost", "Uniform", "UniformStart", "VoronoiPartition",
     "WallObstacle", "WeightedArea", "WeightedCells", "WeightedPolygons", "World", "build_map_schema",
     "check_map", "choice", "compute_lower_bound", "cost_history", "find_optimum", "gain", "generate_map",
-    "list_bundled_maps", "load_map", "make_controller", "partition", "read_results", "read_team",
-    "run_metrics", "save_map", "settled_at", "show", "simulate_many", "summarise", "weighted_partition",
+    "list_bundled_maps", "load_map", "make_controller", "partition", "partition_by_travel_time",
+    "read_results", "read_team", "run_metrics", "save_map", "settled_at", "show", "simulate_many",
+    "summarise",
 ]
 # fmt: on
 

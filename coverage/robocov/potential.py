@@ -49,9 +49,10 @@ def compute_potential_forces(
     The parts are the attraction to the goal (27), the sum of (24) over the robots within `rho_0` that it
     hears, and (24) from the closest obstacle point, zero where that is nan.
 
-    Places are in metres; `reported`, `indptr`, `indices` and `team`, who hears whom, and where, are as
-    `robocov.voronoi.cells_of` takes them. k_rep, rho_0, k_att and the limit, which may be infinite, are in
-    N m³, m, N/m³ and N.
+    Places are in metres; `reported`, `indptr` and `indices`, the neighbours of each robot and their known
+    positions, are as in `robocov.voronoi.clipped_cells.KnownNeighbours`. If there are none, all robots of a
+    team, of `team` successive rows, are neighbours. k_rep, rho_0, k_att and the limit, which may be infinite,
+    are in N m³, m, N/m³ and N.
     """
     n = len(positions)
     forces = np.zeros((4, n, 2))

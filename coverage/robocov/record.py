@@ -39,8 +39,7 @@ from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
 from robocov.optional_imports import import_optional
 from robocov.team import MAX_ROBOTS, Team
-from robocov.voronoi import VoronoiPartition, partition
-from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
+from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
 
 _COLUMNS = {
     "positions": ("x_m", "y_m"),
@@ -253,7 +252,9 @@ class Record(Drawable):
         positions, environment = self.positions[k][working], self.environment
         if self.by_time:
             speeds = self.team.max_speed[working]
-            return weighted_partition(positions, speeds, environment.region, density=environment.density)
+            return partition_by_travel_time(
+                positions, speeds, environment.region, density=environment.density
+            )
         return partition(positions, environment.region, density=environment.density)
 
     def snapshot(self, k: int) -> Snapshot:

@@ -84,7 +84,7 @@ def on_the_move(budget: int) -> None:
             times.append(perf_counter())
             partition(points, region)
             times.append(perf_counter())
-            warm = partition(points, region, warm=warm).triangulation
+            warm = partition(points, region, triangulation=warm).triangulation
             times.append(perf_counter())
             taken.append([stop - start for start, stop in pairwise(times)])
         floor, anew, moving = np.median(taken, axis=0)

@@ -16,8 +16,7 @@ from robocov.observation import Snapshot
 from robocov.observation.neighbours import Neighbours
 from robocov.record import Record
 from robocov.team import Team
-from robocov.voronoi import VoronoiPartition, partition
-from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
+from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
 from robocov_app.render.distance_field import Field, Fields
 
 SAME = 0.05  # metres within which a goal is the centroid: a record's are those of a moment before its end
@@ -157,7 +156,7 @@ class Scene:
         ):
             where, density = snapshot.positions, environment.density
             if isinstance(cells, WeightedCells):
-                cells = weighted_partition(where, team.max_speed, environment.region, density=density)
+                cells = partition_by_travel_time(where, team.max_speed, environment.region, density=density)
             else:
                 cells = partition(where, environment.region, density=density)
         more["cells"], more["cell_owners"] = cells.outlines

@@ -15,7 +15,7 @@ from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.team import Team
-from robocov.voronoi.sampled_cells import centroids, own_samples
+from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_samples
 
 _SAMPLES = 40  # places along a side of the region at which densities are estimated
 _SQUARES = 20  # squares along a side of which one measurement each is kept
@@ -100,12 +100,12 @@ class Adaptive(Law):
         if memory.goals is None or not memory.planned <= seen.time < memory.planned + self.period - 1e-9:
             robot, _, offset, _ = seen.find_near_neighbours(np.inf)
             places, heard = memory.lattice.places, seen.positions[robot] - offset
-            mine = own_samples(places, seen.positions, robot, heard)
+            mine = find_own_samples(places, seen.positions, robot, heard)
             if self.estimate == "gp":
                 memory = self._by_process(seen, memory)
             else:
                 memory = self._by_basis(seen, memory, mine)
-            goals = centroids(mine, places, memory.estimates, seen.positions)
+            goals = compute_sample_centroids(mine, places, memory.estimates, seen.positions)
             memory = replace(memory, goals=goals, planned=seen.time)
         assert memory.goals is not None
         wanted = approach(memory.goals - seen.positions, self.k_prop, memory.team.max_speed)
@@ -118,7 +118,7 @@ class Adaptive(Law):
         here = lattice.basis(seen.positions)
         information = memory.information + dt * here[:, :, None] * here[:, None]
         told = memory.told + dt * here * _measured(seen)[:, None]
-        goals = centroids(mine, lattice.places, memory.estimates, seen.positions)
+        goals = compute_sample_centroids(mine, lattice.places, memory.estimates, seen.positions)
         away = lattice.places - seen.positions[:, None]
         lever = mine * (away * (goals - seen.positions)[:, None]).sum(axis=2) * lattice.area
         agreed = before.copy()

@@ -15,9 +15,8 @@ from robocov.errors import ParameterError, describe_unknown_name, quote
 from robocov.observation import Decision, Observations, to_numbers
 from robocov.observation.region import Region
 from robocov.team import Team
-from robocov.voronoi import VoronoiPartition, partition
+from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
 from robocov.voronoi.delaunay import Mesh
-from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
 
 Information: TypeAlias = Literal["own", "shared map", "whole map"]
 """Information class of a law: what the robot itself senses and hears; maps, and where they last heard others,
@@ -132,7 +131,7 @@ def cells_seen(seen: Observations, measure: str, warm: Mesh | None) -> VoronoiPa
     """
     known = seen.region, seen.neighbours, warm, seen.reported_positions, seen.density
     if measure == "time" and seen.max_speeds is not None:
-        return weighted_partition(seen.positions, seen.max_speeds, *known)
+        return partition_by_travel_time(seen.positions, seen.max_speeds, *known)
     return partition(seen.positions, *known)
 
 

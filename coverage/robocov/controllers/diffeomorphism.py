@@ -22,7 +22,7 @@ from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.optimum import find_nearest_inside
 from robocov.team import Team
-from robocov.voronoi.sampled_cells import centroids, own_samples
+from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_samples
 
 _ROUNDS = 12  # times that pieces of walls are halved which are no edges of the mesh yet
 _GRID = 1e-6  # metres to which vertices of the mesh are rounded
@@ -99,8 +99,8 @@ class Diffeomorphism(Law):
             robot, other, offset, _ = seen.find_near_neighbours(np.inf)
             told = seen.reported_positions is not None
             heard = chart.at(seen.positions[robot] - offset)[0] if told else images[other]
-            mine = own_samples(chart.samples, images, robot, heard)
-            middle = centroids(mine, chart.samples, chart.mass, images)
+            mine = find_own_samples(chart.samples, images, robot, heard)
+            middle = compute_sample_centroids(mine, chart.samples, chart.mass, images)
             memory = DiffeomorphismMemory(team, middle, chart.back(middle), seen.time)
         assert memory.centroids is not None
         (x, y), (a, b, c, d) = (memory.centroids - images).T, slopes.reshape(-1, 4).T

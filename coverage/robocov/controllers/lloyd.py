@@ -9,7 +9,7 @@ from robocov.controllers.driving import approach, drive
 from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.locational_cost.best_points import HEIGHT_HELP, TARGET_HELP, TARGETS, find_targets
 from robocov.observation import Decision, Observations
-from robocov.voronoi import disc_limited, disc_polygons
+from robocov.voronoi import build_disc_limited_polygons, compute_disc_limited_moments
 
 
 @dataclass(frozen=True)
@@ -75,9 +75,9 @@ class RangeLimited(Law):
         cells = cells_seen(seen, "distance", memory.triangulation)
         reach = np.inf if self.interaction_range is None else self.interaction_range
         radius = 0.5 * np.minimum(memory.team.communication_range, reach)
-        area, offset = disc_limited(cells.edges, radius)
+        area, offset = compute_disc_limited_moments(cells.edges, radius)
         if seen.density is not None and not seen.density.is_uniform:
-            limited = disc_polygons(cells.edges, radius)
+            limited = build_disc_limited_polygons(cells.edges, radius)
             uniform = seen.positions + offset
             _, centroid = seen.density.compute_mass_and_centroid(limited, seen.positions, area, uniform)
             offset = centroid - seen.positions

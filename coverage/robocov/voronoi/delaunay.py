@@ -1,11 +1,14 @@
-"""The Delaunay triangulation, kept from step to step: inserted point by point at first, then mended by flips.
+"""The Delaunay triangulation of moving points, kept from step to step and repaired by flips.
 
-Half-edge h begins at corner ``mesh[0, h]``, and ``mesh[1, h]`` is the half-edge the other way, or -1. The
-three of a triangle follow each other, counter-clockwise, and a place is left free behind them, so that
-`h & 3` says which of them one is. The points are followed by three sentinels, far out and around all.
+A mesh stores three half-edges for each triangle, counter-clockwise. Half-edge h begins at the point
+``mesh[CORNER, h]``, and ``mesh[TWIN, h]`` is the half-edge of the neighbouring triangle along the same
+edge, or -1. One entry behind each triangle is unused, so that ``h & 3`` is the position of h within its
+triangle and ``h & -4`` the first half-edge of that triangle. Three sentinels, far away, enclose all points
+and follow them.
 
-An edge is Delaunay when the angles that see it make up at most half a turn, so when their cotangents add up
-to 0 or more; the cotangents also say how far out on the edge's bisector the Voronoi vertices are.
+An edge is Delaunay if the two angles opposite to it add up to at most half a turn, that is, if their
+cotangents add up to at least 0. The cotangents also say where on the edge's bisector the Voronoi vertices
+are.
 """
 
 from typing import TypeAlias
@@ -17,150 +20,212 @@ from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 
 Mesh: TypeAlias = NDArray[np.int32]
-"""Corners and twins of the half-edges, (2, 8 n + 4)."""
+"""Corners and twins of the half-edges of a triangulation of n points, (2, 8 n + 4)."""
 
-_ROUNDING = 1e-14
-"""Of the sum of two cotangents, relative to them: below it, nothing is flipped."""
+CORNER = 0
+"""Row of a mesh: the point at which each half-edge begins."""
+TWIN = 1
+"""Row of a mesh: the half-edge of the neighbouring triangle along the same edge; -1 where there is none."""
 
-_FLIPS = 16
-"""A point, on average, after which triangulating has failed: rounding may flip in circles."""
+_TOLERANCE = 1e-14
+"""Sum of two cotangents, relative to their size, that may be rounding; such an edge is not flipped."""
+_MAX_FLIPS_PER_POINT = 16
+"""Number of flips, on average, after which triangulating has failed: rounding may cause endless flips."""
+_MIN_CROSS = 1e-300
+"""Smallest cross product by which a cotangent is divided."""
 
 
 @kernel
-def triangulated(mesh: Mesh, points: Array, cotangent: Array, stack: IntArray) -> bool:
-    """Make `mesh`, (2, 8 n + 4), Delaunay, from what it is where that is a triangulation still; tell success.
+def update_triangulation(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bool:
+    """Make a mesh Delaunay: repair it if it is a triangulation still, and otherwise build it from scratch.
 
-    ``mesh[0, 0]`` is -1 where there is none yet. The last three of the points, (n + 3, 2) m, are sentinels.
-    Written are the cotangents, (8 n + 4,), of the angles opposite of each half-edge; the stack is as long.
+    Parameters
+    ----------
+    mesh : (2, 8 n + 4) int32 array
+        Changed in place. ``mesh[CORNER, 0]`` is -1 if there is no triangulation yet.
+    points : (n + 3, 2) array, m
+        The last three are sentinels, whose triangle contains all others.
+    cotangents : (8 n + 4,) array
+        Overwritten by the cotangents of the angles opposite to each half-edge.
+    stack : (8 n + 4,) int array
+        Working memory.
+
+    Returns
+    -------
+    bool
+        Whether it succeeded.
     """
-    n, count, flips, home = len(points) - 3, mesh.shape[1], 0, 0
-    if mesh[0, 0] >= 0:
-        upright = _all_measured(mesh, points, cotangent)
-        for h in range(count):
-            if h & 3 < 3 and h < mesh[1, h] and _bent(mesh, cotangent, h):
-                flips, fine = _legalised(mesh, points, cotangent, stack, h, flips)
-                upright &= fine
-        if flips >= 0 and (upright or _all_measured(mesh, points, cotangent)):
-            return True
-        flips = 0
-    for k in range(3):
-        mesh[0, k], mesh[1, k] = n + k, -1
-    for i in range(n):
-        home = _triangle_around(mesh, points, points[i, 0], points[i, 1], home, 2 * i + 1)
-        if home < 0:
-            return False
-        # the triangle a b c becomes a b i, b c i and c a i
-        new = 8 * i + 4
-        for k in range(2):
-            edge, h = home + 1 + k, new + 4 * k
-            mesh[0, h], mesh[0, h + 1], mesh[0, h + 2] = mesh[0, edge], mesh[0, home + (2 + k) % 3], i
-            _link(mesh, h, mesh[1, edge])
-        mesh[0, home + 2] = i
-        _link(mesh, home + 1, new + 2)
-        _link(mesh, new + 1, new + 6)
-        _link(mesh, new + 5, home + 2)
-        for h in (home, new, new + 4):
-            _measured(mesh, points, cotangent, h)
-        for h in (home, new, new + 4):
-            flips, _ = _legalised(mesh, points, cotangent, stack, h, flips)
-        if flips < 0:
-            return False
-    return _all_measured(mesh, points, cotangent)
+    if mesh[CORNER, 0] >= 0 and _repair(mesh, points, cotangents, stack):
+        return True
+    return _build(mesh, points, cotangents, stack)
 
 
 @kernel
-def following(h: int) -> int:
-    """Return the next half-edge of the same triangle."""
+def get_next(h: int) -> int:
+    """Return the half-edge that follows h in its triangle."""
     return h + 1 if h & 3 < 2 else h - 2
 
 
 @kernel
-def before(h: int) -> int:
-    """Return the half-edge of the same triangle that ends where this one begins."""
+def get_previous(h: int) -> int:
+    """Return the half-edge of the same triangle that ends where h begins."""
     return h - 1 if h & 3 else h + 2
 
 
 @kernel
-def _link(mesh: Mesh, one: int, other: int) -> None:
-    mesh[1, one] = other
-    if other >= 0:
-        mesh[1, other] = one
+def _repair(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bool:
+    """Flip all edges that are no longer Delaunay; return whether the mesh is a triangulation then."""
+    flips = 0
+    is_upright = _compute_all_cotangents(mesh, points, cotangents)
+    for h in range(mesh.shape[1]):
+        if h & 3 < 3 and h < mesh[TWIN, h] and _must_flip(mesh, cotangents, h):
+            flips, are_new_upright = _flip_from(mesh, points, cotangents, stack, h, flips)
+            is_upright &= are_new_upright
+            if flips < 0:
+                return False
+    # Flips may have turned triangles upright that were upside down before.
+    return is_upright or _compute_all_cotangents(mesh, points, cotangents)
 
 
 @kernel
-def _all_measured(mesh: Mesh, points: Array, cotangent: Array) -> bool:
-    upright = True
-    for h in range(0, mesh.shape[1], 4):
-        upright &= _measured(mesh, points, cotangent, h)
-    return upright
-
-
-@kernel
-def _measured(mesh: Mesh, points: Array, cotangent: Array, h: int) -> bool:
-    """Compute the cotangents in the triangle of which h is the first half-edge; return whether it is upright.
-
-    Each from its own corner: to the last bit, it does not matter how the triangle is stored. In one that is
-    upside down they are as if it were still flat, so that flips put it upright.
-    """
-    upright = True
+def _build(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bool:
+    """Triangulate from scratch by inserting the points one after the other."""
+    n = len(points) - 3
     for k in range(3):
-        i, j, apex = mesh[0, h + k], mesh[0, h + (k + 1) % 3], mesh[0, h + (k + 2) % 3]
-        ax, ay = points[i, 0] - points[apex, 0], points[i, 1] - points[apex, 1]
-        bx, by = points[j, 0] - points[apex, 0], points[j, 1] - points[apex, 1]
+        mesh[CORNER, k] = n + k
+        mesh[TWIN, k] = -1
+    flips = 0
+    triangle = 0
+    for i in range(n):
+        triangle = _find_triangle(mesh, points, points[i, 0], points[i, 1], triangle, 2 * i + 1)
+        if triangle < 0:
+            return False
+        new = 8 * i + 4
+        _split_triangle(mesh, triangle, new, i)
+        for h in (triangle, new, new + 4):
+            _compute_cotangents(mesh, points, cotangents, h)
+        for h in (triangle, new, new + 4):
+            flips, _ = _flip_from(mesh, points, cotangents, stack, h, flips)
+        if flips < 0:
+            return False
+    return _compute_all_cotangents(mesh, points, cotangents)
+
+
+@kernel
+def _split_triangle(mesh: Mesh, triangle: int, new: int, i: int) -> None:
+    """Split a triangle a b c by a point i: a b i takes its place, and b c i and c a i begin at `new`."""
+    for k in range(2):
+        edge = triangle + 1 + k
+        h = new + 4 * k
+        mesh[CORNER, h] = mesh[CORNER, edge]
+        mesh[CORNER, h + 1] = mesh[CORNER, triangle + (2 + k) % 3]
+        mesh[CORNER, h + 2] = i
+        _link(mesh, h, mesh[TWIN, edge])
+    mesh[CORNER, triangle + 2] = i
+    _link(mesh, triangle + 1, new + 2)
+    _link(mesh, new + 1, new + 6)
+    _link(mesh, new + 5, triangle + 2)
+
+
+@kernel
+def _link(mesh: Mesh, h: int, twin: int) -> None:
+    """Make two half-edges each other's twins; -1 is none."""
+    mesh[TWIN, h] = twin
+    if twin >= 0:
+        mesh[TWIN, twin] = h
+
+
+@kernel
+def _compute_all_cotangents(mesh: Mesh, points: Array, cotangents: Array) -> bool:
+    """Compute the cotangents in all triangles; return whether all are upright."""
+    is_upright = True
+    for h in range(0, mesh.shape[1], 4):
+        is_upright &= _compute_cotangents(mesh, points, cotangents, h)
+    return is_upright
+
+
+@kernel
+def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, h: int) -> bool:
+    """Compute the cotangents in the triangle whose first half-edge is h; return whether it is upright.
+
+    Each is computed from its own corner, so that its last bit does not depend on how the triangle is stored.
+    In a triangle that is upside down they are those of a flat one, so that flips turn it upright.
+    """
+    is_upright = True
+    for k in range(3):
+        i = mesh[CORNER, h + k]
+        j = mesh[CORNER, h + (k + 1) % 3]
+        apex = mesh[CORNER, h + (k + 2) % 3]
+        ax = points[i, 0] - points[apex, 0]
+        ay = points[i, 1] - points[apex, 1]
+        bx = points[j, 0] - points[apex, 0]
+        by = points[j, 1] - points[apex, 1]
         cross = ax * by - ay * bx
-        cotangent[h + k] = (ax * bx + ay * by) / max(abs(cross), 1e-300)
-        upright &= cross > 0.0
-    return upright
+        cotangents[h + k] = (ax * bx + ay * by) / max(abs(cross), _MIN_CROSS)
+        is_upright &= cross > 0.0
+    return is_upright
 
 
 @kernel
-def _bent(mesh: Mesh, cotangent: Array, h: int) -> bool:
-    one, other = cotangent[h], cotangent[mesh[1, h]]
-    return not one + other >= -_ROUNDING * (abs(one) + abs(other))
+def _must_flip(mesh: Mesh, cotangents: Array, h: int) -> bool:
+    """Return whether the edge of a half-edge with a twin is not Delaunay, or its angles are undefined."""
+    one = cotangents[h]
+    other = cotangents[mesh[TWIN, h]]
+    return not one + other >= -_TOLERANCE * (abs(one) + abs(other))
 
 
 @kernel
-def _triangle_around(mesh: Mesh, points: Array, x: float, y: float, home: int, triangles: int) -> int:
-    """Return the first half-edge of the triangle that a place lies in, by walking there; -1 when lost."""
+def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, triangles: int) -> int:
+    """Walk from a triangle to the one that contains (x, y); return its first half-edge, or -1 if lost."""
+    triangle = start
     for _ in range(3 * triangles + 3):
-        for h in range(home, home + 3):
-            a, b = mesh[0, h], mesh[0, following(h)]
-            ax, ay = points[a, 0], points[a, 1]
+        for h in range(triangle, triangle + 3):
+            a = mesh[CORNER, h]
+            b = mesh[CORNER, get_next(h)]
+            ax = points[a, 0]
+            ay = points[a, 1]
             if (points[b, 0] - ax) * (y - ay) - (points[b, 1] - ay) * (x - ax) < 0.0:
                 break
         else:
-            return home
-        if mesh[1, h] < 0:
+            return triangle
+        if mesh[TWIN, h] < 0:
             break
-        home = mesh[1, h] & -4
+        triangle = mesh[TWIN, h] & -4
     return -1
 
 
 @kernel
-def _legalised(
-    mesh: Mesh, points: Array, cotangent: Array, stack: IntArray, h: int, flips: int
+def _flip_from(
+    mesh: Mesh, points: Array, cotangents: Array, stack: IntArray, h: int, flips: int
 ) -> tuple[int, bool]:
-    """Flip half-edge h, and what then asks for it, until all are Delaunay.
+    """Flip the edge of h, and those that are no longer Delaunay because of it, until all are.
 
-    Returns the number of flips so far, -1 on failure, and whether the triangles that they made are upright.
+    Return the number of flips so far, -1 on failure, and whether all triangles made by it are upright.
     """
-    stack[0], size, upright = h, 1, True
+    stack[0] = h
+    size = 1
+    is_upright = True
     while size and flips >= 0:
         size -= 1
         a = stack[size]
-        b = mesh[1, a]
-        if b < 0 or not _bent(mesh, cotangent, a):
+        b = mesh[TWIN, a]
+        if b < 0 or not _must_flip(mesh, cotangents, a):
             continue
-        across, back = before(a), before(b)
-        mesh[0, a], mesh[0, b] = mesh[0, back], mesh[0, across]
-        _link(mesh, a, mesh[1, back])
-        _link(mesh, b, mesh[1, across])
-        _link(mesh, across, back)
-        upright &= _measured(mesh, points, cotangent, a & -4) & _measured(mesh, points, cotangent, b & -4)
+        before_a = get_previous(a)
+        before_b = get_previous(b)
+        mesh[CORNER, a] = mesh[CORNER, before_b]
+        mesh[CORNER, b] = mesh[CORNER, before_a]
+        _link(mesh, a, mesh[TWIN, before_b])
+        _link(mesh, b, mesh[TWIN, before_a])
+        _link(mesh, before_a, before_b)
+        is_upright &= _compute_cotangents(mesh, points, cotangents, a & -4)
+        is_upright &= _compute_cotangents(mesh, points, cotangents, b & -4)
         flips += 1
-        if flips > _FLIPS * len(points) or size + 4 > len(stack):
+        if flips > _MAX_FLIPS_PER_POINT * len(points) or size + 4 > len(stack):
             return -1, False
-        stack[size], stack[size + 1] = a, following(a)
-        stack[size + 2], stack[size + 3] = b, following(b)
+        stack[size] = a
+        stack[size + 1] = get_next(a)
+        stack[size + 2] = b
+        stack[size + 3] = get_next(b)
         size += 4
-    return flips, upright
+    return flips, is_upright

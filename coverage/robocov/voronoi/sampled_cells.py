@@ -1,4 +1,4 @@
-"""Voronoi cells as sets of sample places, for what has no closed integrals: maps and estimates."""
+"""Voronoi cells as sets of sample points, for functions without closed integrals: maps and estimates."""
 
 import numpy as np
 
@@ -7,26 +7,60 @@ from robocov.compiled import kernel
 
 
 @kernel
-def own_samples(places: Array, positions: Array, robot: IntArray, heard: Array) -> BoolArray:
-    """Return which of (k, 2) places are in the cell of each robot, (n, k): nobody it hears is nearer.
+def find_own_samples(
+    samples: Array, positions: Array, robot: IntArray, neighbour_positions: Array
+) -> BoolArray:
+    """Find the samples in the cell of each robot: those to which none of its neighbours is nearer.
 
-    Row m of `heard`, (m, 2), is where the robot with the number ``robot[m]`` knows a neighbour to be.
+    Parameters
+    ----------
+    samples : (k, 2) array, m
+    positions : (n, 2) array, m
+        Positions of the robots.
+    robot : (m,) int array
+        A robot for each of its neighbours.
+    neighbour_positions : (m, 2) array, m
+        Where that robot knows that neighbour to be.
+
+    Returns
+    -------
+    (n, k) bool array
     """
-    mine = np.ones((len(positions), len(places)), dtype=np.bool_)
+    is_own = np.ones((len(positions), len(samples)), dtype=np.bool_)
     for m in range(len(robot)):
         i = robot[m]
-        for k in range(len(places)):
-            if mine[i, k]:
-                x, y = places[k, 0], places[k, 1]
-                own = (x - positions[i, 0]) ** 2 + (y - positions[i, 1]) ** 2
-                mine[i, k] = own <= (x - heard[m, 0]) ** 2 + (y - heard[m, 1]) ** 2
-    return mine
+        for k in range(len(samples)):
+            if is_own[i, k]:
+                x = samples[k, 0]
+                y = samples[k, 1]
+                square = (x - positions[i, 0]) ** 2 + (y - positions[i, 1]) ** 2
+                is_own[i, k] = (
+                    square <= (x - neighbour_positions[m, 0]) ** 2 + (y - neighbour_positions[m, 1]) ** 2
+                )
+    return is_own
 
 
-def centroids(mine: BoolArray, places: Array, mass: Array, positions: Array) -> Array:
-    """Return the centroids, (n, 2), of samples with a mass, (k,) or (n, k); of none, the positions."""
-    weight = mine * mass
+def compute_sample_centroids(is_own: BoolArray, samples: Array, mass: Array, positions: Array) -> Array:
+    """Compute the centroids of cells that consist of samples.
+
+    Parameters
+    ----------
+    is_own : (n, k) bool array
+        Which samples belong to which cell.
+    samples : (k, 2) array, m
+    mass : (k,) or (n, k) array
+        Mass of each sample, or of each sample as each robot knows it.
+    positions : (n, 2) array, m
+        Positions of the robots; the centroids of cells without mass.
+
+    Returns
+    -------
+    (n, 2) array, m
+    """
+    weight = is_own * mass
     total = weight.sum(axis=1)
-    middle = np.column_stack([(weight * part).sum(axis=1) for part in places.T])
-    full = total > 0.0
-    return np.where(full[:, None], middle / np.where(full, total, 1.0)[:, None], positions)
+    moment_x = (weight * samples[:, 0]).sum(axis=1)
+    moment_y = (weight * samples[:, 1]).sum(axis=1)
+    is_filled = total > 0.0
+    centroid = np.column_stack([moment_x, moment_y]) / np.where(is_filled, total, 1.0)[:, None]
+    return np.where(is_filled[:, None], centroid, positions)

@@ -271,7 +271,7 @@ def test_cells_of_what_is_heard_are_those_of_each_robots_own_picture(n: int, see
     places = rng.uniform(0.5, 9.5, size=(n, 2))
     robot, other = np.nonzero((rng.random((n, n)) < 0.6) & ~np.eye(n, dtype=bool))
     heard = rng.uniform(0, 10, size=(len(robot), 2))
-    cells = partition(places, SQUARE, Neighbours.from_pairs(n, robot, other), heard=heard)
+    cells = partition(places, SQUARE, Neighbours.from_pairs(n, robot, other), reported_positions=heard)
     for i in range(n):
         picture = np.concatenate([places[i : i + 1], heard[robot == i]])
         own = partition(picture, SQUARE, Neighbours(len(picture)))
@@ -287,14 +287,14 @@ def test_cells_of_many_that_hear_the_truth_are_the_plain_ones(n: int) -> None:
     places[: n // 2] *= 0.05  # a crowd, whose far neighbours matter
     neighbours = Neighbours.from_ranges(places, np.full(n, 20.0))
     plain = partition(places, SQUARE, neighbours)
-    told = partition(places, SQUARE, neighbours, heard=places[neighbours.list_pairs()[1]])
+    told = partition(places, SQUARE, neighbours, reported_positions=places[neighbours.list_pairs()[1]])
     assert told.mass.tobytes() == plain.mass.tobytes()
     assert told.centroid.tobytes() == plain.centroid.tobytes()
 
 
-def test_heard_without_neighbours_is_refused() -> None:
-    with pytest.raises(InputError, match="heard: given without the neighbours that they are of"):
-        partition(np.ones((2, 2)), SQUARE, heard=np.ones((2, 2)))
+def test_reported_positions_without_neighbours_are_rejected() -> None:
+    with pytest.raises(InputError, match="reported_positions: expected None without limited communication"):
+        partition(np.ones((2, 2)), SQUARE, reported_positions=np.ones((2, 2)))
 
 
 def test_an_inbox_follows_robots_that_come_and_go() -> None:

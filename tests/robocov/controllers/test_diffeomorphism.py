@@ -16,7 +16,7 @@ from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.simulation import Simulation
 from robocov.team import Team
-from robocov.voronoi.sampled_cells import centroids, own_samples
+from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_samples
 
 PENTAGON = Environment("pentagon", ((0, 0), (10, -1), (12, 6), (5, 9), (-1, 5)))
 BLOCK = PolygonObstacle(((3, 3), (6, 3.5), (5, 6)))
@@ -75,14 +75,14 @@ def test_samples_belong_to_the_nearest_robot_that_is_heard() -> None:
     rng = np.random.default_rng(1)
     places, positions = rng.uniform(0, 10, (300, 2)), rng.uniform(0, 10, (7, 2))
     robot, other = Neighbours.from_ranges(positions, np.full(7, 5.0)).list_pairs()
-    mine = own_samples(places, positions, robot, positions[other])
+    mine = find_own_samples(places, positions, robot, positions[other])
     for i in range(7):
         known = [i, *other[robot == i]]
         nearest = np.hypot(*(places[:, None] - positions[known]).transpose(2, 0, 1)).argmin(axis=1)
         np.testing.assert_array_equal(mine[i], nearest == 0)
         middle = places[mine[i]].mean(axis=0)
-        np.testing.assert_allclose(centroids(mine, places, np.ones(300), positions)[i], middle)
-    nobody = centroids(np.zeros((7, 300), dtype=bool), places, np.ones(300), positions)
+        np.testing.assert_allclose(compute_sample_centroids(mine, places, np.ones(300), positions)[i], middle)
+    nobody = compute_sample_centroids(np.zeros((7, 300), dtype=bool), places, np.ones(300), positions)
     np.testing.assert_array_equal(nobody, positions)
 
 

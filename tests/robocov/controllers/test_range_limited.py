@@ -14,7 +14,7 @@ from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
 from robocov.team import Team
-from robocov.voronoi import disc_limited, disc_polygons, partition
+from robocov.voronoi import build_disc_limited_polygons, compute_disc_limited_moments, partition
 
 REGION = Region(np.array([[0.0, 0.0], [11.0, -1.0], [12.0, 8.0], [3.0, 10.0]]))
 SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
@@ -33,7 +33,7 @@ def test_limited_cells_are_those_that_shapely_cuts(seed: int, n: int, radius: fl
     """An independent way: shapely's intersection with a disc of 4096 sides."""
     positions = np.random.default_rng(seed).uniform((1, 1), (10, 7), size=(n, 2))
     cells = partition(positions, REGION)
-    area, centroid = disc_limited(cells.edges, np.full(n, radius))
+    area, centroid = compute_disc_limited_moments(cells.edges, np.full(n, radius))
     for i, ring in enumerate(cells.polygons):
         disc = shapely.Point(positions[i]).buffer(radius, quad_segs=1024)
         part = shapely.Polygon(ring).intersection(disc)
@@ -48,7 +48,7 @@ def test_a_generator_outside_its_cell(seed: int, outside: float) -> None:
     positions = np.array([[-outside, along], [6.0, 4.0]])
     square = Region(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]))
     cells = partition(positions, square)
-    area, centroid = disc_limited(cells.edges, np.full(2, 1.0))
+    area, centroid = compute_disc_limited_moments(cells.edges, np.full(2, 1.0))
     part = shapely.Polygon(cells.polygons[0]).intersection(
         shapely.Point(positions[0]).buffer(1.0, quad_segs=1024)
     )
@@ -61,7 +61,7 @@ def test_a_disc_that_holds_the_cell_changes_nothing() -> None:
     positions = np.random.default_rng(1).uniform((2, 1), (10, 7), size=(9, 2))
     cells = partition(positions, REGION)
     for radius in (20.0, np.inf):
-        area, centroid = disc_limited(cells.edges, np.full(9, radius))
+        area, centroid = compute_disc_limited_moments(cells.edges, np.full(9, radius))
         np.testing.assert_allclose(area, cells.mass, rtol=1e-12)
         np.testing.assert_allclose(positions + centroid, cells.centroid, rtol=1e-12)
 
@@ -70,8 +70,8 @@ def test_polygons_of_chords_have_nearly_the_same_moments() -> None:
     positions = np.random.default_rng(2).uniform((2, 1), (10, 7), size=(7, 2))
     cells = partition(positions, REGION)
     radius = np.array([0.5, 1.0, 1.5, 2.0, 3.0, 5.0, np.inf])
-    area, centroid = disc_limited(cells.edges, radius)
-    edges = disc_polygons(cells.edges, radius)
+    area, centroid = compute_disc_limited_moments(cells.edges, radius)
+    edges = build_disc_limited_polygons(cells.edges, radius)
     cross = edges.start[:, 0] * edges.end[:, 1] - edges.start[:, 1] * edges.end[:, 0]
     chords = 0.5 * np.bincount(edges.cell, cross, minlength=7)
     assert (chords <= area * (1 + 1e-12)).all()

@@ -21,8 +21,7 @@ from robocov.locational_cost import (
 from robocov.locational_cost.best_points import _downhill, find_best_points
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.voronoi import VoronoiPartition, partition
-from robocov.voronoi.weighted_cells import weighted_partition
+from robocov.voronoi import VoronoiPartition, partition, partition_by_travel_time
 
 FUNCTIONS: list[Performance] = [Distance(), Sensing(1e-3), Sensing(0.3), Sensing(2.0), Sensing(1e4)]
 functions = st.sampled_from(FUNCTIONS)
@@ -253,7 +252,7 @@ def test_a_cell_is_its_own_affair_to_the_last_bit() -> None:
 def test_cells_that_are_not_convex_have_their_median_too() -> None:
     """Of robots of different speeds: a fast one's cell has a hole."""
     region = REGIONS["square"]
-    cells = weighted_partition(np.array([[2.0, 3.0], [4.0, 3.0]]), np.array([1.0, 0.3]), region)
+    cells = partition_by_travel_time(np.array([[2.0, 3.0], [4.0, 3.0]]), np.array([1.0, 0.3]), region)
     points = find_best_points(cells, Distance())
     edges = cells.edges
     assert np.abs(compute_gradients(edges, points - cells.generators, Distance())).max() < 1e-9

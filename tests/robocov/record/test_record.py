@@ -21,7 +21,7 @@ from robocov.observation import Decision, Observations, Snapshot
 from robocov.record import ARRAYS, Record, Recorder
 from robocov.simulation import Simulation
 from robocov.team import Team
-from robocov.voronoi.weighted_cells import weighted_partition
+from robocov.voronoi import partition_by_travel_time
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +92,7 @@ def test_what_a_record_says_of_a_moment_is_said_of_who_worked_then(empty: Enviro
     made = Simulation(empty, Rapf(cells="time"), starts, team, 0.05, conditions=failing).run(0.2)
     assert made.by_time and not replace(made, team=Team.homogeneous(3)).by_time
     assert made.snapshot(-1).seen.neighbours.list_pairs()[0].tolist() == [1, 2]
-    expected = weighted_partition(made.positions[-1, 1:], team.max_speed[1:], empty.region)
+    expected = partition_by_travel_time(made.positions[-1, 1:], team.max_speed[1:], empty.region)
     assert made.cells().mass.tolist() == expected.mass.tolist()
     for part in (made.until(0.1), made.thinned(10.0)):
         assert not any(np.shares_memory(getattr(part, name), getattr(made, name)) for name in ARRAYS)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial.legendre import leggauss
 
-from robocov.voronoi.weighted_cells import chords, moments, rings
+from robocov.voronoi.arcs import compute_moments, link_rings, split_into_chords
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -38,7 +38,7 @@ def test_an_arc_adds_what_quadrature_along_it_adds(seed: int, log_size: float, s
     place = (start + end) / 2 + radius * (np.sin(angle)[:, None] * tangent + rise[:, None] * out)
     speed = radius * (np.cos(angle)[:, None] * tangent - np.sin(angle)[:, None] * out)
     cross = weights * half * (place[:, 0] * speed[:, 1] - place[:, 1] * speed[:, 0])
-    ((area, *first, polar),) = moments(arcs(start[None], end[None], half), 1)
+    ((area, *first, polar),) = compute_moments(arcs(start[None], end[None], half), 1)
     size = 1.0 + np.abs(place).max()
     assert area == pytest.approx(cross.sum() / 2, abs=1e-13 * size**2)
     np.testing.assert_allclose(first, cross @ place / 3, atol=1e-13 * size**3)
@@ -47,7 +47,7 @@ def test_an_arc_adds_what_quadrature_along_it_adds(seed: int, log_size: float, s
 
 @pytest.mark.parametrize("pieces", [2, 3, 7, 40])
 def test_a_whole_circle(pieces: int) -> None:
-    ((area, *first, polar),) = moments(circle(2.0, pieces, centre=(5.0, 1.0)), 1)
+    ((area, *first, polar),) = compute_moments(circle(2.0, pieces, centre=(5.0, 1.0)), 1)
     assert area == pytest.approx(4 * np.pi, rel=1e-14)
     np.testing.assert_allclose(first, 4 * np.pi * np.array([5.0, 1.0]), rtol=1e-13)
     # pi r⁴ / 2 about its own centre, and the parallel axis theorem
@@ -58,7 +58,7 @@ def test_no_digit_is_lost_where_an_arc_is_almost_a_segment() -> None:
     """The closed form of the area, r² (x - sin x cos x), has none left there."""
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     half = 1e-9
-    area = moments(arcs(square, np.roll(square, -1, axis=0), half), 1)[0, 0]
+    area = compute_moments(arcs(square, np.roll(square, -1, axis=0), half), 1)[0, 0]
     assert area - 1.0 == pytest.approx(4 * half / 6, rel=1e-6)
 
 
@@ -67,7 +67,7 @@ def test_chords_leave_their_arc_by_no_more_than_is_allowed(
     radius: float, pieces: int, sagitta: float
 ) -> None:
     table = circle(radius, pieces)
-    for line, row in zip(chords(table, sagitta), table, strict=True):
+    for line, row in zip(split_into_chords(table, sagitta), table, strict=True):
         np.testing.assert_array_equal(line[[0, -1]].ravel(), row[:4])
         np.testing.assert_allclose(np.hypot(*line.T), radius, rtol=1e-9)
         middles = (line[1:] + line[:-1]) / 2
@@ -75,14 +75,14 @@ def test_chords_leave_their_arc_by_no_more_than_is_allowed(
 
 
 def test_segments_stay_segments() -> None:
-    line = chords(arcs(np.zeros((1, 2)), np.ones((1, 2)), 0.0), 1e-9)[0]
+    line = split_into_chords(arcs(np.zeros((1, 2)), np.ones((1, 2)), 0.0), 1e-9)[0]
     np.testing.assert_array_equal(line, [[0.0, 0.0], [1.0, 1.0]])
 
 
 def test_rings_are_found_from_pieces_in_any_order() -> None:
     outer, hole = circle(3.0, 5), circle(1.0, 3, turns=-1, centre=(0.5, 0.5))
     order = np.random.default_rng(0).permutation(8)
-    found = rings(np.concatenate([outer, hole])[order], 1e-5)
+    found = link_rings(np.concatenate([outer, hole])[order], 1e-5)
     areas = [area(ring) for ring in found]
     assert sorted(areas) == pytest.approx([-np.pi, 9 * np.pi], rel=1e-4)
 

@@ -33,14 +33,14 @@ from robocov.observation.region import Region
 from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov.voronoi import VoronoiPartition, partition
-from robocov.voronoi.delaunay import Mesh, triangulated
+from robocov.voronoi.delaunay import Mesh, update_triangulation
 
 CORNERS = 40.0 * np.array([[np.cos(a), np.sin(a)] for a in 2 * np.pi / 3 * np.arange(3) + 0.2])
 
 
 @kernel
 def mended(mesh: Mesh, points: Array) -> bool:
-    return triangulated(mesh, points, np.empty(mesh.shape[1]), np.empty(mesh.shape[1], np.intp))
+    return update_triangulation(mesh, points, np.empty(mesh.shape[1]), np.empty(mesh.shape[1], np.intp))
 
 
 def fitted(points: Array, warm: Mesh | None = None) -> Mesh:
@@ -140,7 +140,7 @@ def test_cells_do_not_depend_on_the_way_here(
     region, rng = REGIONS[name], np.random.default_rng(seed)
     points, warm = family(region, n, rng), None
     for _ in range(8):
-        cells = partition(points, region, warm=warm)
+        cells = partition(points, region, triangulation=warm)
         assert_same_cells(cells, partition(points, region), region)
         warm = warm if cells.triangulation is None else cells.triangulation
         points = moved(points, region, 10.0**exponent, rng)
@@ -187,7 +187,7 @@ def test_a_triangulation_of_other_places_does_no_harm(seed: int, n: int) -> None
     rng = np.random.default_rng(seed)
     elsewhere = partition(scattered(PENTAGON, n, rng), PENTAGON).triangulation
     points = scattered(SQUARE, n, rng)
-    assert_same_cells(partition(points, SQUARE, warm=elsewhere), partition(points, SQUARE), SQUARE)
+    assert_same_cells(partition(points, SQUARE, triangulation=elsewhere), partition(points, SQUARE), SQUARE)
     mirrored = points * [-1.0, 1.0]
     assert_delaunay(fitted(mirrored, fitted(points)), mirrored)
 
@@ -228,11 +228,13 @@ def test_without_triangulation_there_is_nothing_to_hand_on() -> None:
     points = scattered(SQUARE, 20, np.random.default_rng(0))
     mesh = partition(points, SQUARE).triangulation
     assert mesh is not None
-    assert_same_cells(partition(points[:19], SQUARE, warm=mesh), partition(points[:19], SQUARE), SQUARE)
+    assert_same_cells(
+        partition(points[:19], SQUARE, triangulation=mesh), partition(points[:19], SQUARE), SQUARE
+    )
     with pytest.raises(ValueError, match="read-only"):
         mesh[0, 0] = 1
     points[3] = points[4]
-    assert partition(points, SQUARE, warm=mesh).triangulation is None
+    assert partition(points, SQUARE, triangulation=mesh).triangulation is None
     assert partition(points[:3], SQUARE).triangulation is None
 
 

@@ -29,7 +29,7 @@ from robocov.density.base import REGION
 from robocov.errors import InputError
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.voronoi import partition
+from robocov.voronoi import partition, partition_by_travel_time
 
 
 @pytest.mark.parametrize("name", REGIONS)
@@ -276,5 +276,17 @@ def test_points_that_are_not_finite_are_named(n: int, bad: float) -> None:
 
 
 def test_points_of_the_wrong_shape_are_named() -> None:
-    with pytest.raises(InputError, match=r"shape \(3,\), but \(n, 2\)"):
+    with pytest.raises(InputError, match=r"shape \(n, 2\), got shape \(3,\)"):
         partition(np.zeros(3), SQUARE)
+
+
+def test_neighbours_that_do_not_fit_the_generators_are_rejected() -> None:
+    """Kernels check no bounds: they would read whatever lies behind the arrays."""
+    points = np.array([[1.0, 1.0], [2.0, 1.0], [3.0, 1.0]])
+    neighbours = Neighbours.from_ranges(points, np.full(3, 1.5))
+    with pytest.raises(InputError, match="neighbours: expected a graph of 2 robots, got 3"):
+        partition(points[:2], SQUARE, neighbours)
+    with pytest.raises(InputError, match=r"reported_positions: expected shape \(4, 2\), got \(3, 2\)"):
+        partition(points, SQUARE, neighbours, reported_positions=points)
+    with pytest.raises(InputError, match=r"reported_positions: expected shape \(4, 2\), got \(3, 2\)"):
+        partition_by_travel_time(points, [1.0, 2.0, 3.0], SQUARE, neighbours, reported_positions=points)

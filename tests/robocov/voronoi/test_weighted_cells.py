@@ -23,8 +23,7 @@ from robocov.density import Gaussian, Gaussians, Uniform
 from robocov.errors import InputError
 from robocov.observation.neighbours import Neighbours, find_close_pairs
 from robocov.observation.region import Region
-from robocov.voronoi import VoronoiPartition, partition
-from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
+from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
 
 FAMILIES = {"scattered": scattered, "lattice": lattice, "circle": circle, "collinear": collinear}
 DEGENERATE = {**FAMILIES, "almost twins": almost_twins, "huddles": huddles}
@@ -66,7 +65,7 @@ def test_cells_tile_the_region(seed: int, name: str, family: str, speeds: str, n
     rng = np.random.default_rng(seed)
     region = REGIONS[name]
     points = np.unique(DEGENERATE[family](region, n, rng), axis=0)
-    cells = weighted_partition(points, SPEEDS[speeds](len(points), rng), region)
+    cells = partition_by_travel_time(points, SPEEDS[speeds](len(points), rng), region)
     # circles of some micrometres and of a kilometre, that nearly touch, keep fewer digits
     tolerance = 1e-6 if speeds == "very different" else 1e-9
     assert cells.mass.sum() == pytest.approx(region.area, rel=tolerance)
@@ -83,7 +82,7 @@ def test_cells_are_those_of_buffers_that_shapely_cuts(seed: int, name: str, reac
     n = len(points)
     speeds = rng.choice([0.4, 1.0, 1.0, 1.7], n)
     neighbours = Neighbours.from_ranges(points, np.full(n, reach))
-    cells = weighted_partition(points, speeds, region, neighbours)
+    cells = partition_by_travel_time(points, speeds, region, neighbours)
     for i in range(n):
         expected = buffered(i, points, speeds, region, neighbours.list_neighbours(i))
         assert cells.mass[i] == pytest.approx(expected.area, abs=1e-6 * region.area)
@@ -97,7 +96,7 @@ def test_every_place_is_in_the_cell_of_whoever_is_there_first(seed: int, n: int)
     rng = np.random.default_rng(seed)
     points = scattered(PENTAGON, n, rng)
     speeds = rng.choice([0.5, 1.0, 1.5], n)
-    cells = weighted_partition(points, speeds, PENTAGON)
+    cells = partition_by_travel_time(points, speeds, PENTAGON)
     if isinstance(cells, VoronoiPartition):
         return
     places = scattered(PENTAGON, 200, rng)
@@ -119,7 +118,7 @@ def test_every_place_is_in_the_cell_of_whoever_is_there_first(seed: int, n: int)
 def test_equal_speeds_give_the_ordinary_cells_to_the_last_bit(seed: int, name: str, n: int) -> None:
     rng = np.random.default_rng(seed)
     points = scattered(REGIONS[name], n, rng)
-    cells = weighted_partition(points, np.full(n, rng.uniform(0.1, 3.0)), REGIONS[name])
+    cells = partition_by_travel_time(points, np.full(n, rng.uniform(0.1, 3.0)), REGIONS[name])
     ordinary = partition(points, REGIONS[name])
     assert cells.mass.tobytes() == ordinary.mass.tobytes()
     assert cells.centroid.tobytes() == ordinary.centroid.tobytes()
@@ -133,7 +132,7 @@ def test_speeds_that_hardly_differ_give_hardly_other_cells(seed: int, name: str,
     points = scattered(REGIONS[name], n, rng)
     if len(find_close_pairs(points, 0.05)[0]):
         return
-    cells = weighted_partition(points, 1.0 + 1e-14 * rng.integers(1, 9, n), REGIONS[name])
+    cells = partition_by_travel_time(points, 1.0 + 1e-14 * rng.integers(1, 9, n), REGIONS[name])
     ordinary = partition(points, REGIONS[name])
     np.testing.assert_allclose(cells.mass, ordinary.mass, atol=1e-10)
     large = ordinary.mass > 0.01
@@ -141,7 +140,7 @@ def test_speeds_that_hardly_differ_give_hardly_other_cells(seed: int, name: str,
 
 
 def test_a_fast_robot_encloses_a_slow_one_whose_cell_is_a_disc() -> None:
-    cells = weighted_partition(np.array([[3.0, 3.0], [4.0, 3.0]]), np.array([1.0, 3.0]), SQUARE)
+    cells = partition_by_travel_time(np.array([[3.0, 3.0], [4.0, 3.0]]), np.array([1.0, 3.0]), SQUARE)
     assert isinstance(cells, WeightedCells)
     # Apollonius: centre p - d / (k² - 1), radius k d / (k² - 1), k = 3
     assert cells.mass[0] == pytest.approx(np.pi * (3 / 8) ** 2, rel=1e-14)
@@ -156,12 +155,12 @@ def test_a_fast_robot_encloses_a_slow_one_whose_cell_is_a_disc() -> None:
 
 def test_a_cell_in_two_pieces_and_a_centroid_that_is_not_in_it() -> None:
     corridor = REGIONS["corridor"]
-    cells = weighted_partition(np.array([[20.0, 0.5], [19.0, 0.5]]), np.array([1.0, 4.0]), corridor)
+    cells = partition_by_travel_time(np.array([[20.0, 0.5], [19.0, 0.5]]), np.array([1.0, 4.0]), corridor)
     assert isinstance(cells, WeightedCells)
     outlines, owners = cells.outlines
     # the slow robot's disc is narrower than the corridor
     assert owners.tolist() == [1, 1, 0]
-    cells = weighted_partition(np.array([[20.0, 0.5], [10.0, 0.5]]), np.array([1.0, 4.0]), corridor)
+    cells = partition_by_travel_time(np.array([[20.0, 0.5], [10.0, 0.5]]), np.array([1.0, 4.0]), corridor)
     assert isinstance(cells, WeightedCells)
     outlines, owners = cells.outlines
     assert owners.tolist() == [1, 1, 0]
@@ -175,12 +174,14 @@ def test_circles_that_are_parallel_lines_but_for_the_last_bits() -> None:
     points = PENTAGON.centroid + np.array([[0.0, 0.0], [2.0**-6, 0.0], [2.0**-5, 0.0]])
     speeds = 1.0 + 4.0 * np.finfo(float).eps * np.arange(3)
     ordinary = partition(points, PENTAGON)
-    np.testing.assert_allclose(weighted_partition(points, speeds, PENTAGON).mass, ordinary.mass, rtol=1e-9)
+    np.testing.assert_allclose(
+        partition_by_travel_time(points, speeds, PENTAGON).mass, ordinary.mass, rtol=1e-9
+    )
 
 
 def test_robots_in_one_place() -> None:
     points = np.array([[2.0, 3.0], [2.0, 3.0], [4.0, 3.0], [2.0, 3.0]])
-    cells = weighted_partition(points, np.array([1.0, 2.0, 2.0, 2.0]), SQUARE)
+    cells = partition_by_travel_time(points, np.array([1.0, 2.0, 2.0, 2.0]), SQUARE)
     assert cells.mass[0] == 0.0
     np.testing.assert_array_equal(cells.centroid[0], points[0])
     np.testing.assert_allclose(cells.mass[[1, 2, 3]], [18.0, 18.0, 18.0])
@@ -194,11 +195,11 @@ def test_the_centroid_is_where_the_cost_of_the_cells_has_no_slope(seed: int, n: 
     rng = np.random.default_rng(seed)
     points = scattered(SQUARE, n, rng)
     speeds = rng.choice([0.5, 1.0, 1.5], n)
-    cells = weighted_partition(points, speeds, SQUARE)
+    cells = partition_by_travel_time(points, speeds, SQUARE)
     slope = 2.0 * (cells.mass / speeds**2)[:, None] * (points - cells.centroid)
 
     def cost(where: np.ndarray) -> float:
-        return float((weighted_partition(where, speeds, SQUARE).polar_moment / speeds**2).sum())
+        return float((partition_by_travel_time(where, speeds, SQUARE).polar_moment / speeds**2).sum())
 
     i, step = int(rng.integers(n)), 1e-5
     for axis in (0, 1):
@@ -225,8 +226,8 @@ def test_a_cell_depends_on_nothing_but_whom_its_robot_hears(seed: int, n: int, r
         if np.hypot(*(place - points[i])) > reach:
             other[k] = place
         slower[k] = rng.choice([0.5, 1.0, 2.0])
-    before = weighted_partition(points, speeds, SQUARE, neighbours)
-    after = weighted_partition(other, slower, SQUARE, Neighbours.from_ranges(other, np.full(n, reach)))
+    before = partition_by_travel_time(points, speeds, SQUARE, neighbours)
+    after = partition_by_travel_time(other, slower, SQUARE, Neighbours.from_ranges(other, np.full(n, reach)))
     assert before.mass[i].tobytes() == after.mass[i].tobytes()
     assert before.centroid[i].tobytes() == after.centroid[i].tobytes()
 
@@ -236,26 +237,30 @@ def test_neighbours_may_be_believed_elsewhere() -> None:
     speeds = np.array([1.0, 2.0, 1.0])
     neighbours = Neighbours.from_ranges(points, np.full(3, 100.0))
     heard = points[neighbours.indices] + [[0.3, 0.1]] * 6
-    cells = weighted_partition(points, speeds, SQUARE, neighbours, heard=heard)
+    cells = partition_by_travel_time(points, speeds, SQUARE, neighbours, reported_positions=heard)
     for i in range(3):
         known = points.copy()
         known[neighbours.list_neighbours(i)] = heard[neighbours.indptr[i] : neighbours.indptr[i + 1]]
-        alone = weighted_partition(known, speeds, SQUARE)
+        alone = partition_by_travel_time(known, speeds, SQUARE)
         assert cells.mass[i] == pytest.approx(alone.mass[i], rel=1e-12)
 
 
 @pytest.mark.parametrize(
     ("points", "speeds", "message"),
     [
-        ([[1.0, 2.0, 3.0]], [1.0], "generators: an array of shape"),
-        ([[1.0, 2.0]], [0.0], r"speeds: \[0.0\], but 1 positive numbers were wanted"),
-        ([[1.0, 2.0]], [1.0, 2.0], "positive numbers were wanted"),
+        ([[1.0, 2.0, 3.0]], [1.0], "generators: expected an array of shape"),
+        ([[1.0, 2.0]], [0.0], r"speeds: expected 1 positive numbers, got \[0.0\]"),
+        ([[1.0, 2.0]], [1.0, 2.0], "expected 1 positive numbers"),
+        ([[1.0, 2.0]], ["fast"], "expected 1 positive numbers"),
+        ([["east", 2.0]], [1.0], "generators: expected numbers"),
         ([[1.0, 2.0], [1.0, np.nan]], [1.0, 2.0], r"generators\[1\]"),
     ],
 )
-def test_what_is_no_team_is_told(points: list[list[float]], speeds: list[float], message: str) -> None:
+def test_unusable_generators_and_speeds_are_rejected(
+    points: list[list[object]], speeds: list[object], message: str
+) -> None:
     with pytest.raises(InputError, match=message):
-        weighted_partition(np.array(points), np.array(speeds), SQUARE)
+        partition_by_travel_time(points, speeds, SQUARE)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["gaussians", "uniform"])
@@ -267,7 +272,7 @@ def test_mass_and_centroid_by_a_density(name: str) -> None:
     )
     rng = np.random.default_rng(7)
     points, speeds = scattered(SQUARE, 5, rng), np.array([1.0, 0.3, 1.0, 0.5, 0.3])
-    cells = weighted_partition(points, speeds, SQUARE, density=density)
+    cells = partition_by_travel_time(points, speeds, SQUARE, density=density)
     middles = (np.arange(600) + 0.5) / 100
     x, y = (part.ravel() for part in np.meshgrid(middles, middles))
     places = np.column_stack([x, y])

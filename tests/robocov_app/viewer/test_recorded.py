@@ -13,7 +13,7 @@ from robocov.errors import InputError, ParameterError
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov.team import Team
-from robocov.voronoi.weighted_cells import WeightedCells
+from robocov.voronoi import WeightedCells
 from robocov_app.runs.saved import Saved, roster_of
 from robocov_app.viewer.launch import Launcher
 from robocov_app.viewer.session.recorded import LostController, control_dt, replayed_session

@@ -16,7 +16,7 @@ from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
 from robocov.sensor import RangeSensor
 from robocov.simulation import DEFAULT_DT
-from robocov.voronoi.weighted_cells import weighted_partition
+from robocov.voronoi import partition_by_travel_time
 from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
 from robocov_app.viewer.session.moments import PaneSetup, State
 
@@ -37,7 +37,7 @@ def replayed_snapshot(state: State, time: float, dt: float = DEFAULT_DT) -> Snap
     if recorded is not None and not np.allclose(decision.forces, recorded.forces, rtol=1e-9, atol=1e-9):
         decision = recorded  # the controller is not what it was, or not loaded
         if setup.law.gains.get("cells") == "time" and team.has_mixed_speeds:
-            cells = weighted_partition(positions, team.max_speed, region, density=density)
+            cells = partition_by_travel_time(positions, team.max_speed, region, density=density)
             decision = replace(decision, cells=cells)
     return Snapshot(seen, decision, None if perception is None else positions)
 

@@ -1,0 +1,190 @@
+"""Boundaries that consist of segments and circular arcs: moments, chords and closed rings.
+
+A piece of a boundary is a row of an array, whose columns are named below. An arc spans from -pi/2 to pi/2 in
+half angle, positive if it turns left; a half angle of zero is a segment. An arc that is almost a segment
+keeps all its digits, however large its radius is. Green's theorem needs the triangle that the chord spans
+with the origin, and the circular segment between chord and arc.
+"""
+
+from math import comb
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.compiled import kernel
+
+START_X = 0
+"""Column of a piece: x of its start relative to the generator, m."""
+START_Y = 1
+"""Column of a piece: y of its start, m."""
+END_X = 2
+"""Column of a piece: x of its end, m."""
+END_Y = 3
+"""Column of a piece: y of its end, m."""
+HALF_ANGLE = 4
+"""Column of a piece: half of the angle that it spans about the centre of its circle, rad."""
+CELL = 5
+"""Column of a piece: the cell that it bounds."""
+BEYOND = 6
+"""Column of a piece: the robot on the other side, or `density.base.REGION`."""
+
+_MAX_SERIES_SQUARE = 0.04
+"""sin² of the half angle up to which the series is used: the closed form divides rounding errors by it."""
+
+_SERIES = np.array([2.0 * comb(2 * m, m) / 4.0**m / (2 * m + 3) for m in range(13, 0, -1)])
+"""Coefficients of (x - sin x cos x - 2/3 sin³ x) / sin⁵ x by powers of sin² x, the highest first."""
+
+_MIN_LENGTH_M = 1e-300
+"""Length by which is divided if there is none."""
+_MIN_CHORD_HALF_ANGLE = 1e-3
+"""Half angle of the shortest chords that replace an arc, rad."""
+
+
+def compute_moments(pieces: Array, cells: int) -> Array:
+    """Compute the moments of cells from the pieces of their boundaries.
+
+    Parameters
+    ----------
+    pieces : (p, 6 or more) array
+        In any order; each relative to the generator of its cell.
+    cells : int
+        Number of cells.
+
+    Returns
+    -------
+    (n, 4) array
+        Area (m²), first moments in x and y (m³) and polar moment (m⁴) of each cell about its generator.
+    """
+    return np.asarray(_compute_moments(np.ascontiguousarray(pieces), cells, _SERIES))
+
+
+@kernel
+def _compute_moments(pieces: Array, cells: int, series: Array) -> Array:
+    moments = np.zeros((cells, 4))
+    for k in range(len(pieces)):
+        x = pieces[k, START_X]
+        y = pieces[k, START_Y]
+        u = pieces[k, END_X]
+        v = pieces[k, END_Y]
+        cross = x * v - u * y
+        middle_x = 0.5 * (x + u)
+        middle_y = 0.5 * (y + v)
+        # The normal points to the right of the chord, and is as long as it.
+        normal_x = v - y
+        normal_y = x - u
+        square = normal_x * normal_x + normal_y * normal_y
+        unit_area, unit_lever, unit_spread = _compute_segment_moments(pieces[k, HALF_ANGLE], series)
+        area = unit_area * square
+        lever = unit_lever * square
+        spread = unit_spread * square * square
+        i = int(pieces[k, CELL])
+        moments[i, 0] += 0.5 * cross + area
+        moments[i, 1] += middle_x * (cross / 3.0 + area) + lever * normal_x
+        moments[i, 2] += middle_y * (cross / 3.0 + area) + lever * normal_y
+        squares = x * (x + u) + u * u + y * (y + v) + v * v
+        shift = lever * (middle_x * normal_x + middle_y * normal_y)
+        middle_square = middle_x * middle_x + middle_y * middle_y
+        moments[i, 3] += cross * squares / 12.0 + spread + 2.0 * shift + area * middle_square
+    return moments
+
+
+@kernel
+def _compute_segment_moments(half_angle: float, series: Array) -> tuple[float, float, float]:
+    """Return the moments of the circular segment on a chord of length 1.
+
+    They are the area, the first moment about the line of the chord, away from the centre, and the polar
+    moment about the middle of the chord. With s and c the sine and cosine of the half angle x, and
+    h = (x - s c - 2/3 s³) / s⁵, which is 1/5 at zero, all three are sums of terms that do not cancel.
+    """
+    s = np.sin(half_angle)
+    c = np.cos(half_angle)
+    square = s * s
+    if square > _MAX_SERIES_SQUARE:
+        h = ((half_angle - s * c) / s**3 - 2.0 / 3.0) / square
+    else:
+        h = 0.0
+        for coefficient in series:
+            h = h * square + coefficient
+    area = s * (2.0 / 3.0 + square * h) / 4.0
+    lever = square * (2.0 / 3.0 / (1.0 + c) - c * h) / 8.0
+    spread = s * (1.0 / (1.0 + c) - 2.0 / 3.0 + (1.5 - square) * h) / 16.0
+    return area, lever, spread
+
+
+def split_into_chords(pieces: Array, max_deviation: float) -> list[Array]:
+    """Split each piece into chords.
+
+    Parameters
+    ----------
+    pieces : (p, 5 or more) array
+    max_deviation : float, m
+        Maximum distance of a chord from its arc.
+
+    Returns
+    -------
+    list of (k, 2) arrays, m
+        The vertices of each piece, including both ends.
+    """
+    return [_split_piece(piece, max_deviation) for piece in pieces[:, :CELL].tolist()]
+
+
+def _split_piece(piece: list[float], max_deviation: float) -> Array:
+    """Return the vertices of the chords of one piece."""
+    x, y, u, v, half_angle = piece
+    chords = _count_chords(np.hypot(u - x, v - y), half_angle, max_deviation)
+    if chords == 1:
+        return np.array([[x, y], [u, v]])
+    angle = half_angle * np.linspace(-1.0, 1.0, chords + 1)
+    # In units of the length of the chord between the ends: along it, and to its right.
+    along = 0.5 + 0.5 * np.sin(angle) / np.sin(half_angle)
+    aside = 0.5 * (np.cos(angle) - np.cos(half_angle)) / np.sin(half_angle)
+    line = np.column_stack([x + along * (u - x) + aside * (v - y), y + along * (v - y) + aside * (x - u)])
+    line[0] = x, y
+    line[-1] = u, v
+    return line
+
+
+def _count_chords(length: float, half_angle: float, max_deviation: float) -> int:
+    """Return the number of chords that replace an arc whose ends are `length` metres apart."""
+    radius = 0.5 * length / max(abs(np.sin(half_angle)), _MIN_LENGTH_M)
+    if radius * half_angle**2 < 2.0 * max_deviation:
+        return 1
+    # A chord of half angle x deviates from its arc by r (1 - cos x), which is at most r x² / 2.
+    ratio = min(max_deviation / max(radius, _MIN_LENGTH_M), 0.5)
+    max_half_angle = np.sqrt(2.0 * ratio)
+    return int(np.ceil(abs(half_angle) / max(max_half_angle, _MIN_CHORD_HALF_ANGLE)))
+
+
+def link_rings(pieces: Array, max_deviation: float) -> list[Array]:
+    """Link pieces to closed rings.
+
+    Parameters
+    ----------
+    pieces : (p, 5 or more) array
+        In any order. Each ends where another one begins, up to rounding.
+    max_deviation : float, m
+        Maximum distance of the polygons from the arcs.
+
+    Returns
+    -------
+    list of (k, 2) arrays, m
+        Polygons, the first vertex not repeated; outlines counter-clockwise, holes clockwise.
+    """
+    lines = split_into_chords(pieces, max_deviation)
+    starts = pieces[:, :END_X]
+    ends = pieces[:, END_X:HALF_ANGLE]
+    remaining = list(range(len(pieces)))
+    rings = []
+    while remaining:
+        first = remaining.pop(0)
+        last = first
+        ring = [lines[first][:-1]]
+        while remaining:
+            gap_to_first = np.hypot(*(starts[first] - ends[last]))
+            gaps = np.hypot(*(starts[remaining] - ends[last]).T)
+            if gap_to_first <= gaps.min():
+                break
+            last = remaining.pop(int(gaps.argmin()))
+            ring.append(lines[last][:-1])
+        rings.append(np.concatenate(ring))
+    return rings

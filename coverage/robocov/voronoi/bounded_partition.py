@@ -1,0 +1,223 @@
+"""The bounded Voronoi partition of all robots at once: equation (1), and what equation (2) needs of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import TypeVar
+
+import numpy as np
+
+from robocov.arrays import Array, IntArray
+from robocov.compiled import kernel
+from robocov.density.base import CellEdges, Density
+from robocov.errors import InputError, quote
+from robocov.observation import Cells
+from robocov.observation.neighbours import NO_INDICES, Neighbours
+from robocov.observation.region import Region
+from robocov.voronoi.clipped_cells import KnownNeighbours, compute_clipped_cells
+from robocov.voronoi.clipping import CellArrays
+from robocov.voronoi.delaunay import CORNER, Mesh
+from robocov.voronoi.triangulated_cells import compute_triangulated_cells
+
+_MIN_TRIANGULATED_ROBOTS = 16
+"""Team size from which a triangulation is faster than clipping each cell by all other robots."""
+
+_NO_POSITIONS = np.empty((0, 2))
+_NO_EDGES = np.empty((0, 6))
+
+_AnyCells = TypeVar("_AnyCells", bound=Cells)
+
+
+@dataclass(eq=False, kw_only=True)
+class VoronoiPartition(Cells):
+    """The cells V_i of equation (1) within a convex region."""
+
+    _find_edges: Callable[[], CellEdges]
+
+    @cached_property
+    def edges(self) -> CellEdges:
+        return self._find_edges()
+
+    @cached_property
+    def polygons(self) -> list[Array]:
+        """The cells, (k, 2) m each, counter-clockwise; (0, 2) if a cell is empty."""
+        return self.edges.build_polygons(self.generators)
+
+    @property
+    def outlines(self) -> tuple[list[Array], IntArray]:
+        return self.polygons, np.arange(len(self.generators))
+
+
+def partition(
+    generators: Array,
+    region: Region,
+    neighbours: Neighbours | None = None,
+    triangulation: Mesh | None = None,
+    reported_positions: Array | None = None,
+    density: Density | None = None,
+) -> VoronoiPartition:
+    """Compute the Voronoi cells of robots within a convex region; obstacles play no part.
+
+    Parameters
+    ----------
+    generators : (n, 2) array, m
+        They may lie on the region's boundary or outside. Generators at one position do not cut each other's
+        cells: they get the same cell.
+    region : Region
+    neighbours : Neighbours or None
+        Communication graph. Cell i is cut only by the bisectors to the neighbours of robot i, and depends, to
+        the last bit, on nothing else. None: each robot is a neighbour of all others.
+    triangulation : (2, 8 n + 4) int32 array or None
+        `Cells.triangulation` of the previous partition. If the generators have moved little since, this one
+        takes a fraction of the time. Its cells are the same, to the last bit unless four generators lie on a
+        circle up to rounding.
+    reported_positions : (m, 2) array or None, m
+        Where robots know their neighbours to be, in the order of ``neighbours.indices``. The cells of two
+        robots may then overlap or leave a gap, as each is based on the knowledge of its own robot. None: the
+        neighbours are where they are.
+    density : Density or None
+        φ of mass, centroid and moments; the cells do not depend on it. None: 1 everywhere.
+
+    Returns
+    -------
+    VoronoiPartition
+
+    Raises
+    ------
+    InputError
+        If the generators are not finite numbers of shape (n, 2), or neighbours or reported positions do not
+        fit to them.
+
+    Examples
+    --------
+    >>> square = Region(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]))
+    >>> halves = partition(np.array([[0.5, 1.0], [1.5, 1.0]]), square)
+    >>> halves.mass, halves.adjacency
+    (array([2., 2.]), array([[0, 1]]))
+    """
+    points = to_generators(generators)
+    known = _convert_neighbours(neighbours, reported_positions, len(points))
+    is_complete = neighbours is None or neighbours.is_complete
+    mesh = _create_mesh(len(points), triangulation, is_complete=is_complete)
+    cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=_NO_EDGES)
+    count = _compute_cells(points, region.sides, known, mesh, cells)
+    if count < 0:
+        robot = -1 - count
+        raise InputError(f"generators[{robot}]: expected finite numbers, got {quote(points[robot].tolist())}")
+    if mesh.shape[1] > 0 and mesh[CORNER, 0] < 0:
+        mesh = _create_mesh(0, None, is_complete=False)  # The triangulation failed.
+    mesh.setflags(write=False)
+    voronoi_cells = VoronoiPartition(
+        generators=points,
+        mass=cells.mass,
+        centroid=cells.centroid,
+        triangulation=mesh if mesh.shape[1] else None,
+        _find_edges=partial(_find_edges, points, region.sides, known, mesh, count),
+    )
+    return apply_density(voronoi_cells, density)
+
+
+def to_generators(values: object) -> Array:
+    """Convert generators to a new array of shape (n, 2); raise InputError if that is not possible."""
+    try:
+        points = np.array(values, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise InputError(f"generators: expected numbers of shape (n, 2), got {quote(values)}") from None
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise InputError(f"generators: expected an array of shape (n, 2), got shape {points.shape}")
+    return points
+
+
+def to_reported_positions(values: Array, neighbours: int) -> Array:
+    """Convert reported positions, one for each neighbour; raise InputError unless they are (m, 2)."""
+    positions = np.ascontiguousarray(values, dtype=np.float64)
+    if positions.shape != (neighbours, 2):
+        raise InputError(f"reported_positions: expected shape {(neighbours, 2)}, got {positions.shape}")
+    return positions
+
+
+def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
+    """Replace the mass and centroid of uniform cells by those with a density.
+
+    Parameters
+    ----------
+    cells : Cells
+        Cells that nobody uses yet, computed for a density of 1. They are changed in place, and their arrays
+        become read-only.
+    density : Density or None
+        None: 1 everywhere.
+
+    Returns
+    -------
+    Cells
+        The same object.
+    """
+    cells.density = density
+    if density is not None and density.is_uniform:
+        cells.mass = cells.mass * density.max_value
+    elif density is not None:
+        cells.mass, cells.centroid = density.compute_mass_and_centroid(
+            cells.edges, cells.generators, cells.mass, cells.centroid
+        )
+    for values in (cells.generators, cells.mass, cells.centroid):
+        values.setflags(write=False)
+    return cells
+
+
+def _convert_neighbours(
+    neighbours: Neighbours | None, reported_positions: Array | None, robots: int
+) -> KnownNeighbours:
+    """Convert a communication graph, and positions in its order, for the kernels, which check no bounds."""
+    if neighbours is not None and neighbours.count != robots:
+        raise InputError(f"neighbours: expected a graph of {robots} robots, got {neighbours.count}")
+    if neighbours is None or neighbours.indptr is None or neighbours.indices is None:
+        if reported_positions is not None:
+            raise InputError("reported_positions: expected None without limited communication")
+        return KnownNeighbours(_NO_POSITIONS, NO_INDICES, NO_INDICES)
+    if reported_positions is None:
+        return KnownNeighbours(_NO_POSITIONS, neighbours.indptr, neighbours.indices)
+    positions = to_reported_positions(reported_positions, len(neighbours.indices))
+    return KnownNeighbours(positions, neighbours.indptr, neighbours.indices)
+
+
+def _create_mesh(robots: int, previous: Mesh | None, *, is_complete: bool) -> Mesh:
+    """Create the mesh from which the triangulation starts; it has no columns if there is to be none."""
+    if not is_complete or robots < _MIN_TRIANGULATED_ROBOTS:
+        return np.empty((2, 0), dtype=np.int32)
+    size = 8 * robots + 4
+    if previous is not None and previous.shape[1] == size:
+        return previous.copy()
+    return np.full((2, size), -1, dtype=np.int32)
+
+
+def _find_edges(points: Array, sides: Array, known: KnownNeighbours, mesh: Mesh, count: int) -> CellEdges:
+    """Compute all cells once more, now with their edges, whose number is known."""
+    edges = np.empty((count, 6))
+    cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=edges)
+    # Copies, because read-only arrays are another type to the compiler.
+    _compute_cells(points.copy(), sides, known, mesh.copy(), cells)
+    return CellEdges(
+        start=edges[:, :2].copy(),
+        end=edges[:, 2:4].copy(),
+        cell=edges[:, 4].astype(np.intp),
+        beyond=edges[:, 5].astype(np.intp),
+    )
+
+
+@kernel
+def _compute_cells(
+    points: Array, sides: Array, neighbours: KnownNeighbours, mesh: Mesh, cells: CellArrays
+) -> int:
+    """Compute all cells; return the number of edges, or -1 - i if generator i is not finite.
+
+    A mesh with columns stands for a complete graph. If the triangulation fails, its first entry is -1.
+    """
+    for i in range(len(points)):
+        if not (abs(points[i, 0]) < np.inf and abs(points[i, 1]) < np.inf):
+            return -1 - i
+    if mesh.shape[1]:
+        total = compute_triangulated_cells(points, sides, mesh, cells)
+        if total >= 0:
+            return total
+        mesh[CORNER, 0] = -1
+    return compute_clipped_cells(points, sides, neighbours, cells)

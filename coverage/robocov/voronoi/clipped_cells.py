@@ -1,0 +1,83 @@
+"""Cells that are clipped by all neighbours of their robots, one robot at a time."""
+
+from typing import NamedTuple
+
+from robocov.arrays import Array, IntArray
+from robocov.compiled import kernel
+from robocov.voronoi.clipping import (
+    CellArrays,
+    Workspace,
+    add_neighbour,
+    clip_cell,
+    create_workspace,
+    write_cell,
+)
+
+
+class KnownNeighbours(NamedTuple):
+    """The neighbours of each robot, and where it knows them to be."""
+
+    positions: Array
+    """(m, 2) m, in the order of `indices`. Empty: all robots know where the others are."""
+    indptr: IntArray
+    """(n + 1,) ``indices[indptr[i]:indptr[i + 1]]`` are the neighbours of robot i. Empty: all others are."""
+    indices: IntArray
+    """(m,)"""
+
+
+@kernel
+def compute_clipped_cells(points: Array, sides: Array, neighbours: KnownNeighbours, cells: CellArrays) -> int:
+    """Compute all cells, each clipped by the bisectors to the neighbours of its robot.
+
+    Parameters
+    ----------
+    points : (n, 2) array, m
+        The generators.
+    sides : (k, 5) array
+        The region, as `Region.sides`.
+    neighbours : KnownNeighbours
+    cells : CellArrays
+        Changed in place.
+
+    Returns
+    -------
+    int
+        Number of edges.
+    """
+    workspace = create_workspace(len(points), len(sides))
+    total = 0
+    for i in range(len(points)):
+        if len(neighbours.indptr):
+            count = _add_listed_neighbours(workspace, points, neighbours, i)
+        else:
+            count = _add_all_robots(workspace, points, i)
+        polygon = clip_cell(workspace, count, points, sides, i)
+        total = write_cell(workspace, polygon, points, i, cells, total)
+    return total
+
+
+@kernel
+def _add_listed_neighbours(workspace: Workspace, points: Array, neighbours: KnownNeighbours, i: int) -> int:
+    """Add the neighbours of robot i at their known positions; return their number."""
+    count = 0
+    for k in range(neighbours.indptr[i], neighbours.indptr[i + 1]):
+        j = neighbours.indices[k]
+        if len(neighbours.positions):
+            dx = neighbours.positions[k, 0] - points[i, 0]
+            dy = neighbours.positions[k, 1] - points[i, 1]
+        else:
+            dx = points[j, 0] - points[i, 0]
+            dy = points[j, 1] - points[i, 1]
+        count = add_neighbour(workspace, count, dx, dy, j)
+    return count
+
+
+@kernel
+def _add_all_robots(workspace: Workspace, points: Array, i: int) -> int:
+    """Add all robots as neighbours of robot i; return their number."""
+    count = 0
+    for j in range(len(points)):
+        dx = points[j, 0] - points[i, 0]
+        dy = points[j, 1] - points[i, 1]
+        count = add_neighbour(workspace, count, dx, dy, j)
+    return count

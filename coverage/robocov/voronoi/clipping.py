@@ -1,0 +1,271 @@
+"""Clipping of one cell: the region is cut by the bisectors between a robot and its neighbours.
+
+The polygon of a cell is stored in one of two rings, and each cut writes the other one. All coordinates are
+relative to the generator of the cell, so that a tiny cell far from the origin keeps all its digits.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.compiled import kernel
+from robocov.density.base import REGION
+
+X = 0
+"""Column of a vertex: its offset from the generator in x, m."""
+Y = 1
+"""Column of a vertex: its offset from the generator in y, m."""
+BEYOND = 2
+"""Column of a vertex: the robot on the other side of the edge that begins there, or `REGION`."""
+_EXCESS = 3
+"""Column of a vertex: how far it lies beyond the present bisector, m²."""
+
+DX = 0
+"""Column of a neighbour: its offset from the generator in x, m."""
+DY = 1
+"""Column of a neighbour: its offset from the generator in y, m."""
+SQUARE = 2
+"""Column of a neighbour: its squared distance, m²."""
+ROBOT = 3
+"""Column of a neighbour: its number."""
+
+_SORTED_NEIGHBOURS = 6
+"""Number of neighbours that cut a cell in order of distance; it is then so small that few others count."""
+
+
+class Workspace(NamedTuple):
+    """Working memory for the computation of one cell after the other."""
+
+    rings: Array
+    """(2, k, 4) Vertices of two polygons; the columns are `X`, `Y`, `BEYOND` and one for cuts."""
+    neighbours: Array
+    """(n, 4) Neighbours that may bound the cell; the columns are `DX`, `DY`, `SQUARE` and `ROBOT`."""
+
+
+class CellPolygon(NamedTuple):
+    """The polygon of a cell in a `Workspace`: which ring it is, its number of vertices, and the first one."""
+
+    ring: int
+    vertices: int
+    start: int
+
+
+class CellArrays(NamedTuple):
+    """What is computed of n cells."""
+
+    mass: Array
+    """(n,) m², the areas."""
+    centroid: Array
+    """(n, 2) m"""
+    edges: Array
+    """(e, 6) The edges: x, y, u, v of the ends relative to the generator (m), cell and `BEYOND`."""
+
+
+@kernel
+def create_workspace(robots: int, sides: int) -> Workspace:
+    """Allocate the working memory for cells of some robots in a region with some sides."""
+    return Workspace(np.empty((2, sides + robots + 2, 4)), np.empty((robots, 4)))
+
+
+@kernel
+def add_neighbour(workspace: Workspace, count: int, dx: float, dy: float, robot: int) -> int:
+    """Add a neighbour that may bound a cell; return the new number of neighbours.
+
+    Neighbours at the same position are left out: two robots at one position do not cut each other's cells.
+    """
+    neighbours = workspace.neighbours
+    neighbours[count, DX] = dx
+    neighbours[count, DY] = dy
+    neighbours[count, SQUARE] = dx * dx + dy * dy
+    neighbours[count, ROBOT] = robot
+    return count + 1 if neighbours[count, SQUARE] > 0.0 else count
+
+
+@kernel
+def clip_cell(workspace: Workspace, neighbours: int, points: Array, sides: Array, i: int) -> CellPolygon:
+    """Cut the region by the bisectors between robot i and its neighbours.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Its first rows are the neighbours; they are reordered.
+    neighbours : int
+        Number of neighbours.
+    points : (n, 2) array, m
+        The generators.
+    sides : (k, 5) array
+        The region, as `Region.sides`.
+    i : int
+        Number of the robot.
+    """
+    rings = workspace.rings
+    near = workspace.neighbours
+    ring = 0
+    count = len(sides)
+    for k in range(count):
+        rings[ring, k, X] = sides[k, 0] - points[i, 0]
+        rings[ring, k, Y] = sides[k, 1] - points[i, 1]
+        rings[ring, k, BEYOND] = REGION
+    # A bisector lies half way to the neighbour: no farther neighbour can cut the cell.
+    max_square = _compute_max_square(rings, ring, count)
+    for turn in range(neighbours):
+        if turn < _SORTED_NEIGHBOURS:
+            _move_nearest(near, turn, neighbours)
+        if near[turn, SQUARE] <= max_square:
+            new_count = _cut(rings, ring, count, near, turn)
+            if new_count >= 0:
+                ring = 1 - ring
+                count = new_count
+                max_square = _compute_max_square(rings, ring, count)
+        elif turn < _SORTED_NEIGHBOURS:
+            break
+    return CellPolygon(ring, count, 0)
+
+
+@kernel
+def _compute_max_square(rings: Array, ring: int, count: int) -> float:
+    """Return the square of twice the distance from the generator to the farthest vertex, m²."""
+    max_square = 0.0
+    for k in range(count):
+        x = rings[ring, k, X]
+        y = rings[ring, k, Y]
+        max_square = max(max_square, 4.0 * (x * x + y * y))
+    return max_square
+
+
+@kernel
+def _move_nearest(near: Array, turn: int, count: int) -> None:
+    """Move the nearest neighbour from row `turn` on to that row."""
+    best = turn
+    for k in range(turn + 1, count):
+        if near[k, SQUARE] < near[best, SQUARE]:
+            best = k
+    for column in range(near.shape[1]):
+        near[turn, column], near[best, column] = near[best, column], near[turn, column]
+
+
+@kernel
+def _cut(rings: Array, old: int, count: int, near: Array, turn: int) -> int:
+    """Write the part of a polygon on the generator's side of a bisector to the other ring.
+
+    Return its number of vertices, or -1 if the bisector does not cut the polygon; nothing is written then.
+    """
+    worst = _compute_excess(rings, old, count, near, turn)
+    if worst < 0:
+        return -1
+    # The vertices beyond the line follow each other, up to rounding, because the polygon is convex.
+    last = worst
+    after = worst
+    for _ in range(count):
+        after = last + 1 if last + 1 < count else 0
+        if rings[old, after, _EXCESS] <= 0.0:
+            break
+        last = after
+    else:
+        return 0
+    first = worst
+    while rings[old, first - 1 if first else count - 1, _EXCESS] > 0.0:
+        first = first - 1 if first else count - 1
+    size = 0
+    kept = after
+    k = after
+    while k != first:
+        for column in range(3):
+            rings[1 - old, size, column] = rings[old, k, column]
+        kept = k
+        size += 1
+        k = k + 1 if k + 1 < count else 0
+    robot = near[turn, ROBOT]
+    if rings[old, kept, _EXCESS] == 0.0:
+        rings[1 - old, size - 1, BEYOND] = robot
+    else:
+        _add_crossing(rings, old, size, kept, first, robot)
+        size += 1
+    if rings[old, after, _EXCESS] < 0.0:
+        _add_crossing(rings, old, size, after, last, rings[old, last, BEYOND])
+        size += 1
+    return size
+
+
+@kernel
+def _compute_excess(rings: Array, ring: int, count: int, near: Array, turn: int) -> int:
+    """Compute how far each vertex lies beyond a bisector; return the farthest one, or -1 if none does."""
+    dx = near[turn, DX]
+    dy = near[turn, DY]
+    level = 0.5 * near[turn, SQUARE]
+    worst = -1
+    max_excess = 0.0
+    for k in range(count):
+        excess = rings[ring, k, X] * dx + rings[ring, k, Y] * dy - level
+        rings[ring, k, _EXCESS] = excess
+        if excess > max_excess:
+            worst = k
+            max_excess = excess
+    return worst
+
+
+@kernel
+def _add_crossing(rings: Array, old: int, size: int, inner: int, outer: int, beyond: float) -> None:
+    """Write the intersection of an edge with the bisector as vertex `size` of the other ring."""
+    inner_excess = rings[old, inner, _EXCESS]
+    fraction = inner_excess / (inner_excess - rings[old, outer, _EXCESS])
+    for column in (X, Y):
+        step = rings[old, outer, column] - rings[old, inner, column]
+        rings[1 - old, size, column] = rings[old, inner, column] + fraction * step
+    rings[1 - old, size, BEYOND] = beyond
+
+
+@kernel
+def write_cell(
+    workspace: Workspace, polygon: CellPolygon, points: Array, i: int, cells: CellArrays, total: int
+) -> int:
+    """Write mass, centroid and edges of the cell of robot i.
+
+    Parameters
+    ----------
+    workspace : Workspace
+    polygon : CellPolygon
+    points : (n, 2) array, m
+        The generators.
+    i : int
+        Number of the robot.
+    cells : CellArrays
+        Changed in place. As many edges are written as there are rows for.
+    total : int
+        Number of edges of the cells before.
+
+    Returns
+    -------
+    int
+        Number of edges of all cells so far.
+    """
+    rings = workspace.rings
+    edges = cells.edges
+    doubled_area = 0.0
+    moment_x = 0.0
+    moment_y = 0.0
+    k = polygon.start
+    for edge in range(total, total + polygon.vertices):
+        after = k + 1 if k + 1 < polygon.vertices else 0
+        x = rings[polygon.ring, k, X]
+        y = rings[polygon.ring, k, Y]
+        u = rings[polygon.ring, after, X]
+        v = rings[polygon.ring, after, Y]
+        cross = x * v - u * y
+        doubled_area += cross
+        moment_x += cross * (x + u)
+        moment_y += cross * (y + v)
+        if edge < len(edges):
+            edges[edge, 0] = x
+            edges[edge, 1] = y
+            edges[edge, 2] = u
+            edges[edge, 3] = v
+            edges[edge, 4] = i
+            edges[edge, 5] = rings[polygon.ring, k, BEYOND]
+        k = after
+    factor = 1.0 / (3.0 * doubled_area) if doubled_area > 0.0 else 0.0
+    cells.mass[i] = max(0.5 * doubled_area, 0.0)
+    cells.centroid[i, 0] = points[i, 0] + moment_x * factor
+    cells.centroid[i, 1] = points[i, 1] + moment_y * factor
+    return total + polygon.vertices

@@ -1,0 +1,145 @@
+"""Parts of cells within a distance of their generators, as robots of limited range know them."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.density.base import REGION, CellEdges
+
+_CHORDS_PER_ARC = 64
+"""Number of chords that replace one arc of a disc, which spans at most half a turn."""
+
+_MIN_AREA = 1e-14
+"""Area, relative to the square of the radius, below which a part is empty up to rounding."""
+
+
+class _Arcs(NamedTuple):
+    """One arc of the disc for each edge; its length may be zero."""
+
+    angle: Array
+    """(e,) rad from +x, where the arc begins."""
+    turn: Array
+    """(e,) rad, how far it turns to the left."""
+
+
+class _CutEdges(NamedTuple):
+    """Edges cut by discs; the path from start to end of an edge is an arc, the part in the disc, an arc."""
+
+    first: Array
+    """(e, 2) m, where the part in the disc begins, relative to the generator."""
+    last: Array
+    """(e, 2) m, where it ends; the same point if the edge is outside the disc."""
+    arc_before: _Arcs
+    arc_behind: _Arcs
+
+
+def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array, Array]:
+    """Compute area and centroid of the part of each cell within a distance of its generator.
+
+    Parameters
+    ----------
+    edges : CellEdges
+    radii : (n,) array, m
+        Positive; infinite for no limit.
+
+    Returns
+    -------
+    area : (n,) array, m²
+    centroid : (n, 2) array, m
+        **Relative to the generator**; zero if the part is empty.
+
+    Notes
+    -----
+    By the divergence theorem each edge adds, with its sign, the part in the disc of the triangle that it
+    spans with the generator: a smaller triangle for the part of the edge inside the disc, sectors for the
+    rest.
+    """
+    cells = len(radii)
+    # A disc that contains the whole cell cuts nothing, however large it is.
+    size = np.zeros(cells)
+    np.maximum.at(size, edges.cell, np.hypot(edges.start[:, 0], edges.start[:, 1]))
+    radius = np.minimum(radii, 2.0 * size + 1.0)[edges.cell]
+    cut = _cut_by_discs(edges, radius)
+    cross = cut.first[:, 0] * cut.last[:, 1] - cut.first[:, 1] * cut.last[:, 0]
+    doubled_area = cross.copy()
+    doubled_moment = cross[:, None] * (cut.first + cut.last) / 3.0
+    for angle, turn in (cut.arc_before, cut.arc_behind):
+        doubled_area += radius * radius * turn
+        factor = 2.0 / 3.0 * radius**3
+        doubled_moment[:, 0] += factor * (np.sin(angle + turn) - np.sin(angle))
+        doubled_moment[:, 1] += factor * (np.cos(angle) - np.cos(angle + turn))
+    area = 0.5 * np.bincount(edges.cell, doubled_area, minlength=cells)
+    moment_x = np.bincount(edges.cell, doubled_moment[:, 0], minlength=cells)
+    moment_y = np.bincount(edges.cell, doubled_moment[:, 1], minlength=cells)
+    moment = np.column_stack([moment_x, moment_y])
+    is_filled = area > _MIN_AREA * np.minimum(radii, size) ** 2
+    centroid = 0.5 * moment / np.where(is_filled, area, 1.0)[:, None]
+    return np.where(is_filled, area, 0.0), np.where(is_filled[:, None], centroid, 0.0)
+
+
+def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
+    """Build polygons of the parts of cells within a distance of their generators.
+
+    Chords replace the arcs of the discs. A chord spans at most a 128th of a turn: of a whole disc, 0.04 % of
+    the area are missing.
+
+    Parameters
+    ----------
+    edges : CellEdges
+    radii : (n,) array, m
+        Positive; infinite for no limit.
+
+    Returns
+    -------
+    CellEdges
+        Some edges have no length.
+    """
+    max_coordinate = float(np.abs(edges.start).max(initial=0.0))
+    radius = np.minimum(radii[edges.cell], 4.0 * max_coordinate + 1.0)
+    cut = _cut_by_discs(edges, radius)
+    starts = [cut.first]
+    ends = [cut.last]
+    cells = [edges.cell]
+    fraction = np.linspace(0.0, 1.0, _CHORDS_PER_ARC + 1)
+    for begin, turn in (cut.arc_before, cut.arc_behind):
+        angle = begin[:, None] + turn[:, None] * fraction
+        points = radius[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        curved = np.flatnonzero(turn != 0.0)
+        starts.append(points[curved, :-1].reshape(-1, 2))
+        ends.append(points[curved, 1:].reshape(-1, 2))
+        cells.append(np.repeat(edges.cell[curved], _CHORDS_PER_ARC))
+    cell = np.concatenate(cells)
+    order = np.argsort(cell, kind="stable")
+    return CellEdges(
+        start=np.concatenate(starts)[order],
+        end=np.concatenate(ends)[order],
+        cell=cell[order],
+        beyond=np.full(len(cell), REGION),
+    )
+
+
+def _cut_by_discs(edges: CellEdges, radius: Array) -> _CutEdges:
+    """Cut edges by discs around their generators, of radius (e,) m for each edge."""
+    step = edges.end - edges.start
+    square_length = np.maximum((step * step).sum(axis=1), 1e-300)
+    # The edge is start + t step with t from 0 to 1; the disc contains it from middle - half to middle + half.
+    middle = -(edges.start * step).sum(axis=1) / square_length
+    nearest = edges.start + middle[:, None] * step
+    half_square = (radius * radius - (nearest * nearest).sum(axis=1)) / square_length
+    half = np.sqrt(np.maximum(half_square, 0.0))
+    first = edges.start + np.clip(middle - half, 0.0, 1.0)[:, None] * step
+    last = edges.start + np.clip(middle + half, 0.0, 1.0)[:, None] * step
+    return _CutEdges(
+        first=first,
+        last=last,
+        arc_before=_build_arcs(edges.start, first),
+        arc_behind=_build_arcs(last, edges.end),
+    )
+
+
+def _build_arcs(start: Array, end: Array) -> _Arcs:
+    """Return the arcs about the origin from the directions of some points, (e, 2), to those of others."""
+    x, y = start.T
+    u, v = end.T
+    return _Arcs(angle=np.arctan2(y, x), turn=np.arctan2(x * v - y * u, x * u + y * v))

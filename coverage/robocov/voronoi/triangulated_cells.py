@@ -1,0 +1,204 @@
+"""Cells from a Delaunay triangulation, in which the neighbours of a robot are those that bound its cell."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array, IntArray
+from robocov.compiled import kernel
+from robocov.voronoi.clipping import (
+    BEYOND,
+    DX,
+    DY,
+    ROBOT,
+    SQUARE,
+    CellArrays,
+    CellPolygon,
+    Workspace,
+    X,
+    Y,
+    clip_cell,
+    create_workspace,
+    write_cell,
+)
+from robocov.voronoi.delaunay import CORNER, TWIN, Mesh, get_next, get_previous, update_triangulation
+
+_MASS_TOLERANCE = 1e-12
+"""Difference of the sum of masses from the region's area, relative to the latter, that may be rounding."""
+
+
+class Triangulation(NamedTuple):
+    """A Delaunay triangulation of n robots."""
+
+    mesh: Mesh
+    """(2, 8 n + 4) Corners and twins of the half-edges."""
+    cotangents: Array
+    """(8 n + 4,) Cotangents of the angles opposite to the half-edges."""
+    half_edges: IntArray
+    """(8 n + 4,) A half-edge that begins at each robot, in the first n entries."""
+
+
+class _Fan(NamedTuple):
+    """The triangles around a robot, counter-clockwise."""
+
+    neighbours: int
+    """Number of neighbours, and of Voronoi vertices."""
+    first: int
+    """Half-edge to the neighbour with the lowest number."""
+    start: int
+    """Position of that neighbour among the others."""
+    max_square: float
+    """Squared distance of the farthest Voronoi vertex, m²; infinite if the cell is not bounded by robots."""
+
+
+@kernel
+def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: CellArrays) -> int:
+    """Compute all cells from a Delaunay triangulation.
+
+    A cell that was clipped by too few robots would be too large. Therefore the cells are right if their
+    masses add up to the area of the region.
+
+    Parameters
+    ----------
+    points : (n, 2) array, m
+        The generators.
+    sides : (k, 5) array
+        The region, as `Region.sides`.
+    mesh : (2, 8 n + 4) int32 array
+        Triangulation of a previous partition, or -1 in ``mesh[0, 0]``. Changed in place.
+    cells : CellArrays
+        Changed in place.
+
+    Returns
+    -------
+    int
+        Number of edges, or -1 if the triangulation failed, as it may if robots coincide.
+    """
+    half_edges = np.empty(mesh.shape[1], np.intp)
+    triangulation = Triangulation(mesh, np.empty(mesh.shape[1]), half_edges)
+    if not _triangulate(triangulation, points, sides):
+        return -1
+    workspace = create_workspace(len(points), len(sides))
+    total = 0
+    mass = 0.0
+    for i in range(len(points)):
+        polygon = _find_cell(workspace, triangulation, points, sides, i)
+        total = write_cell(workspace, polygon, points, i, cells, total)
+        mass += cells.mass[i]
+    area = _compute_area(sides)
+    return total if abs(mass - area) <= _MASS_TOLERANCE * area else -1
+
+
+@kernel
+def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> bool:
+    """Triangulate the robots and three sentinels; return whether it succeeded."""
+    n = len(points)
+    x, y, size = _compute_bounds(sides)
+    corners = np.empty((n + 3, 2))
+    for i in range(n):
+        corners[i, 0] = points[i, 0]
+        corners[i, 1] = points[i, 1]
+        # Then all robots lie within the triangle of the sentinels, and no sentinel cuts a cell.
+        if max(abs(points[i, 0] - x), abs(points[i, 1] - y)) > 2.0 * size:
+            return False
+    corners[n, 0] = x - 8.0 * size
+    corners[n, 1] = y - 5.0 * size
+    corners[n + 1, 0] = x + 8.0 * size
+    corners[n + 1, 1] = y - 5.0 * size
+    corners[n + 2, 0] = x
+    corners[n + 2, 1] = y + 9.0 * size
+    mesh = triangulation.mesh
+    # The array is working memory first, and has its own content only afterwards.
+    half_edges = triangulation.half_edges
+    if not update_triangulation(mesh, corners, triangulation.cotangents, half_edges):
+        return False
+    for h in range(mesh.shape[1]):
+        if h & 3 < 3:
+            half_edges[mesh[CORNER, h]] = h
+    return True
+
+
+@kernel
+def _compute_bounds(sides: Array) -> tuple[float, float, float]:
+    """Return the centre of the region's bounding box and the sum of its width and height, m."""
+    left = sides[0, 0]
+    right = sides[0, 0]
+    low = sides[0, 1]
+    high = sides[0, 1]
+    for k in range(1, len(sides)):
+        left = min(left, sides[k, 0])
+        right = max(right, sides[k, 0])
+        low = min(low, sides[k, 1])
+        high = max(high, sides[k, 1])
+    return 0.5 * (left + right), 0.5 * (low + high), right - left + high - low
+
+
+@kernel
+def _compute_area(sides: Array) -> float:
+    """Return the area of the region, m², from coordinates about its centre."""
+    x, y, _ = _compute_bounds(sides)
+    area = 0.0
+    for k in range(len(sides)):
+        after = k + 1 if k + 1 < len(sides) else 0
+        area += 0.5 * ((sides[k, 0] - x) * (sides[after, 1] - y) - (sides[after, 0] - x) * (sides[k, 1] - y))
+    return area
+
+
+@kernel
+def _find_cell(
+    workspace: Workspace, triangulation: Triangulation, points: Array, sides: Array, i: int
+) -> CellPolygon:
+    """Find the cell of robot i from the Voronoi vertices around it; clip it if the region cuts it."""
+    fan = _walk_around(workspace, triangulation, points, i, triangulation.half_edges[i])
+    clearance = np.inf
+    for k in range(len(sides)):
+        clearance = min(clearance, sides[k, 4] - (sides[k, 2] * points[i, 0] + sides[k, 3] * points[i, 1]))
+    if clearance > 0.0 and fan.max_square < clearance * clearance:
+        return CellPolygon(0, fan.neighbours, fan.start)
+    # From the lowest neighbour on, so that the result does not depend on the order of the triangles.
+    fan = _walk_around(workspace, triangulation, points, i, fan.first)
+    return clip_cell(workspace, fan.neighbours, points, sides, i)
+
+
+@kernel
+def _walk_around(
+    workspace: Workspace, triangulation: Triangulation, points: Array, i: int, begin: int
+) -> _Fan:
+    """Write neighbours and Voronoi vertices of robot i, counter-clockwise from half-edge `begin` on."""
+    mesh = triangulation.mesh
+    near = workspace.neighbours
+    rings = workspace.rings
+    n = len(points)
+    count = 0
+    lowest = n
+    first = begin
+    start = 0
+    max_square = 0.0
+    h = begin
+    while True:
+        back = get_previous(h)
+        j = mesh[CORNER, get_next(h)]
+        if j < n:
+            if j < lowest:
+                lowest = j
+                first = h
+                start = count
+            dx = points[j, 0] - points[i, 0]
+            dy = points[j, 1] - points[i, 1]
+            # The vertex lies on the bisector, to its left by half the distance times the cotangent.
+            x = 0.5 * (dx - triangulation.cotangents[h] * dy)
+            y = 0.5 * (dy + triangulation.cotangents[h] * dx)
+            max_square = max(max_square, x * x + y * y)
+            near[count, DX] = dx
+            near[count, DY] = dy
+            near[count, SQUARE] = dx * dx + dy * dy
+            near[count, ROBOT] = j
+            rings[0, count, X] = x
+            rings[0, count, Y] = y
+            rings[0, count, BEYOND] = mesh[CORNER, back]
+            count += 1
+        else:
+            max_square = np.inf
+        h = mesh[TWIN, back]
+        if h == begin:
+            return _Fan(count, first, start, max_square)
