@@ -47,7 +47,7 @@ if TYPE_CHECKING:  # isort: off
     from robocov.optimum import Optimum, find_optimum
     from robocov.record import Record
     from robocov.sensor import RangeSensor
-    from robocov.simulation import Simulation, simulate_many
+    from robocov.simulation import Simulation, SimulationBatch, TeamState
     from robocov.team import Team
     from robocov.team_files import read_team
     from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
@@ -80,7 +80,7 @@ _NAMES = {
     "optimum": "Optimum find_optimum",
     "record": "Record",
     "sensor": "RangeSensor",
-    "simulation": "Simulation simulate_many",
+    "simulation": "Simulation SimulationBatch TeamState",
     "team": "Team",
     "team_files": "read_team",
     "voronoi": "VoronoiPartition WeightedCells partition partition_by_travel_time",
@@ -97,11 +97,12 @@ __all__ = [
     "Lloyd", "LowerBound", "MapError", "Neighbours", "Observations", "ObstaclePath", "Optimum",
     "OutputError", "OwnView", "ParameterError", "PointsStart", "PolygonObstacle", "RangeSensor", "Rapf",
     "Raster", "Record", "Region", "Results", "RobocovError", "Rpf", "RunMetrics", "Simulation",
-    "Snapshot", "StartError", "Team", "TimeVaryingCost", "Uniform", "UniformStart", "VoronoiPartition",
+    "SimulationBatch", "Snapshot", "StartError", "Team", "TeamState", "TimeVaryingCost", "Uniform",
+    "UniformStart", "VoronoiPartition",
     "WallObstacle", "WeightedArea", "WeightedCells", "WeightedPolygons", "World", "build_map_schema",
     "check_map", "choice", "compute_lower_bound", "cost_history", "find_optimum", "gain", "generate_map",
     "list_bundled_maps", "load_map", "make_controller", "partition", "partition_by_travel_time",
-    "read_results", "read_team", "run_metrics", "save_map", "settled_at", "show", "simulate_many",
+    "read_results", "read_team", "run_metrics", "save_map", "settled_at", "show",
     "summarise",
 ]
 # fmt: on

@@ -129,7 +129,7 @@ def moved(name: str, what: str) -> float:
         some.step()
     before = some.positions
     if what == "a door opens":
-        some = some.changed(environment=replace(rooms, name="open", obstacles=walls(0.0, 0.0, 1.0)))
+        some = some.with_changes(environment=replace(rooms, name="open", obstacles=walls(0.0, 0.0, 1.0)))
     while some.time < 660.0:
         some.step()
     return float(np.hypot(*(some.positions - before).T).mean())

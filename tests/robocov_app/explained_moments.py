@@ -53,7 +53,7 @@ def run(simulation: Simulation, seconds: float) -> list[Report]:
     recent = np.array(past[-round(SETTLED_WINDOW / simulation.dt) - 1 :: 8])
     team, environment = simulation.team, simulation.environment
     return [
-        explain(simulation.snapshot, team, environment, robot, recent=recent[:, robot])
+        explain(simulation.observe_and_decide(), team, environment, robot, recent=recent[:, robot])
         for robot in range(len(team))
     ]
 

@@ -3,13 +3,12 @@
 from collections.abc import Iterator
 from functools import partial
 
-import numpy as np
 import pymunk
 from scipy.spatial import Delaunay
 
 from robocov.controllers import Rapf
 from robocov.mapfile import load_map
-from robocov.simulation import Simulation
+from robocov.simulation import Simulation, SimulationBatch
 from robocov_app.bench.measure import Call, Case, Row, in_turn
 
 GOALS = {6: (1.0, 16.0), 50: (0.7, 12.0), 200: (0.5, 9.0), 1000: (0.5, 8.0)}
@@ -44,7 +43,7 @@ def _rows(n: int, quick: bool) -> Iterator[Row]:
 def _together(quick: bool) -> Iterator[Row]:
     campus, n = load_map("campus"), 6
     starts = [campus.start("uniform").sample(n, seed=seed) for seed in range(TOGETHER)]
-    simulation = Simulation(campus, Rapf(), np.concatenate(starts), runs=TOGETHER)
+    simulation = SimulationBatch(campus, Rapf(), starts)
     # as often as there are runs: what one call takes is too short for the clock
     bare = [partial(_warmed_up(simulation, n).step, simulation.dt)] * TOGETHER
     calls: dict[str, Call] = {"step": simulation.step, "space": lambda: [call() for call in bare]}
@@ -54,12 +53,12 @@ def _together(quick: bool) -> Iterator[Row]:
     yield Row("step", "one step of one run", size, each, *bare_each, before=BEFORE[n][1])
 
 
-def _warmed_up(simulation: Simulation, n: int) -> pymunk.Space:
+def _warmed_up(simulation: Simulation | SimulationBatch, n: int) -> pymunk.Space:
     """Send the team on its way; return a space with discs where its first n robots are, and nothing else."""
     for _ in range(WARM_UP):
         simulation.step()
     space = pymunk.Space()
-    for x, y in simulation.positions[:n].tolist():
+    for x, y in simulation.positions.reshape(-1, 2)[:n].tolist():
         body = pymunk.Body(1.0, float("inf"))
         body.position = (x, y)
         space.add(body, pymunk.Circle(body, 0.1))

@@ -17,7 +17,7 @@ from robocov.observation import Decision, Observations, Scanning, Snapshot
 from robocov.observation.neighbours import find_close_pairs
 from robocov.observation.region import Region
 from robocov.record import Record
-from robocov.simulation import Simulation
+from robocov.simulation import Simulation, SimulationBatch
 from robocov.team import Team
 from robocov_app.learning import task as tasks
 from robocov_app.learning.task import SEEDS, CoverageTask, Rows, Scenarios, changed_task, from_middle
@@ -99,37 +99,48 @@ class SharedSimulation:
     """One simulation for `count` ideal episodes on one map, in which nothing moves, moved on together."""
 
     def __init__(self, task: CoverageTask, environment: Environment, count: int) -> None:
-        self.environment, self._task, self._count = environment, task, count
-        self._simulation: Simulation | None = None
-        self._told: tuple[Observations | None, Rows] = None, np.empty((0, 0), dtype=np.float32)
+        self.environment = environment
+        self._task = task
+        self._count = count
+        self._joint_team = Team.concatenate([task.whole_team] * count)
+        self._simulation: SimulationBatch | None = None
+        self._observed: Observations | None = None
+        self._rows: Rows = np.empty((0, 0, 0), dtype=np.float32)
 
-    def begin(self, run: int, positions: Array) -> Simulation:
-        task, count = self._task, self._count
-        if self._simulation is None:  # the others follow
-            starts, team = np.tile(positions, (count, 1)), Team.concatenate([task.whole_team] * count)
-            learner = Learner.of(task)
-            self._simulation = Simulation(self.environment, learner, starts, team, task.dt, runs=count)
+    def begin(self, run: int, positions: Array) -> SimulationBatch:
+        if self._simulation is None:
+            # The other episodes take their own positions when they begin.
+            self._simulation = SimulationBatch(
+                self.environment,
+                Learner.of(self._task),
+                np.tile(positions, (self._count, 1, 1)),
+                self._task.whole_team,
+                self._task.dt,
+            )
         self._simulation.restart(run, positions)
         return self._simulation
 
     def advance(self, actions: Array, episodes: Mapping[int, Episode]) -> dict[int, Outcome]:
         """Hold actions, (count, n, 2) N or m/s; return what came of those of some of the episodes."""
         assert self._simulation is not None
-        contact = held(self._task, self._simulation, actions.reshape(-1, 2), None).reshape(self._count, -1)
+        contact = held(self._task, self._simulation, actions)
         due = [run for run, episode in episodes.items() if episode.due()]
         results: dict[int, CoverageResult] = {}
         if due:
-            positions = self._simulation.positions.reshape(actions.shape)[due]
+            positions = self._simulation.positions[due]
             results = dict(zip(due, episodes[due[0]].cost.evaluate_teams(positions), strict=True))
         each = episodes.items()
         return {run: one.moved(contact[run], run in results, results.get(run)) for run, one in each}
 
     def rows(self) -> Rows:
+        """Return what the robots of all episodes are told now, (count, n, size)."""
         assert self._simulation is not None
-        seen = self._simulation.observe()
-        if seen is not self._told[0]:
-            self._told = seen, self._task.observation.rows(seen, self._simulation.team)
-        return self._told[1]
+        observations = self._simulation.observe()
+        if observations is not self._observed:
+            rows = self._task.observation.rows(observations, self._joint_team)
+            self._rows = rows.reshape(self._count, -1, rows.shape[1])
+            self._observed = observations
+        return self._rows
 
 
 Place: TypeAlias = "tuple[SharedSimulation, int]"
@@ -151,13 +162,17 @@ class Episode:
         if len(positions) != n:
             raise StartError(f"starts: {len(positions)}, but one for each of {n} robots was wanted")
         shared, run = place or (None, 0)
+        self.shared: SharedSimulation | None = None
+        self.simulation: Simulation | SimulationBatch
+        # The index of the episode's robots in the arrays of the simulation.
+        self._index: int | slice = slice(None)
         if shared is not None and shared.environment is environment:
-            self.shared: SharedSimulation | None = shared
-            self._rows, self.simulation = slice(run * n, (run + 1) * n), shared.begin(run, positions)
+            self.shared = shared
+            self._index = run
+            self.simulation = shared.begin(run, positions)
         else:
-            self.shared, self._rows = None, slice(n)
             self.simulation = spec.simulation(Learner.of(task))
-        self.working = self.simulation.working[self._rows]
+        self.working = self.simulation.working[self._index]
         self.cost, self._cost = cost, TimeVaryingCost(cost)
         self._all_count = spec.conditions is None and not environment.has_moving_obstacles
         self._counted = self._cost.find_counted_robots(0.0, self.positions, self.working)
@@ -175,7 +190,7 @@ class Episode:
     @property
     def positions(self) -> Array:
         """Centres of the robots, (n, 2) m."""
-        return self.simulation.positions[self._rows]
+        return self.simulation.positions[self._index]
 
     @property
     def time(self) -> float:
@@ -188,13 +203,26 @@ class Episode:
     def observations(self) -> Rows:
         """Return what each robot is told now, (n, size)."""
         if self.shared is not None:
-            return self.shared.rows()[self._rows]
+            return self.shared.rows()[self._index]
         return self.task.observation.rows(self.simulation.observe(), self.team, self._scans)
+
+    def observe(self) -> Observations:
+        """Return what the robots of this episode know now."""
+        if isinstance(self.simulation, SimulationBatch):
+            assert isinstance(self._index, int)
+            return self.simulation.observe_run(self._index)
+        return self.simulation.observe()
+
+    def snapshot(self) -> Snapshot:
+        """Return the present step of this episode, without forces."""
+        if isinstance(self.simulation, Simulation):
+            return self.simulation.observe_and_decide()
+        return Snapshot(self.observe(), Decision(np.zeros_like(self.positions)))
 
     def state(self) -> Rows:
         """Return where all are, from the middle in diagonals, and how fast, (4 n,) from -1 to 1."""
         where = from_middle(self.positions, self.environment.region)
-        speed = self.simulation.velocities[self._rows] / self.team.max_speed[:, None]
+        speed = self.simulation.velocities[self._index] / self.team.max_speed[:, None]
         rows: Rows = np.clip(np.column_stack([where, speed]), -1.0, 1.0).astype(np.float32)
         return rows.ravel()
 
@@ -204,9 +232,9 @@ class Episode:
 
     def advance(self, actions: Array, *, last: bool = False) -> Outcome:
         """Hold actions, (n, 2) N or m/s, for one decision; the last one is rewarded in any case."""
-        keep = self._moments if self.task.recording else None
-        contact = held(self.task, self.simulation, checked_actions(actions, len(self.team)), keep)
-        self.working = self.simulation.working[self._rows]
+        moments = self._moments if self.task.recording else None
+        contact = held(self.task, self.simulation, checked_actions(actions, len(self.team)), moments)
+        self.working = self.simulation.working[self._index]
         self._scans = self.simulation.observe().scans
         return self.moved(contact, last or self.due())
 
@@ -249,40 +277,65 @@ class Episode:
 
     def record(self) -> Record:
         """Return the episode so far as a record, without forces at its end; the task says `recording`."""
-        if not self.task.recording:
+        if not self.task.recording or isinstance(self.simulation, SimulationBatch):
             raise ParameterError("record: a task with recording=True was wanted")
         recorder = self._spec.recorder(self.simulation.controller)
-        for moment in (*self._moments, self.simulation.snapshot):
+        for moment in (*self._moments, self.snapshot()):
             recorder.add(moment)
         return recorder.record(self.simulation.joined)
 
 
-def held(task: CoverageTask, simulation: Simulation, actions: Array, moments: list[Snapshot] | None) -> Array:
-    """Hold actions, (n, 2) N or m/s, for the time of one decision; return the time in contact, (n,) s."""
-    contact = np.zeros(len(actions))
+def held(
+    task: CoverageTask,
+    simulation: Simulation | SimulationBatch,
+    actions: Array,
+    moments: list[Snapshot] | None = None,
+) -> Array:
+    """Hold actions for the time of one decision.
+
+    Parameters
+    ----------
+    task : CoverageTask
+    simulation : Simulation or SimulationBatch
+    actions : (n, 2) or (runs, n, 2) array, N or m/s
+    moments : list of Snapshot, or None
+        Where to append the snapshots of the steps of a single simulation.
+
+    Returns
+    -------
+    (n,) or (runs, n) array, s
+        Time in contact.
+    """
+    contact = np.zeros(actions.shape[:-1])
     for _ in range(task.repeat):
         forces = tasks.driving_forces(task.action, actions, simulation.velocities, simulation.team)
-        forces = np.where(simulation.working[:, None], forces, 0.0)
-        if moments is not None:
-            moments.append(replace(simulation.snapshot, decision=Decision(forces)))
+        forces = np.where(simulation.working[..., None], forces, 0.0)
+        if moments is not None and isinstance(simulation, Simulation):
+            moments.append(replace(simulation.observe_and_decide(), decision=Decision(forces)))
         simulation.step(forces=forces)
-        contact += task.dt * _touching(simulation, task.robots)
+        contact += task.dt * _find_touching(simulation)
     return contact
 
 
-def _touching(simulation: Simulation, each: int) -> BoolArray:
-    """Return which robots that work touch a wall or another robot now, (n,); there are `each` in a run."""
-    positions, works, radius = simulation.positions, simulation.working, simulation.team.radius
-    touching = works & ~np.isnan(simulation.sensor.find_nearest_points(positions, radius + TOUCHING)[:, 0])
-    reach, run = 2.0 * float(radius.max()) + TOUCHING, np.arange(len(positions)) // each
-    # nobody is near those of other runs
-    apart = positions + (2.0 * (simulation.environment.region.diameter + reach) * run)[:, None]
-    first, second, _ = find_close_pairs(apart, 1.001 * reach)
-    if len(first):
+def _find_touching(simulation: Simulation | SimulationBatch) -> BoolArray:
+    """Return which working robots touch a wall or another robot now, (n,) or (runs, n)."""
+    shape = simulation.working.shape
+    robots = len(simulation.team)
+    positions = simulation.positions.reshape(-1, 2)
+    working = simulation.working.ravel()
+    radius = np.broadcast_to(simulation.team.radius, shape).ravel()
+    nearest = simulation.sensor.find_nearest_points(positions, radius + TOUCHING)
+    touching = working & ~np.isnan(nearest[:, 0])
+    reach = 2.0 * float(radius.max()) + TOUCHING
+    # Robots of different runs are moved far apart, so that only pairs of one run are close.
+    run = np.arange(len(positions)) // robots
+    moved_apart = positions + (2.0 * (simulation.environment.region.diameter + reach) * run)[:, None]
+    first, second, _ = find_close_pairs(moved_apart, 1.001 * reach)
+    if len(first) > 0:
         x, y = (positions[first] - positions[second]).T
-        met = np.sqrt(x * x + y * y) <= radius[first] + radius[second] + TOUCHING
-        touching[first[met & works[first] & works[second]]] = True
-    return touching
+        is_contact = np.sqrt(x * x + y * y) <= radius[first] + radius[second] + TOUCHING
+        touching[first[is_contact & working[first] & working[second]]] = True
+    return touching.reshape(shape)
 
 
 def checked_actions(actions: Any, count: int) -> Array:
@@ -373,7 +426,7 @@ class EpisodeEnv:
         ways["trail_time"] = np.arange(float(len(trail))) * episode.task.period
         label = f"action {episode.cycle} of {episode.task.cycles}"
         cost = f"mean distance {episode.result.mean_distance:.3f} m"
-        scene = Scene.of(*drawn, episode.simulation.snapshot, **ways, label=label, cost=cost)
+        scene = Scene.of(*drawn, episode.snapshot(), **ways, label=label, cost=cost)
         return self._painter, scene
 
     def _show(self) -> None:

@@ -150,7 +150,7 @@ class ControllerPolicy:
             self._law = informed(self.controller, episode.environment)
             self._memory = self._law.begin(episode.environment.region, episode.team)
         if self._asked_at != episode.cycle:
-            seen = replace(episode.simulation.snapshot.seen, scans=self._scanned(episode))
+            seen = replace(episode.observe(), scans=self._scanned(episode))
             decision = self._law.decide(seen, self._memory)
             self._memory, self._asked_at = decision.memory, episode.cycle
             self._actions = actions_of(episode.task.action, decision.forces, seen.velocities, episode.team)
@@ -165,5 +165,5 @@ class ControllerPolicy:
         if number == self._scan_number:
             return None
         self._scan_number, simulation = number, episode.simulation
-        scans = simulation.sensor.scan(simulation.positions, scanning.rays, episode.team.sensing_range)
+        scans = simulation.sensor.scan(episode.positions, scanning.rays, episode.team.sensing_range)
         return Scans(*scans)

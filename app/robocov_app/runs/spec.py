@@ -12,7 +12,7 @@ from robocov.controllers.gains import Value
 from robocov.controllers.user_modules import Source, provided
 from robocov.environment import Environment
 from robocov.record import Record, Recorder
-from robocov.simulation import DEFAULT_DT, Simulation, check_joins
+from robocov.simulation import DEFAULT_DT, Simulation, TeamState, check_joins
 from robocov.team import Team
 
 MOST_ROWS = 2e7  # largest record, in moments times robots: about 2 GB
@@ -66,12 +66,32 @@ class RunSpec:
     def simulation(
         self, controller: Controller | None = None, *, steps: int = 0, resumed: bool = False
     ) -> Simulation:
-        """Return the run at its beginning, or `resumed` after some steps; by default under its controller."""
-        names = ("velocities", "steering", "conditions")
-        state: dict[str, Any] = {name: getattr(self, name) for name in names}
-        team = self.starts, self.team, self.dt
-        law = controller or self.made_controller()
-        return Simulation(self.environment, law, *team, steps=steps, resumed=resumed, **state)
+        """Build the simulation of the run.
+
+        Parameters
+        ----------
+        controller : Controller or None
+            By default the run's own.
+        steps : int
+            Number of control steps taken before.
+        resumed : bool
+            Whether a simulation computed the positions and velocities, see `TeamState.is_computed`.
+        """
+        state = TeamState(
+            positions=self.starts,
+            velocities=self.velocities,
+            steering=self.steering,
+            steps=steps,
+            is_computed=resumed,
+        )
+        return Simulation(
+            self.environment,
+            controller or self.made_controller(),
+            state,
+            self.team,
+            self.dt,
+            conditions=self.conditions,
+        )
 
     def recorder(self, controller: Controller, name: str | None = None) -> Recorder:
         """Return what makes a record of the run; `name` is that of a controller that goes by another one."""

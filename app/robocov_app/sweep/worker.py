@@ -143,7 +143,7 @@ def measured(task: Task, environment: Environment) -> tuple[Record, dict[str, fl
             return False
 
         record = spec.record(simulation, watch=watch)
-    return record, {"deciding_s": simulation.deciding, "told_bytes": telling.bytes}
+    return record, {"deciding_s": simulation.decision_time, "told_bytes": telling.bytes}
 
 
 class Telling:

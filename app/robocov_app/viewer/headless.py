@@ -76,7 +76,7 @@ def parts_of(document: Document, node: Node, end: int) -> list[Part]:
         part = parts[-1]
         part.ends = run.step
         for pane in run.panes:
-            part.recorders[pane.number].add(pane.simulation.snapshot)
+            part.recorders[pane.number].add(pane.simulation.observe_and_decide())
         held = {run.hand[0]} if run.hand is not None else set()
         moved = {each.robot for each in here.changes if each.step == run.step and isinstance(each, Place)}
         part.placed += [(run.step, robot) for robot in sorted(moved)]
@@ -248,7 +248,8 @@ def _scene(pane: Pane, histories: list[History], name: str) -> Scene:
     for begin, _, history in (each for each in histories if each[1] == name):
         known += history.mean_distance[begin + history.time <= pane.time + 1e-9].tolist()
     cost = cost_label(mean_label(pane.setup.environment), known[-1], None) if known else ""
-    return pane.scene(pane.setup, pane.simulation.snapshot, pane.trail.until(pane.time), cost=cost)
+    snapshot = pane.simulation.observe_and_decide()
+    return pane.scene(pane.setup, snapshot, pane.trail.until(pane.time), cost=cost)
 
 
 def _file_name(words: str) -> str:

@@ -13,7 +13,7 @@ from robocov.controllers import Lloyd, Rapf
 from robocov.controllers.tangentbug import TangentBug
 from robocov.environment import CircleObstacle, Environment
 from robocov.observation import Decision
-from robocov.simulation import Simulation
+from robocov.simulation import Simulation, TeamState
 from robocov.team import Team
 
 HALL = Environment("hall", ((0, 0), (10, 0), (10, 8), (0, 8)), (CircleObstacle((5.0, 4.0), 1.0),))
@@ -32,15 +32,15 @@ BAD = Conditions(
 )
 
 
-def simulation(conditions: Conditions | None, reach: float = np.inf, time: float = 0.0) -> Simulation:
+def simulation(conditions: Conditions | None, reach: float = np.inf, steps: int = 0) -> Simulation:
     team = Team.homogeneous(len(STARTS), communication_range=reach)
-    return Simulation(HALL, Rapf(), STARTS, team, 0.05, conditions=conditions, time=time)
+    return Simulation(HALL, Rapf(), TeamState(STARTS, steps=steps), team, 0.05, conditions=conditions)
 
 
 def bits(one: Simulation, steps: int) -> list[bytes]:
     found = []
     for _ in range(steps):
-        seen = one.snapshot.seen
+        seen = one.observe_and_decide().seen
         heard = b"" if seen.reported_positions is None else seen.reported_positions.tobytes()
         found.append(
             one.positions.tobytes()
@@ -74,7 +74,7 @@ def test_a_copy_goes_on_identically(steps: int, seed: int) -> None:
     one = simulation(Conditions(**{**BAD.__dict__, "seed": seed}))
     for _ in range(steps):
         one.step()
-    _ = one.snapshot  # a copy in the midst of a step
+    _ = one.observe_and_decide()  # a copy in the midst of a step
     twin = one.copy()
     expected = bits(one, 15)
     assert bits(twin, 15) == expected
@@ -85,11 +85,11 @@ def test_rewinding_gives_the_same_again() -> None:
     one = simulation(BAD)
     for _ in range(17):
         one.step()
-    where, how_fast, memory, inbox, when = one.positions, one.velocities, one.memory, one.inbox, one.time
+    state = TeamState(one.positions, one.velocities, steps=17, is_computed=True)
+    memory = one.memory
+    inbox = one.inbox
     expected = bits(one, 12)
-    again = Simulation(
-        HALL, Rapf(), where, one.team, 0.05, velocities=how_fast, time=when, conditions=BAD
-    ).remembering(memory, inbox)
+    again = Simulation(HALL, Rapf(), state, one.team, 0.05, conditions=BAD).with_memory(memory, inbox)
     assert bits(again, 12) == expected
 
 
@@ -187,9 +187,9 @@ def test_the_record_holds_the_truth() -> None:
     record = one.run(0.5)
     assert (np.abs(np.diff(record.positions, axis=0)) < 0.06).all()  # 1 m/s, and no jumps
     assert (record.positions[0] == STARTS).all()
-    assert one.snapshot.truth is not None
-    assert (one.snapshot.positions == one.positions).all()
-    assert not np.array_equal(one.snapshot.seen.positions, one.positions)
+    assert one.observe_and_decide().truth is not None
+    assert (one.observe_and_decide().positions == one.positions).all()
+    assert not np.array_equal(one.observe_and_decide().seen.positions, one.positions)
 
 
 def test_what_is_told_is_what_is_believed() -> None:
@@ -243,5 +243,5 @@ def test_a_change_in_the_window_keeps_the_messages() -> None:
     one = simulation(BAD)
     for _ in range(8):
         one.step()
-    assert one.changed(controller=Lloyd()).inbox is one.inbox
-    assert one.changed(conditions=Conditions(loss=0.1)).inbox is not one.inbox
+    assert one.with_changes(controller=Lloyd()).inbox is one.inbox
+    assert one.with_changes(conditions=Conditions(loss=0.1)).inbox is not one.inbox

@@ -113,7 +113,7 @@ def test_what_was_remembered_stays_as_it_was() -> None:
     assert memory.returns is not None
     legs, returns = memory.legs.copy(), memory.returns.copy()
     states = [each.state.copy() for each in memory.maps]
-    again = some.remembering(memory)
+    again = some.with_memory(memory)
     for _ in range(40):
         some.step()
         again.step()
@@ -146,7 +146,7 @@ def test_a_robot_alone_and_a_crowd() -> None:
     alone = simulation(n=1)
     for _ in range(300):
         alone.step()
-    assert np.isfinite(alone.snapshot.decision.forces).all()
+    assert np.isfinite(alone.observe_and_decide().decision.forces).all()
     assert np.hypot(*(alone.positions[0] - CORNER[0])) > 1.0
     empty = Environment("empty", SQUARE)
     x, y = np.meshgrid(np.linspace(0.6, 2.4, 4), np.linspace(0.6, 2.4, 4))
@@ -227,7 +227,7 @@ def test_a_team_that_rests_moves_again_when_a_door_opens(kind: type[Atlas]) -> N
     while some.time < 100.0:
         some.step()
     assert np.abs(some.positions - before).max() < 1e-3
-    some = some.changed(environment=replace(shut, name="open", obstacles=halves))
+    some = some.with_changes(environment=replace(shut, name="open", obstacles=halves))
     while some.time < 140.0:
         some.step()
     # about as good as two in each room
@@ -245,7 +245,7 @@ def test_robots_that_meet_pass_on_the_left() -> None:
         memory = some.memory
         states = tuple(replace(state, due=math.inf, planned=state.known) for state in memory.states)
         legs = np.zeros(2, dtype=np.intp)
-        some = some.remembering(replace(memory, states=states, routes=tuple(goals), legs=legs))
+        some = some.with_memory(replace(memory, states=states, routes=tuple(goals), legs=legs))
         some.step()
         between = some.positions[0] - some.positions[1]
         assert np.hypot(*between) > 0.23
@@ -328,7 +328,7 @@ def test_who_is_not_where_it_was_presumed_to_be_is_forgotten() -> None:
     dies = Conditions(failures=(Failure(2, 20.0),))
     near = some.positions.copy()
     near[0, 0] += 0.8 * (near[1, 0] - near[0, 0])
-    some = some.changed(positions=near, conditions=dies).remembering(some.memory)
+    some = some.with_changes(positions=near, conditions=dies).with_memory(some.memory)
     some.step()
     assert some.memory.states[0].others.robots.tolist() == [1], "it may be late"
     while some.time < 50.0:

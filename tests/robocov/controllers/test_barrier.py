@@ -130,7 +130,7 @@ def least_gaps(simulation: Simulation, seconds: float) -> tuple[float, float]:
     both = np.add.outer(radius, radius) + np.diag(np.full(len(radius), -np.inf))
     for _ in range(round(seconds / simulation.dt)):
         simulation.step()
-        places, points = simulation.positions, simulation.snapshot.seen.obstacle_points
+        places, points = simulation.positions, simulation.observe_and_decide().seen.obstacle_points
         robots = min(robots, float((np.hypot(*(places[:, None] - places).T) - both).min()))
         walls = min(walls, float(np.nanmin(np.hypot(*(places - points).T) - radius, initial=np.inf)))
     return robots, walls

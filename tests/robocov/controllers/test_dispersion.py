@@ -12,7 +12,7 @@ from robocov.mapfile import load_map
 from robocov.metrics import settled_at
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
-from robocov.simulation import Simulation
+from robocov.simulation import Simulation, TeamState
 from robocov.team import Team
 
 HALL = Environment("hall", ((0, 0), (60, 0), (60, 60), (0, 60)))
@@ -104,7 +104,7 @@ def test_nobody_near_and_nothing_to_do() -> None:
 @pytest.mark.parametrize("explore", [0.0, 0.4])
 def test_a_robot_that_is_alone_goes_on_if_it_is_to_explore(explore: float) -> None:
     law = Dispersion(explore_speed=explore)
-    simulation = Simulation(HALL, law, [[20, 20]], velocities=np.array([[0.3, 0.4]]))
+    simulation = Simulation(HALL, law, TeamState([[20, 20]], velocities=[[0.3, 0.4]]))
     for _ in range(120):
         simulation.step()
     np.testing.assert_allclose(simulation.velocities[0], explore * np.array([0.6, 0.8]), atol=1e-3)
@@ -118,7 +118,7 @@ def test_obstacles_come_first(seed: int) -> None:
     least = np.inf
     for _ in range(60 * 10):
         simulation.step()
-        seen = simulation.snapshot.seen
+        seen = simulation.observe_and_decide().seen
         least = min(least, float(np.nanmin(np.hypot(*(seen.positions - seen.obstacle_points).T))))
     assert least > 0.1
 

@@ -27,7 +27,7 @@ from robocov.mapfile import load_map
 from robocov.observation import Decision, Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.optimum import find_nearest_inside
-from robocov.simulation import Simulation
+from robocov.simulation import Simulation, TeamState
 from robocov.team import Team
 
 SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
@@ -135,15 +135,14 @@ def test_a_simulation_tells_it_the_map_and_keeps_the_law_that_it_was_given() -> 
     simulation.step()
     assert simulation.controller is law
     # changed under way, it goes by the new map
-    opened = simulation.changed(environment=SQUARE)
-    fresh = Simulation(
-        SQUARE, law, simulation.positions, velocities=simulation.velocities, time=simulation.time
-    )
+    opened = simulation.with_changes(environment=SQUARE)
+    fresh = Simulation(SQUARE, law, TeamState(simulation.positions, simulation.velocities, steps=1))
     for _ in range(15):
         opened.step()
         fresh.step()
-    assert opened.snapshot.decision.goals is not None
-    np.testing.assert_allclose(opened.snapshot.decision.goals, fresh.snapshot.decision.goals, atol=0.05)
+    goals = opened.observe_and_decide().decision.goals
+    assert goals is not None
+    np.testing.assert_allclose(goals, fresh.observe_and_decide().decision.goals, atol=0.05)
 
 
 def test_what_each_law_goes_by() -> None:

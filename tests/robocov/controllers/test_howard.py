@@ -10,7 +10,7 @@ from robocov.controllers.driving import last_returns, with_nearest
 from robocov.environment import Environment
 from robocov.observation import Observations, Scans, compute_headings
 from robocov.observation.neighbours import Neighbours
-from robocov.simulation import Simulation
+from robocov.simulation import Simulation, TeamState
 from robocov.team import Team
 
 SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
@@ -76,8 +76,8 @@ def test_a_wall_repels_the_same_by_any_number_of_rays(rays: int) -> None:
 def test_all_of_a_corner_repels_not_only_its_closest_point() -> None:
     law, team = Howard(), Team.homogeneous(1)
     simulation = Simulation(SQUARE, law, [[1.0, 1.3]], team)
-    force = simulation.snapshot.decision.forces[0]
-    assert simulation.snapshot.seen.scans is not None
+    force = simulation.observe_and_decide().decision.forces[0]
+    assert simulation.observe_and_decide().seen.scans is not None
     assert (force > 0.05).all()
 
 
@@ -86,7 +86,7 @@ def test_friction_takes_the_place_of_the_worlds_viscosity() -> None:
     hall = Environment("hall", ((0, 0), (200, 0), (200, 200), (0, 200)))
     law = Howard(k_obs=0.0, friction=0.5)
     team = Team.homogeneous(1, sensing_range=0.5)
-    simulation = Simulation(hall, law, [[100, 100]], team, velocities=np.array([[0.9, 0.0]]))
+    simulation = Simulation(hall, law, TeamState([[100, 100]], velocities=[[0.9, 0.0]]), team)
     for _ in range(120):
         simulation.step()
     assert simulation.velocities[0, 0] == pytest.approx(0.9 * np.exp(-0.5 * 2.0), rel=0.02)

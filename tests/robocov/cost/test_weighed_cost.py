@@ -116,9 +116,9 @@ def test_a_run_by_another_density_from_now_on():
     simulation = Simulation(square, Rapf(), ROBOTS)
     for _ in range(30):
         simulation.step()
-    twin, anew = simulation.with_density(heavy), simulation.changed(environment=heavy)
+    twin, anew = simulation.with_density(heavy), simulation.with_changes(environment=heavy)
     assert simulation.environment is square and twin.environment is heavy
-    assert twin.snapshot.seen.density is heavy.density
+    assert twin.observe_and_decide().seen.density is heavy.density
     for _ in range(30):
         twin.step()
         anew.step()

@@ -76,7 +76,7 @@ def test_a_snapshot_of_the_record_is_the_one_of_the_run(record: Record, cluttere
     )
     for _ in range(17):
         simulation.step()
-    live, saved = simulation.snapshot, record.snapshot(17)
+    live, saved = simulation.observe_and_decide(), record.snapshot(17)
     assert live.time == saved.time
     np.testing.assert_array_equal(live.positions, saved.positions)
     np.testing.assert_array_equal(live.decision.forces, saved.decision.forces)
@@ -357,12 +357,12 @@ class TestReusedArrays:
     def test_a_copy_goes_on_the_same_also_after_the_decision(self, empty: Environment) -> None:
         simulation = Simulation(empty, Reusing(), empty.start().sample(2), dt=0.02)
         simulation.step()
-        assert simulation.snapshot.decision.forces.max() == pytest.approx(0.02)
-        for twin in (simulation.copy(), simulation.changed(), simulation.remembering(simulation.memory)):
+        assert simulation.observe_and_decide().decision.forces.max() == pytest.approx(0.02)
+        for twin in (simulation.copy(), simulation.with_changes(), simulation.with_memory(simulation.memory)):
             twin.step()
-            assert twin.snapshot.decision.forces.max() == pytest.approx(0.03)
+            assert twin.observe_and_decide().decision.forces.max() == pytest.approx(0.03)
         simulation.step()
-        assert simulation.snapshot.decision.forces.max() == pytest.approx(0.03)
+        assert simulation.observe_and_decide().decision.forces.max() == pytest.approx(0.03)
 
 
 def test_a_file_is_there_whole_or_not_at_all(tmp_path: Path) -> None:

@@ -264,7 +264,7 @@ def test_thousands_of_steps_have_the_cells_of_the_first(controller: Controller) 
     for step in range(1500):
         simulation.step()
         if step % 10 == 0:
-            cells = simulation.snapshot.decision.cells
+            cells = simulation.observe_and_decide().decision.cells
             assert isinstance(cells, VoronoiPartition)
             assert_same_cells(cells, partition(simulation.positions, room.region), room.region)
             assert cells.triangulation is not None

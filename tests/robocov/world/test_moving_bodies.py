@@ -13,7 +13,7 @@ from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle, WallObstacle
 from robocov.errors import StartError
 from robocov.metrics import MOVING_RATE, clearances, cost_history
-from robocov.simulation import Simulation
+from robocov.simulation import Simulation, TeamState
 
 
 def box(x: float, y: float, width: float, height: float, path: ObstaclePath | None = None) -> PolygonObstacle:
@@ -127,9 +127,9 @@ def test_copies_share_no_time() -> None:
 
 def test_a_simulation_that_begins_later_has_the_obstacles_where_they_are_then() -> None:
     with pytest.raises(StartError, match=r"starts\[0\] = \[4, 1\] is inside an obstacle"):
-        Simulation(HALL, Rapf(), [[4.0, 1.0]], time=4.0)
-    Simulation(HALL, Rapf(), [[4.0, 1.0]], time=0.0)
-    Simulation(HALL, Rapf(), [[2.0, 1.0]], time=4.0)
+        Simulation(HALL, Rapf(), TeamState([[4.0, 1.0]], steps=240))
+    Simulation(HALL, Rapf(), TeamState([[4.0, 1.0]], steps=0))
+    Simulation(HALL, Rapf(), TeamState([[2.0, 1.0]], steps=240))
 
 
 def test_cost_is_of_the_map_as_it_is() -> None:

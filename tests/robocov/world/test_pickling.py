@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ import pytest
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Rapf
 from robocov.environment import Environment, ObstaclePath, PolygonObstacle
-from robocov.simulation import Simulation
+from robocov.simulation import Simulation, SimulationBatch
 from robocov.team import Team
 
 WALL = PolygonObstacle(((4, 3), (6, 3), (6, 5), (4, 5)))
@@ -25,19 +26,15 @@ MOVING = Environment("moving", HALL.boundary, (WALL, PolygonObstacle(((1, 6), (2
 STARTS = np.array([[1.0, 1.0], [1.21, 1.0], [3.8, 4.0], [3.0, 2.5]])
 
 
-def pickled(simulation: Simulation) -> Simulation:
+def pickled(simulation: Any) -> Any:
     return pickle.loads(pickle.dumps(simulation))
 
 
-WAYS: dict[str, Callable[[Simulation], Simulation]] = {"pickle": pickled, "deepcopy": copy.deepcopy}
+WAYS: dict[str, Callable[[Any], Any]] = {"pickle": pickled, "deepcopy": copy.deepcopy}
 
 
 def ideal() -> Simulation:
     return Simulation(HALL, Rapf(), STARTS)
-
-
-def several() -> Simulation:
-    return Simulation(HALL, Rapf(), np.concatenate([STARTS, STARTS - 0.3]), runs=2)
 
 
 def moving() -> Simulation:
@@ -54,7 +51,7 @@ def changing() -> Simulation:
     return Simulation(MOVING, Rapf(), STARTS, conditions=conditions)
 
 
-def steps_of(simulation: Simulation, count: int) -> bytes:
+def steps_of(simulation: Simulation | SimulationBatch, count: int) -> bytes:
     found = []
     for _ in range(count):
         simulation.step()
@@ -63,11 +60,11 @@ def steps_of(simulation: Simulation, count: int) -> bytes:
 
 
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("make", [ideal, several, moving, unicycles, changing])
+@pytest.mark.parametrize("make", [ideal, moving, unicycles, changing])
 def test_it_goes_on_bit_for_bit_and_by_itself(make: Callable[[], Simulation], way: str) -> None:
     simulation = make()
     steps_of(simulation, 20)
-    _ = simulation.snapshot
+    _ = simulation.observe_and_decide()
     twin = WAYS[way](simulation)
     assert twin.time == simulation.time and twin.joined == simulation.joined
     for array in (twin.positions, twin.velocities, twin.team.radius):
@@ -75,6 +72,16 @@ def test_it_goes_on_bit_for_bit_and_by_itself(make: Callable[[], Simulation], wa
     expected = steps_of(simulation, 25)
     assert steps_of(twin, 25) == expected
     assert twin.joined == simulation.joined
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_batch_continues_bit_for_bit(way: str) -> None:
+    batch = SimulationBatch(HALL, Rapf(), [STARTS, STARTS - 0.3])
+    steps_of(batch, 20)
+    batch.observe()
+    twin = WAYS[way](batch)
+    assert twin.time == batch.time
+    assert steps_of(twin, 25) == steps_of(batch, 25)
 
 
 @pytest.mark.parametrize("name", sorted(CONTROLLERS))

@@ -15,7 +15,7 @@ from robocov.controllers import Atlas, Barrier, Individually, OwnView, Rapf
 from robocov.environment import Environment
 from robocov.errors import ParameterError, StartError
 from robocov.mapfile import load_map
-from robocov.simulation import Simulation
+from robocov.simulation import Simulation, TeamState
 from robocov.team import Team
 from robocov.world import World
 from robocov.world.obstacle_pieces import build_solid_pieces
@@ -156,18 +156,16 @@ def test_a_copy_goes_on_bit_for_bit() -> None:
     first = Simulation(environment, Rapf(), starts, team)
     first.run(2.0)
     twin = first.copy()
-    again = Simulation(
-        environment, Rapf(), first.positions, team, velocities=first.velocities, steering=first.steering,
-        steps=120, resumed=True,
-    )  # fmt: skip
+    state = TeamState(first.positions, first.velocities, first.steering, steps=120, is_computed=True)
+    again = Simulation(environment, Rapf(), state, team)
     for each in (first, twin, again):
         each.run(2.0)
     assert first.positions.tobytes() == twin.positions.tobytes() == again.positions.tobytes()
     assert first.steering is not None and again.steering is not None
     assert first.steering.tobytes() == again.steering.tobytes()
     # another team: who moves faces where it moves
-    moving = Simulation(environment, Rapf(), starts, velocities=np.array([[0.0, 0.1]] * 4))
-    turned = moving.changed(team=team).steering
+    moving = Simulation(environment, Rapf(), TeamState(starts, np.array([[0.0, 0.1]] * 4)))
+    turned = moving.with_changes(team=team).steering
     assert turned is not None and turned.tolist() == [[np.pi / 2, 0.0]] * 4
 
 
@@ -196,8 +194,8 @@ def test_what_is_no_unicycle_is_told(given_team: dict[str, object], message: str
 
 
 def test_steering_has_to_be_finite(empty: Environment) -> None:
-    with pytest.raises(StartError, match=r"steering: .* but finite \[heading, turning rate\]"):
-        Simulation(empty, Rapf(), [[2.0, 2.0]], steering=np.array([[np.nan, 0.0]]))
+    with pytest.raises(StartError, match=r"steering: expected finite \[heading, turning rate\]"):
+        TeamState(np.array([[2.0, 2.0]]), steering=np.array([[np.nan, 0.0]]))
 
 
 class Counting:
@@ -218,7 +216,7 @@ def test_a_law_for_one_robot_remembers(empty: Environment) -> None:
     assert isinstance(run.controller, Individually)
     for _ in range(12):
         run.step()
-        _ = run.snapshot, run.snapshot
+        _ = run.observe_and_decide(), run.observe_and_decide()
     assert [memory[-1] for memory in run.memory.own] == [12, 14]
     twin = run.copy()
     run.step()

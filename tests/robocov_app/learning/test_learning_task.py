@@ -34,7 +34,7 @@ def test_the_team_goes_before_the_number() -> None:
         ({"reward_every": 0}, "reward_every: 0, but a whole number"),
         ({"duration": 0.05}, r"duration: 0\.05 s, but at least the time of one action, 0\.1 s"),
         ({"duration": float("nan")}, "duration: nan s"),
-        ({"dt": 2.0}, r"dt: 2\.0 s"),
+        ({"dt": 2.0}, r"dt: expected a number .*, got 2\.0"),
         ({"action": "push"}, "action: unknown kind of action 'push'"),
         ({"reward": "none"}, "reward: unknown kind of reward 'none'"),
         ({"action": "velocity", "dt": 0.2}, r"dt: 0\.2 s, but at most 0\.1 s was wanted"),

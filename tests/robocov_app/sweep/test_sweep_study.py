@@ -106,7 +106,7 @@ WRONG = [
         {"duration": 1e6, "dt": 1e-3},
         "duration: 1e+06 s of 2 robots at 0.001 s are 2e+09 rows of a record, but at most",
     ),
-    ({"dt": 0.0}, "dt: 0.0 s, but a number from 0.0001 to 1 s was wanted"),
+    ({"dt": 0.0}, "dt: expected a number from 0.0001 to 1 s, got 0.0"),
     ({"lattice": 1}, "lattice: 1, but a whole number from 2 to 2048 was wanted"),
     ({"cost_hz": -1}, "cost_hz: -1, but a number from 0 to 10000 was wanted"),
     ({"record_hz": "often"}, "record_hz: 'often', but a number"),

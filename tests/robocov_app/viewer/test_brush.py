@@ -76,7 +76,7 @@ def test_robots_know_of_it_while_it_is_painted():
         brush.move(session, (5.0 - 0.02 * k, 3.0))
         stepped(session, 1)
         for pane in session.panes:
-            assert pane.simulation.snapshot.seen.density is session.environment.density
+            assert pane.simulation.observe_and_decide().seen.density is session.environment.density
     assert session.environment.density is not None
     assert session.head.parent is not None
     assert brush.painting

@@ -59,7 +59,7 @@ def states(session: Session, steps: int) -> list[bytes]:
     for _ in range(steps):
         session.step()
         for pane in session.panes:
-            seen = pane.simulation.snapshot.seen
+            seen = pane.simulation.observe_and_decide().seen
             heard = b"" if seen.reported_positions is None else seen.reported_positions.tobytes()
             found.append(pane.simulation.positions.tobytes() + seen.positions.tobytes() + heard)
     return found
@@ -92,7 +92,7 @@ def test_the_past_is_explained_as_it_was() -> None:
     pane = session.panes[0]
     then = []
     for _ in range(12):
-        then.append(pane.simulation.snapshot)
+        then.append(pane.simulation.observe_and_decide())
         session.step()
     session.look_at(8 * 0.05)
     past = session.snapshot(pane)
@@ -152,7 +152,7 @@ def test_what_the_selected_robot_believes_is_drawn() -> None:
     session = begun()
     states(session, 12)
     pane = session.panes[0]
-    scene = Scene.of(HALL, pane.setup.team, pane.simulation.snapshot)
+    scene = Scene.of(HALL, pane.setup.team, pane.simulation.observe_and_decide())
     painter = Painter(HALL, (400, 300), LIGHT, standard_layers(), 1.0)
     # what is drawn of all is what is: cells that neither overlap nor leave gaps
     assert scene.cells is not None

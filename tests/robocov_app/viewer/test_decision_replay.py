@@ -57,7 +57,7 @@ def test_the_past_is_explained_as_it_was(law):
     pane = session.panes[0]
     seen = []
     for _ in range(20):
-        seen.append(pane.simulation.snapshot)
+        seen.append(pane.simulation.observe_and_decide())
         session.step()
     for k in (13, 2, 19, 0):
         told = replayed_snapshot(session.history[k].states[0], session.history.time(k))

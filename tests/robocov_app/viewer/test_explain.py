@@ -308,7 +308,7 @@ def test_terms_of_users_may_be_anything():
     team = Team.homogeneous(1)
     simulation = Simulation(SQUARE, Rapf(), [[4.0, 4.0]], team)
     decision = Decision(np.array([[1.0, 0.0]]), None, terms)
-    report = explain(replace(simulation.snapshot, decision=decision), team, SQUARE, 0)
+    report = explain(replace(simulation.observe_and_decide(), decision=decision), team, SQUARE, 0)
     assert [line.kind for line in report.lines if line.kind] == [REST, "viscosity", "resultant"]
     sums_up(report)
 

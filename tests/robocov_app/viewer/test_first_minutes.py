@@ -78,7 +78,7 @@ def test_a_curve_begins_at_the_beginning_also_if_nobody_answered_then(tmp_path: 
 def test_the_cursor_tells_of_the_pane_below_it_and_of_the_map_as_it_is(tmp_path: Path) -> None:
     with opened(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
         other = driver.session.panes[1]
-        other.simulation = other.simulation.changed(positions=other.simulation.positions + [0.3, 0.0])
+        other.simulation = other.simulation.with_changes(positions=other.simulation.positions + [0.3, 0.0])
         driver.viewer.costs.forget()
         said = []
         for pane in (0, 1):

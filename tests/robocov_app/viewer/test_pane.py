@@ -86,14 +86,15 @@ def test_it_steps_as_the_simulation_does():
     assert pane.time == pytest.approx(0.5)
     assert pane.trail.time[-1] == pytest.approx(0.5)
     assert len(pane.trail) == 16
-    np.testing.assert_array_equal(pane.simulation.snapshot.decision.forces, twin.snapshot.decision.forces)
+    forces = pane.simulation.observe_and_decide().decision.forces
+    np.testing.assert_array_equal(forces, twin.observe_and_decide().decision.forces)
 
 
 def test_what_is_sensed_is_noted_now_and_then():
     pane = lane_of(steps=1)
     assert len(pane.sensed) == 3
     np.testing.assert_array_equal(
-        pane.sensed.until(0.0)[0], begun(THEN, PLACES, DT).snapshot.seen.obstacle_points
+        pane.sensed.until(0.0)[0], begun(THEN, PLACES, DT).observe_and_decide().seen.obstacle_points
     )
     slow = lane_of(steps=SENSED_EVERY)
     assert slow.sensed.until(1.0)[1].tolist() == [1, 2, 3]
@@ -214,8 +215,8 @@ class TestChanges:
 def test_robots_that_failed_are_sensed_as_obstacles_are():
     failed = replace(THEN, failed={8: (1.3, 1.5)})
     pane = lane_in(failed)
-    seen = pane.simulation.snapshot.seen
+    seen = pane.simulation.observe_and_decide().seen
     assert len(seen.positions) == seen.neighbours.count == 3
     away = np.hypot(*(seen.obstacle_points - (1.3, 1.5)).T)
     assert away == pytest.approx(0.1, abs=2e-3)
-    assert isinstance(pane.simulation.snapshot.decision, Decision)
+    assert isinstance(pane.simulation.observe_and_decide().decision, Decision)

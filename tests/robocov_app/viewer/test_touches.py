@@ -196,19 +196,19 @@ def test_numbers_are_not_given_twice():
 def test_who_fails_is_not_heard_but_sensed():
     session = begun(RPF, robots=3, given=np.array([[3.0, 3.0], [3.4, 3.0], [1.0, 1.0]]))
     pane = session.panes[0]
-    before = pane.simulation.snapshot
+    before = pane.simulation.observe_and_decide()
     assert before.seen.neighbours.list_neighbours(0).tolist() == [1, 2]
     session.fail_robot(2)
-    seen = pane.simulation.snapshot.seen
+    seen = pane.simulation.observe_and_decide().seen
     assert pane.numbers == (1, 3)
     assert seen.neighbours.count == 2
     assert seen.neighbours.list_neighbours(0).tolist() == [1]
     # its rim, where there was nothing nearer than a wall
     assert seen.obstacle_points[0] == pytest.approx([3.3, 3.0], abs=2e-3)
-    assert pane.simulation.snapshot.decision.terms["repulsion_obstacle"][0, 0] < 0.0
+    assert pane.simulation.observe_and_decide().decision.terms["repulsion_obstacle"][0, 0] < 0.0
     session.revive_robot(2)
     assert pane.numbers == (1, 2, 3)
-    after = pane.simulation.snapshot
+    after = pane.simulation.observe_and_decide()
     np.testing.assert_array_equal(after.seen.obstacle_points, before.seen.obstacle_points)
     np.testing.assert_array_equal(after.decision.forces, before.decision.forces)
 

@@ -61,7 +61,8 @@ class Lockstep:
 
     def advance(self) -> list[Happening]:
         for pane in self.panes:
-            _ = pane.simulation.snapshot  # a controller that fails does so before any pane has moved on
+            # A controller that fails does so before any pane has moved.
+            pane.simulation.observe_and_decide()
         for pane in self.panes:
             pane.step(self._pull(pane))
         self.step += 1

@@ -58,7 +58,7 @@ class Pane:
 
     def step(self, pushes: Array | None = None) -> None:
         if self._steps % SENSED_EVERY == 0:
-            seen = self.simulation.snapshot.seen
+            seen = self.simulation.observe_and_decide().seen
             self.sensed.add(seen.time, self.numbers, seen.obstacle_points)
         self._steps += 1
         self.simulation.step(pushes)
@@ -98,7 +98,7 @@ class Pane:
         rows = np.array([row_of.get(number, -1) for number in setup.numbers], dtype=np.intp)
         steering = None if old.steering is None else np.where(rows[:, None] < 0, 0.0, old.steering[rows])
         other: dict[str, Any] = {"controller": controller, "team": team, "steering": steering}
-        make = partial(old.changed, environment=environment, **other)
+        make = partial(old.with_changes, environment=environment, **other)
         positions = old.positions if wanted.positions is None else wanted.positions
         velocities = old.velocities if wanted.velocities is None else wanted.velocities
         try:
@@ -108,7 +108,7 @@ class Pane:
             moved = np.hypot(*(placed - positions).T) > 1e-3
             changed = make(positions=placed, velocities=np.where(moved[:, None], 0.0, velocities))
         if old.inbox is not None and setup.numbers != self.numbers:
-            changed = changed.remembering(changed.memory, old.inbox.select_robots(rows))
+            changed = changed.with_memory(changed.memory, old.inbox.select_robots(rows))
         return changed
 
     def take(self, setup: PaneSetup, simulation: Simulation) -> None:
@@ -135,4 +135,4 @@ def begun(
 def resumed(state: State, dt: float, step: int) -> Simulation:
     later: dict[str, Any] = {"steering": state.steering, "steps": step, "resumed": True}
     simulation = begun(state.setup, state.positions, dt, state.velocities, **later)
-    return simulation.remembering(simulation.memory if state.memory is None else state.memory, state.inbox)
+    return simulation.with_memory(simulation.memory if state.memory is None else state.memory, state.inbox)

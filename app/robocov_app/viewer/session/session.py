@@ -172,7 +172,7 @@ class Session:
         """Return the moment that is looked at; a controller that fails on it has decided nothing."""
         if self._cursor is None:
             with suppress(RobocovError):
-                return pane.simulation.snapshot
+                return pane.simulation.observe_and_decide()
         return replayed_snapshot(self._state(pane), self.time, self.scenario.dt)
 
     def positions(self, pane: Pane) -> Array:

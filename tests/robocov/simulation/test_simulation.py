@@ -6,7 +6,6 @@ import platform
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,18 +14,18 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import robocov as rc
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS as ALL
-from robocov.controllers import Controller, Lloyd, Rapf, Rpf, make_controller
+from robocov.controllers import Controller, Howard, Lloyd, OwnView, Rapf, Rpf, make_controller
 from robocov.cost import CoverageCost
+from robocov.density import Uniform
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle
 from robocov.errors import ParameterError, StartError
 from robocov.mapfile import load_map
 from robocov.metrics import clearances, contacts
 from robocov.observation import Decision, Observations
 from robocov.record import ARRAYS, Record
-from robocov.simulation import Simulation
+from robocov.simulation import Simulation, TeamState
 from robocov.team import Team
 
 CONTROLLERS = [Rapf(), Rapf(k_rep=1.0, k_att=3.0, attraction_limit=None), Rpf(), Lloyd()]
@@ -201,7 +200,7 @@ def test_a_controller_that_returns_nonsense_is_told_so(
         ([[1.0, 0.05]], r"starts\[0\] = \[1, 0.05\] is 0.05 m from a wall"),
         ([[1.0, 1.0], [1.1, 1.0]], r"starts\[0\] and starts\[1\] are 0.1 m apart"),
         ([[np.nan, 1.0]], r"starts\[0\]"),
-        ([1.0, 2.0], r"starts: an array of shape \(2,\)"),
+        ([1.0, 2.0], r"starts: expected an array of shape \(n, 2\) with n >= 1, got shape \(2,\)"),
     ],
 )
 def test_impossible_starts_are_refused(
@@ -238,7 +237,7 @@ def test_a_decision_must_be_one(empty: Environment) -> None:
     with pytest.raises(ParameterError, match=r"'wild': KeyError: 'late' \(test_simulation.py, line \d+\)"):
         Simulation(empty, Late(np.zeros((2, 2))), starts)
     for wrong in (Rapf, "rapf"):
-        with pytest.raises(ParameterError, match=r"but a controller, as in Rapf\(\), with a method"):
+        with pytest.raises(ParameterError, match=r"expected a controller, as in Rapf\(\), with a method"):
             Simulation(empty, wrong, starts)  # type: ignore[arg-type]
     simulation = Simulation(empty, Wild([[0, 0], [0, 0]]), starts)  # type: ignore[arg-type]
     simulation.step()
@@ -259,9 +258,9 @@ def test_a_copy_has_a_memory_of_its_own(empty: Environment) -> None:
     simulation = Simulation(empty, Counting(np.zeros((1, 2))), [[2.0, 2.0]])
     for _ in range(3):
         simulation.step()
-    assert (simulation.snapshot.decision.memory, simulation.memory) == ([4], [3])
-    assert simulation.changed(velocities=np.zeros((1, 2))).memory == [3]
-    assert simulation.changed(controller=Counting(np.zeros((1, 2)))).memory == [0]
+    assert (simulation.observe_and_decide().decision.memory, simulation.memory) == ([4], [3])
+    assert simulation.with_changes(velocities=np.zeros((1, 2))).memory == [3]
+    assert simulation.with_changes(controller=Counting(np.zeros((1, 2)))).memory == [0]
     twin = simulation.copy()
     for _ in range(5):
         simulation.step()
@@ -270,8 +269,84 @@ def test_a_copy_has_a_memory_of_its_own(empty: Environment) -> None:
     np.testing.assert_array_equal(twin.positions, simulation.positions)
 
 
+class OwnCounter:
+    """Counts its steps in a list that it changes in place, and has no method ``begin``."""
+
+    def force(self, own: OwnView) -> list[float]:
+        if own.memory is None:
+            own.memory = [0]
+        own.memory[0] += 1
+        return [0.1 * own.memory[0], 0.0]
+
+
+def test_a_copy_is_independent_of_memory_that_a_controller_for_one_robot_assigns(empty: Environment) -> None:
+    simulation = Simulation(empty, OwnCounter(), [[2.0, 2.0]])
+    simulation.step()
+    simulation.observe_and_decide()
+    twin = simulation.copy()
+    for _ in range(4):
+        simulation.step()
+        twin.step()
+    assert simulation.memory.own == twin.memory.own == [[5]]
+    assert twin.positions.tobytes() == simulation.positions.tobytes()
+
+
+def test_memory_that_a_controller_for_one_robot_assigns_reaches_its_next_step(empty: Environment) -> None:
+    class Numbering:
+        def force(self, own: OwnView) -> list[float]:
+            own.memory = (own.memory or 0) + own.number + 1
+            return [0.0, 0.0]
+
+    simulation = Simulation(empty, Numbering(), [[2.0, 2.0], [4.0, 4.0]])
+    for _ in range(3):
+        simulation.step()
+    assert simulation.memory.own == [3, 6]
+
+
+class NewsReader(Wild):
+    """Is informed of the map, and pushes by the largest density that it has read of."""
+
+    information = "whole map"
+
+    def __init__(self, mass: float = 0.0) -> None:
+        super().__init__(np.full((1, 2), mass))
+
+    def informed(self, environment: Environment) -> NewsReader:
+        return NewsReader(float(environment.free_masses.sum()))
+
+
+def test_a_new_density_reaches_a_controller_that_knows_the_map(empty: Environment) -> None:
+    simulation = Simulation(empty, NewsReader(), [[2.0, 2.0]])
+    twin = simulation.with_density(empty.with_density(Uniform(3.0)))
+    before = simulation.observe_and_decide().decision.forces
+    after = twin.observe_and_decide().decision.forces
+    np.testing.assert_allclose(after, 3.0 * before)
+    assert simulation.environment is empty
+
+
+def test_changes_keep_the_number_of_steps(empty: Environment) -> None:
+    """Times are multiples of the control period, and scans are taken in the same steps."""
+    simulation = Simulation(empty, Howard(), [[2.0, 2.0], [3.0, 3.0]], dt=0.03)
+    twin = simulation.copy()
+    for _ in range(40):
+        simulation.step()
+        twin.step()
+        twin = twin.with_changes()
+        assert twin.time == simulation.time
+        assert (twin.observe().scans is None) == (simulation.observe().scans is None)
+
+
+def test_a_state_has_two_finite_numbers_for_each_robot() -> None:
+    positions = np.array([[2.0, 2.0], [3.0, 3.0]])
+    with pytest.raises(StartError, match=r"velocities: expected finite \[x, y\] for each robot"):
+        TeamState(positions, velocities=np.zeros((1, 2)))
+    with pytest.raises(StartError, match=r"steering: expected finite \[heading, turning rate\]"):
+        TeamState(positions, steering=np.full((2, 2), np.inf))
+    assert len(TeamState(positions)) == 2
+
+
 def test_team_and_starts_must_agree(empty: Environment) -> None:
-    with pytest.raises(ParameterError, match="team: 3 robots, but 1 starts"):
+    with pytest.raises(ParameterError, match="team: expected 1 robots, one for each start, got 3"):
         Simulation(empty, Rapf(), [[1.0, 1.0]], Team.homogeneous(3))
 
 
@@ -345,7 +420,7 @@ class TestChanges:
 
     def test_nothing_changed_goes_on_alike(self) -> None:
         before = self.moving()
-        after, twin = before.changed(), before.copy()
+        after, twin = before.with_changes(), before.copy()
         assert after.time == before.time == pytest.approx(1.5)
         for _ in range(120):
             after.step()
@@ -358,18 +433,18 @@ class TestChanges:
 
     def test_another_controller_starts_from_here(self) -> None:
         before = self.moving()
-        after = before.changed(controller=Rpf())
+        after = before.with_changes(controller=Rpf())
         assert after.controller == Rpf()
         np.testing.assert_array_equal(after.positions, before.positions)
         np.testing.assert_array_equal(after.velocities, before.velocities)
-        assert after.snapshot.seen.time == before.time
+        assert after.observe_and_decide().seen.time == before.time
 
     def test_obstacles_and_robots_come_and_go(self) -> None:
         before = self.moving()
         emptier = Environment("emptier", self.ROOM.boundary, self.ROOM.obstacles[1:], self.ROOM.starts)
-        after = before.changed(environment=emptier)
+        after = before.with_changes(environment=emptier)
         assert after.environment is emptier
-        fewer = after.changed(
+        fewer = after.with_changes(
             team=Team.homogeneous(4), positions=after.positions[:4], velocities=after.velocities[:4]
         )
         fewer.step()
@@ -381,7 +456,7 @@ class TestChanges:
         for k in range(600):
             simulation.step()
             if k % 20 == 0:
-                simulation.changed()
+                simulation.with_changes()
 
     def test_robots_within_a_new_obstacle_are_named(self) -> None:
         before = self.moving()
@@ -391,14 +466,14 @@ class TestChanges:
         )
         blocked = Environment("blocked", self.ROOM.boundary, (*self.ROOM.obstacles, block))
         with pytest.raises(StartError, match=r"starts\[2\] = .* is inside an obstacle"):
-            before.changed(environment=blocked)
+            before.with_changes(environment=blocked)
 
     def test_wrong_sizes_and_numbers_are_named(self) -> None:
         before = self.moving()
-        with pytest.raises(ParameterError, match="team: 3 robots, but 6 starts"):
-            before.changed(team=Team.homogeneous(3))
-        with pytest.raises(StartError, match=r"velocities: .* were wanted"):
-            before.changed(velocities=np.full((6, 2), np.nan))
+        with pytest.raises(ParameterError, match="team: expected 6 robots, one for each start, got 3"):
+            before.with_changes(team=Team.homogeneous(3))
+        with pytest.raises(StartError, match=r"velocities: expected finite \[x, y\] for each robot"):
+            before.with_changes(velocities=np.full((6, 2), np.nan))
         with pytest.raises(ParameterError, match=r"external_forces of shape \(2, 2\)"):
             before.step(np.zeros((2, 2)))
         with pytest.raises(ParameterError, match=r"external_forces: .* finite newtons"):
@@ -418,7 +493,7 @@ class TestChanges:
         before = self.moving()
         driven, alone = before.copy(), before.copy()
         for _ in range(5):
-            driven.step(forces=alone.snapshot.decision.forces)
+            driven.step(forces=alone.observe_and_decide().decision.forces)
             alone.step()
         assert driven.positions.tobytes() == alone.positions.tobytes()
         driven.step(forces=np.zeros((6, 2)))
@@ -448,15 +523,15 @@ def busy() -> Simulation:
 def test_asking_changes_nothing() -> None:
     asked, left = busy(), busy()
     for _ in range(40):
-        assert asked.snapshot is asked.snapshot
-        assert asked.observe() is asked.snapshot.seen
+        assert asked.observe_and_decide() is asked.observe_and_decide()
+        assert asked.observe() is asked.observe_and_decide().seen
         assert asked.sensor is asked.sensor
         inbox = asked.inbox
-        assert asked.copy().snapshot.inbox is not inbox is asked.inbox
+        assert asked.copy().observe_and_decide().inbox is not inbox is asked.inbox
         asked.step()
         left.step()
     assert asked.positions.tobytes() == left.positions.tobytes()
-    assert asked.snapshot.seen.obstacle_points.tobytes() == left.snapshot.seen.obstacle_points.tobytes()
+    assert asked.observe().obstacle_points.tobytes() == left.observe().obstacle_points.tobytes()
 
 
 @pytest.mark.parametrize("made", [busy, TestChanges().moving], ids=["everything changes", "rooms"])
@@ -480,69 +555,3 @@ def test_a_copy_shares_nothing_that_is_changed(made: Callable[[], Simulation]) -
         simulation.sensor.find_nearest_points(places, ranges).tobytes()
         == twin.sensor.find_nearest_points(places, ranges).tobytes()
     )
-
-
-def same(many: list[rc.Record], alone: list[rc.Record]) -> None:
-    for one, other in zip(many, alone, strict=True):
-        for name in ARRAYS:
-            assert getattr(one, name).tobytes() == getattr(other, name).tobytes(), name
-        assert (one.seed, one.start, one.conditions) == (other.seed, other.start, other.conditions)
-        assert one.team.to_dict() == other.team.to_dict()
-
-
-@pytest.mark.parametrize("name", ["rapf", "rpf", "lloyd", "range-limited", "howard"])
-@pytest.mark.parametrize("hearing", [np.inf, 2.5])
-def test_each_run_is_what_it_is_alone(name: str, hearing: float) -> None:
-    """Bit for bit, also where robots of several runs are in one place, and lean on walls and each other."""
-    rooms = rc.load_map("rooms")
-    controller = rc.make_controller(name)
-    starts = [rooms.start().sample(4, seed=seed % 3, radius=0.15) for seed in range(4)]
-    team = rc.Team.homogeneous(4, radius=0.15, communication_range=hearing)
-    team = replace(team, max_speed=np.array([1.0, 0.5, 1.0, 0.8]))
-    many = rc.simulate_many(rooms, controller, starts, 4.0, team, 0.05, start="door", seeds=[0, 1, 2, 0])
-    alone = [
-        rc.Simulation(rooms, controller, places, team, 0.05).run(4.0, start="door", seed=seed % 3)
-        for seed, places in enumerate(starts)
-    ]
-    same(many, alone)
-
-
-def test_runs_of_any_kind_are_simulated() -> None:
-    """Teams of several sizes, and one under conditions."""
-    museum = rc.load_map("museum")
-    starts = [museum.start().sample(n, seed=n) for n in (3, 5, 3, 17, 15)]
-    loss = rc.Conditions(seed=3, loss=0.5)
-    conditions = [None, None, loss, rc.Conditions(), None]
-    many = rc.simulate_many(museum, rc.Rapf(), starts, 0.5, conditions=conditions)
-    alone = [
-        rc.Simulation(museum, rc.Rapf(), places, conditions=each).run(0.5)
-        for places, each in zip(starts, conditions, strict=True)
-    ]
-    same(many, alone)
-    assert many[2].conditions == loss
-
-
-def test_a_run_begun_again_is_what_it_is_alone() -> None:
-    rooms = rc.load_map("rooms")
-    first, second, third = (rooms.start().sample(3, seed=seed) for seed in range(3))
-    both = rc.Simulation(rooms, rc.Lloyd(), np.concatenate([first, second]), runs=2)
-    for _ in range(60):
-        both.step()
-    both.restart(0, third)
-    one, other = rc.Simulation(rooms, rc.Lloyd(), third), rc.Simulation(rooms, rc.Lloyd(), second)
-    for _ in range(60):
-        other.step()
-    for _ in range(60):
-        for each in (both, one, other):
-            each.step()
-    assert both.positions.tobytes() == one.positions.tobytes() + other.positions.tobytes()
-
-
-def test_what_cannot_be_moved_together_is_told() -> None:
-    rooms = rc.load_map("rooms")
-    places = rooms.start().sample(3, seed=0)
-    with pytest.raises(rc.ParameterError, match="runs: 2 of 3 robots, but equal teams"):
-        rc.Simulation(rooms, rc.Rapf(), places, runs=2)
-    both = rc.Simulation(rooms, rc.Rapf(), np.concatenate([places, places]), runs=2)
-    with pytest.raises(rc.StartError, match="the robots overlap"):
-        both.restart(1, np.repeat(places[:1], 3, axis=0))

@@ -1,0 +1,16 @@
+"""Simulations: all robots observe, all decide, then all move.
+
+- `simulation`: one run of one team
+- `batch`: many runs of equal teams, advanced together
+- `team_state`: the state from which a run starts or continues
+- `controller_caller`: calls of controllers, checked, with faults in one line
+- `sensing`: from the world and the sensor to what robots observe
+- `checks`: checks of control periods and joining robots
+"""
+
+from robocov.simulation.batch import SimulationBatch
+from robocov.simulation.checks import DEFAULT_DT, check_dt, check_joins
+from robocov.simulation.simulation import Simulation
+from robocov.simulation.team_state import TeamState
+
+__all__ = ["DEFAULT_DT", "Simulation", "SimulationBatch", "TeamState", "check_dt", "check_joins"]

@@ -1,0 +1,370 @@
+"""The simulation of many runs of equal teams, advanced together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray
+from robocov.controllers import remembers
+from robocov.controllers.base import Controller, IndividualController
+from robocov.environment import Environment, require_environment
+from robocov.errors import ParameterError, StartError, format_count, to_floats
+from robocov.observation import Decision, Observations, Scans, Snapshot, check_forces
+from robocov.observation.neighbours import Neighbours
+from robocov.record import Record, Recorder
+from robocov.sensor import RangeSensor
+from robocov.simulation.checks import DEFAULT_DT, check_dt, check_team, count_steps
+from robocov.simulation.controller_caller import ControllerCaller
+from robocov.simulation.sensing import build_observations, is_scan_due
+from robocov.simulation.simulation import MAX_START_OVERLAP_M
+from robocov.team import Team
+from robocov.world import World
+from robocov.world.free_positions import require_free_starts
+from robocov.world.obstacle_pieces import build_solid_pieces
+
+MAX_JOINT_TEAM_SIZE = 15
+"""Largest teams whose controller is called once for all runs. Cells of larger teams come from a
+triangulation, with which one call for each run is as fast."""
+
+
+class _BatchDecision(NamedTuple):
+    """What the robots of all runs decide in a step."""
+
+    forces: Array
+    """(runs * n, 2) N"""
+    goals: Array | None
+    """(runs * n, 2) m; None if the controller knows no goals."""
+    memories: list[Any]
+
+
+class SimulationBatch:
+    """Independent runs of equal teams in one environment, advanced together.
+
+    Small teams under a controller without memory (RAPF, RPF, Lloyd, range-limited) take a fraction of the
+    time of separate simulations. Any other controller is called once for each run.
+
+    Parameters
+    ----------
+    environment : Environment
+        All obstacles stand still.
+    controller : Controller or IndividualController
+    starts : (runs, n, 2) array, m
+        Positions of the robots of each run, which are at rest.
+    team : Team or None
+        The team of each run; by default `Team.homogeneous(n)`.
+    dt : float, s
+        Control period.
+
+    Attributes
+    ----------
+    team : Team
+        The n robots of one run.
+
+    Raises
+    ------
+    StartError
+        If the starts are no array of this shape, or a robot would start in a wall or in another robot.
+    ParameterError
+        If an obstacle moves, the control period is out of range, or team and starts differ in size.
+
+    See Also
+    --------
+    Simulation : One run, also with moving obstacles and under conditions.
+
+    Notes
+    -----
+    Robots of different runs neither see nor touch each other. Each run of points is the same, bit for bit,
+    as ``Simulation(environment, controller, starts[k], team, dt)``; unicycles agree within rounding.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rooms = rc.load_map("rooms")
+    >>> starts = [rooms.start().sample(6, seed=seed) for seed in range(3)]
+    >>> batch = rc.SimulationBatch(rooms, rc.Rapf(), starts)
+    >>> batch.step()
+    >>> batch.positions.shape
+    (3, 6, 2)
+    """
+
+    def __init__(
+        self,
+        environment: Environment,
+        controller: Controller | IndividualController,
+        starts: Array | Sequence[Array],
+        team: Team | None = None,
+        dt: float = DEFAULT_DT,
+    ) -> None:
+        require_environment(environment)
+        check_dt(dt)
+        if environment.has_moving_obstacles:
+            raise ParameterError(
+                f"environment: expected obstacles that stand still, got map {environment.name!r}"
+            )
+        positions = _to_starts(starts)
+        runs, robots, _ = positions.shape
+        self.environment = environment
+        self.team = check_team(team, robots)
+        self.dt = dt
+        self._steps = 0
+        for start_positions in positions:
+            require_free_starts(environment, start_positions, self.team, MAX_START_OVERLAP_M)
+        self._caller = ControllerCaller(controller, environment.static, time=0.0)
+        self._joint_team = Team.concatenate([self.team] * runs)
+        self._rows = [slice(run * robots, (run + 1) * robots) for run in range(runs)]
+        pieces = build_solid_pieces(environment)
+        self._world = World(pieces, self._joint_team, positions.reshape(-1, 2), runs=runs)
+        self.sensor = RangeSensor(pieces)
+        self._complete_graphs: list[Neighbours] | None = None
+        if np.isinf(self.team.communication_range).all():
+            self._complete_graphs = [Neighbours(robots)] * runs
+        self._decides_jointly = robots <= MAX_JOINT_TEAM_SIZE and not remembers(self.controller)
+        self._memories: list[Any] = []
+        if self._decides_jointly:
+            self._memories = [self._caller.begin(environment.region, self._joint_team, self.time)]
+        else:
+            self._memories = [self._begin_run() for _ in range(runs)]
+        self._start_step()
+
+    def _start_step(self) -> None:
+        """Forget what was observed and decided in the last step."""
+        self._graphs: list[Neighbours] | None = None
+        self._observations: Observations | None = None
+        self._decision: _BatchDecision | None = None
+
+    def _begin_run(self) -> Any:
+        """Return the memory of the robots of one run before their first decision."""
+        return self._caller.begin(self.environment.region, self.team, self.time)
+
+    def __len__(self) -> int:
+        """Return the number of runs."""
+        return len(self._rows)
+
+    def __repr__(self) -> str:
+        runs = format_count(len(self), "run")
+        robots = format_count(len(self.team), "robot")
+        return (
+            f"<SimulationBatch {self.controller.name} on {self.environment.name}, "
+            f"{runs} of {robots}, at {self.time:.2f} s>"
+        )
+
+    @property
+    def controller(self) -> Controller:
+        """The controller of all teams."""
+        return self._caller.controller
+
+    @property
+    def time(self) -> float:
+        """Simulation time, s."""
+        return self._steps * self.dt
+
+    @property
+    def positions(self) -> Array:
+        """Centres of the robots, (runs, n, 2) m."""
+        return self._world.positions.reshape(len(self), -1, 2)
+
+    @property
+    def velocities(self) -> Array:
+        """Velocities, (runs, n, 2) m/s."""
+        return self._world.velocities.reshape(len(self), -1, 2)
+
+    @property
+    def working(self) -> BoolArray:
+        """Mask of robots present and not failed, (runs, n) bool; none fails in a batch."""
+        return self._world.working.reshape(len(self), -1)
+
+    def step(self, *, forces: Array | None = None) -> None:
+        """Advance all runs by one control step: observe, decide, move.
+
+        Parameters
+        ----------
+        forces : (runs, n, 2) array or None, N
+            Forces that replace the controller's, for example in reinforcement learning. The controller is
+            not called then.
+
+        Raises
+        ------
+        ParameterError
+            If forces are not finite or not of this shape, or the controller fails.
+        """
+        next_memories = self._memories
+        if forces is None:
+            decision = self._observe_and_decide()
+            joint_forces = decision.forces
+            next_memories = decision.memories
+        else:
+            joint_forces = self._check_forces(forces)
+        self._world.step(joint_forces, self.dt)
+        self._memories = next_memories
+        self._steps += 1
+        self._start_step()
+
+    def observe(self) -> Observations:
+        """Return what the robots of all runs know now.
+
+        Row ``r * n + i`` belongs to robot i of run r. Robots hear only those of their own run.
+        """
+        if self._observations is None:
+            scanning = self._caller.scanning
+            self._observations = build_observations(
+                world=self._world,
+                sensor=self.sensor,
+                environment=self.environment,
+                team=self._joint_team,
+                neighbours=Neighbours.combine(self._get_graphs()),
+                time=self.time,
+                scanning=scanning if is_scan_due(scanning, self._steps, self.dt) else None,
+            )
+        return self._observations
+
+    def observe_run(self, run: int) -> Observations:
+        """Return what the robots of one run know now, as `Simulation.observe` does."""
+        observations = self.observe()
+        rows = self._rows[run]
+        scans = observations.scans
+        if scans is not None:
+            scans = Scans(scans.distances[rows], scans.hit[rows])
+        return replace(
+            observations,
+            positions=observations.positions[rows],
+            velocities=observations.velocities[rows],
+            neighbours=self._get_graphs()[run],
+            obstacle_points=observations.obstacle_points[rows],
+            max_speeds=self.team.max_speed,
+            scans=scans,
+            steering=None if observations.steering is None else observations.steering[rows],
+        )
+
+    def _check_forces(self, forces: Any) -> Array:
+        """Return forces from outside as an array with a row for each robot of all runs."""
+        shape = (len(self), len(self.team), 2)
+        if np.shape(forces) != shape:
+            raise ParameterError(f"forces: expected an array of shape {shape}, got {np.shape(forces)}")
+        rows = len(self._joint_team)
+        return check_forces(np.asarray(forces).reshape(rows, 2), rows, "forces")
+
+    def _get_graphs(self) -> list[Neighbours]:
+        """Return the communication graph of each run in this step."""
+        if self._complete_graphs is not None:
+            return self._complete_graphs
+        if self._graphs is None:
+            ranges = self.team.communication_range
+            self._graphs = [
+                Neighbours.from_ranges(self._world.positions[rows], ranges) for rows in self._rows
+            ]
+        return self._graphs
+
+    def _observe_and_decide(self) -> _BatchDecision:
+        """Let all robots observe and the controller decide, once in each step."""
+        if self._decision is None:
+            if self._decides_jointly:
+                observations = [self.observe()]
+            else:
+                observations = [self.observe_run(run) for run in range(len(self))]
+            decisions = [
+                self._caller.decide(known, memory)
+                for known, memory in zip(observations, self._memories, strict=True)
+            ]
+            self._decision = _BatchDecision(
+                forces=np.concatenate([decision.forces for decision in decisions]),
+                goals=_join_goals(decisions),
+                memories=[decision.memory for decision in decisions],
+            )
+        return self._decision
+
+    def restart(self, run: int, starts: Array) -> None:
+        """Restart one run; simulation time continues.
+
+        Parameters
+        ----------
+        run : int
+            Number of the run, from 0.
+        starts : (n, 2) array, m
+            Positions of its robots, which are at rest.
+
+        Raises
+        ------
+        StartError
+            If a robot would start in a wall or in another robot.
+        """
+        require_free_starts(self.environment, starts, self.team, MAX_START_OVERLAP_M)
+        self._world.place(run, starts)
+        if not self._decides_jointly:
+            self._memories = [*self._memories[:run], self._begin_run(), *self._memories[run + 1 :]]
+        self._start_step()
+
+    def run(
+        self, duration: float, *, start: str | None = None, seeds: Sequence[int] | None = None
+    ) -> list[Record]:
+        """Simulate all runs for some time, and record each.
+
+        Parameters
+        ----------
+        duration : float, s
+        start : str or None
+            Name of the start from which the positions were sampled, for the records.
+        seeds : sequence of int, or None
+            Seed of each run, with which its positions were sampled, for the records.
+
+        Raises
+        ------
+        ParameterError
+            If the duration is negative or not finite, or there is not one seed for each run.
+        """
+        if seeds is not None and len(seeds) != len(self):
+            raise ParameterError(f"seeds: expected {len(self)}, one for each run, got {len(seeds)}")
+        steps = count_steps(duration, self.dt)
+        recorder = Recorder(self.environment, self._joint_team, self.controller, self.dt, start=start)
+        recorder.add(self._to_snapshot())
+        for _ in range(steps):
+            self.step()
+            recorder.add(self._to_snapshot())
+        joint_record = recorder.record()
+        return [
+            self._extract_record(joint_record, run, seed=None if seeds is None else seeds[run])
+            for run in range(len(self))
+        ]
+
+    def _to_snapshot(self) -> Snapshot:
+        """Return the present step of all runs, as far as a record needs it."""
+        decision = self._observe_and_decide()
+        return Snapshot(self.observe(), Decision(forces=decision.forces, goals=decision.goals))
+
+    def _extract_record(self, joint_record: Record, run: int, seed: int | None) -> Record:
+        """Return the record of one run."""
+        arrays = {
+            name: getattr(joint_record, name)[:, self._rows[run]].copy()
+            for name in joint_record.arrays
+            if name != "time"
+        }
+        return replace(joint_record, team=self.team, seed=seed, **arrays)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # What the robots know and decide in this step is computed again.
+        return {**vars(self), "_graphs": None, "_observations": None, "_decision": None}
+
+
+def _to_starts(starts: Any) -> Array:
+    """Return the start positions of all runs, (runs, n, 2) m."""
+    positions = to_floats("starts", starts, "[x, y] of each robot of each run in metres", StartError)
+    if positions.ndim != 3 or positions.shape[2] != 2 or 0 in positions.shape:
+        raise StartError(
+            "starts: expected an array of shape (runs, n, 2) with runs >= 1 and n >= 1, "
+            f"got shape {positions.shape}"
+        )
+    return positions
+
+
+def _join_goals(decisions: Sequence[Decision]) -> Array | None:
+    """Return the goals of the robots of all runs, nan where there is none; None if no run has goals."""
+    if all(decision.goals is None for decision in decisions):
+        return None
+    goals = []
+    for decision in decisions:
+        no_goals = np.full_like(decision.forces, np.nan)
+        goals.append(no_goals if decision.goals is None else decision.goals)
+    return np.concatenate(goals)

@@ -1,0 +1,129 @@
+"""Checks of what a simulation is built from."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import shapely
+
+from robocov.conditions import TIME_TOLERANCE_S, Conditions
+from robocov.environment import Environment
+from robocov.errors import ParameterError, is_number, quote
+from robocov.team import Team
+
+DEFAULT_DT = 1 / 60
+"""Default control period, s."""
+MIN_DT_S = 1e-4
+MAX_DT_S = 1.0
+
+
+def check_dt(dt: float) -> None:
+    """Check a control period.
+
+    Parameters
+    ----------
+    dt : float, s
+
+    Raises
+    ------
+    ParameterError
+        If it is not a number from `MIN_DT_S` to `MAX_DT_S`.
+    """
+    if not is_number(dt) or not MIN_DT_S <= dt <= MAX_DT_S:
+        raise ParameterError(f"dt: expected a number from {MIN_DT_S:.4f} to {MAX_DT_S:g} s, got {quote(dt)}")
+
+
+def count_steps(duration: float, dt: float) -> int:
+    """Return the number of control steps of a run.
+
+    Parameters
+    ----------
+    duration : float, s
+    dt : float, s
+
+    Raises
+    ------
+    ParameterError
+        If the duration is negative or not finite.
+    """
+    if not is_number(duration) or not 0.0 <= duration < np.inf:
+        raise ParameterError(f"duration: expected a finite number of at least 0 s, got {quote(duration)}")
+    steps: int = round(duration / dt)
+    return steps
+
+
+def check_team(team: Any, robots: int) -> Team:
+    """Return a team of the expected size, by default one of equal robots.
+
+    Parameters
+    ----------
+    team : Team or None
+    robots : int
+
+    Raises
+    ------
+    ParameterError
+        If it is no team, or has another number of robots.
+    """
+    if team is None:
+        return Team.homogeneous(robots)
+    if not isinstance(team, Team):
+        raise ParameterError(f"team: expected a Team, got {quote(team)}")
+    if len(team) != robots:
+        raise ParameterError(f"team: expected {robots} robots, one for each start, got {len(team)}")
+    return team
+
+
+def check_conditions(conditions: Any, robots: int) -> Conditions | None:
+    """Return conditions that a team can have, or None if they are ideal.
+
+    Parameters
+    ----------
+    conditions : Conditions or None
+    robots : int
+
+    Raises
+    ------
+    ParameterError
+        If they are no conditions, or name robots that the team does not have.
+    """
+    if conditions is None:
+        return None
+    if not isinstance(conditions, Conditions):
+        raise ParameterError(f"conditions: expected Conditions, got {quote(conditions)}")
+    conditions.check_team(robots)
+    return None if conditions.is_ideal else conditions
+
+
+def check_joins(environment: Environment, conditions: Conditions | None) -> None:
+    """Check the positions at which robots are to join.
+
+    Parameters
+    ----------
+    environment : Environment
+        Its boundary has to enclose the positions.
+    conditions : Conditions or None
+        None: no robot joins.
+
+    Raises
+    ------
+    ParameterError
+        If a robot is to join outside of the boundary, or has a position of its own and joins at time zero.
+    """
+    if conditions is None:
+        return
+    for k, join in enumerate(conditions.joins):
+        if join.place is None:
+            continue
+        x, y = join.place
+        where = f"conditions.joins[{k}]"
+        if join.time <= TIME_TOLERANCE_S:
+            expected = "expected a time above 0 s for a robot that joins at a place of its own"
+            raise ParameterError(f"{where}: {expected}, got robot {join.robot} at {join.time:g} s")
+        if not environment.boundary_polygon.covers(shapely.Point(x, y)):
+            left, bottom, right, top = environment.boundary_polygon.bounds
+            inside = f"inside the boundary of map {environment.name!r}"
+            extent = f"x from {left:g} to {right:g} m, y from {bottom:g} to {top:g} m"
+            got = f"got [{x:g}, {y:g}] for robot {join.robot}"
+            raise ParameterError(f"{where}: expected a place {inside} ({extent}), {got}")

@@ -1,0 +1,112 @@
+"""Calls of controllers, with checked answers, and faults of users' code in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import replace
+from typing import Any
+
+from robocov.controllers import CONTROLLERS, informed
+from robocov.controllers.base import Controller, IndividualController, Individually, for_team
+from robocov.controllers.user_modules import fault_of, location_of
+from robocov.environment import Environment
+from robocov.errors import ParameterError, RobocovError, quote
+from robocov.observation import Decision, Observations, Scanning, check_decision, copy_decision
+from robocov.observation.region import Region
+from robocov.team import Team
+
+
+class ControllerCaller:
+    """Calls a controller and checks its answers.
+
+    A built-in controller is trusted. A controller of a user may change its arguments, return arrays that it
+    changes later, or raise anything: it gets copies, its answers are copied, and its faults become one line
+    with the file and line of its code.
+
+    Parameters
+    ----------
+    controller : Controller or IndividualController
+    environment : Environment
+        The map that a controller with the information "whole map" gets to know.
+    time : float, s
+        Simulation time, for messages.
+
+    Attributes
+    ----------
+    controller : Controller
+        The controller of the whole team, before it was informed of the map.
+    scanning : Scanning or None
+        The range scans that it needs.
+
+    Raises
+    ------
+    ParameterError
+        If it is no controller, or fails.
+    """
+
+    def __init__(
+        self, controller: Controller | IndividualController, environment: Environment, time: float
+    ) -> None:
+        team_controller = for_team(controller)
+        if isinstance(team_controller, type) or not isinstance(team_controller, Controller):
+            raise ParameterError(
+                "controller: expected a controller, as in Rapf(), with a method decide or force, "
+                f"got {quote(team_controller)}"
+            )
+        self.controller: Controller = team_controller
+        self._is_built_in = type(team_controller) in CONTROLLERS.values()
+        self._informed_controller: Controller = self._call(time, informed, team_controller, environment)
+        self.scanning: Scanning | None = self._call(time, getattr, team_controller, "scanning", None)
+        if not isinstance(self.scanning, Scanning | None):
+            raise ParameterError(
+                f"controller {team_controller.name!r}: scanning: expected a Scanning, "
+                f"got {quote(self.scanning)}"
+            )
+
+    def begin(self, region: Region, team: Team, time: float) -> Any:
+        """Return the memory of the robots before their first decision."""
+        return self._call(time, self._informed_controller.begin, region, team)
+
+    def decide(self, observations: Observations, memory: Any) -> Decision:
+        """Return the decision of the controller.
+
+        Parameters
+        ----------
+        observations : Observations
+        memory : object
+            The memory that the previous decision returned, or `begin`.
+
+        Raises
+        ------
+        ParameterError
+            If the controller fails, or returns anything but a decision for each robot.
+        """
+        robots = len(observations.positions)
+        name = self.controller.name
+        decide = self._informed_controller.decide
+        if self._is_built_in:
+            return check_decision(decide(observations, memory), robots, name, observations.time)
+        answer = self._call(observations.time, decide, replace(observations), _copy_memory(memory))
+        source = "" if isinstance(self._informed_controller, Individually) else location_of(decide)
+        decision = check_decision(answer, robots, name, observations.time, source)
+        return copy_decision(decision, name, source)
+
+    def _call(self, time: float, function: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a function of the controller; a fault in a user's code is explained in one line."""
+        try:
+            return function(*arguments)
+        except (RobocovError, KeyboardInterrupt):
+            raise
+        except BaseException as error:
+            if self._is_built_in:
+                raise
+            raise fault_of(f"controller {self.controller.name!r}", error, f" at {time:.3f} s") from error
+
+
+def _copy_memory(memory: Any) -> Any:
+    """Return a copy of a memory, or the memory itself if it contains something that cannot be copied."""
+    try:
+        return deepcopy(memory)
+    except Exception:
+        return memory

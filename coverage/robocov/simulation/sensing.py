@@ -1,0 +1,56 @@
+"""From the world and the range sensor to what robots observe."""
+
+from __future__ import annotations
+
+from robocov.environment import Environment
+from robocov.observation import Observations, Scanning, Scans
+from robocov.observation.neighbours import Neighbours
+from robocov.sensor import RangeSensor
+from robocov.team import Team
+from robocov.world import ChangingWorld, World
+
+
+def build_observations(
+    world: World | ChangingWorld,
+    sensor: RangeSensor,
+    environment: Environment,
+    team: Team,
+    neighbours: Neighbours,
+    time: float,
+    scanning: Scanning | None,
+) -> Observations:
+    """Build what robots with exact sensors observe.
+
+    Parameters
+    ----------
+    world : World or ChangingWorld
+    sensor : RangeSensor
+    environment : Environment
+    team : Team
+    neighbours : Neighbours
+        The communication graph.
+    time : float, s
+    scanning : Scanning or None
+        The scans to take in this step; None: no scan.
+    """
+    scans = None
+    if scanning is not None:
+        distances, is_hit = sensor.scan(world.positions, scanning.rays, team.sensing_range)
+        scans = Scans(distances, is_hit)
+    return Observations(
+        positions=world.positions,
+        velocities=world.velocities,
+        neighbours=neighbours,
+        obstacle_points=sensor.find_nearest_points(world.positions, team.sensing_range),
+        region=environment.region,
+        time=time,
+        max_speeds=team.max_speed,
+        density=environment.density,
+        scans=scans,
+        steering=world.steering,
+    )
+
+
+def is_scan_due(scanning: Scanning | None, step: int, dt: float) -> bool:
+    """Return whether the robots scan in a step, counted from 0."""
+    return scanning is not None and step % scanning.count_steps(dt) == 0

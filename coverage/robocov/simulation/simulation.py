@@ -1,0 +1,499 @@
+"""The simulation of one run: all robots observe, all decide, then move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import copy, deepcopy
+from time import process_time
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray
+from robocov.conditions import Conditions, JoinedRobot
+from robocov.conditions.perception import Inbox, Perception, ignore_idle_robots
+from robocov.controllers.base import Controller, IndividualController
+from robocov.drawing import show
+from robocov.environment import Environment, require_environment
+from robocov.errors import format_count
+from robocov.observation import Observations, Snapshot, check_forces
+from robocov.observation.neighbours import Neighbours
+from robocov.record import Record, Recorder
+from robocov.sensor import RangeSensor
+from robocov.simulation.checks import (
+    DEFAULT_DT,
+    check_conditions,
+    check_dt,
+    check_joins,
+    check_team,
+    count_steps,
+)
+from robocov.simulation.controller_caller import ControllerCaller
+from robocov.simulation.sensing import build_observations, is_scan_due
+from robocov.simulation.team_state import TeamState, to_team_state
+from robocov.team import Team
+from robocov.world import MAX_PENETRATION, ChangingWorld, World
+from robocov.world.free_positions import require_free_starts
+from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
+
+MAX_START_OVERLAP_M = 1e-6
+"""Overlap of robots at rest, with walls or with each other, that is taken for rounding."""
+
+
+class _Knowledge(NamedTuple):
+    """What the robots know in a step."""
+
+    observations: Observations
+    inbox: Inbox | None
+
+
+class Simulation:
+    """A team under one controller in one environment.
+
+    Parameters
+    ----------
+    environment : Environment
+    controller : Controller or IndividualController
+        A controller for one robot is called for every robot in turn.
+    starts : (n, 2) array, m, or TeamState
+        Positions of robots at rest, or a state from which to continue.
+    team : Team or None
+        By default `Team.homogeneous(n)`.
+    dt : float, s
+        Control period. The physics takes substeps where it needs them.
+    conditions : Conditions or None
+        Imperfect sensing and communication, failing and joining robots; by default everything is ideal.
+
+    Attributes
+    ----------
+    memory : object
+        Memory of the robots: what the controller returned in its last decision.
+    inbox : Inbox or None
+        Messages that the robots have received; None if robots know the positions of others at once.
+    joined : tuple of JoinedRobot
+        Robots that have joined since the simulation was built.
+    decision_time : float
+        Processor time that the controller has used so far, s.
+
+    Raises
+    ------
+    StartError
+        If a robot would start in a wall or in another robot.
+    ParameterError
+        If the control period is out of range, or team and starts differ in size.
+
+    See Also
+    --------
+    SimulationBatch : Many runs of equal teams, advanced together.
+
+    Notes
+    -----
+    A step depends on nothing but the state of the robots, their memory and messages, and the number of
+    steps so far: a copy continues identically, bit for bit.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rooms = rc.load_map("rooms")
+    >>> simulation = rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(6, seed=0))
+    >>> simulation.step()
+    >>> simulation.positions.shape
+    (6, 2)
+    """
+
+    def __init__(
+        self,
+        environment: Environment,
+        controller: Controller | IndividualController,
+        starts: Array | list[list[float]] | TeamState,
+        team: Team | None = None,
+        dt: float = DEFAULT_DT,
+        *,
+        conditions: Conditions | None = None,
+    ) -> None:
+        require_environment(environment)
+        check_dt(dt)
+        state = to_team_state(starts)
+        self.environment = environment
+        self.team = check_team(team, robots=len(state))
+        self.dt = dt
+        self.conditions = check_conditions(conditions, robots=len(state))
+        self.joined: tuple[JoinedRobot, ...] = ()
+        self.decision_time = 0.0
+        self._steps = state.steps
+        if not state.is_computed:
+            check_joins(environment, self.conditions)
+            self._check_robots_fit(state)
+        self._caller = ControllerCaller(controller, environment.static, self.time)
+        self._world = self._build_world(state)
+        self.sensor = RangeSensor(build_solid_pieces(environment), build_movers(environment))
+        team_changes = self.conditions is not None and self.conditions.has_team_changes
+        self._obstacles_change = environment.has_moving_obstacles or team_changes
+        self._perception: Perception | None = None
+        self.inbox: Inbox | None = None
+        if self.conditions is not None:
+            self._perception = Perception(self.conditions, self.team, dt)
+            self.inbox = self._perception.create_inbox()
+        self._complete_graph: Neighbours | None = None
+        if np.isinf(self.team.communication_range).all():
+            self._complete_graph = Neighbours(len(self.team))
+        self.memory: Any = self._caller.begin(environment.region, self.team, self.time)
+        self._start_step()
+
+    def _check_robots_fit(self, state: TeamState) -> None:
+        max_overlap = MAX_START_OVERLAP_M
+        if state.velocities is not None:
+            # A robot that moves may lean on something, and then overlaps with it a little.
+            max_overlap = 2.0 * MAX_PENETRATION
+        working = None
+        if self.conditions is not None:
+            working = self.conditions.find_working(self.time, len(state))
+        require_free_starts(self.environment.at(self.time), state.positions, self.team, max_overlap, working)
+
+    def _build_world(self, state: TeamState) -> World | ChangingWorld:
+        if self.conditions is not None and self.conditions.has_team_changes:
+            return ChangingWorld(
+                self.conditions,
+                self.environment,
+                self.team,
+                state.positions,
+                state.velocities,
+                steering=state.steering,
+                time=self.time,
+            )
+        return World(
+            build_solid_pieces(self.environment),
+            self.team,
+            state.positions,
+            state.velocities,
+            steering=state.steering,
+            movers=build_movers(self.environment),
+        )
+
+    def _start_step(self) -> None:
+        """Forget what was observed and decided in the last step, and move the sensor's obstacles."""
+        self._knowledge: _Knowledge | None = None
+        self._snapshot: Snapshot | None = None
+        if self._obstacles_change:
+            self.sensor.set_time(self.time, self._world.failed_robots)
+
+    def __repr__(self) -> str:
+        robots = format_count(len(self.team), "robot")
+        return (
+            f"<Simulation {self.controller.name} on {self.environment.name}, {robots}, at {self.time:.2f} s>"
+        )
+
+    @property
+    def controller(self) -> Controller:
+        """The controller of the team."""
+        return self._caller.controller
+
+    @property
+    def time(self) -> float:
+        """Simulation time, s."""
+        return self._steps * self.dt
+
+    @property
+    def positions(self) -> Array:
+        """Centres of the robots, (n, 2) m."""
+        return self._world.positions
+
+    @property
+    def velocities(self) -> Array:
+        """Velocities, (n, 2) m/s."""
+        return self._world.velocities
+
+    @property
+    def steering(self) -> Array | None:
+        """Heading and turning rate of unicycles, (n, 2) rad and rad/s; None in a team of points."""
+        return self._world.steering
+
+    @property
+    def working(self) -> BoolArray:
+        """Mask of robots present and not failed, (n,) bool."""
+        return self._world.working
+
+    def step(self, external_forces: Array | None = None, *, forces: Array | None = None) -> None:
+        """Advance by one control step: observe, decide, move.
+
+        Parameters
+        ----------
+        external_forces : (n, 2) array or None, N
+            Forces that act in addition to the controller's, such as those of a pointer that drags a robot;
+            see `World.step`. Records do not contain them.
+        forces : (n, 2) array or None, N
+            Forces that replace the controller's, for example in reinforcement learning. The controller is
+            not called then.
+
+        Raises
+        ------
+        ParameterError
+            If forces are not finite or not of shape (n, 2), or the controller fails.
+        StartError
+            If there is no space for a robot that joins.
+        """
+        robots = len(self.team)
+        if external_forces is not None:
+            external_forces = check_forces(external_forces, robots, "external_forces")
+        next_memory = self.memory
+        if forces is None:
+            decision = self.observe_and_decide().decision
+            forces = decision.forces
+            next_memory = decision.memory
+        else:
+            forces = check_forces(forces, robots, "forces")
+        next_inbox = None if self._perception is None else self._get_knowledge().inbox
+        positions_before = self.positions
+        self._world.step(forces, self.dt, external_forces, time=self.time)
+        self.memory = next_memory
+        self.inbox = next_inbox
+        self._steps += 1
+        self.joined += self._list_joined(positions_before)
+        self._start_step()
+
+    def observe(self) -> Observations:
+        """Return what each robot knows now; the controller is not called."""
+        return self._get_knowledge().observations
+
+    def observe_and_decide(self) -> Snapshot:
+        """Let the robots observe and the controller decide, once in each step.
+
+        Calling it again before the next step returns the same snapshot.
+
+        Returns
+        -------
+        Snapshot
+            The present state, what the robots observe, and what the controller decides.
+
+        Raises
+        ------
+        ParameterError
+            If the controller fails, or does not return a decision for each robot.
+        """
+        if self._snapshot is None:
+            knowledge = self._get_knowledge()
+            started = process_time()
+            decision = self._caller.decide(knowledge.observations, self.memory)
+            self.decision_time += process_time() - started
+            if self._perception is None:
+                self._snapshot = Snapshot(knowledge.observations, decision)
+            else:
+                self._snapshot = Snapshot(
+                    knowledge.observations,
+                    ignore_idle_robots(decision, self.working),
+                    truth=self.positions,
+                    working=self.working,
+                    inbox=knowledge.inbox,
+                )
+        return self._snapshot
+
+    def _get_knowledge(self) -> _Knowledge:
+        """Return what the robots know in this step; it is found out once."""
+        if self._knowledge is None:
+            observations = self._sense()
+            inbox = None
+            if self._perception is not None:
+                observations, inbox = self._perception.perceive(observations, self.inbox, self.working)
+            self._knowledge = _Knowledge(observations, inbox)
+        return self._knowledge
+
+    def _sense(self) -> Observations:
+        """Return what robots with ideal sensors and communication observe."""
+        neighbours = self._complete_graph
+        if neighbours is None:
+            neighbours = Neighbours.from_ranges(self.positions, self.team.communication_range)
+        scanning = self._caller.scanning
+        return build_observations(
+            world=self._world,
+            sensor=self.sensor,
+            environment=self.environment,
+            team=self.team,
+            neighbours=neighbours,
+            time=self.time,
+            scanning=scanning if is_scan_due(scanning, self._steps, self.dt) else None,
+        )
+
+    def _list_joined(self, positions_before: Array) -> tuple[JoinedRobot, ...]:
+        """Return the robots that joined in the last step.
+
+        The position of a robot before it joins is the one at which it should.
+        """
+        if self.conditions is None or not self.conditions.joins:
+            return ()
+        times = np.array([self.time - self.dt, self.time])
+        was_present, is_present = self.conditions.find_present(times, len(self.team))
+        robots = np.flatnonzero(is_present & ~was_present & self.working)
+        return tuple(
+            JoinedRobot(
+                robot=robot + 1,
+                time=self.time,
+                place=(float(self.positions[robot, 0]), float(self.positions[robot, 1])),
+                requested=(float(positions_before[robot, 0]), float(positions_before[robot, 1])),
+            )
+            for robot in robots.tolist()
+        )
+
+    def snapshots(self, duration: float) -> Iterator[Snapshot]:
+        """Yield the present snapshot, and one after every step.
+
+        Parameters
+        ----------
+        duration : float, s
+            Time to simulate.
+
+        Raises
+        ------
+        ParameterError
+            If the duration is negative or not finite.
+        """
+        steps = count_steps(duration, self.dt)
+        yield self.observe_and_decide()
+        for _ in range(steps):
+            self.step()
+            yield self.observe_and_decide()
+
+    def run(self, duration: float, *, start: str | None = None, seed: int | None = None) -> Record:
+        """Simulate for some time, and record it.
+
+        Parameters
+        ----------
+        duration : float, s
+        start : str or None
+            Name of the start from which the positions were sampled, for the record.
+        seed : int or None
+            Seed with which they were sampled, for the record.
+
+        Raises
+        ------
+        ParameterError
+            If the duration is negative or not finite.
+
+        Examples
+        --------
+        >>> import robocov as rc
+        >>> rooms = rc.load_map("rooms")
+        >>> rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(6, seed=0)).run(1.0)
+        <Record rapf on Rooms, 6 robots, 1.0 s>
+        """
+        recorder = Recorder(
+            self.environment,
+            self.team,
+            self.controller,
+            self.dt,
+            start=start,
+            seed=seed,
+            conditions=self.conditions,
+        )
+        for snapshot in self.snapshots(duration):
+            recorder.add(snapshot)
+        return recorder.record(self.joined)
+
+    def show(self, *, height: int = 620) -> Any:
+        """Show the simulation in an interactive window, in a notebook in a cell of `height` px.
+
+        The window starts with the present positions at 0 s. It does not change this simulation; see
+        `robocov.show`.
+        """
+        return show(self, height=height)
+
+    def copy(self) -> Simulation:
+        """Return an independent simulation in the same state, which continues identically."""
+        twin = copy(self)
+        twin._world = self._world.copy()
+        twin.memory = deepcopy(self.memory)
+        if self._obstacles_change:
+            twin.sensor = self.sensor.copy()
+        # The snapshot contains the next memory, which must not be shared.
+        twin._start_step()
+        return twin
+
+    def __getstate__(self) -> dict[str, Any]:
+        # What the robots know and decide in this step is computed again.
+        return {**vars(self), "_knowledge": None, "_snapshot": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._start_step()
+
+    def with_density(self, environment: Environment) -> Simulation:
+        """Return a simulation that continues in the same place with another density.
+
+        Parameters
+        ----------
+        environment : Environment
+            The present one, apart from its density. A controller that knows the map is informed again.
+        """
+        twin = self.copy()
+        twin.environment = environment
+        twin._caller = ControllerCaller(self.controller, environment.static, self.time)
+        return twin
+
+    def with_memory(self, memory: Any, inbox: Inbox | None = None) -> Simulation:
+        """Return a simulation in the same state, but with another memory of the robots.
+
+        Parameters
+        ----------
+        memory : object
+        inbox : Inbox or None
+            Messages that the robots have received; None: the present ones.
+        """
+        twin = self.copy()
+        twin.memory = deepcopy(memory)
+        if inbox is not None:
+            twin.inbox = inbox
+        return twin
+
+    def with_changes(
+        self,
+        *,
+        environment: Environment | None = None,
+        controller: Controller | IndividualController | None = None,
+        team: Team | None = None,
+        positions: Array | None = None,
+        velocities: Array | None = None,
+        steering: Array | None = None,
+        conditions: Conditions | None = None,
+    ) -> Simulation:
+        """Return a simulation that continues from here with changes; this one remains as it is.
+
+        The memory of the robots is kept unless the controller or the number of robots changes, and their
+        messages unless the conditions or the number of robots change.
+
+        Parameters
+        ----------
+        environment, controller, team, conditions
+            As those of `Simulation`; None: no change.
+        positions, velocities, steering : (n, 2) arrays or None
+            As those of `TeamState`; None: no change.
+
+        Raises
+        ------
+        StartError
+            If a robot is in a wall or in another robot, by more than contacts allow.
+        ParameterError
+            If team and positions differ in size.
+        """
+        new_team = self.team if team is None else team
+        if steering is None and len(new_team) == len(self.team):
+            steering = self.steering
+        state = TeamState(
+            positions=self.positions if positions is None else positions,
+            velocities=self.velocities if velocities is None else velocities,
+            steering=steering,
+            steps=self._steps,
+        )
+        twin = Simulation(
+            self.environment if environment is None else environment,
+            self.controller if controller is None else controller,
+            state,
+            new_team,
+            self.dt,
+            conditions=self.conditions if conditions is None else conditions,
+        )
+        twin.joined = self.joined
+        if len(new_team) == len(self.team):
+            if conditions is None:
+                twin.inbox = self.inbox
+            if controller is None:
+                twin.memory = deepcopy(self.memory)
+        return twin

@@ -1,0 +1,76 @@
+"""The state from which a run starts or continues."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import StartError, quote, to_floats
+
+
+@dataclass(frozen=True, eq=False)
+class TeamState:
+    """The state of a team from which a simulation starts or continues.
+
+    Raises
+    ------
+    StartError
+        If there is no robot, or an array does not have two numbers for each robot, or is not finite.
+
+    Examples
+    --------
+    A simulation that starts with moving robots:
+
+    >>> import robocov as rc
+    >>> rooms = rc.load_map("rooms")
+    >>> state = rc.TeamState(positions=[[1.0, 1.0]], velocities=[[0.5, 0.0]])
+    >>> rc.Simulation(rooms, rc.Rapf(), state).velocities
+    array([[0.5, 0. ]])
+    """
+
+    positions: Array
+    """(n, 2) m"""
+    velocities: Array | None = None
+    """(n, 2) m/s; by default robots are at rest."""
+    steering: Array | None = None
+    """(n, 2) rad and rad/s, heading from +x and turning rate of unicycles. By default they face the direction
+    in which they move."""
+    steps: int = 0
+    """Number of control steps that were taken before."""
+    is_computed: bool = False
+    """Whether a simulation computed this state, so that robots need not be checked to fit: a robot that leans
+    on something overlaps with it a little."""
+
+    def __post_init__(self) -> None:
+        positions = to_floats("starts", self.positions, "[x, y] of each robot in metres", StartError)
+        if positions.ndim != 2 or positions.shape[1] != 2 or len(positions) < 1:
+            raise StartError(
+                f"starts: expected an array of shape (n, 2) with n >= 1, got shape {positions.shape}"
+            )
+        object.__setattr__(self, "positions", positions)
+        if self.velocities is not None:
+            velocities = to_floats("velocities", self.velocities, "[x, y] of each robot in m/s", StartError)
+            _check_rows("velocities", velocities, positions.shape, "[x, y]")
+            object.__setattr__(self, "velocities", velocities)
+        if self.steering is not None:
+            columns = "[heading, turning rate]"
+            steering = to_floats("steering", self.steering, f"{columns} of each robot", StartError)
+            _check_rows("steering", steering, positions.shape, columns)
+            object.__setattr__(self, "steering", steering)
+
+    def __len__(self) -> int:
+        """Return the number of robots."""
+        return len(self.positions)
+
+
+def _check_rows(name: str, rows: Array, shape: tuple[int, ...], columns: str) -> None:
+    if rows.shape != shape or not np.isfinite(rows).all():
+        raise StartError(f"{name}: expected finite {columns} for each robot, got {quote(rows.tolist())}")
+
+
+def to_team_state(starts: Any) -> TeamState:
+    """Return the state of robots at rest at given positions; a state is returned as it is."""
+    return starts if isinstance(starts, TeamState) else TeamState(starts)

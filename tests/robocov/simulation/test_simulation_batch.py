@@ -1,0 +1,161 @@
+"""Runs that are simulated together are what they are alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robocov.controllers import Howard, Lloyd, OwnView, Rapf, make_controller
+from robocov.environment import CircleObstacle, Environment, ObstaclePath
+from robocov.errors import ParameterError, StartError
+from robocov.mapfile import load_map
+from robocov.record import ARRAYS, Record
+from robocov.simulation import Simulation, SimulationBatch
+from robocov.team import Team
+
+ROOMS = load_map("rooms")
+
+
+def assert_equal_records(first: list[Record], second: list[Record]) -> None:
+    for one, other in zip(first, second, strict=True):
+        for name in ARRAYS:
+            assert getattr(one, name).tobytes() == getattr(other, name).tobytes(), name
+        assert (one.seed, one.start, one.conditions) == (other.seed, other.start, other.conditions)
+        assert one.team.to_dict() == other.team.to_dict()
+
+
+@pytest.mark.parametrize("name", ["rapf", "rpf", "lloyd", "range-limited", "howard"])
+@pytest.mark.parametrize("communication_range", [np.inf, 2.5])
+def test_each_run_is_the_same_as_alone(name: str, communication_range: float) -> None:
+    """Also where robots of several runs are in one place, and lean on walls and each other."""
+    controller = make_controller(name)
+    seeds = [0, 1, 2, 0]
+    starts = [ROOMS.start().sample(4, seed=seed, radius=0.15) for seed in seeds]
+    team = Team.homogeneous(4, radius=0.15, communication_range=communication_range)
+    team = replace(team, max_speed=np.array([1.0, 0.5, 1.0, 0.8]))
+    together = SimulationBatch(ROOMS, controller, starts, team, 0.05).run(4.0, start="door", seeds=seeds)
+    alone = [
+        Simulation(ROOMS, controller, positions, team, 0.05).run(4.0, start="door", seed=seed)
+        for seed, positions in zip(seeds, starts, strict=True)
+    ]
+    assert_equal_records(together, alone)
+
+
+@pytest.mark.parametrize("robots", [15, 17])
+def test_teams_of_any_size_are_the_same_as_alone(robots: int) -> None:
+    museum = load_map("museum")
+    starts = [museum.start().sample(robots, seed=seed) for seed in range(2)]
+    together = SimulationBatch(museum, Rapf(), starts).run(0.5)
+    alone = [Simulation(museum, Rapf(), positions).run(0.5) for positions in starts]
+    assert_equal_records(together, alone)
+
+
+def test_memory_belongs_to_one_run() -> None:
+    class Counter:
+        def begin(self, number: int, team: Team) -> int:
+            return 10 * number
+
+        def force(self, own: OwnView) -> list[float]:
+            own.memory += 1
+            return [0.01 * own.memory, 0.0]
+
+    starts = [ROOMS.start().sample(2, seed=seed) for seed in range(3)]
+    together = SimulationBatch(ROOMS, Counter(), starts).run(0.5)
+    alone = [Simulation(ROOMS, Counter(), positions).run(0.5) for positions in starts]
+    assert_equal_records(together, alone)
+
+
+def test_a_restarted_run_is_the_same_as_alone() -> None:
+    first, second, third = (ROOMS.start().sample(3, seed=seed) for seed in range(3))
+    batch = SimulationBatch(ROOMS, Lloyd(), [first, second])
+    other = Simulation(ROOMS, Lloyd(), second)
+    for _ in range(60):
+        batch.step()
+        other.step()
+    batch.restart(0, third)
+    restarted = Simulation(ROOMS, Lloyd(), third)
+    for _ in range(60):
+        for simulation in (batch, restarted, other):
+            simulation.step()
+    assert batch.positions[0].tobytes() == restarted.positions.tobytes()
+    assert batch.positions[1].tobytes() == other.positions.tobytes()
+
+
+def test_a_restart_forgets_the_memory_of_that_run_only() -> None:
+    starts = [ROOMS.start().sample(3, seed=seed) for seed in range(2)]
+    batch = SimulationBatch(ROOMS, Howard(), starts)
+    other = Simulation(ROOMS, Howard(), starts[1])
+    for _ in range(20):
+        batch.step()
+        other.step()
+    batch.restart(0, starts[0])
+    for _ in range(20):
+        batch.step()
+        other.step()
+    assert batch.positions[1].tobytes() == other.positions.tobytes()
+
+
+def test_robots_observe_their_own_run_only() -> None:
+    starts = [ROOMS.start().sample(3, seed=seed) for seed in range(2)]
+    batch = SimulationBatch(ROOMS, Howard(), starts)
+    for run, positions in enumerate(starts):
+        expected = Simulation(ROOMS, Howard(), positions).observe()
+        observations = batch.observe_run(run)
+        assert observations.positions.tobytes() == expected.positions.tobytes()
+        assert observations.obstacle_points.tobytes() == expected.obstacle_points.tobytes()
+        assert (
+            observations.neighbours.list_neighbours(0).tolist()
+            == expected.neighbours.list_neighbours(0).tolist()
+            == [1, 2]
+        )
+        assert observations.scans is not None and expected.scans is not None
+        assert observations.scans.distances.tobytes() == expected.scans.distances.tobytes()
+    robot, neighbour = batch.observe().neighbours.list_pairs()
+    assert (robot // 3 == neighbour // 3).all()
+
+
+def test_given_forces_replace_those_of_the_controller() -> None:
+    starts = [ROOMS.start().sample(2, seed=seed) for seed in range(2)]
+    batch = SimulationBatch(ROOMS, Rapf(), starts)
+    alone = Simulation(ROOMS, Rapf(), starts[1])
+    forces = np.array([[[0.0, 0.0], [0.0, 0.0]], [[0.1, 0.2], [0.3, 0.0]]])
+    for _ in range(3):
+        batch.step(forces=forces)
+        alone.step(forces=forces[1])
+    assert batch.positions[0].tobytes() == starts[0].tobytes()
+    assert batch.positions[1].tobytes() == alone.positions.tobytes()
+    with pytest.raises(ParameterError, match=r"forces: expected an array of shape \(2, 2, 2\), got \(4, 2\)"):
+        batch.step(forces=forces.reshape(4, 2))
+
+
+def test_a_batch_has_runs_of_equal_size_that_fit() -> None:
+    positions = ROOMS.start().sample(3, seed=0)
+    for starts in (positions, np.zeros((0, 3, 2)), np.zeros((2, 0, 2))):
+        with pytest.raises(StartError, match=r"starts: expected an array of shape \(runs, n, 2\)"):
+            SimulationBatch(ROOMS, Rapf(), starts)
+    with pytest.raises(StartError, match="starts: "):
+        SimulationBatch(ROOMS, Rapf(), [positions, positions[:2]])
+    with pytest.raises(ParameterError, match="team: expected 3 robots, one for each start, got 2"):
+        SimulationBatch(ROOMS, Rapf(), [positions], Team.homogeneous(2))
+    batch = SimulationBatch(ROOMS, Rapf(), [positions, positions])
+    with pytest.raises(StartError, match="the robots overlap"):
+        batch.restart(1, np.repeat(positions[:1], 3, axis=0))
+    with pytest.raises(ParameterError, match="seeds: expected 2, one for each run, got 1"):
+        batch.run(0.1, seeds=[1])
+    assert len(batch) == 2
+    assert repr(batch) == "<SimulationBatch rapf on Rooms, 2 runs of 3 robots, at 0.00 s>"
+
+
+def test_each_record_has_its_own_seed() -> None:
+    positions = ROOMS.start().sample(3, seed=0)
+    records = SimulationBatch(ROOMS, Rapf(), [positions] * 3).run(0.0, seeds=[7, 8, 9])
+    assert [record.seed for record in records] == [7, 8, 9]
+
+
+def test_obstacles_of_a_batch_stand_still() -> None:
+    cart = CircleObstacle((2, 1), 0.6, "cart", ObstaclePath(((2, 1), (8, 1)), 0.5))
+    busy = Environment("busy", ((0, 0), (10, 0), (10, 6), (0, 6)), (cart,))
+    with pytest.raises(ParameterError, match="environment: expected obstacles that stand still"):
+        SimulationBatch(busy, Rapf(), [[[4.0, 4.0]]])
