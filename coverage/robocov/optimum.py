@@ -26,6 +26,7 @@ from robocov.cost import CoverageCost, CoverageResult
 from robocov.environment import MIN_START_GAP_RADII, Environment
 from robocov.errors import ParameterError, is_number, quote, require_number
 from robocov.k_median import Beat, apply_best_swaps, run_lloyd, seed_sources
+from robocov.potential import GOLDEN_ANGLE
 from robocov.team import DEFAULT_RADIUS
 
 MAX_ROBOTS = 500
@@ -40,7 +41,6 @@ _BUILT, _TABLED = 0.3, 0.5  # parts of the progress at which the cost is built, 
 _SEGMENTS = 32  # edges of a quarter circle around corners: they cut 3e-4 of the radius off, less than the gap
 _PUSHES = 60  # times that overlapping robots are pushed apart before the place counts as too narrow for them
 _FARTHER = 1.005  # they are pushed a little too far, else they would never quite arrive
-_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # the golden angle: its multiples are spread evenly
 _MEMORY = 8  # steps from which the curvature is learnt
 _ARMIJO = 1e-4  # part of the fall that the slope promises which is good enough
 _HALVINGS = 4, 14  # of a step along the learnt direction, and along the slope, before it counts as none
@@ -245,7 +245,7 @@ class ConfigurationSpace:
         apart = np.hypot(between[:, 0], between[:, 1])
         # two robots in one place have no direction apart: a fixed one, another for each pair
         same = apart == 0.0
-        angle = _GOLDEN * (one[same] + other[same] * len(positions))
+        angle = GOLDEN_ANGLE * (one[same] + other[same] * len(positions))
         between[same] = np.column_stack([np.cos(angle), np.sin(angle)])
         part = (_FARTHER * self.spacing - apart) / 2.0 / np.where(same, 1.0, apart)
         push = between * part[:, None]

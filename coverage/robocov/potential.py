@@ -1,14 +1,16 @@
-"""The forces (24) and (27) of the paper's artificial potentials (23) and (26), in one walk over the robots.
+"""The forces (24) and (27) of the paper's artificial potentials (23) and (26).
 
-What the paper leaves open is decided here:
+Three cases that the paper leaves open are decided as follows:
 
-- *Contact*. (24) is singular at distance zero. Below `CONTACT_DISTANCE` its magnitude stays what it is
-  there, and the potential goes on linearly, so that F = -grad U holds everywhere.
-- *Two robots in one place* have no direction apart. They are pushed apart along a fixed direction
-  that depends on their two numbers alone, opposite for the two.
-- *Saturation*. (27) grows with the third power of the distance, without bound, and pushes robots
-  through the repulsion of walls. A limit caps its magnitude; the potential goes on linearly there.
+- *Contact*. (24) is singular at distance zero. Below `CONTACT_DISTANCE` its magnitude is constant and the
+  potential continues linearly, so that F = -grad U holds everywhere.
+- *Robots at the same position* have no direction from one to the other. They are pushed apart along a fixed
+  direction that depends on their two numbers alone, and is opposite for the two.
+- *Saturation*. (27) grows with the third power of the distance, without bound, and would push robots
+  through the repulsion of walls. A limit caps its magnitude; the potential continues linearly there.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,105 +19,219 @@ from robocov.compiled import kernel
 from robocov.observation.neighbours import find_bin, sort_into_bins
 
 CONTACT_DISTANCE = 0.01
-"""Distance in metres below which the repulsion no longer grows: a tenth of a robot's radius."""
+"""Distance below which the repulsion no longer grows, m: a tenth of a robot's radius."""
+GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
+"""The golden angle, rad: its multiples are spread evenly over all directions."""
 
-_TOGETHER = 1e-12
-"""Distance in metres at which two robots in one place are taken to be."""
+_MIN_DISTANCE = 1e-12
+"""Distance that robots at the same position are treated as having, m."""
 
-_GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
+
+class HeardPositions(NamedTuple):
+    """Which robots each robot knows of, and where it believes them to be.
+
+    Attributes
+    ----------
+    indptr : (n + 1,) or (0,) int array
+        Robot i knows of the robots ``indices[indptr[i]:indptr[i + 1]]``. Empty: each robot knows of all.
+    indices : (m,) int array
+    reported : (m, 2) or (0, 2) array, m
+        Positions that these robots have reported, in the order of `indices`. Empty: the true ones.
+    """
+
+    indptr: IntArray
+    indices: IntArray
+    reported: Array
+
+
+class PotentialGains(NamedTuple):
+    """Parameters of the potentials.
+
+    Attributes
+    ----------
+    k_rep : float, N m³
+        Strength of the repulsion (24).
+    rho_0 : float, m
+        Its range.
+    k_att : float, N/m³
+        Strength of the attraction (27).
+    max_attraction : float, N
+        Limit of its magnitude; may be infinite.
+    """
+
+    k_rep: float
+    rho_0: float
+    k_att: float
+    max_attraction: float
+
+
+class PotentialForces(NamedTuple):
+    """Forces on each robot, (n, 2) N each.
+
+    Attributes
+    ----------
+    total
+        Sum of the other three.
+    attraction
+        The force (27) towards the goal.
+    robots
+        Sum of (24) over the robots within `rho_0`.
+    obstacle
+        (24) from the closest obstacle point.
+    """
+
+    total: Array
+    attraction: Array
+    robots: Array
+    obstacle: Array
 
 
 @kernel
-def _repulsion(distance: float, k_rep: float, rho_0: float) -> float:
-    """Return the magnitude of (24) for each metre of offset, N/m; zero where that has no direction."""
+def compute_potential_forces(
+    positions: Array, heard: HeardPositions, obstacle_points: Array, goals: Array, gains: PotentialGains
+) -> PotentialForces:
+    """Compute the forces (25) + (27) on each robot.
+
+    Parameters
+    ----------
+    positions : (n, 2) array, m
+    heard : HeardPositions
+        Robots that repel each other.
+    obstacle_points : (n, 2) array, m
+        Closest obstacle point of each robot; nan if none is in range.
+    goals : (n, 2) array, m
+    gains : PotentialGains
+
+    Returns
+    -------
+    PotentialForces
+    """
+    n = len(positions)
+    attraction = np.zeros((n, 2))
+    obstacle = np.zeros((n, 2))
+    for i in range(n):
+        x = positions[i, 0]
+        y = positions[i, 1]
+        dx = x - obstacle_points[i, 0]
+        dy = y - obstacle_points[i, 1]
+        slope = _compute_repulsion(np.sqrt(dx * dx + dy * dy), gains.k_rep, gains.rho_0)
+        # The slope is nan if there is no obstacle point.
+        if slope > 0.0:
+            obstacle[i, 0] = slope * dx
+            obstacle[i, 1] = slope * dy
+        dx = goals[i, 0] - x
+        dy = goals[i, 1] - y
+        slope = _compute_attraction(dx * dx + dy * dy, gains.k_att, gains.max_attraction)
+        attraction[i, 0] = slope * dx
+        attraction[i, 1] = slope * dy
+    if len(heard.indptr) > 0:
+        robots = _sum_repulsion_of_heard_robots(positions, heard, gains)
+    else:
+        robots = _sum_repulsion_of_all_robots(positions, gains)
+    total = attraction + robots + obstacle
+    return PotentialForces(total, attraction, robots, obstacle)
+
+
+@kernel
+def compute_separations(robots: IntArray, neighbours: IntArray) -> Array:
+    """Compute the directions in which pairs of robots at the same position are pushed apart.
+
+    Parameters
+    ----------
+    robots, neighbours : (m,) int array
+        Numbers of the two robots of each pair.
+
+    Returns
+    -------
+    (m, 2) array
+        Unit vectors in which the first robot of each pair is pushed; for the second one they are opposite.
+    """
+    directions = np.empty((len(robots), 2))
+    for k in range(len(robots)):
+        x, y = _compute_separation(robots[k], neighbours[k])
+        directions[k, 0] = x
+        directions[k, 1] = y
+    return directions
+
+
+@kernel
+def _compute_repulsion(distance: float, k_rep: float, rho_0: float) -> float:
+    """Return the magnitude of (24) divided by the distance, N/m; zero at distance zero."""
     inverse = 1.0 / max(distance, CONTACT_DISTANCE)
     magnitude = k_rep * max(inverse - 1.0 / rho_0, 0.0) * inverse * inverse
     return magnitude / distance if distance > 0.0 else 0.0
 
 
 @kernel
-def _attraction(square: float, k_att: float, limit: float) -> float:
-    """Return the magnitude of (27) for each metre of offset, N/m."""
-    return float(min(k_att * square, limit / max(np.sqrt(square), 1e-300)))
+def _compute_attraction(squared_distance: float, k_att: float, max_attraction: float) -> float:
+    """Return the magnitude of (27) divided by the distance, N/m."""
+    distance = max(np.sqrt(squared_distance), 1e-300)
+    return float(min(k_att * squared_distance, max_attraction / distance))
 
 
 @kernel
-def compute_potential_forces(
-    positions: Array, reported: Array, indptr: IntArray, indices: IntArray, team: int, obstacle_points: Array,
-    goals: Array, k_rep: float, rho_0: float, k_att: float, limit: float,
-) -> Array:  # fmt: skip
-    """Return the forces (25) + (27) on each robot, and their three parts, (4, n, 2) N.
+def _sum_repulsion_of_heard_robots(positions: Array, heard: HeardPositions, gains: PotentialGains) -> Array:
+    """Return the sums of (24) over the robots that each robot knows of, (n, 2) N."""
+    sums = np.zeros((len(positions), 2))
+    has_reports = len(heard.reported) > 0
+    for i in range(len(positions)):
+        for k in range(heard.indptr[i], heard.indptr[i + 1]):
+            j = heard.indices[k]
+            if has_reports:
+                dx = positions[i, 0] - heard.reported[k, 0]
+                dy = positions[i, 1] - heard.reported[k, 1]
+            else:
+                dx = positions[i, 0] - positions[j, 0]
+                dy = positions[i, 1] - positions[j, 1]
+            _add_repulsion(sums, i, j, dx, dy, gains)
+    return sums
 
-    The parts are the attraction to the goal (27), the sum of (24) over the robots within `rho_0` that it
-    hears, and (24) from the closest obstacle point, zero where that is nan.
 
-    Places are in metres; `reported`, `indptr` and `indices`, the neighbours of each robot and their known
-    positions, are as in `robocov.voronoi.clipped_cells.KnownNeighbours`. If there are none, all robots of a
-    team, of `team` successive rows, are neighbours. k_rep, rho_0, k_att and the limit, which may be infinite,
-    are in N m³, m, N/m³ and N.
-    """
+@kernel
+def _sum_repulsion_of_all_robots(positions: Array, gains: PotentialGains) -> Array:
+    """Return the sums of (24) over all other robots, (n, 2) N, of which those out of range are skipped."""
     n = len(positions)
-    forces = np.zeros((4, n, 2))
-    starts, order = np.empty(2 * team + 8, np.intp), np.empty(team, np.intp)
-    left = low = scale = 0.0
-    columns = rows = 1
+    sums = np.zeros((n, 2))
+    if n == 0:
+        return sums
+    starts = np.empty(2 * n + 8, np.intp)
+    order = np.empty(n, np.intp)
+    left, low, scale, columns, rows = sort_into_bins(positions, 0, n, gains.rho_0, starts, order)
     for i in range(n):
-        x, y = positions[i, 0], positions[i, 1]
-        if len(indptr):
-            for k in range(indptr[i], indptr[i + 1]):
-                j = indices[k]
-                if len(reported):
-                    _push(forces, i, j, x - reported[k, 0], y - reported[k, 1], k_rep, rho_0)
-                else:
-                    _push(forces, i, j, x - positions[j, 0], y - positions[j, 1], k_rep, rho_0)
-        else:
-            if i % team == 0:
-                left, low, scale, columns, rows = sort_into_bins(positions, i, i + team, rho_0, starts, order)
-            column, row = find_bin(x - left, scale), find_bin(y - low, scale)
-            for r in range(max(row - 1, 0), min(row + 2, rows)):
-                b = r * columns
-                for k in range(starts[b + max(column - 1, 0)], starts[b + min(column + 2, columns)]):
-                    j = order[k]
-                    if j != i:
-                        _push(forces, i, j, x - positions[j, 0], y - positions[j, 1], k_rep, rho_0)
-        dx, dy = x - obstacle_points[i, 0], y - obstacle_points[i, 1]
-        part = _repulsion(np.sqrt(dx * dx + dy * dy), k_rep, rho_0)
-        if part > 0.0:
-            forces[3, i, 0], forces[3, i, 1] = part * dx, part * dy
-        dx, dy = goals[i, 0] - x, goals[i, 1] - y
-        part = _attraction(dx * dx + dy * dy, k_att, limit)
-        forces[1, i, 0], forces[1, i, 1] = part * dx, part * dy
-        for c in range(2):
-            forces[0, i, c] = forces[1, i, c] + forces[2, i, c] + forces[3, i, c]
-    return forces
+        column = find_bin(positions[i, 0] - left, scale)
+        row = find_bin(positions[i, 1] - low, scale)
+        first_column = max(column - 1, 0)
+        stop_column = min(column + 2, columns)
+        for r in range(max(row - 1, 0), min(row + 2, rows)):
+            for k in range(starts[r * columns + first_column], starts[r * columns + stop_column]):
+                j = order[k]
+                if j != i:
+                    dx = positions[i, 0] - positions[j, 0]
+                    dy = positions[i, 1] - positions[j, 1]
+                    _add_repulsion(sums, i, j, dx, dy, gains)
+    return sums
 
 
 @kernel
-def _push(forces: Array, i: int, j: int, dx: float, dy: float, k_rep: float, rho_0: float) -> None:
-    """Add (24) on robot i from robot j to its sum."""
-    square = dx * dx + dy * dy
-    if square > rho_0 * rho_0:
+def _add_repulsion(sums: Array, i: int, j: int, dx: float, dy: float, gains: PotentialGains) -> None:
+    """Add (24) on robot i from robot j to its sum; dx and dy lead from j to i."""
+    squared_distance = dx * dx + dy * dy
+    if squared_distance > gains.rho_0 * gains.rho_0:
         return
-    distance = np.sqrt(square)
-    if distance < _TOGETHER:
-        dx, dy = _apart(i, j)
-        dx, dy, distance = _TOGETHER * dx, _TOGETHER * dy, _TOGETHER
-    part = _repulsion(distance, k_rep, rho_0)
-    forces[2, i, 0] += part * dx
-    forces[2, i, 1] += part * dy
+    distance = np.sqrt(squared_distance)
+    if distance < _MIN_DISTANCE:
+        x, y = _compute_separation(i, j)
+        dx = _MIN_DISTANCE * x
+        dy = _MIN_DISTANCE * y
+        distance = _MIN_DISTANCE
+    slope = _compute_repulsion(distance, gains.k_rep, gains.rho_0)
+    sums[i, 0] += slope * dx
+    sums[i, 1] += slope * dy
 
 
 @kernel
-def _apart(i: int, j: int) -> tuple[float, float]:
-    angle = _GOLDEN_ANGLE * (min(i, j) + 1.0) * (max(i, j) + 1.0)
+def _compute_separation(i: int, j: int) -> tuple[float, float]:
+    """Return the unit vector in which robot i is pushed away from robot j at the same position."""
+    angle = GOLDEN_ANGLE * (min(i, j) + 1.0) * (max(i, j) + 1.0)
     sign = 1.0 if i < j else -1.0
     return sign * np.cos(angle), sign * np.sin(angle)
-
-
-@kernel
-def compute_separations(robot: IntArray, neighbour: IntArray) -> Array:
-    """Return unit vectors, (m, 2), along which robots in one place are told apart."""
-    directions = np.empty((len(robot), 2))
-    for k in range(len(robot)):
-        directions[k, 0], directions[k, 1] = _apart(robot[k], neighbour[k])
-    return directions

@@ -6,7 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.observation.neighbours import NO_INDICES, Neighbours
-from robocov.potential import CONTACT_DISTANCE, compute_potential_forces, compute_separations
+from robocov.potential import (
+    CONTACT_DISTANCE,
+    HeardPositions,
+    PotentialGains,
+    compute_potential_forces,
+    compute_separations,
+)
 
 coordinate = st.floats(-5, 5)
 strength = st.floats(0.01, 100)
@@ -24,7 +30,8 @@ def forces(
     points = np.full_like(positions, np.nan) if obstacle_points is None else obstacle_points
     reported = np.empty((0, 2)) if reported is None else reported
     goals = positions if goals is None else goals
-    return compute_potential_forces(positions, reported, *links, len(positions), points, goals, *k)
+    heard = HeardPositions(*links, reported)
+    return np.stack(compute_potential_forces(positions, heard, points, goals, PotentialGains(*k)))
 
 
 def repulsive_force(offset: np.ndarray, k_rep: float, rho_0: float) -> np.ndarray:

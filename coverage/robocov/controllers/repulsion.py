@@ -12,7 +12,14 @@ from robocov.locational_cost.best_points import HEIGHT_HELP, TARGET_HELP, TARGET
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.neighbours import NO_INDICES
 from robocov.observation.region import Region
-from robocov.potential import CONTACT_DISTANCE, compute_potential_forces, compute_separations
+from robocov.potential import (
+    CONTACT_DISTANCE,
+    HeardPositions,
+    PotentialForces,
+    PotentialGains,
+    compute_potential_forces,
+    compute_separations,
+)
 from robocov.team import Team
 from robocov.voronoi.delaunay import Mesh
 
@@ -25,19 +32,22 @@ _NOT_REPORTED = np.empty((0, 2))
 
 
 def _compute_potential_forces(
-    seen: Observations, goals: Array, k_rep: float, rho_0: float,
-    k_att: float = 0.0, limit: float | None = None, *, from_robots: bool = True,
-) -> Array:  # fmt: skip
-    """Return what `compute_potential_forces` does, of what the robots see; no `limit` is None."""
-    n, links = len(seen.positions), seen.neighbours
-    if from_robots:
-        indptr = NO_INDICES if links.indptr is None else links.indptr
+    seen: Observations, goals: Array, gains: PotentialGains, *, includes_robots: bool = True
+) -> PotentialForces:
+    """Return the forces of the potentials on all robots, from what they observe."""
+    links = seen.neighbours
+    if not includes_robots:
+        indptr = np.zeros(len(seen.positions) + 1, np.intp)
+    elif links.indptr is None:
+        indptr = NO_INDICES
     else:
-        indptr = np.zeros(n + 1, np.intp)
-    indices = NO_INDICES if links.indices is None else links.indices
-    reported = _NOT_REPORTED if seen.reported_positions is None else seen.reported_positions
-    known = seen.positions, reported, indptr, indices, n, seen.obstacle_points
-    return compute_potential_forces(*known, goals, k_rep, rho_0, k_att, np.inf if limit is None else limit)
+        indptr = links.indptr
+    heard = HeardPositions(
+        indptr=indptr,
+        indices=NO_INDICES if links.indices is None else links.indices,
+        reported=_NOT_REPORTED if seen.reported_positions is None else seen.reported_positions,
+    )
+    return compute_potential_forces(seen.positions, heard, seen.obstacle_points, goals, gains)
 
 
 def _close_pairs(seen: Observations, reach: float) -> tuple[IntArray, IntArray, Array, Array]:
@@ -67,9 +77,10 @@ class Rpf(Law):
     rho_0: float = gain(4.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)
 
     def decide(self, seen: Observations, memory: object) -> Decision:
-        forces, _, robots, obstacle = _compute_potential_forces(seen, seen.positions, self.k_rep, self.rho_0)
-        terms = {"repulsion_robots": robots, "repulsion_obstacle": obstacle}
-        return Decision(forces, terms=terms, memory=memory)
+        gains = PotentialGains(float(self.k_rep), float(self.rho_0), k_att=0.0, max_attraction=np.inf)
+        forces = _compute_potential_forces(seen, seen.positions, gains)
+        terms = {"repulsion_robots": forces.robots, "repulsion_obstacle": forces.obstacle}
+        return Decision(forces.total, terms=terms, memory=memory)
 
 
 @dataclass(frozen=True)
@@ -106,10 +117,15 @@ class Rapf(Law):
     def decide(self, seen: Observations, memory: Mesh | None) -> Decision:
         cells = cells_seen(seen, self.cells, memory)
         goals = find_targets(cells, seen.density, self.target, self.height)
-        gains = self.k_rep, self.rho_0, self.k_att, self.attraction_limit
-        forces, attraction, robots, obstacle = _compute_potential_forces(seen, goals, *gains)
-        terms = {"attraction": attraction, "repulsion_robots": robots, "repulsion_obstacle": obstacle}
-        return Decision(forces, goals, terms, cells, cells.triangulation)
+        max_attraction = np.inf if self.attraction_limit is None else float(self.attraction_limit)
+        gains = PotentialGains(float(self.k_rep), float(self.rho_0), float(self.k_att), max_attraction)
+        forces = _compute_potential_forces(seen, goals, gains)
+        terms = {
+            "attraction": forces.attraction,
+            "repulsion_robots": forces.robots,
+            "repulsion_obstacle": forces.obstacle,
+        }
+        return Decision(forces.total, goals, terms, cells, cells.triangulation)
 
 
 @dataclass(frozen=True)
@@ -207,9 +223,8 @@ class Poduri(Law):
         spare = reach - np.minimum(distance, _STRETCHED * reach)
         degree = np.where(critical, self.k_cover * (1.0 / self.eta - 1.0) ** 2 / spare**2, 0.0)
         apart, held = summed(robot, way * cover[:, None], n), summed(robot, way * -degree[:, None], n)
-        obstacle = _compute_potential_forces(
-            seen, seen.positions, self.k_obs, self.rho_obs, from_robots=False
-        )[3]
+        gains = PotentialGains(float(self.k_obs), float(self.rho_obs), k_att=0.0, max_attraction=np.inf)
+        obstacle = _compute_potential_forces(seen, seen.positions, gains, includes_robots=False).obstacle
         terms = {"repulsion_robots": apart, "attraction": held, "repulsion_obstacle": obstacle}
         return Decision(apart + held + obstacle, terms=terms, memory=memory)
 

@@ -8,13 +8,13 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.environment import Environment, Point
 from robocov.errors import StartError
 from robocov.observation.neighbours import find_close_pairs
+from robocov.potential import GOLDEN_ANGLE
 from robocov.team import Team
 
 _CLEARANCE_M = 1e-3
 """Clearance of a robot from what it is moved away from."""
 _MAX_ROUNDS = 300
 """Robots that still overlap after this number of rounds have no room next to each other."""
-_GOLDEN_ANGLE_RAD = 2.399963
 _QUADRANT_SEGMENTS = 16
 """Edges per quadrant of the polygons that represent the discs of other robots."""
 
@@ -87,7 +87,7 @@ def _compute_directions(positions: Array, first: IntArray, second: IntArray, dis
     divisor = np.where(is_same_point, 1.0, distance)
     directions: Array = (positions[second] - positions[first]) / divisor[:, None]
     # Robots at the same point have no direction apart. Each pair gets one of its own.
-    angle = _GOLDEN_ANGLE_RAD * (first + second)
+    angle = GOLDEN_ANGLE * (first + second)
     own_directions = np.column_stack([np.cos(angle), np.sin(angle)])
     directions[is_same_point] = own_directions[is_same_point]
     return directions
