@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray, compute_weighted_mean, find_run_starts, freeze
 from robocov.cost.site_paths import GROUP, TILE, CornerViews, CostMap, Tiles, Work, corner_views, site_paths
-from robocov.density.base import compute_square_means
+from robocov.density.polygon_masses import compute_square_means
 from robocov.drawing import Drawable
 from robocov.environment import Environment, require_environment
 from robocov.errors import InputError, ParameterError, format_count, quote, require_number, to_floats

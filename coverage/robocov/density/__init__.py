@@ -1,7 +1,12 @@
-"""The density φ: how much each place of the region counts, and its integrals over cells.
+"""The density φ: how important each point of the region is, and its integrals over cells.
 
-Every density integrates over all Voronoi cells at once, in closed form or exactly by quadrature: by the
-divergence theorem an integral over a cell is a sum over its edges, so that no cell is ever clipped.
+- `base`: what a density is, and the uniform one
+- `gaussians`, `polygons`, `raster`: sums of Gaussians, weighted areas, and images
+- `cell_edges`: cells as edges, over which densities are integrated
+- `polygon_masses`: integrals over other polygons
+
+Each density is integrated over all Voronoi cells at once, in closed form or by a quadrature that is exact. By
+the divergence theorem an integral over a cell is a sum over its edges, so that no cell is ever clipped.
 """
 
 from robocov.density.base import MAX_WEIGHT, Density, Uniform

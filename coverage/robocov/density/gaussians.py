@@ -1,34 +1,73 @@
-"""Hot spots, and their integrals over polygons in closed form.
+"""Sums of Gaussians, and their integrals over polygons in closed form.
 
 Let g = exp(-|q|²/2), and let an edge lie at the signed distance d from the centre along its outward
 normal n, between s₁ and s₂ along its direction t. With div[(1 - g) q / |q|²] = g, an edge adds to the mass
 
     ∫ d (1 - g) / (d² + s²) ds = [atan(s/d) - 2π T(d, s/d)] from s₁ to s₂
 
-where T is Owen's function (Owen 1956). With q g = -grad g, it adds -n E₀ to the first moment, E₀ = ∫ g ds,
-and with ∂(qᵢ g)/∂qⱼ = (δᵢⱼ - qᵢ qⱼ) g, -(d n + s t) nᵀ g integrated along it, to the second moments beside
-the mass. Any other Gaussian is this one after an affine map.
+where T is Owen's function (Owen 1956). With q g = -grad g, it adds -n E₀ to the first moment, where
+E₀ = ∫ g ds. With ∂(qᵢ g)/∂qⱼ = (δᵢⱼ - qᵢ qⱼ) g, it adds -(d n + s t) nᵀ g, integrated along the edge, to the
+second moments minus the mass. Any other Gaussian is this one after an affine map.
 """
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, TypeAlias
+from typing import ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.density.base import CellEdges, Density, require_weight
+from robocov.density.base import Density, require_weight
+from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError, quote
 
 Point: TypeAlias = tuple[float, float]
 Matrix: TypeAlias = tuple[Point, Point]
 
+_MIN_RELATIVE_DETERMINANT = 1e-9
+"""Determinant of a covariance, relative to the product of its diagonal, below which it counts as singular."""
+
+
+class _Factor(NamedTuple):
+    """Lower triangular factor L of a covariance S = L Lᵀ, m: its diagonal, and the entry below it."""
+
+    xx: float
+    yy: float
+    yx: float
+
+
+class _EdgeIntegrals(NamedTuple):
+    """What edges add to integrals of the standard Gaussian, (s,) each.
+
+    The second moments are stored as their differences from the mass, and xy as its negative.
+    """
+
+    mass: Array
+    x: Array
+    y: Array
+    missing_xx: Array
+    missing_xy: Array
+    missing_yy: Array
+
 
 @dataclass(frozen=True)
 class Gaussian:
-    """One hot spot, ``weight exp(-½ (q - c)ᵀ S⁻¹ (q - c))``, its centre and σ in metres.
+    """One Gaussian, ``weight exp(-½ (q - c)ᵀ S⁻¹ (q - c))``.
 
-    Either the standard deviation σ is given, or the covariance S, m², symmetric and positive definite.
+    Parameters
+    ----------
+    center : (x, y), m
+    weight : float
+        Value at the centre, from 0.
+    sigma : float or None, m
+        Standard deviation, above 0.
+    covariance : 2 x 2 nested tuples or None, m²
+        S, symmetric and positive definite. Either this or `sigma` is given.
+
+    Raises
+    ------
+    ParameterError
+        If a value is out of range, or not exactly one of `sigma` and `covariance` is given.
     """
 
     center: Point
@@ -39,53 +78,100 @@ class Gaussian:
     def __post_init__(self) -> None:
         require_weight("weight", self.weight)
         if (self.sigma is None) == (self.covariance is None):
-            raise ParameterError("sigma and covariance: either one of them was wanted")
+            got = "neither" if self.sigma is None else "both"
+            raise ParameterError(f"sigma, covariance: expected one of them, got {got}")
         if self.sigma is not None and not 0.0 < self.sigma < math.inf:
-            raise ParameterError(f"sigma: {quote(self.sigma)} m, but a number above 0 was wanted")
-        if self.covariance is not None and not _definite(self.covariance):
-            wanted = "a symmetric, positive definite 2 x 2 matrix was wanted"
-            raise ParameterError(f"covariance: {quote(self.covariance)} m², but {wanted}")
+            raise ParameterError(f"sigma: expected a number above 0, got {quote(self.sigma)} m")
+        if self.covariance is not None and not _is_positive_definite(self.covariance):
+            raise ParameterError(
+                "covariance: expected a symmetric, positive definite 2 x 2 matrix, "
+                f"got {quote(self.covariance)} m²"
+            )
 
     @property
     def matrix(self) -> Matrix:
-        """S, m²."""
+        """Covariance S, m²."""
         if self.covariance is not None:
             return self.covariance
         assert self.sigma is not None
         return (self.sigma**2, 0.0), (0.0, self.sigma**2)
 
-    def _root(self) -> tuple[float, float, float]:
-        """Return L of S = L Lᵀ, m: its diagonal, and what is below it."""
-        (xx, xy), (_, yy) = self.matrix
-        a = math.sqrt(xx)
-        c = xy / a
-        return a, math.sqrt(yy - c * c), c
+    def evaluate(self, points: Array) -> Array:
+        """Evaluate the Gaussian.
 
-    def _standard(self, offset: Array) -> Array:
-        """Return (s, 2) offsets from the centre in the coordinates where this is the standard Gaussian."""
-        a, b, c = self._root()
-        u = offset[:, 0] / a
-        return np.column_stack([u, (offset[:, 1] - c * u) / b])
+        Parameters
+        ----------
+        points : (k, 2) array, m
 
-    def _moments(self, edges: CellEdges, origins: Array) -> Array:
-        a, b, c = self._root()
+        Returns
+        -------
+        (k,) array
+        """
+        standard = self._standardize(points - np.array(self.center))
+        x = standard[:, 0]
+        y = standard[:, 1]
+        return np.asarray(self.weight * np.exp(-0.5 * (x * x + y * y)))
+
+    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+        """Compute mass, first moments and polar moment of cells; see `Density.compute_moments`."""
+        factor = self._factorize()
         lever = origins - np.array(self.center)
-        at = lever[edges.cell]
-        parts = _edge_integrals(self._standard(edges.start + at), self._standard(edges.end + at))
-        count, area = len(origins), self.weight * a * b
-        mass, u, v, uu, uv, vv = (np.bincount(edges.cell, part, minlength=count) * area for part in parts)
-        # back from L q: moments about the centre, then about the origins
-        x, y = a * u, c * u + b * v
-        second = (a * a + c * c) * (mass - uu) - 2.0 * b * c * uv + b * b * (mass - vv)
-        (px, py), square = lever.T, (lever * lever).sum(axis=1)
-        polar = second - 2.0 * (px * x + py * y) + square * mass
-        return np.column_stack([mass, x - px * mass, y - py * mass, polar])
+        edge_lever = lever[edges.cell]
+        start = self._standardize(edges.start + edge_lever)
+        end = self._standardize(edges.end + edge_lever)
+        scale = self.weight * factor.xx * factor.yy
+        sums: list[Array] = [
+            np.asarray(np.bincount(edges.cell, integral, minlength=len(origins)) * scale)
+            for integral in _integrate_along_edges(start, end)
+        ]
+        cells = _EdgeIntegrals(*sums)
+        # From the standard coordinates to moments about the centre of the Gaussian.
+        mass = cells.mass
+        x = factor.xx * cells.x
+        y = factor.yx * cells.x + factor.yy * cells.y
+        polar = (
+            (factor.xx * factor.xx + factor.yx * factor.yx) * (mass - cells.missing_xx)
+            - 2.0 * factor.yy * factor.yx * cells.missing_xy
+            + factor.yy * factor.yy * (mass - cells.missing_yy)
+        )
+        # From there to moments about the origins.
+        lever_x = lever[:, 0]
+        lever_y = lever[:, 1]
+        squared_lever = (lever * lever).sum(axis=1)
+        polar = polar - 2.0 * (lever_x * x + lever_y * y) + squared_lever * mass
+        return np.column_stack([mass, x - lever_x * mass, y - lever_y * mass, polar])
+
+    def _factorize(self) -> _Factor:
+        """Return the Cholesky factor of the covariance."""
+        (xx, xy), (_, yy) = self.matrix
+        factor_xx = math.sqrt(xx)
+        factor_yx = xy / factor_xx
+        return _Factor(factor_xx, math.sqrt(yy - factor_yx * factor_yx), factor_yx)
+
+    def _standardize(self, offset: Array) -> Array:
+        """Return (s, 2) offsets from the centre in the coordinates in which this is the standard Gaussian."""
+        factor = self._factorize()
+        u = offset[:, 0] / factor.xx
+        return np.column_stack([u, (offset[:, 1] - factor.yx * u) / factor.yy])
 
 
 @dataclass(frozen=True)
 class Gaussians(Density):
-    """A sum of hot spots over a floor, from 0. Its integrals are closed forms of erf and Owen's T function.
+    """A sum of Gaussians and a constant. Its integrals are closed forms of erf and Owen's T function.
 
+    Parameters
+    ----------
+    peaks : tuple of Gaussian
+    floor : float
+        The constant, from 0.
+
+    Raises
+    ------
+    ParameterError
+        If all weights are 0, or the floor is out of range.
+
+    Examples
+    --------
     >>> density = Gaussians((Gaussian((2.0, 0.0), weight=3.0, sigma=1.0),), floor=0.5)
     >>> density.evaluate(np.array([[2.0, 0.0], [9.0, 0.0]])).round(6)
     array([3.5, 0.5])
@@ -98,8 +184,8 @@ class Gaussians(Density):
 
     def __post_init__(self) -> None:
         require_weight("floor", self.floor)
-        if not self.floor + sum(peak.weight for peak in self.peaks) > 0.0:
-            raise ParameterError("floor: 0, and no peak of a weight above 0, but some weight was wanted")
+        if not self.max_value > 0.0:
+            raise ParameterError("floor: expected a number above 0 or a peak with a weight above 0, got 0")
 
     @property
     def min_value(self) -> float:
@@ -110,53 +196,62 @@ class Gaussians(Density):
         return self.floor + sum(peak.weight for peak in self.peaks)
 
     def evaluate(self, points: Array) -> Array:
-        points, total = np.asarray(points, dtype=float), np.full(len(points), float(self.floor))
+        points = np.asarray(points, dtype=float)
+        total = np.full(len(points), float(self.floor))
         for peak in self.peaks:
-            x, y = peak._standard(points - np.array(peak.center)).T
-            total += peak.weight * np.exp(-0.5 * (x * x + y * y))
+            total += peak.evaluate(points)
         return total
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
         total = self.floor * edges.compute_moments(len(origins))
         for peak in self.peaks:
-            total += peak._moments(edges, origins)
+            total += peak.compute_moments(edges, origins)
         return total
 
 
-def _edge_integrals(start: Array, end: Array) -> Array:
-    """Return what edges add to integrals of the standard Gaussian, (6, s).
-
-    These are the mass, the first moments, and what the second moments xx, xy, yy are less than the mass
-    (less than zero for xy).
-    """
-    from scipy.special import erf, owens_t  # not at once: loading a map needs none of it
+def _integrate_along_edges(start: Array, end: Array) -> _EdgeIntegrals:
+    """Integrate the standard Gaussian along edges, whose ends are (s, 2)."""
+    # SciPy is imported late, because loading a map does not need it.
+    from scipy.special import erf, owens_t
 
     along = end - start
     length = np.hypot(along[:, 0], along[:, 1])
-    long = length > 0.0
-    tx, ty = (along / np.where(long, length, 1.0)[:, None]).T
-    nx, ny = ty, -tx
-    (x, y), (u, v) = start.T, end.T
-    d = x * nx + y * ny
-    s1, s2 = x * tx + y * ty, u * tx + v * ty
-    # at d = 0 the two terms cancel
-    apart = d != 0.0
+    has_length = length > 0.0
+    tangent_x, tangent_y = (along / np.where(has_length, length, 1.0)[:, None]).T
+    normal_x = tangent_y
+    normal_y = -tangent_x
+    d = start[:, 0] * normal_x + start[:, 1] * normal_y
+    s1 = start[:, 0] * tangent_x + start[:, 1] * tangent_y
+    s2 = end[:, 0] * tangent_x + end[:, 1] * tangent_y
+    has_distance = d != 0.0
+    divisor = np.where(has_distance, d, 1.0)
     with np.errstate(over="ignore"):
-        a1, a2 = s1 / np.where(apart, d, 1.0), s2 / np.where(apart, d, 1.0)
-    turn = np.arctan(a2) - np.arctan(a1) - 2.0 * np.pi * (owens_t(d, a2) - owens_t(d, a1))
-    # far out squares overflow, and the exponential is zero all the same
+        ratio1 = s1 / divisor
+        ratio2 = s2 / divisor
+    mass = np.arctan(ratio2) - np.arctan(ratio1) - 2.0 * np.pi * (owens_t(d, ratio2) - owens_t(d, ratio1))
+    # At distance 0 the two terms cancel.
+    mass[~has_distance] = 0.0
+    # Far from the centre squares may overflow; the exponential is zero all the same.
     peak = np.exp(-0.5 * d * d)
     e0 = peak * np.sqrt(np.pi / 2.0) * (erf(s2 / np.sqrt(2.0)) - erf(s1 / np.sqrt(2.0)))
     e1 = peak * (np.exp(-0.5 * s1 * s1) - np.exp(-0.5 * s2 * s2))
     de0 = d * e0
-    xx, xy, yy = nx * (nx * de0 + tx * e1), ny * (nx * de0 + tx * e1), ny * (ny * de0 + ty * e1)
-    parts = np.stack([turn, -nx * e0, -ny * e0, xx, xy, yy])
-    parts[:, ~long] = 0.0
-    parts[0, ~apart] = 0.0
-    return parts
+    integrals = _EdgeIntegrals(
+        mass=mass,
+        x=-normal_x * e0,
+        y=-normal_y * e0,
+        missing_xx=normal_x * (normal_x * de0 + tangent_x * e1),
+        missing_xy=normal_y * (normal_x * de0 + tangent_x * e1),
+        missing_yy=normal_y * (normal_y * de0 + tangent_y * e1),
+    )
+    for integral in integrals:
+        integral[~has_length] = 0.0
+    return integrals
 
 
-def _definite(matrix: Matrix) -> bool:
+def _is_positive_definite(matrix: Matrix) -> bool:
+    """Return whether a matrix is a covariance; one that is nearly singular is not."""
     (a, b), (c, d) = matrix
-    # beyond, a Gaussian is a line for this arithmetic
-    return b == c and a > 0.0 and d > 0.0 and a * d - b * c > 1e-9 * a * d and a + d < math.inf
+    is_symmetric = b == c
+    has_positive_diagonal = a > 0.0 and d > 0.0 and a + d < math.inf
+    return is_symmetric and has_positive_diagonal and a * d - b * c > _MIN_RELATIVE_DETERMINANT * a * d

@@ -1,14 +1,14 @@
-"""Areas that count more than others, or less; integrals over polygons, exact and without clipping.
+"""Areas of constant weight, and their exact integrals over polygons, without clipping.
 
-The area to the left of a rising edge e counts as a part of a polygon, that to the left of a falling one
-as none: so a polygon is a signed sum of strips, one an edge. Of two polygons, the integral over what they
-have in common is a signed sum over the pairs of their edges e and f, each the integral of a polynomial
-over what lies between f and e,
+A polygon is a signed sum of strips, one for each edge: the area to the left of a rising edge counts
+positive, that to the left of a falling edge negative. The integral over the intersection of two polygons is
+therefore a signed sum over the pairs of their edges e and f. Each term is the integral of a polynomial over
+the area between f and e,
 
-    ∫ max(0, x_e(y) - x_f(y)) dy          (the area; over the heights y that both have)
+    ∫ max(0, x_e(y) - x_f(y)) dy          (the area; over the heights y that both edges have)
 
 and the same with other powers of x and y in it. Both edges are straight, so that this is an integral of
-a polynomial in y over one interval. Nothing is decided by rounding: each pair adds what depends
+a polynomial in y over one interval. Nothing is decided by rounding: each pair adds a term that depends
 continuously on all ends, however edges meet, touch or coincide.
 """
 
@@ -21,20 +21,34 @@ import shapely
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.density.base import CellEdges, Density, require_weight
+from robocov.density.base import Density, require_weight
+from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError
 
 Ring: TypeAlias = tuple[tuple[float, float], ...]
 
-_NODE = 0.5 - 0.5 / 3.0**0.5
-"""The first of Gauss's rule with two points, exact for cubic polynomials."""
+_GAUSS_NODE = 0.5 - 0.5 / 3.0**0.5
+"""First node of Gauss's rule with two points on [0, 1], which is exact for cubic polynomials."""
 
 
 @dataclass(frozen=True)
 class WeightedArea:
-    """A polygon in which every place has the same weight, from 0.
+    """A polygon of constant weight.
 
-    The rings, of [x, y] in metres, run either way round; their first vertices are not repeated.
+    Parameters
+    ----------
+    vertices : tuple of (x, y), m
+        Outer ring, in either direction. The first vertex is not repeated.
+    weight : float
+        From 0.
+    holes : tuple of rings
+        Rings like `vertices`.
+    name : str or None
+
+    Raises
+    ------
+    ParameterError
+        If the weight is out of range.
     """
 
     vertices: Ring
@@ -53,9 +67,26 @@ class WeightedArea:
 
 @dataclass(frozen=True)
 class WeightedPolygons(Density):
-    """A density that is constant in polygons, and outside them all. Its integrals are exact.
+    """A density that is constant in polygons, and outside of them all. Its integrals are exact.
 
-    Where areas overlap, the last of them counts; outside them all, the background, from 0.
+    Parameters
+    ----------
+    areas : tuple of WeightedArea
+        Where areas overlap, the last of them counts.
+    background : float
+        Density outside of all areas, from 0.
+
+    Raises
+    ------
+    ParameterError
+        If all weights are 0, or the background is out of range.
+
+    Examples
+    --------
+    >>> room = WeightedArea(((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)), weight=5.0)
+    >>> density = WeightedPolygons((room,), background=1.0)
+    >>> density.evaluate(np.array([[1.0, 1.0], [3.0, 1.0]]))
+    array([5., 1.])
     """
 
     kind: ClassVar[str] = "polygons"
@@ -66,7 +97,9 @@ class WeightedPolygons(Density):
     def __post_init__(self) -> None:
         require_weight("background", self.background)
         if not self.max_value > 0.0:
-            raise ParameterError("background: 0, and no area of a weight above 0, but some weight was wanted")
+            raise ParameterError(
+                "background: expected a number above 0 or an area with a weight above 0, got 0"
+            )
 
     @property
     def min_value(self) -> float:
@@ -78,71 +111,109 @@ class WeightedPolygons(Density):
 
     @cached_property
     def _jumps(self) -> Array:
-        """The edges at which φ jumps, (e, 5) m: lower end, upper end, how much more there is on the right."""
-        pieces, above = [np.empty((0, 5))], shapely.MultiPolygon()
-        for area in reversed(self.areas):  # the last ones are on top
-            seen = shapely.difference(area.polygon, above) if not above.is_empty else area.polygon
-            above = shapely.union(above, area.polygon)
-            # of what is no polygon there are no rings
-            for ring in shapely.get_rings(shapely.orient_polygons(shapely.get_parts(seen))):
+        """Edges across which φ jumps, (e, 5): lower end and upper end, m, and φ on the right minus left."""
+        jumps = [np.empty((0, 5))]
+        covered = shapely.MultiPolygon()
+        # The last areas are on top.
+        for area in reversed(self.areas):
+            visible = area.polygon if covered.is_empty else shapely.difference(area.polygon, covered)
+            covered = shapely.union(covered, area.polygon)
+            # Points and lines, where areas touch, have no rings.
+            for ring in shapely.get_rings(shapely.orient_polygons(shapely.get_parts(visible))):
                 points = shapely.get_coordinates(ring)
-                start, end = points[:-1], points[1:]
-                falls = start[:, 1:] > end[:, 1:]
-                low, high = np.where(falls, end, start), np.where(falls, start, end)
-                # the inside of a polygon lies to the left of an edge that rises
-                jump = np.where(falls, 1.0, -1.0) * (area.weight - self.background)
-                pieces.append(np.hstack([low, high, jump]))
-        jumps = np.concatenate(pieces)
-        return np.asarray(jumps[(jumps[:, 1] < jumps[:, 3]) & (jumps[:, 4] != 0.0)])
+                jumps.append(_build_jumps(points, area.weight - self.background))
+        edges = np.concatenate(jumps)
+        is_level = edges[:, 1] >= edges[:, 3]
+        return np.asarray(edges[~is_level & (edges[:, 4] != 0.0)])
 
     def evaluate(self, points: Array) -> Array:
         x, y = np.asarray(points, dtype=float).T
-        value = np.full(len(x), float(self.background))
+        values = np.full(len(x), float(self.background))
         for area in self.areas:
-            value[shapely.contains_xy(area.polygon, x, y)] = area.weight
-        return value
+            values[shapely.contains_xy(area.polygon, x, y)] = area.weight
+        return values
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
-        total = self.background * edges.compute_moments(len(origins))
-        _add_steps(self._jumps, edges.start, edges.end, edges.cell, np.ascontiguousarray(origins), total)
-        return total
+        moments = self.background * edges.compute_moments(len(origins))
+        _add_jumps(moments, self._jumps, edges.start, edges.end, edges.cell, np.ascontiguousarray(origins))
+        return moments
+
+
+def _build_jumps(points: Array, step: float) -> Array:
+    """Return the edges of a closed, counter-clockwise ring, inside of which φ is larger by `step`."""
+    start = points[:-1]
+    end = points[1:]
+    falls = start[:, 1:] > end[:, 1:]
+    low = np.where(falls, end, start)
+    high = np.where(falls, start, end)
+    # The inside of the polygon lies to the left of an edge that rises.
+    jump = np.where(falls, 1.0, -1.0) * step
+    return np.hstack([low, high, jump])
 
 
 @kernel
-def _add_steps(jumps: Array, start: Array, end: Array, cell: IntArray, origins: Array, total: Array) -> None:
-    """Add what lies between each edge and each jump to its left."""
+def _add_jumps(
+    moments: Array, jumps: Array, start: Array, end: Array, cell: IntArray, origins: Array
+) -> None:
+    """Add to the moments of cells the integrals between each edge and each jump to its left."""
     for e in range(len(cell)):
-        ox, oy = origins[cell[e], 0], origins[cell[e], 1]
-        sign, x, y, u, v = 1.0, start[e, 0], start[e, 1], end[e, 0], end[e, 1]
+        c = cell[e]
+        # Edges run upwards from here on; the sign says in which direction they ran.
+        sign = 1.0
+        x = start[e, 0]
+        y = start[e, 1]
+        u = end[e, 0]
+        v = end[e, 1]
+        if y == v:
+            continue
         if y > v:
-            sign, x, y, u, v = -1.0, u, v, x, y
-        for f in range(len(jumps) if y < v else 0):
-            # relative to the origin, where the edges are small
-            low_x, low_y = jumps[f, 0] - ox, jumps[f, 1] - oy
-            high_x, high_y = jumps[f, 2] - ox, jumps[f, 3] - oy
-            bottom, top = max(y, low_y), min(v, high_y)
+            sign = -1.0
+            x = end[e, 0]
+            y = end[e, 1]
+            u = start[e, 0]
+            v = start[e, 1]
+        for f in range(len(jumps)):
+            # Relative to the origin, where the edges of the cell are small.
+            low_x = jumps[f, 0] - origins[c, 0]
+            low_y = jumps[f, 1] - origins[c, 1]
+            high_x = jumps[f, 2] - origins[c, 0]
+            high_y = jumps[f, 3] - origins[c, 1]
+            bottom = max(y, low_y)
+            top = min(v, high_y)
             if bottom >= top or max(x, u) <= min(low_x, high_x):
                 continue
-            e0, e1 = _at(x, y, u, v, bottom), _at(x, y, u, v, top)
-            f0, f1 = _at(low_x, low_y, high_x, high_y, bottom), _at(low_x, low_y, high_x, high_y, top)
-            gap, then = e0 - f0, e1 - f1
-            if gap <= 0.0 and then <= 0.0:
+            edge_bottom = _find_x(x, y, u, v, bottom)
+            edge_top = _find_x(x, y, u, v, top)
+            jump_bottom = _find_x(low_x, low_y, high_x, high_y, bottom)
+            jump_top = _find_x(low_x, low_y, high_x, high_y, top)
+            width_bottom = edge_bottom - jump_bottom
+            width_top = edge_top - jump_top
+            if width_bottom <= 0.0 and width_top <= 0.0:
                 continue
-            # where they cross, one part of the interval counts
-            begin = gap / (gap - then) if gap < 0.0 else 0.0
-            part = (gap / (gap - then) if then < 0.0 else 1.0) - begin
-            weight, c = 0.5 * part * (top - bottom) * sign * jumps[f, 4], cell[e]
-            for node in (_NODE, 1.0 - _NODE):
-                where = begin + part * node
-                right, left = e0 + where * (e1 - e0), f0 + where * (f1 - f0)
-                width, height = weight * (right - left), bottom + where * (top - bottom)
-                total[c, 0] += width
-                total[c, 1] += 0.5 * width * (right + left)
-                total[c, 2] += height * width
-                total[c, 3] += width * ((right * right + right * left + left * left) / 3.0 + height * height)
+            # If the edge crosses the jump, only the heights on one side of the crossing count.
+            first = 0.0
+            last = 1.0
+            if width_bottom < 0.0:
+                first = width_bottom / (width_bottom - width_top)
+            if width_top < 0.0:
+                last = width_bottom / (width_bottom - width_top)
+            fraction = last - first
+            weight = 0.5 * fraction * (top - bottom) * sign * jumps[f, 4]
+            for node in (_GAUSS_NODE, 1.0 - _GAUSS_NODE):
+                t = first + fraction * node
+                right = edge_bottom + t * (edge_top - edge_bottom)
+                left = jump_bottom + t * (jump_top - jump_bottom)
+                width = weight * (right - left)
+                height = bottom + t * (top - bottom)
+                mean_square = (right * right + right * left + left * left) / 3.0
+                moments[c, 0] += width
+                moments[c, 1] += 0.5 * width * (right + left)
+                moments[c, 2] += height * width
+                moments[c, 3] += width * (mean_square + height * height)
 
 
 @kernel
-def _at(x: float, y: float, u: float, v: float, height: float) -> float:
-    """Return x where an edge has a height."""
-    return x + min(max((height - y) / (v - y), 0.0), 1.0) * (u - x)
+def _find_x(x: float, y: float, u: float, v: float, height: float) -> float:
+    """Return the x at which an edge from (x, y) to (u, v) has a height."""
+    fraction = min(max((height - y) / (v - y), 0.0), 1.0)
+    return x + fraction * (u - x)

@@ -1,4 +1,4 @@
-"""A picture of a density: constant in each of its cells, or linear between their middles."""
+"""An image of a density: constant in each of its pixels, or linear between their centres."""
 
 from __future__ import annotations
 
@@ -11,58 +11,87 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray, freeze
 from robocov.compiled import kernel
-from robocov.density.base import MAX_WEIGHT, CellEdges, Density
+from robocov.density.base import MAX_WEIGHT, Density
+from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError, quote
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-_NODE = 0.5 * 0.6**0.5
-"""Distance of the outer nodes of Gauss's rule with three points from the middle one."""
-
 MAX_RASTER_SIZE = 1024
-"""Most rows, and most columns, of a raster."""
+"""Maximum number of rows, and of columns, of a raster."""
 
 Interpolation: TypeAlias = Literal["cells", "bilinear"]
-"""Whether a raster is constant in each of its cells, or linear between the middles of these both ways."""
+"""Whether a raster is constant in each of its pixels, or linear between their centres in both directions."""
+
+_GAUSS_NODE = 0.5 * 0.6**0.5
+"""Distance of the outer nodes of Gauss's rule with three points on [0, 1] from the middle one."""
 
 
 @dataclass(frozen=True, eq=False)
 class Raster(Density):
-    """A picture of the density. Its integrals are exact."""
+    """An image of the density. Its integrals are exact.
+
+    Parameters
+    ----------
+    values : (rows, columns) array
+        From 0, **the lowest row first**. The attribute is read-only.
+    extent : (x_min, y_min, x_max, y_max), m
+        What the image covers. Outside, the nearest pixel of its border counts.
+    interpolation : {"bilinear", "cells"}
+
+    Raises
+    ------
+    ParameterError
+        If a value is out of range.
+
+    Examples
+    --------
+    >>> raster = Raster(np.array([[1.0, 2.0]]), extent=(0.0, 0.0, 2.0, 1.0))
+    >>> raster.evaluate(np.array([[0.5, 0.5], [1.0, 0.5]]))
+    array([1. , 1.5])
+    """
 
     kind: ClassVar[str] = "raster"
 
     values: Array = field(repr=False)
-    """(rows, columns) From 0, **the lowest row first**, read-only."""
     extent: tuple[float, float, float, float]
-    """(x_min, y_min, x_max, y_max) m, what the picture covers. Beyond it, its nearest border counts."""
     interpolation: Interpolation = "bilinear"
 
     def __post_init__(self) -> None:
         values = freeze(self.values)
         shape = values.shape
         if values.ndim != 2 or not 1 <= min(shape) <= max(shape) <= MAX_RASTER_SIZE:
-            wanted = f"rows and columns, from 1 to {MAX_RASTER_SIZE} each"
-            raise ParameterError(f"values: an array of shape {shape}, but {wanted}, were wanted")
-        if not (np.isfinite(values) & (values >= 0.0) & (values <= MAX_WEIGHT)).all():
-            raise ParameterError(f"values: numbers from 0 to {MAX_WEIGHT:.0f} were wanted")
+            raise ParameterError(
+                f"values: expected an array of 1 to {MAX_RASTER_SIZE} rows and columns, got shape {shape}"
+            )
+        is_valid = np.isfinite(values) & (values >= 0.0) & (values <= MAX_WEIGHT)
+        if not is_valid.all():
+            first_wrong = float(values[~is_valid][0])
+            raise ParameterError(
+                f"values: expected numbers from 0 to {MAX_WEIGHT:.0f}, got {quote(first_wrong)}"
+            )
         if not values.max() > 0.0:
-            raise ParameterError("values: all are 0, but some weight was wanted")
+            raise ParameterError("values: expected at least one number above 0, got only 0")
         x_min, y_min, x_max, y_max = self.extent
-        if not (-math.inf < x_min < x_max < math.inf and -math.inf < y_min < y_max < math.inf):
-            wanted = "[x_min, y_min, x_max, y_max] with a width and a height was wanted"
-            raise ParameterError(f"extent: {quote(self.extent)}, but {wanted}")
+        has_width = -math.inf < x_min < x_max < math.inf
+        has_height = -math.inf < y_min < y_max < math.inf
+        if not (has_width and has_height):
+            raise ParameterError(
+                "extent: expected [x_min, y_min, x_max, y_max] with a width and a height, "
+                f"got {quote(self.extent)}"
+            )
         if self.interpolation not in ("bilinear", "cells"):
-            wanted = "bilinear or cells was wanted"
-            raise ParameterError(f"interpolation: {quote(self.interpolation)}, but {wanted}")
+            raise ParameterError(
+                f"interpolation: expected bilinear or cells, got {quote(self.interpolation)}"
+            )
         object.__setattr__(self, "values", values)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Raster):
             return NotImplemented
-        same = self.extent == other.extent and self.interpolation == other.interpolation
-        return same and np.array_equal(self.values, other.values)
+        has_same_frame = self.extent == other.extent and self.interpolation == other.interpolation
+        return has_same_frame and np.array_equal(self.values, other.values)
 
     def __hash__(self) -> int:
         return self._hash
@@ -80,88 +109,153 @@ class Raster(Density):
         return float(self.values.max())
 
     def evaluate(self, points: Array) -> Array:
-        grid = _grid(self)
+        grid = _build_grid(self)
         u, v = ((np.asarray(points, dtype=float) - grid.origin) / grid.step).T
         rows, columns = grid.coefficients.shape[1:]
         column = np.clip(np.floor(u), 0, columns - 1).astype(np.intp)
         row = np.clip(np.floor(v), 0, rows - 1).astype(np.intp)
         a, b, c, d = grid.coefficients[:, row, column]
-        xi, eta = u - column, v - row
+        xi = u - column
+        eta = v - row
         return np.asarray(a + b * xi + (c + d * xi) * eta)
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
-        grid = _grid(self)
-        at = (origins - grid.origin)[edges.cell]
-        start, end = (edges.start + at) / grid.step, (edges.end + at) / grid.step
-        sums = _integrals(grid.coefficients, grid.left, start, end, edges.cell, len(origins))
-        # from grid steps to metres, about the origins
-        (dx, dy), (px, py) = grid.step, (origins - grid.origin).T
-        mass, x, y, xx, yy = (sums * (dx * dy)).T
-        x, y = x * dx, y * dy
-        polar = xx * (dx * dx) - px * (2.0 * x - px * mass) + yy * (dy * dy) - py * (2.0 * y - py * mass)
-        return np.column_stack([mass, x - px * mass, y - py * mass, polar])
+        grid = _build_grid(self)
+        offsets = origins - grid.origin
+        edge_offsets = offsets[edges.cell]
+        integrals = _integrate_cells(
+            grid.coefficients,
+            grid.left,
+            (edges.start + edge_offsets) / grid.step,
+            (edges.end + edge_offsets) / grid.step,
+            edges.cell,
+            len(origins),
+        )
+        # From steps of the grid to metres.
+        step_x, step_y = grid.step
+        mass, x, y, xx, yy = (integrals * (step_x * step_y)).T
+        x = x * step_x
+        y = y * step_y
+        # From moments about the origin of the grid to moments about the given ones.
+        offset_x, offset_y = offsets.T
+        polar = (
+            xx * (step_x * step_x)
+            - offset_x * (2.0 * x - offset_x * mass)
+            + yy * (step_y * step_y)
+            - offset_y * (2.0 * y - offset_y * mass)
+        )
+        return np.column_stack([mass, x - offset_x * mass, y - offset_y * mass, polar])
+
+
+def sample_density(density: Density | None, extent: Iterable[float], columns: int, rows: int) -> Raster:
+    """Build a bilinear raster of the values of a density at the centres of its pixels.
+
+    Parameters
+    ----------
+    density : Density or None
+        None is 1 everywhere.
+    extent : (x_min, y_min, x_max, y_max), m
+    columns, rows : int
+
+    Returns
+    -------
+    Raster
+    """
+    x_min, y_min, x_max, y_max = extent
+    x = x_min + (np.arange(columns) + 0.5) * ((x_max - x_min) / columns)
+    y = y_min + (np.arange(rows) + 0.5) * ((y_max - y_min) / rows)
+    points = np.column_stack([np.tile(x, rows), np.repeat(y, columns)])
+    values = np.ones(len(points)) if density is None else density.evaluate(points)
+    return Raster(values.reshape(rows, columns), (x_min, y_min, x_max, y_max))
 
 
 class _Grid(NamedTuple):
-    """A density that is bilinear in each cell of a grid, and what its integrals need.
+    """A density that is bilinear in each square of a grid, and integrals of it.
 
-    Places are measured in steps of the grid, from its lower left corner. In the cell of column i and row j
-    it is ``a + b ξ + c η + d ξ η``, with ξ and η from 0 to 1. The outermost cells reach to infinity; there
-    b and c are such that nothing changes outwards.
+    Lengths are measured in steps of the grid, from its lower left corner. In the square of column i and row
+    j the density is ``a + b ξ + c η + d ξ η``, with ξ and η from 0 to 1. The outermost squares extend to
+    infinity; b, c and d are such that nothing changes outwards.
+
+    Attributes
+    ----------
+    origin, step : (2,) arrays, m
+    coefficients : (4, rows, columns) array
+        a, b, c and d.
+    left : (3, 2, rows, columns) array
+        Integrals of φ, u φ and u² φ along the part of a row to the left of each square, at η = 0, and
+        their increase to η = 1.
     """
 
     origin: Array
-    """(2,) m, as the `step`."""
     step: Array
     coefficients: Array
-    """(4, rows, columns) a, b, c, d."""
     left: Array
-    """(3, 2, rows, columns) Integrals of φ, u φ and u² φ over the part of a row to the left of each cell, at
-    η = 0, and by how much they grow to η = 1."""
 
 
-# ten times as large as the picture; while one is painted there are many, and all but the last few are past
+# A grid takes ten times the memory of its image. While an image is painted there are many, of which only the
+# last few are still in use.
 @lru_cache(maxsize=4)
-def _grid(raster: Raster) -> _Grid:
-    values, low, high = raster.values, np.array(raster.extent[:2]), np.array(raster.extent[2:])
-    step = (high - low) / values.shape[::-1]
-    zero = np.zeros_like(values)
-    coefficients = np.stack([values, zero, zero, zero])
+def _build_grid(raster: Raster) -> _Grid:
+    values = raster.values
+    origin = np.array(raster.extent[:2])
+    step = (np.array(raster.extent[2:]) - origin) / values.shape[::-1]
     if raster.interpolation == "bilinear":
-        # from middle to middle; what lies beyond the outermost is as they are
+        # Squares reach from one centre of pixels to the next; the border is repeated outside.
         padded = np.pad(values, 1, mode="edge")
-        a, right, up = padded[:-1, :-1], padded[:-1, 1:], padded[1:, :-1]
-        coefficients = np.stack([a, right - a, up - a, padded[1:, 1:] - right - up + a])
-        low = low - 0.5 * step
+        here = padded[:-1, :-1]
+        right = padded[:-1, 1:]
+        above = padded[1:, :-1]
+        diagonal = padded[1:, 1:]
+        coefficients = np.stack([here, right - here, above - here, diagonal - right - above + here])
+        origin = origin - 0.5 * step
+    else:
+        zero = np.zeros_like(values)
+        coefficients = np.stack([values, zero, zero, zero])
+    return _Grid(origin, step, coefficients, _integrate_rows(coefficients))
+
+
+def _integrate_rows(coefficients: Array) -> Array:
+    """Return the integrals along rows to the left of each square; see `_Grid.left`."""
     a, b, c, d = coefficients
     i = np.arange(a.shape[1])
-    flat, slope = np.stack([a, c]), np.stack([b, d])
-    # integrals over ξ from 0 to 1 of ξ^k (flat + ξ slope)
-    whole = [flat / (k + 1) + slope / (k + 2) for k in range(3)]
-    powers = np.stack([whole[0], i * whole[0] + whole[1], i * i * whole[0] + 2 * i * whole[1] + whole[2]])
-    left = np.zeros_like(powers)
-    np.cumsum(powers[..., :-1], axis=-1, out=left[..., 1:])
-    return _Grid(low, step, coefficients, left)
+    constant = np.stack([a, c])
+    slope = np.stack([b, d])
+    # Integrals over ξ from 0 to 1 of φ, ξ φ and ξ² φ.
+    zeroth = constant + slope / 2
+    first = constant / 2 + slope / 3
+    second = constant / 3 + slope / 4
+    squares = np.stack([zeroth, i * zeroth + first, i * i * zeroth + 2 * i * first + second])
+    left = np.zeros_like(squares)
+    np.cumsum(squares[..., :-1], axis=-1, out=left[..., 1:])
+    return left
 
 
 @kernel
-def _integrals(
+def _integrate_cells(
     coefficients: Array, left: Array, start: Array, end: Array, cell: IntArray, count: int
 ) -> Array:
     """Return the integrals of φ times 1, u, v, u² and v² over cells, (n, 5), from their edges.
 
-    With P(x, y) the integral of φ along the row from the picture's left side to x, the integral of φ over a
-    polygon is that of P dy along its edges. P is a prefix sum over the pixels and a polynomial within one:
-    cut where it passes from one pixel into the next, an edge is integrated by Gauss's rule without error.
+    With P(x, y) the integral of φ along the row from the left side of the image to x, the integral of φ
+    over a polygon is that of P dy along its edges. P is a prefix sum over the squares and a polynomial within
+    one: divided where it leaves a square, an edge is integrated by Gauss's rule without error.
     """
-    rows, columns = coefficients.shape[1], coefficients.shape[2]
+    rows = coefficients.shape[1]
+    columns = coefficients.shape[2]
     sums = np.zeros((count, 5))
     for e in range(len(cell)):
-        u0, v0, du, dv = start[e, 0], start[e, 1], end[e, 0] - start[e, 0], end[e, 1] - start[e, 1]
-        # level edges enclose nothing with the side
-        t, line_u, line_v = 0.0 if dv != 0.0 else 1.0, _first_line(u0, du, columns), _first_line(v0, dv, rows)
+        c = cell[e]
+        u0 = start[e, 0]
+        v0 = start[e, 1]
+        du = end[e, 0] - u0
+        dv = end[e, 1] - v0
+        line_u = _find_first_line(u0, du, columns)
+        line_v = _find_first_line(v0, dv, rows)
+        # Level edges enclose nothing with the left side.
+        t = 0.0 if dv != 0.0 else 1.0
         while t < 1.0:
-            next_u, next_v = _crossed(line_u, u0, du, columns), _crossed(line_v, v0, dv, rows)
+            next_u = _find_crossing(line_u, u0, du, columns)
+            next_v = _find_crossing(line_v, v0, dv, rows)
             stop = max(min(next_u, next_v, 1.0), t)
             if next_u <= stop:
                 line_u += 1 if du > 0.0 else -1
@@ -171,49 +265,41 @@ def _integrals(
             i = min(max(int(np.floor(u0 + middle * du)), 0), columns - 1)
             j = min(max(int(np.floor(v0 + middle * dv)), 0), rows - 1)
             for node in range(3):
-                where = t + (0.5 + _NODE * (node - 1)) * (stop - t)
-                weight = (8.0 if node == 1 else 5.0) / 18.0 * (stop - t) * dv
-                v = v0 + where * dv
-                xi, eta = u0 + where * du - i, v - j
-                # along the row φ is p + q ξ
+                position = t + (0.5 + _GAUSS_NODE * (node - 1)) * (stop - t)
+                node_weight = 8.0 if node == 1 else 5.0
+                weight = node_weight / 18.0 * (stop - t) * dv
+                v = v0 + position * dv
+                xi = u0 + position * du - i
+                eta = v - j
+                # Along the row, φ is p + q ξ.
                 p = coefficients[0, j, i] + coefficients[2, j, i] * eta
                 q = coefficients[1, j, i] + coefficients[3, j, i] * eta
-                zeroth, first = xi * (p + xi * q / 2.0), xi * xi * (p / 2.0 + xi * q / 3.0)
+                zeroth = xi * (p + xi * q / 2.0)
+                first = xi * xi * (p / 2.0 + xi * q / 3.0)
                 second = xi * xi * xi * (p / 3.0 + xi * q / 4.0)
-                one = left[0, 0, j, i] + eta * left[0, 1, j, i] + zeroth
-                sums[cell[e], 0] += weight * one
-                sums[cell[e], 1] += weight * (left[1, 0, j, i] + eta * left[1, 1, j, i] + i * zeroth + first)
-                sums[cell[e], 2] += weight * v * one
-                sums[cell[e], 3] += weight * (
-                    left[2, 0, j, i] + eta * left[2, 1, j, i] + i * (i * zeroth + 2.0 * first) + second
-                )
-                sums[cell[e], 4] += weight * v * v * one
+                along_0 = left[0, 0, j, i] + eta * left[0, 1, j, i] + zeroth
+                along_1 = left[1, 0, j, i] + eta * left[1, 1, j, i] + i * zeroth + first
+                along_2 = left[2, 0, j, i] + eta * left[2, 1, j, i] + i * (i * zeroth + 2.0 * first) + second
+                sums[c, 0] += weight * along_0
+                sums[c, 1] += weight * along_1
+                sums[c, 2] += weight * v * along_0
+                sums[c, 3] += weight * along_2
+                sums[c, 4] += weight * v * v * along_0
             t = stop
     return sums
 
 
 @kernel
-def _first_line(begin: float, along: float, lines: int) -> int:
-    """Return the first inner line of a grid that is crossed on a way along an axis."""
-    if along > 0.0:
-        return int(max(np.floor(begin) + 1.0, 1.0))
-    return int(min(np.ceil(begin), lines + 0.0) - 1.0)
+def _find_first_line(start: float, step: float, lines: int) -> int:
+    """Return the first inner line of a grid that is crossed on the way from a coordinate along an axis."""
+    if step > 0.0:
+        return int(max(np.floor(start) + 1.0, 1.0))
+    return int(min(np.ceil(start), lines + 0.0) - 1.0)
 
 
 @kernel
-def _crossed(line: int, begin: float, along: float, lines: int) -> float:
-    """Return at which part of the way a line is crossed, if it is an inner one."""
-    return (line - begin) / along if 0 < line < lines and along != 0.0 else np.inf
-
-
-def sample_density(density: Density | None, extent: Iterable[float], columns: int, rows: int) -> Raster:
-    """Return a bilinear raster with the values of a density at the middles of its cells.
-
-    No density counts as 1 everywhere. The extent is (x_min, y_min, x_max, y_max) in metres.
-    """
-    x_min, y_min, x_max, y_max = extent
-    x = x_min + (np.arange(columns) + 0.5) * ((x_max - x_min) / columns)
-    y = y_min + (np.arange(rows) + 0.5) * ((y_max - y_min) / rows)
-    points = np.column_stack([np.tile(x, rows), np.repeat(y, columns)])
-    values = np.ones(len(points)) if density is None else density.evaluate(points)
-    return Raster(values.reshape(rows, columns), (x_min, y_min, x_max, y_max))
+def _find_crossing(line: int, start: float, step: float, lines: int) -> float:
+    """Return the fraction of an edge at which it crosses a line of a grid; infinity for no inner line."""
+    if 0 < line < lines and step != 0.0:
+        return (line - start) / step
+    return np.inf

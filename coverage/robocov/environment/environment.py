@@ -13,7 +13,7 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array, freeze
 from robocov.density import Density
-from robocov.density.base import compute_polygon_masses
+from robocov.density.polygon_masses import compute_polygon_masses
 from robocov.drawing import Drawable
 from robocov.environment.obstacles import Obstacle, shift_obstacle
 from robocov.environment.polygons import GRID_M, Ring, extract_polygons, unite_shapes

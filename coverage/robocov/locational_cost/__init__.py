@@ -21,7 +21,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.density.base import CellEdges
+from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError, quote
 
 _RULE = np.stack(np.polynomial.legendre.leggauss(16))  # nodes and weights

@@ -22,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.density.base import CellEdges, Density, Uniform
+from robocov.density.base import Density, Uniform
+from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError, format_count, quote, require_number
 from robocov.observation.neighbours import Neighbours, find_close_pairs
 from robocov.observation.region import Region

@@ -77,9 +77,9 @@ def team_places(
     (`k_median.improve_sources`). The robots are at `now`; the first one plans. Those that are `fixed`, (k,),
     never the first, stay where `begin` says, and `others`, (o, 2) m, where they are; where all but the first
     stay, it goes to the best place of its own cell. What a relocation must save is the part `threshold` of
-    the cost, one in the own cell the part `nearby`. Who goes to which of the places is such that the sum of the
-    squared ways is least: then the choice stays the same while the robots are on their way, and their ways
-    do not cross. As they go elsewhere too, to look, they swap places only where that saves the part
+    the cost, one in the own cell the part `nearby`. Who goes to which of the places is such that the sum of
+    the squared ways is least: then the choice stays the same while the robots are on their way, and their
+    ways do not cross. As they go elsewhere too, to look, they swap places only where that saves the part
     `swapping` of the sum.
     """
     home = ways.standing(now[0])

@@ -9,7 +9,8 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.density.base import CellEdges, Density
+from robocov.density.base import Density
+from robocov.density.cell_edges import CellEdges
 from robocov.errors import InputError, quote
 from robocov.observation import Cells
 from robocov.observation.neighbours import NO_INDICES, Neighbours

@@ -10,7 +10,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.compiled import kernel
-from robocov.density.base import REGION
+from robocov.density.cell_edges import REGION
 
 X = 0
 """Column of a vertex: its offset from the generator in x, m."""

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.density.base import REGION, CellEdges
+from robocov.density.cell_edges import REGION, CellEdges
 
 _CHORDS_PER_ARC = 64
 """Number of chords that replace one arc of a disc, which spans at most half a turn."""

@@ -18,7 +18,8 @@ from functools import cached_property
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.density.base import CellEdges, Density
+from robocov.density.base import Density
+from robocov.density.cell_edges import CellEdges
 from robocov.errors import InputError, quote
 from robocov.observation import Cells
 from robocov.observation.neighbours import Neighbours

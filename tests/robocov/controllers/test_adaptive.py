@@ -10,7 +10,8 @@ from robocov.arrays import Array
 from robocov.controllers import Adaptive, Lloyd
 from robocov.controllers.adaptive import AdaptiveMemory, Lattice
 from robocov.density import Gaussian, Gaussians
-from robocov.density.base import CellEdges, Density
+from robocov.density.base import Density
+from robocov.density.cell_edges import CellEdges
 from robocov.environment import Environment
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours

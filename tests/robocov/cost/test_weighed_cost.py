@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from robocov.controllers import Lloyd, Rapf
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians, Uniform, WeightedArea, WeightedPolygons
-from robocov.density.base import compute_square_means
+from robocov.density.polygon_masses import compute_square_means
 from robocov.environment import CircleObstacle, Environment, WallObstacle
 from robocov.optimum import find_optimum
 from robocov.simulation import Simulation

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from shapely import Polygon
 
 from robocov.density import Gaussian, Gaussians, Uniform
-from robocov.density.base import compute_polygon_masses, compute_square_means
+from robocov.density.polygon_masses import compute_polygon_masses, compute_square_means
 from robocov.environment import CircleObstacle, Environment
 
 HOLED = Polygon([(0, 0), (8, 0), (8, 8), (0, 8)], [[(2, 2), (5, 2), (5, 5)]])
@@ -46,7 +46,7 @@ def test_many_squares_are_taken_some_at_a_time(monkeypatch):
     density = Gaussians((Gaussian((3.0, 3.0), 2.0, sigma=1.0),), 0.5)
     middles = np.random.default_rng(1).uniform(0.0, 8.0, (50, 2))
     whole = compute_square_means(density, middles, 0.5)
-    monkeypatch.setattr("robocov.density.base._AT_ONCE", 7)
+    monkeypatch.setattr("robocov.density.polygon_masses._SQUARES_PER_BATCH", 7)
     assert_allclose(compute_square_means(density, middles, 0.5), whole, rtol=1e-13)
 
 

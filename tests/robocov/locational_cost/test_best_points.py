@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize, minimize_scalar
 from voronoi_cases import FAMILIES, PENTAGON, REGIONS, Family, families, names, performance, scattered, seeds
 
-from robocov.density.base import CellEdges
+from robocov.density.cell_edges import CellEdges
 from robocov.locational_cost import (
     Distance,
     Performance,

@@ -12,7 +12,7 @@ from scipy.integrate import dblquad, quad
 from scipy.special import spence
 from voronoi_cases import PENTAGON, REGIONS, names, performance, scattered, seeds
 
-from robocov.density.base import CellEdges
+from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError
 from robocov.locational_cost import (
     Distance,

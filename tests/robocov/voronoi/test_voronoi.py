@@ -25,7 +25,7 @@ from voronoi_cases import (
     seeds,
 )
 
-from robocov.density.base import REGION
+from robocov.density.cell_edges import REGION
 from robocov.errors import InputError
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region

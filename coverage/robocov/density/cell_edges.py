@@ -1,0 +1,107 @@
+"""Cells as edges: polygons, moments and adjacency of all cells at once."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import kernel
+
+REGION = -1
+"""Neighbour of an edge of a cell that is part of the region's boundary."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CellEdges:
+    """All edges of all cells, grouped by cell, and counter-clockwise round each cell.
+
+    Attributes
+    ----------
+    start, end : (s, 2) arrays, m
+        Ends of the edges **relative to the generator** of their cell, so that a tiny cell far from the origin
+        keeps all its digits.
+    cell : (s,) int array
+        Cell of each edge, ascending.
+    beyond : (s,) int array
+        The cell on the other side of each edge, or `REGION`.
+    """
+
+    start: Array
+    end: Array
+    cell: IntArray
+    beyond: IntArray
+
+    def build_polygons(self, generators: Array) -> list[Array]:
+        """Build the polygon of each cell.
+
+        Parameters
+        ----------
+        generators : (n, 2) array, m
+
+        Returns
+        -------
+        list of (k, 2) arrays, m
+            Counter-clockwise rings, whose first vertex is not repeated. Edges of length zero are left out; an
+            empty cell is a (0, 2) array.
+        """
+        has_length = self._has_length()
+        cell = self.cell[has_length]
+        vertices = self.start[has_length] + generators[cell]
+        stops = np.cumsum(np.bincount(cell, minlength=len(generators))).tolist()
+        return [vertices[start:stop] for start, stop in pairwise([0, *stops])]
+
+    def compute_moments(self, count: int) -> Array:
+        """Compute the moments of cells about their generators, for density 1.
+
+        Parameters
+        ----------
+        count : int
+            Number of cells n.
+
+        Returns
+        -------
+        (n, 4) array, m², m³, m³ and m⁴
+            Area, first moments in x and y, and polar moment.
+        """
+        return _sum_moments(self.start, self.end, self.cell, count)
+
+    def list_adjacent_pairs(self) -> IntArray:
+        """List the pairs of cells that share an edge.
+
+        Returns
+        -------
+        (m, 2) int array
+            Pairs (i, j) with i < j, in ascending order.
+        """
+        is_shared = (self.beyond != REGION) & self._has_length()
+        one = self.cell[is_shared]
+        other = self.beyond[is_shared]
+        count = int(max(one.max(initial=0), other.max(initial=0))) + 1
+        # Each pair becomes one number: sorting pairs takes several times as long.
+        numbers = np.unique(np.minimum(one, other) * count + np.maximum(one, other))
+        return np.column_stack(np.divmod(numbers, count)).astype(np.intp, copy=False)
+
+    def _has_length(self) -> BoolArray:
+        """Return which edges are longer than rounding makes a point at their distance from the generator."""
+        length = np.hypot(self.end[:, 0] - self.start[:, 0], self.end[:, 1] - self.start[:, 1])
+        distance = np.hypot(self.start[:, 0], self.start[:, 1]) + np.hypot(self.end[:, 0], self.end[:, 1])
+        return np.asarray(length > 1e-12 * distance)
+
+
+@kernel
+def _sum_moments(start: Array, end: Array, cell: IntArray, count: int) -> Array:
+    """Return the sums of the moments of the triangles that the edges span with the generators."""
+    sums = np.zeros((count, 4))
+    for k in range(len(cell)):
+        x = start[k, 0]
+        y = start[k, 1]
+        u = end[k, 0]
+        v = end[k, 1]
+        c = cell[k]
+        cross = x * v - u * y
+        sums[c, 0] += cross / 2.0
+        sums[c, 1] += cross * (x + u) / 6.0
+        sums[c, 2] += cross * (y + v) / 6.0
+        sums[c, 3] += cross * (x * (x + u) + u * u + y * (y + v) + v * v) / 12.0
+    return sums

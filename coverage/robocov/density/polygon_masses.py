@@ -1,0 +1,77 @@
+"""Integrals of a density over polygons that are not cells."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from robocov.arrays import Array, IntArray
+from robocov.density.base import Density
+from robocov.density.cell_edges import REGION, CellEdges
+
+_SQUARES_PER_BATCH = 1 << 16
+"""Number of squares that are integrated at once, which limits the memory."""
+
+
+def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]) -> Array:
+    """Integrate a density over polygons.
+
+    Parameters
+    ----------
+    density : Density
+    polygons : sequence of k shapely polygons, m
+        Valid ones. Their holes are left out.
+
+    Returns
+    -------
+    (k,) array, m²
+
+    Examples
+    --------
+    >>> from robocov import Uniform
+    >>> compute_polygon_masses(Uniform(2.0), [shapely.box(0.0, 0.0, 3.0, 1.0)])
+    array([6.])
+    """
+    polygons = shapely.orient_polygons(polygons)
+    rings, ring_owners = shapely.get_rings(polygons, return_index=True)
+    origins = shapely.get_coordinates(shapely.centroid(polygons))
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    owners = ring_owners[ring]
+    points -= origins[owners]
+    # From the last point of a ring no edge leads to the first point of the next one.
+    is_edge = ring[1:] == ring[:-1]
+    edges = _build_edges(points[:-1][is_edge], points[1:][is_edge], owners[:-1][is_edge])
+    return np.maximum(density.compute_moments(edges, origins)[:, 0], 0.0)
+
+
+def compute_square_means(density: Density, centers: Array, side: float) -> Array:
+    """Compute the mean density of axis-parallel squares.
+
+    Parameters
+    ----------
+    density : Density
+    centers : (k, 2) array, m
+    side : float, m
+        Length of the sides.
+
+    Returns
+    -------
+    (k,) array
+    """
+    corners = 0.5 * side * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    next_corners = np.roll(corners, -1, axis=0)
+    masses = np.empty(len(centers))
+    for first in range(0, len(centers), _SQUARES_PER_BATCH):
+        batch = centers[first : first + _SQUARES_PER_BATCH]
+        start = np.tile(corners, (len(batch), 1))
+        end = np.tile(next_corners, (len(batch), 1))
+        edges = _build_edges(start, end, np.repeat(np.arange(len(batch)), 4))
+        masses[first : first + len(batch)] = density.compute_moments(edges, batch)[:, 0]
+    # Rounding must not make a density that the map does not have, such as a negative one.
+    return np.clip(masses / (side * side), density.min_value, density.max_value)
+
+
+def _build_edges(start: Array, end: Array, cell: IntArray) -> CellEdges:
+    """Return edges of polygons without neighbours."""
+    beyond = np.full(len(cell), REGION)
+    return CellEdges(start, end, cell.astype(np.intp, copy=False), beyond)
