@@ -8,7 +8,7 @@ import numpy as np
 import pygame
 
 from robocov.arrays import Array
-from robocov.planning.discovered import PRESUMED, UNKNOWN, WALL, DiscoveredMap
+from robocov.planning.discovered_map import PRESUMED_WALL, UNKNOWN, WALL, DiscoveredMap
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas, bounded, clipped_polygon, clipped_segment, premultiplied
 from robocov_app.render.layers import draw_blocked, draw_boundary, says
@@ -16,7 +16,7 @@ from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Colour, mix
 
-_OPACITY = {UNKNOWN: 0.28, PRESUMED: 0.45, WALL: 0.85}  # of the colours of cells; free ones are clear
+_OPACITY = {UNKNOWN: 0.28, PRESUMED_WALL: 0.45, WALL: 0.85}  # of the colours of cells; free ones are clear
 
 
 def discovered_map(scene: Scene) -> DiscoveredMap | None:
@@ -31,15 +31,15 @@ def draw_discovered(canvas: Canvas, known: DiscoveredMap) -> None:
     raster = known.raster
     view = canvas.surface.get_clip()
     corners = np.array([view.topleft, view.bottomright], dtype=float)
-    row, column = raster.cells(canvas.camera.to_world(corners))
+    row, column = raster.find_cells(canvas.camera.to_world(corners))
     seen = slice(row.min(), row.max() + 1), slice(column.min(), column.max() + 1)
-    state, outside = np.minimum(known.state[seen], WALL), raster.outside[seen]
+    state, outside = np.minimum(known.state[seen], WALL), raster.is_outside[seen]
     pixels = np.zeros((*state.shape, 4), dtype=np.uint8)
     for value, opacity in _OPACITY.items():
         colour = canvas.theme.obstacle if value == UNKNOWN else canvas.theme.forces["repulsion_obstacle"]
         pixels[(state == value) & ~outside] = premultiplied(colour, opacity)
     ends = np.array([[column.min(), row.min()], [column.max() + 1, row.max() + 1]])
-    ends = canvas.camera.to_pixels(np.array(raster.origin) + ends * raster.cell)
+    ends = canvas.camera.to_pixels(np.array(raster.origin) + ends * raster.cell_size)
     (left, bottom), (right, top) = ends.round().astype(int).tolist()
     if right <= left or bottom <= top:
         return

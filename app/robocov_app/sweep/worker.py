@@ -21,7 +21,7 @@ from robocov.errors import RobocovError
 from robocov.mapfile import from_json
 from robocov.metrics import cost_history, summarise
 from robocov.metrics.run_metrics import figures_of
-from robocov.planning.discovered import DiscoveredMap
+from robocov.planning.discovered_map import DiscoveredMap
 from robocov.record import Record, versions
 from robocov.simulation import Simulation
 from robocov_app.runs.run import cost_table

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -18,9 +19,13 @@ from robocov.controllers.route_following import follow_routes
 from robocov.controllers.shared_map import Circle, circles, surveyed
 from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.region import Region
-from robocov.planning.discovered import DiscoveredMap, Raster
-from robocov.planning.placement import OwnPlace, demand, own_place, team_places, viewpoint
-from robocov.planning.wayfinding import GridPlanner, Window
+from robocov.planning.discovered_map import DiscoveredMap
+from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.own_goal import OwnGoal, find_own_goal
+from robocov.planning.raster import Raster
+from robocov.planning.team_placement import MinSavings, TeamSituation, compute_node_weights, place_team
+from robocov.planning.viewpoint import find_viewpoint
+from robocov.planning.window import Window
 from robocov.team import Team
 
 FINEST_CELL, MOST_CELLS = 0.05, 1_000_000  # side of a cell of the maps, m, larger in very large regions
@@ -44,6 +49,7 @@ _BACKOFF = 8.0  # s, at most, that it makes way then
 _JOINTLY = 3.0  # a robot plans for others as long as it takes to cross the region so many times
 _STAGGERED = 0.5  # part of the period in which all robots make their first plans
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+_LATEST_PLANS: WeakKeyDictionary[GridPlanner, Any] = WeakKeyDictionary()
 
 
 class Teammates(NamedTuple):
@@ -195,7 +201,7 @@ class Atlas(Law):
         """Return the memory of robots that have seen nothing yet."""
         low_x, low_y, high_x, high_y = region.bounds
         cell = max(FINEST_CELL, math.sqrt((high_x - low_x) * (high_y - low_y) / MOST_CELLS))
-        empty = DiscoveredMap.nothing(Raster(region, cell))
+        empty = DiscoveredMap.build_unknown(Raster(region, cell))
         nowhere, never = np.empty((0, 2)), np.empty(0)
         nobody = Teammates(np.empty(0, dtype=np.intp), nowhere, never, never, never, nowhere)
         first = [self.period * _STAGGERED * (i * _GOLDEN % 1.0) * self.staggered for i in range(len(team))]
@@ -220,7 +226,7 @@ class Atlas(Law):
                 states[i], goal = self._planned(seen, memory.team, state, i, reports)
                 ways = states[i].ways
                 if goal is not None and ways is not None:
-                    routes[i], legs[i] = ways.route(seen.positions[i], goal), 0
+                    routes[i], legs[i] = ways.find_route(seen.positions[i], goal), 0
             elif state.planned is None:
                 routes[i] = seen.positions[i : i + 1]
         team, returns = memory.team, last_returns(seen, memory.returns)
@@ -235,9 +241,10 @@ class Atlas(Law):
     ) -> list[DiscoveredMap]:
         """Return the maps after a scan of each robot; where others are, it is free."""
         each = zip(maps, seen.positions, scans.distances, scans.hit, strict=True)
-        maps = [known.scanned(*scan) for known, *scan in each]
+        maps = [known.add_scan(*scan) for known, *scan in each]
         return [
-            known.visited(seen.get_neighbour_positions(i), float(radius[i])) for i, known in enumerate(maps)
+            known.add_robots(seen.get_neighbour_positions(i), float(radius[i]))
+            for i, known in enumerate(maps)
         ]
 
     def _reports(self, states: Sequence[PlannerState], heard: IntArray) -> list[Teammates]:
@@ -264,8 +271,8 @@ class Atlas(Law):
         beyond[np.argsort(((at - place) ** 2).sum(axis=1), kind="stable")[: MAX_PLANNING_GROUP - 1]] = False
         order = np.argsort(beyond, kind="stable")
         others, at, still = others[order], at[order], (still | beyond)[order]
-        window = Window.around(raster, place, math.inf, OWN_NODES)
-        spacing = window.stride * raster.cell
+        window = Window.build_around(raster, place, math.inf, OWN_NODES)
+        spacing = window.stride * raster.cell_size
         # nobody gets farther than to the next node meanwhile
         period = max(self.period, spacing / fastest)
         first = state.planned is None
@@ -275,8 +282,8 @@ class Atlas(Law):
             walked += math.dist(place, state.situation[0])
         state = replace(state, due=due, walked=walked, quiet=quiet)
         # a team, or walls, that have changed: there may be much to do again
-        walls = 0 if state.planned is None else state.known.walls_changed(state.planned)
-        if first or met != before.met or walls * raster.cell > _WALLS * float(team.radius[i]):
+        walls = 0 if state.planned is None else state.known.count_changed_walls(state.planned)
+        if first or met != before.met or walls * raster.cell_size > _WALLS * float(team.radius[i]):
             state = replace(state, since=seen.time, walked=0.0, looked=0.0, former=())
         situation, group = np.vstack([place, at]), np.concatenate([[i], others])
         same = before.idle and before.planned is before.known and before.quiet == quiet
@@ -285,21 +292,22 @@ class Atlas(Law):
             if np.abs(situation - before.situation).max() < _HARDLY * spacing:
                 return replace(state, walked=before.walked), None
         state = replace(state, planned=state.known, situation=situation, group=group)
-        ways = state.ways or GridPlanner.of(state.known, window, float(team.radius[i]) + self.clearance)
-        ways = ways.updated(state.known, window)
+        clearance = float(team.radius[i]) + self.clearance
+        ways = state.ways or GridPlanner.get_shared(state.known, window, clearance)
+        ways = ways.update(state.known, window)
         state = replace(state, ways=ways)
-        weights = demand(ways, seen.density)
+        weights = compute_node_weights(ways, seen.density)
         settling = 2.0 ** min(state.walked / (self.settling * seen.region.diameter), 60.0)
         together = agreed or seen.time - state.since <= _JOINTLY * seen.region.diameter / fastest
         # afterwards each decides for itself alone
         still = still & (not agreed) if together else np.ones_like(still)
         state, places = self._plan_for_all(state, seen, still, settling, together=together, agreed=agreed)
-        begin = ways.nearest(places[0])
+        begin = ways.find_nearest_node(places[0])
         at[~still] = places[1:][~still[: len(places) - 1]]
         if begin < 0:
             return replace(state, own=place, idle=False), place
         former = np.full(2, np.nan) if state.own is None else state.own
-        own = own_place(ways, weights, at, begin, former, min(1.0, self.rest * settling))
+        own = find_own_goal(ways, weights, at, begin, former, min(1.0, self.rest * settling))
         state = replace(state, own=own.goal, node=own.node)
         if agreed and before.situation is not None:
             state, aside = self._aside(state, before.situation[0], seen.time, i)
@@ -347,8 +355,8 @@ class Atlas(Law):
         if len(others):
             away = float(np.sqrt(((now - now[0]) ** 2).sum(axis=1).max()))
             reach, nodes = max(_AROUND * away, _LEAST), GROUP_NODES
-        window = Window.around(known.raster, now[0], reach, nodes)
-        ways = (state.team_ways or state.ways).updated(known, window)
+        window = Window.build_around(known.raster, now[0], reach, nodes)
+        ways = (state.team_ways or state.ways).update(known, window)
         fixed = np.concatenate([[False], still])[: len(now)]
         begin = now.copy()
         if state.places is not None:
@@ -364,19 +372,18 @@ class Atlas(Law):
         # who plans on the same map comes to the same plan, which is made once
         order = np.argsort(group) if agreed else np.arange(len(group))
         key = (*(each[order].tobytes() for each in (group, now, begin)), threshold)
-        made = ways.plans.get(key) if agreed else None
+        latest = _LATEST_PLANS.get(ways) if agreed else None
+        made = latest[1] if latest is not None and latest[0] == key else None
         if made is None or made[0] is not seen.density:
             # who is there already does not leave for what may not be there
-            weights = demand(ways, seen.density, sure=not together)
-            own = now[order], begin[order], fixed[order]
+            weights = compute_node_weights(ways, seen.density, only_known=not together)
+            own = TeamSituation(now[order], begin[order], fixed[order], others)
             made = (
                 seen.density,
-                team_places(ways, weights, *own, others, threshold, nearby, _SWAPPING * agreed),
+                place_team(ways, weights, own, MinSavings(threshold, nearby, _SWAPPING * agreed)),
             )
             if agreed:
-                # of former moments nobody asks any more
-                ways.plans.clear()
-                ways.plans[key] = made
+                _LATEST_PLANS[ways] = key, made
         places = np.empty_like(begin)
         places[order] = made[1]
         return replace(state, team_ways=ways, places=np.column_stack([group, places])), places
@@ -400,12 +407,12 @@ class Atlas(Law):
         return replace(state, jammed=0, idle=False), place + back * (_CROWD / float(np.hypot(*back)))
 
     def _looking(
-        self, state: PlannerState, own: OwnPlace, place: Array, step: float, *, agreed: bool
+        self, state: PlannerState, own: OwnGoal, place: Array, step: float, *, agreed: bool
     ) -> tuple[PlannerState, Array]:
         """Return the state, and where to go: to the own place, or first to what there is to see."""
         ways, former, look = state.ways, state.former, None
         assert ways is not None and state.group is not None
-        node = ways.standing(place)
+        node = ways.find_own_node(place)
         if state.look is not None and math.dist(state.look, place) < _ARRIVED:
             former = (*former, state.look)
         if state.look is None and math.dist(own.goal, place) > _ARRIVED:
@@ -415,7 +422,7 @@ class Atlas(Law):
         if node >= 0 and self.stake < 1.0 and len(state.group) > 1:
             far = self.patience * (_LOOKED_FOR_ALL if agreed else 1.0) * state.known.raster.region.diameter
             least = self.stake * own.cost * 2.0 ** min(looked / far, 60.0)
-            look = viewpoint(ways, own.mine, ways.distances(node), least, former)
+            look = find_viewpoint(ways, own.cell_distances, ways.get_distances(node), least, former)
         state = replace(state, look=look, former=former, looked=looked, idle=look is None)
         return state, own.goal if look is None else look
 
@@ -445,7 +452,7 @@ class AtlasShared(Atlas):
         # those who share a map share the next one, too
         for known, circle, size in (each := list(zip(told, around, radius.tolist(), strict=True))):
             if (id(known), circle, size) not in visited:
-                visited[id(known), circle, size] = known.visited(seen.positions[list(circle)], size)
+                visited[id(known), circle, size] = known.add_robots(seen.positions[list(circle)], size)
         return [visited[id(known), circle, size] for known, circle, size in each]
 
     def _reports(self, states: Sequence[PlannerState], heard: IntArray) -> list[Teammates]:

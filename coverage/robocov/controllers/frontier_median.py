@@ -11,7 +11,7 @@ from robocov.arrays import Array
 from robocov.controllers.gains import gain
 from robocov.controllers.shared_map import Candidates, SharedMapLaw, Situation, assigned
 from robocov.k_median import choose_greedily, improve_sources
-from robocov.planning.discovered import FREE, UNKNOWN
+from robocov.planning.discovered_map import FREE, UNKNOWN
 
 _LOOKED, _THERE = 0.5, 0.3  # metres around a place from where somebody has looked, and to it when he does
 _STUCK = 0.05  # who gets on by less than so many metres between two plans is not going to get there
@@ -72,25 +72,27 @@ class FrontierMedian(SharedMapLaw):
     def _targets(self, now: Situation, looked: Array) -> Array:
         """Return places on the frontiers, (t, 2) m."""
         raster, ways, window = now.known.raster, now.ways, now.ways.window
-        state = window.cut(now.known.state, np.uint8(FREE))
-        unknown = (state == UNKNOWN) & ~window.cut(raster.outside, True)
+        state = window.crop(now.known.state, np.uint8(FREE))
+        unknown = (state == UNKNOWN) & ~window.crop(raster.is_outside, True)
         # between two rays that are just as far apart there is nothing to look for
-        inside = ndimage.binary_opening(unknown, _BLOCK) & ~ways.tight
-        frontier = (state == FREE) & ~ways.tight & ndimage.binary_dilation(inside)
+        inside = ndimage.binary_opening(unknown, _BLOCK) & ~ways.is_tight
+        frontier = (state == FREE) & ~ways.is_tight & ndimage.binary_dilation(inside)
         part, _ = ndimage.label(frontier, _BLOCK)
-        row, column = np.nonzero(frontier & (np.bincount(part.ravel()) * raster.cell >= self.shortest)[part])
+        row, column = np.nonzero(
+            frontier & (np.bincount(part.ravel()) * raster.cell_size >= self.shortest)[part]
+        )
         block = row // window.stride * window.columns + column // window.stride
         _, first = np.unique(part[row, column] * len(ways.nodes) + block, return_index=True)
-        targets = raster.middles(row[first] + window.row, column[first] + window.column)
+        targets = raster.compute_centers(row[first] + window.first_row, column[first] + window.first_column)
         square = ((targets[:, None] - looked) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
         return np.asarray(targets[square > _LOOKED**2])
 
     def _shares(self, now: Situation, targets: Array) -> Array:
         """Return where each robot is to look, (k, 2) m."""
         ways, goals = now.ways, now.at.copy()
-        roomy = np.flatnonzero(ways.roomy)
+        roomy = np.flatnonzero(ways.is_roomy)
         nodes = roomy[((targets[:, None] - ways.nodes[roomy]) ** 2).sum(axis=2).argmin(axis=1)]
-        cost = np.array([ways.from_places(at[None])[nodes] for at in now.at])
+        cost = np.array([ways.compute_distances_from(at[None])[nodes] for at in now.at])
         utility, left = np.ones(len(targets)), np.ones(len(goals), dtype=bool)
         for _ in range(len(goals)):
             worth = np.where(left[:, None] & (utility > 0.0), utility - self.beta * cost, -np.inf)
@@ -99,7 +101,7 @@ class FrontierMedian(SharedMapLaw):
                 break
             goals[robot], left[robot] = targets[target], False
             away = np.sqrt(((targets - targets[target]) ** 2).sum(axis=1))
-            in_view = (away < now.reach) & ways.clear(targets[target], targets, ways.blocked)
+            in_view = (away < now.reach) & ways.find_clear_lines(targets[target], targets, ways.is_blocked)
             utility -= np.where(in_view, 1.0 - away / now.reach, 0.0)
         return goals
 

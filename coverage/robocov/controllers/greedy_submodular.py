@@ -39,7 +39,7 @@ class GreedySubmodular(SharedMapLaw):
     threshold: float = gain(0.01, "1", "part of the cost that a greedy plan made anew must save", high=1.0)
 
     def placed(self, now: Situation) -> tuple[Array, bool, Array]:
-        weights, notes = now.weights(~now.known.blocked), np.empty((0, 2))
+        weights, notes = now.weights(~now.known.is_blocked), np.empty((0, 2))
         among = Candidates.at_nodes(now, weights, now.ways.sources)
         if len(among.places) < len(now.at):
             return now.at, False, notes

@@ -23,8 +23,10 @@ from robocov.k_median import run_lloyd
 from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.planning.discovered import DiscoveredMap, Raster
-from robocov.planning.wayfinding import GridPlanner, Window
+from robocov.planning.discovered_map import DiscoveredMap
+from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.raster import Raster
+from robocov.planning.window import Window
 from robocov.team import Team
 
 FINEST_CELL, MOST_CELLS = 0.05, 1_000_000  # side of a cell of the maps, m, larger in very large regions
@@ -70,8 +72,8 @@ class Situation(NamedTuple):
 
     def weights(self, cells: BoolArray) -> Array:
         """Return the number of these cells that each node stands for, times φ, (m,); 0 where no way leads."""
-        weights = self.ways.sums(self.ways.window.cut(cells, False))
-        weights = weights * np.isfinite(self.ways.from_places(self.at))
+        weights = self.ways.sum_by_node(self.ways.window.crop(cells, False))
+        weights = weights * np.isfinite(self.ways.compute_distances_from(self.at))
         if self.density is not None and not self.density.is_uniform:
             weights = weights * self.density.evaluate(self.ways.nodes)
         return np.asarray(weights, dtype=np.float64)
@@ -87,7 +89,7 @@ class Candidates(NamedTuple):
     def at_nodes(cls, now: Situation, weights: Array, nodes: IntArray) -> Candidates:
         """Return those of some nodes that a way leads to, for the weights of all nodes."""
         target, nodes = np.flatnonzero(weights > 0.0), nodes[weights[nodes] > 0.0]
-        away = np.minimum(now.ways.table(nodes)[:, target], _FAR)
+        away = np.minimum(now.ways.compute_distance_table(nodes)[:, target], _FAR)
         return cls(now.ways.nodes[nodes], np.ascontiguousarray((away * weights[target]).T))
 
     def total(self, chosen: IntArray) -> float:
@@ -104,7 +106,9 @@ class Candidates(NamedTuple):
         ways, places = now.ways, self.places[chosen]
         apart = ways.spacing * math.sqrt(np.count_nonzero(weights) / len(self.places))
         square = ((ways.nodes[:, None] - places) ** 2).sum(axis=2).min(axis=1)
-        fine = Candidates.at_nodes(now, weights, np.flatnonzero(ways.roomy & (square < (1.5 * apart) ** 2)))
+        fine = Candidates.at_nodes(
+            now, weights, np.flatnonzero(ways.is_roomy & (square < (1.5 * apart) ** 2))
+        )
         return fine.places[run_lloyd(fine.table, fine.nearest(places))]
 
 
@@ -113,8 +117,8 @@ def assigned(now: Situation, places: Array) -> Array:
 
     That stays so on the way, as far as ways are straight.
     """
-    nodes = [now.ways.nearest(place) for place in places]
-    away = np.array([now.ways.from_places(at[None])[nodes] for at in now.at])
+    nodes = [now.ways.find_nearest_node(place) for place in places]
+    away = np.array([now.ways.compute_distances_from(at[None])[nodes] for at in now.at])
     return np.asarray(places[scipy.optimize.linear_sum_assignment(np.minimum(away, _FAR) ** 2)[1]])
 
 
@@ -158,7 +162,7 @@ class SharedMapLaw(Law):
         """Return the memory of robots that have seen nothing yet."""
         low_x, low_y, high_x, high_y = region.bounds
         cell = max(FINEST_CELL, math.sqrt((high_x - low_x) * (high_y - low_y) / MOST_CELLS))
-        n, nothing = len(team), DiscoveredMap.nothing(Raster(region, cell))
+        n, nothing = len(team), DiscoveredMap.build_unknown(Raster(region, cell))
         return SharedMapMemory(team, (nothing,) * n, (None,) * n, (), np.zeros(n, dtype=np.intp))
 
     def decide(self, seen: Observations, memory: SharedMapMemory) -> Decision:
@@ -171,7 +175,7 @@ class SharedMapLaw(Law):
             plans = self._plans(seen, memory)
             own = [plan.places[np.searchsorted(plan.group.robots, i)] for i, plan in enumerate(plans)]
             each_own = zip(plans, seen.positions, own, strict=True)
-            routes = tuple(plan.ways.route(at, place) for plan, at, place in each_own)
+            routes = tuple(plan.ways.find_route(at, place) for plan, at, place in each_own)
             legs, due = np.zeros_like(memory.legs), seen.time + self.period
             memory = replace(memory, plans=plans, routes=routes, legs=legs, due=due)
         returns, drive = last_returns(seen, memory.returns), (self.k_prop, self.response_time)
@@ -205,9 +209,9 @@ class SharedMapLaw(Law):
                 return replace(former, group=group)
             _, here, there = np.intersect1d(group.robots, former.group.robots, return_indices=True)
             begin[here] = former.places[there]
-        window = Window.around(known.raster, group.at[0], math.inf, int(self.nodes))
+        window = Window.build_around(known.raster, group.at[0], math.inf, int(self.nodes))
         ways = GridPlanner(known, window, radius + self.clearance) if former is None else former.ways
-        ways = ways.updated(known, window)
+        ways = ways.update(known, window)
         now = Situation(group.at, begin, former, known, ways, seen.density, reach)
         return Plan(group, *self.placed(now), known, ways, seen.density)
 
@@ -232,16 +236,16 @@ def surveyed(
     maps that are merged time and again would keep what one of them has mistaken.
     """
     every = list(zip(seen.positions, scans.distances, scans.hit, strict=True))
-    own = cache(lambda i: maps[i].scanned(*every[i]))
+    own = cache(lambda i: maps[i].add_scan(*every[i]))
     together, sizes, later = dict[Circle, DiscoveredMap](), Counter(around), []
     for i, circle in enumerate(around):
         if sizes[circle] < len(circle):
-            later.append(own(i).merged(own(k) for k in circle if k != i))
+            later.append(own(i).merge(own(k) for k in circle if k != i))
             continue
         if circle not in together:
-            one = maps[i].merged(maps[k] for k in circle if maps[k] is not maps[i])
+            one = maps[i].merge(maps[k] for k in circle if maps[k] is not maps[i])
             for k in circle:
-                one = one.scanned(*every[k])
+                one = one.add_scan(*every[k])
             together[circle] = one
         later.append(together[circle])
     return later

@@ -12,8 +12,8 @@ from robocov.arrays import Array
 from robocov.controllers.gains import gain
 from robocov.controllers.shared_map import Candidates, SharedMapLaw, Situation, assigned
 from robocov.k_median import apply_best_swap
-from robocov.planning.voronoi_graph import VoronoiGraph
-from robocov.planning.wayfinding import Window
+from robocov.planning.voronoi_roadmap import VoronoiRoadmap
+from robocov.planning.window import Window
 
 MOST_CELLS, MOST_VERTICES = 150_000, 300  # that the map is thinned on, and of the graph, about
 _SPACING = 0.25  # metres between vertices, at least
@@ -59,22 +59,22 @@ class VoronoiGraphCoverage(SharedMapLaw):
     def _vertices(self, now: Situation) -> Candidates:
         """Return the vertices of the graph where the robots are, with distances along it."""
         known, raster, ways = now.known, now.known.raster, now.ways
-        window = Window.around(raster, now.at[0], math.inf, MOST_CELLS)
+        window = Window.build_around(raster, now.at[0], math.inf, MOST_CELLS)
         blocks = window.rows, window.stride, window.columns, window.stride
         rows, columns = raster.shape
-        room = ~window.cut(ways.tight[:rows, :columns], True).reshape(blocks).any(axis=(1, 3))
-        free = window.cut(~known.blocked, False).reshape(blocks).sum(axis=(1, 3))
+        room = ~window.crop(ways.is_tight[:rows, :columns], True).reshape(blocks).any(axis=(1, 3))
+        free = window.crop(~known.is_blocked, False).reshape(blocks).sum(axis=(1, 3))
         part, _ = ndimage.label(room, np.ones((3, 3)))
-        standing = np.array([ways.nodes[ways.standing(place)] for place in now.at])
-        row, column = (each // window.stride for each in raster.cells(standing))
+        standing = np.array([ways.nodes[ways.find_own_node(place)] for place in now.at])
+        row, column = (each // window.stride for each in raster.find_cells(standing))
         room &= np.isin(part, part[row, column]) & (part > 0)
-        side = raster.cell * window.stride
-        graph = VoronoiGraph.of(room, free > 0, _SPACING / side, MOST_VERTICES)
+        side = raster.cell_size * window.stride
+        graph = VoronoiRoadmap.build(room, free > 0, _SPACING / side, MOST_VERTICES)
         places = np.asarray(raster.origin) + (graph.vertices[:, ::-1] + 0.5) * side
         mass = free.astype(np.float64)
         if now.density is not None and not now.density.is_uniform:
-            mass *= now.density.evaluate(window.nodes(raster)).reshape(mass.shape)
-        inside = graph.region >= 0
-        weights = np.bincount(graph.region[inside], mass[inside], minlength=len(places))
+            mass *= now.density.evaluate(window.compute_nodes(raster)).reshape(mass.shape)
+        inside = graph.vertex_of_cell >= 0
+        weights = np.bincount(graph.vertex_of_cell[inside], mass[inside], minlength=len(places))
         away = np.minimum(graph.distances * side, 1e9)
         return Candidates(places, np.ascontiguousarray((away * weights).T))

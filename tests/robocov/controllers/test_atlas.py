@@ -3,6 +3,7 @@ from __future__ import annotations
 import math
 from copy import deepcopy
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
 from robocov.mapfile import load_map
 from robocov.metrics import clearances, contacts
-from robocov.planning.discovered import UNKNOWN
+from robocov.planning.discovered_map import UNKNOWN
 from robocov.simulation import Simulation
 from robocov.team import Team
 
@@ -194,10 +195,13 @@ def test_what_must_be_saved_begins_anew_when_the_team_changes() -> None:
 @pytest.mark.slow
 def test_what_relocations_and_goals_must_save_doubles_with_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[float, float]] = []
-    place = atlas.own_place
-    monkeypatch.setattr(
-        atlas, "own_place", lambda *args: (asked.append((some.time, args[-1])), place(*args))[1]
-    )
+    find_own_goal = atlas.find_own_goal
+
+    def record_saving(*args: Any) -> Any:
+        asked.append((some.time, args[-1]))
+        return find_own_goal(*args)
+
+    monkeypatch.setattr(atlas, "find_own_goal", record_saving)
     some = Simulation(ROOMS, Atlas(settling=0.1), CORNER[:2], Team.homogeneous(2), dt=0.05)
     while some.time < 8.0:
         some.step()
@@ -385,15 +389,23 @@ def test_copies_share_what_never_changes() -> None:
     assert all((known.state == 0).all() for known in memory.maps)
 
 
-def test_who_shares_a_map_plans_once() -> None:
-    some = simulation(AtlasShared)
-    while some.time < 3.0:
-        some.step()
-    states = some.memory.states
+def test_robots_that_share_a_map_plan_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan_times: list[float] = []
+    place_team = atlas.place_team
+
+    def count_plan(*args: Any, **kwargs: Any) -> Any:
+        plan_times.append(simulated.time)
+        return place_team(*args, **kwargs)
+
+    monkeypatch.setattr(atlas, "place_team", count_plan)
+    simulated = simulation(AtlasShared)
+    while simulated.time < 3.0:
+        simulated.step()
+    assert len(plan_times) == len(set(plan_times)) == 3
+    states = simulated.memory.states
     assert len({id(state.known) for state in states}) == len({id(state.team_ways) for state in states}) == 1
     plans = [state.places[np.argsort(state.places[:, 0])] for state in states]
     assert all(np.array_equal(plan, plans[0]) for plan in plans)
-    assert states[0].team_ways is not None and len(states[0].team_ways.plans) == 1
 
 
 @pytest.mark.slow

@@ -15,8 +15,10 @@ from robocov.errors import ParameterError
 from robocov.metrics import clearances, contacts
 from robocov.observation import Observations, Scans
 from robocov.observation.neighbours import Neighbours
-from robocov.planning.discovered import FREE, UNKNOWN, WALL, DiscoveredMap, Raster
-from robocov.planning.wayfinding import GridPlanner, Window
+from robocov.planning.discovered_map import FREE, UNKNOWN, WALL, DiscoveredMap
+from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.raster import Raster
+from robocov.planning.window import Window
 from robocov.simulation import Simulation
 from robocov.team import Team
 
@@ -42,7 +44,7 @@ def simulation(name: str, n: int = 4, **limits: float) -> Simulation:
 
 def situation(state: np.ndarray, at: list[list[float]]) -> Situation:
     known = DiscoveredMap(RASTER, state.astype(np.uint8))
-    window = Window.around(RASTER, np.array([1.0, 1.0]), np.inf, 400)
+    window = Window.build_around(RASTER, np.array([1.0, 1.0]), np.inf, 400)
     ways = GridPlanner(known, window, 0.13)
     places = np.array(at)
     return Situation(places, np.full(places.shape, np.nan), None, known, ways, None, 3.0)
@@ -147,9 +149,9 @@ def test_what_one_has_mistaken_is_corrected_by_whoever_sees_it() -> None:
 def test_the_sum_of_squared_ways_is_the_least() -> None:
     rng = np.random.default_rng(1)
     now = situation(np.full(RASTER.shape, FREE), rng.uniform(1, 7, (5, 2)).tolist())
-    nodes = rng.choice(np.flatnonzero(now.ways.roomy), 5, replace=False)
+    nodes = rng.choice(np.flatnonzero(now.ways.is_roomy), 5, replace=False)
     places = now.ways.nodes[nodes]
-    away = np.array([now.ways.from_places(at[None])[nodes] for at in now.at]) ** 2
+    away = np.array([now.ways.compute_distances_from(at[None])[nodes] for at in now.at]) ** 2
     best = min(permutations(range(5)), key=lambda order: away[range(5), order].sum())
     assert np.array_equal(assigned(now, places), places[list(best)])
 

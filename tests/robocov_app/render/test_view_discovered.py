@@ -6,7 +6,8 @@ from drawn_pixels import ONE, distance, drawn
 from drawn_run import SQUARE, explained
 
 from robocov.controllers.atlas import Atlas
-from robocov.planning.discovered import FREE, PRESUMED, WALL, DiscoveredMap, Raster
+from robocov.planning.discovered_map import FREE, PRESUMED_WALL, WALL, DiscoveredMap
+from robocov.planning.raster import Raster
 from robocov.team import Team
 from robocov_app.render.knowledge import discovered_map
 from robocov_app.render.scene import Sensed
@@ -20,7 +21,7 @@ def scene(selected: int | None = 0):
     columns = raster.shape[1]
     state[:, : columns // 2] = FREE
     state[20:25, 10:20] = WALL
-    state[30:35, 10:20] = PRESUMED
+    state[30:35, 10:20] = PRESUMED_WALL
     known = DiscoveredMap(raster, state)
     plain = explained(ONE)
     memory = Atlas().begin(SQUARE.region, Team.homogeneous(len(plain.team)))
@@ -35,7 +36,7 @@ def test_walls_and_what_is_unknown_are_seen(theme):
     assert discovered_map(shown) is known
     frame, painter = drawn(shown, "sensed", theme=theme)
     at = {
-        name: painter.camera.to_pixels(known.raster.middles(np.array(row), np.array(column)))
+        name: painter.camera.to_pixels(known.raster.compute_centers(np.array(row), np.array(column)))
         for name, (row, column) in {
             "wall": (22, 15),
             "presumed": (32, 15),

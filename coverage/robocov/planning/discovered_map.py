@@ -1,0 +1,289 @@
+"""Occupancy grid of one robot, filled by its own range scans.
+
+A cell is *unknown* until a ray passes it, or a robot is there (then it is *free*), or a ray ends in it (then
+it is a *wall*, until rays have passed it several times and none has ended there). The ends of neighbouring
+rays that are close together belong to one surface: the cells between them are *presumed* to be wall, until a
+ray passes there. Routes may lead through unknown cells; their `openness` says how much they count.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocov.arrays import Array, BoolArray
+from robocov.compiled import kernel
+from robocov.observation import compute_headings
+from robocov.planning.raster import CellGrid, Raster, find_column, find_row
+
+UNKNOWN = 0
+FREE = 1
+PRESUMED_WALL = 2
+WALL = 3
+CERTAIN_WALL = 6
+"""States of a cell. The values from `WALL` to `CERTAIN_WALL` are walls, the more certain the higher."""
+
+MAX_BRIDGED_GAP_M = 0.5
+"""Longest gap between the ends of neighbouring rays that is presumed to be wall.
+
+It is no wider than the passages that a robot should find: doors seen from afar would be closed.
+"""
+_RAY_STEP_CELLS = 0.7
+"""Distance between the points of a ray at which its cell is looked up."""
+_END_DEPTH_CELLS = 0.25
+"""Depth of the obstacle's cell behind the end of a ray, which may lie on the border between two cells."""
+_CORE_HALF_WIDTH_CELLS = 0.3
+"""A ray frees a presumed wall only if it passes this close to the centre of the cell."""
+
+
+@dataclass(frozen=True, eq=False)
+class DiscoveredMap:
+    """Occupancy grid of a robot. Immutable: methods that add to it return another map.
+
+    Attributes
+    ----------
+    raster : Raster
+    state : (rows, columns) uint8 array
+        `UNKNOWN`, `FREE`, `PRESUMED_WALL`, or a value from `WALL` to `CERTAIN_WALL`, the lowest row first.
+        It becomes read-only.
+    """
+
+    raster: Raster
+    state: NDArray[np.uint8]
+
+    def __post_init__(self) -> None:
+        self.state.setflags(write=False)
+
+    @classmethod
+    def build_unknown(cls, raster: Raster) -> DiscoveredMap:
+        """Build the map of a robot that has not seen anything yet."""
+        return cls(raster, np.zeros(raster.shape, dtype=np.uint8))
+
+    def __deepcopy__(self, memo: object) -> DiscoveredMap:
+        return self
+
+    @cached_property
+    def is_blocked(self) -> BoolArray:
+        """Whether each cell is a wall, a presumed one, or outside the region, (rows, columns)."""
+        return np.asarray((self.state >= PRESUMED_WALL) | self.raster.is_outside)
+
+    def add_scan(self, position: Array, distances: Array, is_hit: BoolArray) -> DiscoveredMap:
+        """Add one scan.
+
+        Parameters
+        ----------
+        position : (2,) array, m
+            Where the scan was taken.
+        distances : (rays,) array, m
+            Lengths of rays evenly round a full turn, the first along +x.
+        is_hit : (rays,) bool array
+            Whether each ray ends at an obstacle.
+
+        Returns
+        -------
+        DiscoveredMap
+            The same map if the scan adds nothing to it.
+        """
+        state = self.state.copy()
+        # Nothing beyond the region matters.
+        lengths = np.minimum(distances, self.raster.region.diameter)
+        directions = compute_headings(len(distances))
+        grid = self.raster.grid
+        _mark_passed_cells(state, grid, position, directions, lengths)
+        ends = _compute_ray_ends(grid, position, directions, lengths)
+        _mark_presumed_walls(state, grid, ends, is_hit)
+        _mark_hit_cells(state, grid, ends, is_hit)
+        return self._replace_state(state)
+
+    def add_robots(self, positions: Array, radius: float) -> DiscoveredMap:
+        """Mark cells where robots are as free: they fit there. Walls remain.
+
+        Parameters
+        ----------
+        positions : (k, 2) array, m
+        radius : float, m
+
+        Returns
+        -------
+        DiscoveredMap
+            The same map if nothing changes.
+        """
+        state = self.state.copy()
+        _mark_robots(state, self.raster.grid, positions, radius)
+        return self._replace_state(state)
+
+    def merge(self, others: Iterable[DiscoveredMap]) -> DiscoveredMap:
+        """Add what other maps of the same raster contain about cells that this one has not seen.
+
+        Parameters
+        ----------
+        others : iterable of DiscoveredMap
+            In order of precedence.
+
+        Returns
+        -------
+        DiscoveredMap
+            The same map if the others add nothing to it.
+        """
+        state = self.state
+        for other in others:
+            # What somebody has seen replaces a presumption; what this robot has seen itself stays.
+            is_unseen = (state == UNKNOWN) | ((state == PRESUMED_WALL) & (other.state != UNKNOWN))
+            state = np.where(is_unseen, other.state, state)
+        return self._replace_state(state)
+
+    def count_changed_walls(self, earlier: DiscoveredMap) -> int:
+        """Count the cells where walls have disappeared, or appeared in the open, since an earlier map."""
+        if earlier is self:
+            return 0
+        disappeared = _count_opened_walls(earlier.state, self.state)
+        appeared = _count_opened_walls(self.state, earlier.state)
+        return disappeared + appeared
+
+    def _replace_state(self, state: NDArray[np.uint8]) -> DiscoveredMap:
+        """Return the map with another state; the same map if the state is equal."""
+        if np.array_equal(state, self.state):
+            return self
+        return DiscoveredMap(self.raster, state)
+
+
+def dilate(is_blocked: BoolArray, reach: float) -> BoolArray:
+    """Find the cells close to blocked ones; everything next to the raster counts as blocked.
+
+    Parameters
+    ----------
+    is_blocked : (rows, columns) bool array
+    reach : float
+        Maximum distance between the centres of two cells, in sides of cells.
+
+    Returns
+    -------
+    (rows, columns) bool array
+
+    Examples
+    --------
+    >>> cells = np.zeros((5, 5), dtype=bool)
+    >>> cells[2, 2] = True
+    >>> dilate(cells, 1.0).astype(int)[1:4, 1:4]
+    array([[0, 1, 0],
+           [1, 1, 1],
+           [0, 1, 0]])
+    """
+    rows, columns = is_blocked.shape
+    margin = int(reach)
+    padded = np.pad(is_blocked, margin, constant_values=True)
+    is_close = np.zeros_like(is_blocked)
+    row, column = np.mgrid[-margin : margin + 1, -margin : margin + 1]
+    for up, right in np.argwhere(row**2 + column**2 <= reach * reach).tolist():
+        is_close |= padded[up : up + rows, right : right + columns]
+    return is_close
+
+
+@kernel
+def _count_opened_walls(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> int:
+    """Count the cells that were walls before and are now free, with only free cells around them.
+
+    At the border of walls a cell is sometimes free and sometimes a wall, depending on where it is seen from.
+    """
+    count = 0
+    rows, columns = before.shape
+    for row in range(1, rows - 1):
+        for column in range(1, columns - 1):
+            if before[row, column] >= WALL and after[row, column] == FREE:
+                is_open_around = True
+                for i in range(row - 1, row + 2):
+                    for j in range(column - 1, column + 2):
+                        is_open_around = is_open_around and after[i, j] == FREE
+                count += is_open_around
+    return count
+
+
+@kernel
+def _mark_passed_cells(
+    state: NDArray[np.uint8], grid: CellGrid, position: Array, directions: Array, lengths: Array
+) -> None:
+    """Mark the cells that rays pass as free; walls only become less certain."""
+    rows, columns = state.shape
+    step = _RAY_STEP_CELLS * grid.cell_size
+    for ray in range(len(lengths)):
+        along = 0.5 * _RAY_STEP_CELLS * grid.cell_size
+        while along < lengths[ray] - step:
+            x = position[0] + along * directions[ray, 0]
+            y = position[1] + along * directions[ray, 1]
+            row = find_row(y, grid, rows)
+            column = find_column(x, grid, columns)
+            evidence = state[row, column]
+            if evidence in (UNKNOWN, WALL):
+                state[row, column] = FREE
+            elif evidence > WALL:
+                state[row, column] = evidence - 1
+            elif evidence == PRESUMED_WALL:
+                off_x = (x - grid.low_x) / grid.cell_size - column - 0.5
+                off_y = (y - grid.low_y) / grid.cell_size - row - 0.5
+                if max(abs(off_x), abs(off_y)) < _CORE_HALF_WIDTH_CELLS:
+                    state[row, column] = FREE
+            along += step
+
+
+@kernel
+def _compute_ray_ends(grid: CellGrid, position: Array, directions: Array, lengths: Array) -> Array:
+    """Compute points, (rays, 2) m, just inside the obstacles at the ends of the rays."""
+    ends = np.empty(directions.shape)
+    for ray in range(len(lengths)):
+        length = lengths[ray] + _END_DEPTH_CELLS * grid.cell_size
+        ends[ray, 0] = position[0] + length * directions[ray, 0]
+        ends[ray, 1] = position[1] + length * directions[ray, 1]
+    return ends
+
+
+@kernel
+def _mark_presumed_walls(state: NDArray[np.uint8], grid: CellGrid, ends: Array, is_hit: BoolArray) -> None:
+    """Mark unknown cells between the ends of neighbouring rays as presumed walls, and confirm walls there."""
+    rows, columns = state.shape
+    half_cell = 0.5 * grid.cell_size
+    steps = math.ceil(MAX_BRIDGED_GAP_M / half_cell)
+    for ray in range(len(ends)):
+        next_ray = (ray + 1) % len(ends)
+        dx = ends[next_ray, 0] - ends[ray, 0]
+        dy = ends[next_ray, 1] - ends[ray, 1]
+        gap = math.sqrt(dx * dx + dy * dy)
+        if not (is_hit[ray] and is_hit[next_ray] and half_cell < gap < MAX_BRIDGED_GAP_M):
+            continue
+        for step in range(1, steps):
+            row = find_row(ends[ray, 1] + dy * step / steps, grid, rows)
+            column = find_column(ends[ray, 0] + dx * step / steps, grid, columns)
+            if state[row, column] == UNKNOWN:
+                state[row, column] = PRESUMED_WALL
+            elif state[row, column] >= WALL:
+                state[row, column] = CERTAIN_WALL
+
+
+@kernel
+def _mark_hit_cells(state: NDArray[np.uint8], grid: CellGrid, ends: Array, is_hit: BoolArray) -> None:
+    """Mark the cells in which rays have met an obstacle as walls."""
+    rows, columns = state.shape
+    for ray in range(len(ends)):
+        if is_hit[ray]:
+            row = find_row(ends[ray, 1], grid, rows)
+            column = find_column(ends[ray, 0], grid, columns)
+            state[row, column] = CERTAIN_WALL
+
+
+@kernel
+def _mark_robots(state: NDArray[np.uint8], grid: CellGrid, positions: Array, radius: float) -> None:
+    """Mark the cells whose centre is within a radius of a robot as free, except for walls."""
+    rows, columns = state.shape
+    for x, y in positions:
+        first_column = find_column(x - radius, grid, columns)
+        last_column = find_column(x + radius, grid, columns)
+        for row in range(find_row(y - radius, grid, rows), find_row(y + radius, grid, rows) + 1):
+            for column in range(first_column, last_column + 1):
+                off_x = grid.low_x + (column + 0.5) * grid.cell_size - x
+                off_y = grid.low_y + (row + 0.5) * grid.cell_size - y
+                if state[row, column] < WALL and off_x * off_x + off_y * off_y <= radius * radius:
+                    state[row, column] = FREE

@@ -1,0 +1,284 @@
+"""Distances and routes among known walls, on the lattice of a window of a discovered map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import count
+from weakref import WeakValueDictionary
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.planning.discovered_map import DiscoveredMap
+from robocov.planning.lattice import (
+    Edges,
+    Frame,
+    LatticeCells,
+    build_edges,
+    compute_distances,
+    find_clear_lines,
+    find_nearest_nodes,
+)
+from robocov.planning.map_window import MapWindow
+from robocov.planning.window import Window
+
+_MAX_ROUTE_ENDS = 12
+"""Number of nodes that are tried for the first, and the last, one of a route."""
+_MIN_SOURCES = 180
+"""A plan chooses among this number of nodes, or among one of `_NODES_PER_SOURCE` if that is more."""
+_NODES_PER_SOURCE = 9
+_MAX_REMEMBERED_POSITIONS = 1000
+"""Positions whose visible nodes are remembered: robots move on, though the map stays the same."""
+
+
+@dataclass(eq=False)
+class GridPlanner(MapWindow):
+    """Distances and routes in a window of a discovered map, around its walls.
+
+    Planners compute what they are asked for once, and are shared by robots that share a map.
+
+    Parameters
+    ----------
+    known_map : DiscoveredMap
+    window : Window
+    clearance : float, m
+        Distance that routes keep from walls, except for the last step to a node.
+    """
+
+    _distances_of_node: dict[int, Array] = field(default_factory=dict, init=False, repr=False)
+    _visible_nodes: dict[bytes, IntArray] = field(default_factory=dict, init=False, repr=False)
+
+    @classmethod
+    def get_shared(cls, known_map: DiscoveredMap, window: Window, clearance: float) -> GridPlanner:
+        """Return the planner in use for this very map and window; build one if there is none."""
+        # A planner in use keeps its map alive, therefore no other map has the same id.
+        key = id(known_map), window, clearance
+        planner = _PLANNERS_IN_USE.get(key)
+        if planner is None:
+            planner = cls(known_map, window, clearance)
+        return _PLANNERS_IN_USE.setdefault(key, planner)
+
+    def update(self, known_map: DiscoveredMap, window: Window) -> GridPlanner:
+        """Return the planner for a later map and window; the same planner if its cells are the same."""
+        later = GridPlanner.get_shared(known_map, window, self.clearance)
+        if (
+            self.window == window
+            and np.array_equal(self.is_blocked, later.is_blocked)
+            and np.array_equal(self.is_unknown, later.is_unknown)
+        ):
+            return self
+        return later
+
+    @cached_property
+    def _edges(self) -> Edges:
+        """Edges between nodes; unknown cells count as longer."""
+        return build_edges(
+            cells=LatticeCells(self.is_tight, self.is_blocked, self.is_unknown, self.is_roomy),
+            rows=self.window.rows,
+            columns=self.window.columns,
+            stride=self.window.stride,
+            spacing=self.spacing,
+        )
+
+    @cached_property
+    def _graph(self) -> csr_array:
+        """The edges as a sparse matrix."""
+        count_of_nodes = len(self.nodes)
+        edges = self._edges
+        return csr_array((edges.lengths, edges.ends, edges.starts), shape=(count_of_nodes, count_of_nodes))
+
+    @cached_property
+    def _frame(self) -> Frame:
+        """Where the window's cells are; the last row and column are at most those of the raster."""
+        rows, columns = self.known_map.raster.shape
+        height, width = self.window.shape
+        low_x, low_y = self.known_map.raster.origin
+        return Frame(
+            low_x=low_x,
+            low_y=low_y,
+            cell_size=self.known_map.raster.cell_size,
+            first_row=self.window.first_row,
+            first_column=self.window.first_column,
+            last_row=min(self.window.first_row + height, rows) - 1,
+            last_column=min(self.window.first_column + width, columns) - 1,
+        )
+
+    @cached_property
+    def sources(self) -> IntArray:
+        """Nodes that a plan for a team chooses among: every k-th one in both directions, (c,)."""
+        max_sources = max(_MIN_SOURCES, len(self.nodes) // _NODES_PER_SOURCE)
+        row, column = np.divmod(np.arange(len(self.nodes)), self.window.columns)
+        for k in count(1):
+            sources = np.flatnonzero(self.is_roomy & (row % k == k // 2) & (column % k == k // 2))
+            if len(sources) <= max_sources:
+                break
+        return sources
+
+    @cached_property
+    def source_distances(self) -> Array:
+        """Distances from the sources to all nodes, (c, m) m."""
+        return self.compute_distance_table(self.sources)
+
+    def get_distances(self, node: int) -> Array:
+        """Return the distances from a node to all nodes, (m,) m, infinite where no path leads."""
+        if node not in self._distances_of_node:
+            self._distances_of_node[node] = self.compute_distance_table(np.array([node]))[0]
+        return self._distances_of_node[node]
+
+    def compute_distances_within(self, nodes: Sequence[int], limit: float) -> list[Array]:
+        """Compute the distances from each of some nodes to all nodes, (m,) m each.
+
+        Nodes farther away than a limit, m, may be infinitely far; the lower it is, the faster this is.
+        """
+        return [
+            self._distances_of_node[node]
+            if node in self._distances_of_node
+            else self._search([node], [0.0], limit)
+            for node in nodes
+        ]
+
+    def compute_distance_table(self, nodes: IntArray) -> Array:
+        """Compute the distances from some nodes, (k,), to all nodes, (k, m) m."""
+        table = np.array([self._search([node], [0.0]) for node in nodes.tolist()])
+        return table.reshape(-1, len(self.nodes))
+
+    def compute_distances_from(self, positions: Array) -> Array:
+        """Compute the distances of all nodes, (m,) m, from the nearest of (k, 2) m positions."""
+        visible = [self._find_visible_nodes(position) for position in positions]
+        lengths = [
+            np.sqrt(((self.nodes[nodes] - position) ** 2).sum(axis=1))
+            for nodes, position in zip(visible, positions, strict=True)
+        ]
+        return self._search(np.concatenate([[], *visible]), np.concatenate([[], *lengths]))
+
+    def _search(self, nodes: ArrayLike, offsets: ArrayLike, limit: float = math.inf) -> Array:
+        """Compute the distances from the nearest of some nodes, which have distances themselves."""
+        return compute_distances(
+            self._edges,
+            self.spacing,
+            np.asarray(nodes, dtype=np.intp),
+            np.asarray(offsets, dtype=np.float64),
+            limit,
+        )
+
+    def find_nearest_node(self, position: Array) -> int:
+        """Return the roomy node nearest to a position, (2,) m; -1 if there is none."""
+        if not self.is_roomy.any():
+            return -1
+        square = np.where(self.is_roomy, ((self.nodes - position) ** 2).sum(axis=1), np.inf)
+        return int(square.argmin())
+
+    def find_own_node(self, position: Array) -> int:
+        """Return the node at which a robot at (2,) m is: the nearest roomy one in sight, or at all.
+
+        -1 if there is none.
+        """
+        visible = self._find_visible_nodes(position)
+        return int(visible[0]) if len(visible) else -1
+
+    def _find_visible_nodes(self, position: Array) -> IntArray:
+        """Return the close roomy nodes in sight of a position; if there are none, the nearest one."""
+        key = position.tobytes()
+        if key not in self._visible_nodes:
+            if len(self._visible_nodes) >= _MAX_REMEMBERED_POSITIONS:
+                self._visible_nodes.clear()
+            close = self._find_close_nodes(position, self.is_roomy)
+            visible = close[self.find_clear_lines(position, self.nodes[close], self.is_blocked)]
+            # A robot that is inside what is believed to be a wall is actually next to it.
+            self._visible_nodes[key] = visible if len(visible) else close[:1]
+        return self._visible_nodes[key]
+
+    def _find_close_nodes(self, position: Array, is_candidate: BoolArray) -> IntArray:
+        """Return some candidates close to a position, the nearest first."""
+        return find_nearest_nodes(position, self.nodes, is_candidate, _MAX_ROUTE_ENDS)
+
+    def find_clear_lines(
+        self, position: Array, ends: Array, is_obstructing: BoolArray, ignored_length: float = 0.0
+    ) -> BoolArray:
+        """Find the straight lines from a position that meet no obstructing cell.
+
+        Parameters
+        ----------
+        position : (2,) array, m
+        ends : (k, 2) array, m
+        is_obstructing : (h, w) bool array
+            For example `is_blocked` or `is_tight`.
+        ignored_length : float, m
+            What is closer to the position does not count: a robot may be where no route leads to, but only
+            away from there.
+
+        Returns
+        -------
+        (k,) bool array
+        """
+        return find_clear_lines(position, ends, is_obstructing, self._frame, ignored_length)
+
+    def find_route(self, position: Array, goal: Array) -> Array:
+        """Find the shortest route from a position to a goal.
+
+        Parameters
+        ----------
+        position, goal : (2,) arrays, m
+
+        Returns
+        -------
+        (w, 2) array, m
+            Way-points, each in sight of the one before. The last one is the goal, or the closest node to it
+            that a path leads to; the position itself if no path leads anywhere. No tight cell is crossed
+            between way-points; a position that is tight itself is left straight.
+        """
+        is_direct = self.find_clear_lines(position, goal[None], self.is_tight, self.clearance)[0]
+        if is_direct:
+            return np.array(goal[None])
+        first = self._find_first_node(position)
+        if first < 0:
+            return np.array(position[None])
+        distance, predecessor = self._find_shortest_paths(first)
+        close = self._find_close_nodes(goal, np.isfinite(distance) & self.is_roomy)
+        if not len(close):
+            return np.array(position[None])
+        is_visible = self.find_clear_lines(goal, self.nodes[close], self.is_tight)
+        path = [int(close[is_visible.argmax()])]
+        while predecessor[path[-1]] >= 0:
+            path.append(int(predecessor[path[-1]]))
+        points = self.nodes[path[::-1]]
+        if is_visible.any():
+            points = np.vstack([points, goal])
+        return self._remove_detours(position, points)
+
+    def _find_shortest_paths(self, node: int) -> tuple[Array, IntArray]:
+        """Return the distances of all nodes from one, m, and the node before each on the shortest path."""
+        distances, predecessors = dijkstra(self._graph, indices=[node], return_predecessors=True)
+        return distances[0], predecessors[0]
+
+    def _find_first_node(self, position: Array) -> int:
+        """Return the first node of a route: close, roomy, and in sight; -1 if there is none."""
+        close = self._find_close_nodes(position, self.is_roomy)
+        is_visible = self.find_clear_lines(position, self.nodes[close], self.is_tight, 2.0 * self.clearance)
+        if not is_visible.any():
+            is_visible = self.find_clear_lines(position, self.nodes[close], self.is_blocked)
+        return int(close[is_visible.argmax()]) if is_visible.any() else -1
+
+    def _remove_detours(self, position: Array, points: Array) -> Array:
+        """Return the way-points without those that are passed in sight of later ones."""
+        remaining: list[Array] = []
+        here = position
+        k = 0
+        while k < len(points):
+            ignored_length = 0.0 if remaining else self.clearance
+            is_visible = self.find_clear_lines(here, points[k:], self.is_tight, ignored_length)
+            if is_visible.any():
+                k += int(is_visible.nonzero()[0][-1])
+            here = points[k]
+            remaining.append(here)
+            k += 1
+        return np.array(remaining)
+
+
+_PLANNERS_IN_USE: WeakValueDictionary[tuple[int, Window, float], GridPlanner] = WeakValueDictionary()

@@ -1,0 +1,331 @@
+"""A lattice of nodes in a window: its graph, shortest distances on it, and lines of sight.
+
+A node is joined to those one step away, diagonally, and a knight's move away: 16 directions, so that a path
+on the lattice is at most 2.8 % longer than the shortest one. Two nodes are joined if no cell on the straight
+line between them is too close to a wall; nodes close to walls can be reached, but not passed.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import kernel
+
+_MOVES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
+"""Rows and columns of half the directions; the others are their opposites."""
+_UNKNOWN_DETOUR = 0.4
+"""Fraction by which routes through unknown cells are assumed to be longer, as walls turn up there."""
+_SIGHT_STEP_CELLS = 0.5
+"""Distance between the points of a straight line at which its cell is looked up."""
+
+
+class LatticeCells(NamedTuple):
+    """What the graph of a lattice depends on."""
+
+    is_tight: BoolArray
+    """(h, w) Whether each cell is too close to a wall."""
+    is_blocked: BoolArray
+    """(h, w) Whether each cell is a wall."""
+    is_unknown: BoolArray
+    """(h, w) Whether each cell has not been seen."""
+    is_roomy: BoolArray
+    """(m,) Whether each node keeps the clearance."""
+
+
+class Edges(NamedTuple):
+    """Edges of a directed graph in compressed rows: those of node k are starts[k] to starts[k + 1] - 1."""
+
+    lengths: Array
+    """(e,) m"""
+    ends: IntArray
+    """(e,) Node that each edge leads to."""
+    starts: IntArray
+    """(m + 1,)"""
+
+
+class Frame(NamedTuple):
+    """Where the cells of a window are."""
+
+    low_x: float
+    """Lower left corner of the raster, m."""
+    low_y: float
+    cell_size: float
+    """m"""
+    first_row: int
+    """First and last row and column of the raster that the window contains."""
+    first_column: int
+    last_row: int
+    last_column: int
+
+
+class _Moves(NamedTuple):
+    """The moves from a node to its neighbours, (k,) of them."""
+
+    rows: IntArray
+    """(k,) Rows of nodes up."""
+    columns: IntArray
+    """(k,) Columns of nodes to the right."""
+    lengths: Array
+    """(k,) m"""
+    crossed: IntArray
+    """(c, 2) Rows and columns of the cells that the moves cross, from that of the node on."""
+    starts: IntArray
+    """(k + 1,) Those of move k are starts[k] to starts[k + 1] - 1."""
+
+
+def build_edges(cells: LatticeCells, rows: int, columns: int, stride: int, spacing: float) -> Edges:
+    """Build the edges of a lattice.
+
+    Parameters
+    ----------
+    cells : LatticeCells
+    rows, columns : int
+        Numbers of rows and columns of nodes.
+    stride : int
+        Number of cells from one node to the next.
+    spacing : float, m
+        Distance from one node to the next.
+
+    Returns
+    -------
+    Edges
+        As long as they are, but unknown cells count as longer. Nodes in tight cells are ends of paths and
+        nothing more: no edge leads on from there, for example through a hole in a wall that has not been seen
+        completely.
+    """
+    moves = _build_moves(stride, spacing)
+    lengths = _compute_move_lengths(cells, moves, rows, columns, stride)
+    return _compress_edges(lengths, columns)
+
+
+def _build_moves(stride: int, spacing: float) -> _Moves:
+    """Build the moves with the cells that they cross."""
+    crossed = [_list_crossed_cells(up, right, stride) for up, right in _MOVES]
+    counts = np.array([len(cells) for cells in crossed])
+    steps = np.array(_MOVES)
+    return _Moves(
+        rows=steps[:, 0].copy(),
+        columns=steps[:, 1].copy(),
+        lengths=np.array([math.hypot(*move) for move in _MOVES]) * spacing,
+        crossed=np.concatenate(crossed),
+        starts=np.concatenate([[0], np.cumsum(counts)]),
+    )
+
+
+@lru_cache(maxsize=512)
+def _list_crossed_cells(up: int, right: int, stride: int) -> tuple[tuple[int, int], ...]:
+    """Return row and column, relative to a node, of the cells that the line to a neighbour crosses."""
+    along = np.linspace(0.0, 1.0, 2 * max(up, abs(right)) * stride + 1)
+    row = np.rint(along * up * stride).astype(int)
+    column = np.rint(along * right * stride).astype(int)
+    return tuple(dict.fromkeys(zip(row.tolist(), column.tolist(), strict=True)))
+
+
+@kernel
+def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns: int, stride: int) -> Array:
+    """Compute the lengths of all moves, (m, 5, 5) m, infinite where there is no edge.
+
+    The entry [2 + up, 2 + right] belongs to the move by that many rows and columns.
+    """
+    lengths = np.full((rows * columns, 5, 5), np.inf)
+    for move in range(len(moves.lengths)):
+        up = moves.rows[move]
+        right = moves.columns[move]
+        first = moves.starts[move]
+        stop = moves.starts[move + 1]
+        for row in range(rows - up):
+            for column in range(max(0, -right), columns - max(0, right)):
+                top = stride // 2 + row * stride
+                left = stride // 2 + column * stride
+                is_passable = True
+                is_without_wall = True
+                unknown_cells = 0
+                for k in range(first, stop):
+                    i = top + moves.crossed[k, 0]
+                    j = left + moves.crossed[k, 1]
+                    is_passable = is_passable and not cells.is_tight[i, j]
+                    is_without_wall = is_without_wall and not cells.is_blocked[i, j]
+                    unknown_cells += cells.is_unknown[i, j]
+                node = row * columns + column
+                other = (row + up) * columns + column + right
+                length = moves.lengths[move] * (1.0 + _UNKNOWN_DETOUR / (stop - first) * unknown_cells)
+                is_roomy = cells.is_roomy[node]
+                is_other_roomy = cells.is_roomy[other]
+                if is_passable or (is_without_wall and is_roomy and not is_other_roomy):
+                    lengths[node, 2 + up, 2 + right] = length
+                if is_passable or (is_without_wall and is_other_roomy and not is_roomy):
+                    lengths[other, 2 - up, 2 - right] = length
+    return lengths
+
+
+@kernel
+def _compress_edges(lengths: Array, columns: int) -> Edges:
+    """Collect the edges of finite length of all moves, (m, 5, 5) m."""
+    count = 0
+    edge_lengths = np.empty(lengths.size)
+    ends = np.empty(lengths.size, dtype=np.intp)
+    starts = np.zeros(len(lengths) + 1, dtype=np.intp)
+    for node in range(len(lengths)):
+        for up in range(5):
+            for right in range(5):
+                if lengths[node, up, right] < np.inf:
+                    edge_lengths[count] = lengths[node, up, right]
+                    ends[count] = node + (up - 2) * columns + right - 2
+                    count += 1
+        starts[node + 1] = count
+    return Edges(edge_lengths[:count].copy(), ends[:count].copy(), starts)
+
+
+@kernel
+def compute_distances(
+    edges: Edges, shortest_edge: float, sources: IntArray, offsets: Array, limit: float
+) -> Array:
+    """Compute the distances of all nodes from the nearest of some sources.
+
+    Parameters
+    ----------
+    edges : Edges
+    shortest_edge : float, m
+        Length that no edge falls below.
+    sources : (k,) int array
+    offsets : (k,) array, m
+        Distances at the sources.
+    limit : float, m
+        Nodes farther away are not reached.
+
+    Returns
+    -------
+    (m,) array, m
+        Infinite for nodes that are not reached.
+
+    Notes
+    -----
+    Dijkstra's algorithm, but all nodes are settled at once that are farther than the nearest one by less than
+    the shortest edge: no shorter path to one of them leads over another.
+    """
+    nodes = len(edges.starts) - 1
+    distance = np.full(nodes, np.inf)
+    front = np.empty(nodes, dtype=np.intp)
+    is_in_front = np.zeros(nodes, dtype=np.bool_)
+    front_size = 0
+    for k in range(len(sources)):
+        node = sources[k]
+        distance[node] = min(distance[node], offsets[k])
+        if not is_in_front[node]:
+            front[front_size] = node
+            is_in_front[node] = True
+            front_size += 1
+    settled = np.empty(nodes, dtype=np.intp)
+    while front_size:
+        nearest = np.inf
+        for k in range(front_size):
+            nearest = min(nearest, distance[front[k]])
+        settled_count = 0
+        remaining = 0
+        for k in range(front_size):
+            node = front[k]
+            if distance[node] < nearest + shortest_edge:
+                settled[settled_count] = node
+                is_in_front[node] = False
+                settled_count += 1
+            else:
+                front[remaining] = node
+                remaining += 1
+        front_size = remaining
+        for k in range(settled_count):
+            node = settled[k]
+            for edge in range(edges.starts[node], edges.starts[node + 1]):
+                end = edges.ends[edge]
+                length = distance[node] + edges.lengths[edge]
+                if length < distance[end] and length <= limit:
+                    distance[end] = length
+                    if not is_in_front[end]:
+                        front[front_size] = end
+                        is_in_front[end] = True
+                        front_size += 1
+    return distance
+
+
+@kernel
+def find_nearest_nodes(position: Array, nodes: Array, is_candidate: BoolArray, max_count: int) -> IntArray:
+    """Find the candidates nearest to a position, the nearest first.
+
+    Parameters
+    ----------
+    position : (2,) array, m
+    nodes : (m, 2) array, m
+    is_candidate : (m,) bool array
+    max_count : int
+
+    Returns
+    -------
+    (k,) int array
+        At most `max_count` nodes.
+    """
+    nearest = np.empty(max_count, dtype=np.intp)
+    squares = np.empty(max_count)
+    count = 0
+    for node in range(len(nodes)):
+        square = (nodes[node, 0] - position[0]) ** 2 + (nodes[node, 1] - position[1]) ** 2
+        if not is_candidate[node] or (count == max_count and square >= squares[max_count - 1]):
+            continue
+        count = min(count + 1, max_count)
+        k = count - 1
+        while k > 0 and squares[k - 1] > square:
+            nearest[k] = nearest[k - 1]
+            squares[k] = squares[k - 1]
+            k -= 1
+        nearest[k] = node
+        squares[k] = square
+    return nearest[:count]
+
+
+@kernel
+def find_clear_lines(
+    position: Array, ends: Array, is_obstructing: BoolArray, frame: Frame, ignored_length: float
+) -> BoolArray:
+    """Find the straight lines from a position that meet no obstructing cell.
+
+    Parameters
+    ----------
+    position : (2,) array, m
+    ends : (k, 2) array, m
+    is_obstructing : (h, w) bool array
+        Cells of a window.
+    frame : Frame
+        Where these cells are.
+    ignored_length : float, m
+        What is closer to the position than that does not count.
+
+    Returns
+    -------
+    (k,) bool array
+    """
+    lengths = np.empty(len(ends))
+    for k in range(len(ends)):
+        lengths[k] = math.sqrt((ends[k, 0] - position[0]) ** 2 + (ends[k, 1] - position[1]) ** 2)
+    longest = 0.0
+    for k in range(len(ends)):
+        longest = max(longest, lengths[k])
+    steps = math.ceil(longest / (_SIGHT_STEP_CELLS * frame.cell_size)) + 1
+    cells_per_metre = 1.0 / frame.cell_size
+    is_clear = np.ones(len(ends), dtype=np.bool_)
+    for k in range(len(ends)):
+        for step in range(steps + 1):
+            fraction = step * (1.0 / steps) if step < steps else 1.0
+            x = position[0] + (ends[k, 0] - position[0]) * fraction
+            y = position[1] + (ends[k, 1] - position[1]) * fraction
+            row = math.floor((y - frame.low_y) * cells_per_metre)
+            column = math.floor((x - frame.low_x) * cells_per_metre)
+            row = min(max(row, frame.first_row), frame.last_row) - frame.first_row
+            column = min(max(column, frame.first_column), frame.last_column) - frame.first_column
+            is_ignored = ignored_length > 0.0 and lengths[k] * fraction <= ignored_length
+            if is_obstructing[row, column] and not is_ignored:
+                is_clear[k] = False
+                break
+    return is_clear

@@ -1,0 +1,151 @@
+"""The cells of a discovered map in a window, and the nodes that stand for blocks of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy import ndimage
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.planning.discovered_map import UNKNOWN, DiscoveredMap, dilate
+from robocov.planning.openness import MAX_BLOCKS, compute_openness
+from robocov.planning.window import Window
+
+
+class Frontier(NamedTuple):
+    """Unknown cells next to free ones with room for a robot, (b,) of them."""
+
+    rows: IntArray
+    """(b,) Row in the window."""
+    columns: IntArray
+    """(b,) Column in the window."""
+    patches: IntArray
+    """(b,) Number of the unknown patch that each belongs to, from 1."""
+    is_side_free: BoolArray
+    """(b, 4) Whether there is such a free cell to the right, above, to the left, below."""
+
+
+class UnknownArea(NamedTuple):
+    """Free cells that are expected in unknown patches, by nodes, (p,) pairs of both."""
+
+    patches: IntArray
+    """(p,) Number of the patch, from 1."""
+    nodes: IntArray
+    """(p,) Node."""
+    expected_cells: Array
+    """(p,) Expected number of free cells."""
+
+
+@dataclass(eq=False)
+class MapWindow:
+    """Cells of a discovered map in a window, (h, w), and the nodes of the window, (m,).
+
+    Parameters
+    ----------
+    known_map : DiscoveredMap
+    window : Window
+    clearance : float, m
+        Distance that routes keep from walls, except for the last step to a node.
+    """
+
+    known_map: DiscoveredMap
+    window: Window
+    clearance: float
+
+    @cached_property
+    def is_blocked(self) -> BoolArray:
+        """Whether each cell is a wall, (h, w)."""
+        return self.window.crop(self.known_map.is_blocked, True)
+
+    @cached_property
+    def is_unknown(self) -> BoolArray:
+        """Whether the robot has not seen each cell, (h, w)."""
+        return np.asarray(self.window.crop(self.known_map.state, np.uint8(UNKNOWN)) == UNKNOWN)
+
+    @cached_property
+    def is_outside(self) -> BoolArray:
+        """Whether each cell is outside the region, (h, w)."""
+        return self.window.crop(self.known_map.raster.is_outside, True)
+
+    @cached_property
+    def is_free(self) -> BoolArray:
+        """Whether each cell is known to be free, (h, w)."""
+        return np.asarray(~(self.is_unknown | self.is_blocked | self.is_outside))
+
+    @cached_property
+    def is_tight(self) -> BoolArray:
+        """Whether each cell is too close to walls, (h, w)."""
+        return dilate(self.is_blocked, self.clearance / self.known_map.raster.cell_size)
+
+    @cached_property
+    def openness(self) -> Array:
+        """Probability that each unknown cell is free, 0 for all others, (h, w)."""
+        state = self.window.crop(self.known_map.state, np.uint8(UNKNOWN))
+        max_blocks = min(MAX_BLOCKS, self.window.rows * self.window.columns)
+        return compute_openness(state, self.is_outside, max_blocks)
+
+    @cached_property
+    def patches(self) -> IntArray:
+        """Numbers of the connected patches of unknown cells, from 1; 0 for all other cells, (h, w)."""
+        labels, _ = ndimage.label(self.is_unknown & ~self.is_outside)
+        return np.asarray(labels)
+
+    @property
+    def spacing(self) -> float:
+        """Distance between neighbouring nodes, m."""
+        return self.window.stride * self.known_map.raster.cell_size
+
+    @cached_property
+    def nodes(self) -> Array:
+        """Positions of the nodes, (m, 2) m, row by row."""
+        return self.window.compute_nodes(self.known_map.raster)
+
+    @cached_property
+    def is_roomy(self) -> BoolArray:
+        """Whether each node keeps the clearance, (m,)."""
+        stride = self.window.stride
+        return np.asarray(~self.is_tight[stride // 2 :: stride, stride // 2 :: stride].ravel())
+
+    @cached_property
+    def free_cells(self) -> Array:
+        """Number of free cells that each node stands for, (m,)."""
+        return self.sum_by_node(self.is_free)
+
+    @cached_property
+    def expected_free_cells(self) -> Array:
+        """The same with unknown cells, which count by their openness, (m,)."""
+        return self.sum_by_node(self.is_free + self.openness)
+
+    @cached_property
+    def frontier(self) -> Frontier:
+        """The unknown cells next to free ones with room for a robot."""
+        is_usable = np.pad(self.is_free & ~self.is_tight, 1)
+        is_side_free = np.stack(
+            [is_usable[1:-1, 2:], is_usable[2:, 1:-1], is_usable[1:-1, :-2], is_usable[:-2, 1:-1]], axis=-1
+        )
+        rows, columns = np.nonzero(is_side_free.any(axis=-1) & (self.patches > 0))
+        return Frontier(
+            rows=rows,
+            columns=columns,
+            patches=self.patches[rows, columns],
+            is_side_free=is_side_free[rows, columns],
+        )
+
+    @cached_property
+    def unknown_area(self) -> UnknownArea:
+        """The free cells that are expected in unknown patches."""
+        rows, columns = self.patches.nonzero()
+        stride = self.window.stride
+        nodes = rows // stride * self.window.columns + columns // stride
+        count = len(self.nodes)
+        pairs, index = np.unique(self.patches[rows, columns] * count + nodes, return_inverse=True)
+        expected_cells = np.bincount(index, self.openness[rows, columns]).astype(np.float64)
+        return UnknownArea(patches=pairs // count, nodes=pairs % count, expected_cells=expected_cells)
+
+    def sum_by_node(self, values: Array | BoolArray) -> Array:
+        """Sum values of cells, (h, w), by the nodes that stand for them, (m,)."""
+        blocks = values.reshape(self.window.block_shape)
+        return np.asarray(blocks.sum(axis=(1, 3), dtype=np.float64).ravel())

@@ -1,0 +1,160 @@
+"""The best position of one robot while all others stay where they are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array, IntArray
+from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.team_placement import UNREACHABLE_M
+
+_MAX_STEPS = 6
+"""Number of nodes by which a search moves the goal at most."""
+
+
+class OwnGoal(NamedTuple):
+    """A local minimum of the coverage cost by the position of one robot."""
+
+    goal: Array
+    """(2,) m"""
+    node: int
+    """Node nearest to it."""
+    cell_distances: Array
+    """(m,) m, distances from there to the nodes of the robot's own cell, 0 for all other nodes."""
+    cost: float
+    """Coverage cost J of the whole team, in cells times metres."""
+
+
+def find_own_goal(
+    planner: GridPlanner,
+    weights: Array,
+    other_positions: Array,
+    first_node: int,
+    former_goal: Array,
+    min_saving: float,
+) -> OwnGoal:
+    """Find a local minimum of the coverage cost by the position of one robot alone.
+
+    Parameters
+    ----------
+    planner : GridPlanner
+    weights : (m,) array
+        Of the nodes, as `compute_node_weights` returns them.
+    other_positions : (k, 2) array, m
+        Of all other robots.
+    first_node : int
+        Where the search begins.
+    former_goal : (2,) array, m
+        It is kept if the new one is hardly better; nan if there is none.
+    min_saving : float
+        Fraction of the cost of its own cell that a new goal must save.
+
+    Returns
+    -------
+    OwnGoal
+
+    Notes
+    -----
+    The search moves to a neighbouring node as long as one is better, by a few nodes at most. The goal is the
+    minimum of the parabolas, in x and in y, through the costs of the last node and its neighbours.
+    """
+    search = _NodeSearch(planner, weights, other_positions, first_node)
+    node = first_node
+    neighbours = search.list_neighbours(node)
+    for _ in range(_MAX_STEPS):
+        candidates = [neighbour for neighbour in neighbours if neighbour >= 0]
+        best = min(candidates, key=search.costs.__getitem__, default=node)
+        if not search.costs[best] < search.costs[node]:
+            break
+        node = best
+        neighbours = search.list_neighbours(node)
+    cell_distances = search.compute_cell_distances(node)
+    goal, excess = _refine_goal(planner, node, neighbours, search.costs, former_goal)
+    if np.isfinite(former_goal).all():
+        cell_cost = float((search.target_weights * cell_distances[search.targets]).sum())
+        if excess < min_saving * cell_cost:
+            goal = former_goal.copy()
+    return OwnGoal(goal=goal, node=node, cell_distances=cell_distances, cost=search.costs[node])
+
+
+class _NodeSearch:
+    """Coverage costs with the robot at some nodes, computed when the search comes near these."""
+
+    def __init__(self, planner: GridPlanner, weights: Array, other_positions: Array, first_node: int) -> None:
+        self._planner = planner
+        distances = planner.get_distances(first_node)
+        self.targets: IntArray = np.flatnonzero(np.isfinite(distances) & (weights > 0.0))
+        self.target_weights: Array = weights[self.targets]
+        other_distances = planner.compute_distances_from(other_positions)[self.targets]
+        self._other_distances: Array = np.minimum(other_distances, UNREACHABLE_M)
+        own_distances = distances[self.targets]
+        cell_radius = float(own_distances[own_distances < self._other_distances].max(initial=0.0))
+        # Nodes farther away do not come into the robot's cell within the few steps of the search.
+        self._limit = 1.5 * cell_radius + 4.0 * planner.spacing
+        self._node_count = len(weights)
+        self._distances: dict[int, Array] = {}
+        self.costs: dict[int, float] = {}
+
+    def list_neighbours(self, node: int) -> list[int]:
+        """Return the neighbours of a node as `_list_neighbours` does; `costs` then contains all of them."""
+        neighbours = _list_neighbours(self._planner, node)
+        new_nodes = [k for k in (node, *neighbours) if k >= 0 and k not in self._distances]
+        tables = self._planner.compute_distances_within(new_nodes, self._limit)
+        for new_node, table in zip(new_nodes, tables, strict=True):
+            distances = table[self.targets]
+            nearest = np.minimum(self._other_distances, distances)
+            self._distances[new_node] = distances
+            self.costs[new_node] = float((self.target_weights * nearest).sum())
+        return neighbours
+
+    def compute_cell_distances(self, node: int) -> Array:
+        """Compute the distances from a node to those of the robot's cell, 0 for all others, (m,) m."""
+        distances = self._distances[node]
+        is_own = distances < self._other_distances
+        cell_distances = np.zeros(self._node_count)
+        cell_distances[self.targets] = np.where(is_own, np.minimum(distances, self._limit), 0.0)
+        return cell_distances
+
+
+def _list_neighbours(planner: GridPlanner, node: int) -> list[int]:
+    """Return the roomy nodes to the right, above, to the left and below; -1 if there is none."""
+    rows = planner.window.rows
+    columns = planner.window.columns
+    row, column = divmod(node, columns)
+    is_inside = (column + 1 < columns, row + 1 < rows, column > 0, row > 0)
+    neighbours = (node + 1, node + columns, node - 1, node - columns)
+    return [
+        neighbour if inside and planner.is_roomy[neighbour] else -1
+        for neighbour, inside in zip(neighbours, is_inside, strict=True)
+    ]
+
+
+def _refine_goal(
+    planner: GridPlanner, node: int, neighbours: list[int], costs: Mapping[int, float], former_goal: Array
+) -> tuple[Array, float]:
+    """Return the minimum of the parabolas around a node, and how far the former goal is above it.
+
+    The latter is infinite if the former goal is outside the parabolas, more than one spacing away.
+    """
+    right, up, left, down = neighbours
+    goal = planner.nodes[node].copy()
+    excess = 0.0
+    for axis, (ahead, behind) in enumerate(((right, left), (up, down))):
+        offset = (former_goal[axis] - planner.nodes[node][axis]) / planner.spacing
+        if abs(offset) > 1.0:
+            excess = math.inf
+        if ahead < 0 or behind < 0:
+            continue
+        slope = 0.5 * (costs[ahead] - costs[behind])
+        curvature = costs[ahead] + costs[behind] - 2.0 * costs[node]
+        if curvature > 0.0:
+            shift = min(max(-slope / curvature, -0.5), 0.5)
+            goal[axis] += shift * planner.spacing
+            former_cost = slope * offset + 0.5 * curvature * offset * offset
+            minimal_cost = slope * shift + 0.5 * curvature * shift * shift
+            excess += former_cost - minimal_cost
+    return goal, excess

@@ -1,0 +1,172 @@
+"""Goals for a team by the knowledge of one robot: a k-median on the nodes of its map.
+
+The cost is (22) on the nodes of a `GridPlanner`, each weighted with its area (times the density):
+
+    J(P) = sum over q of w_q min_j d(q, p_j)
+
+with geodesic distances d. An unknown cell counts by how likely it is free (see `openness`).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.density import Density
+from robocov.k_median import improve_sources, move_first_source
+from robocov.planning.grid_planner import GridPlanner
+
+UNREACHABLE_M = 1e9
+"""Distance that stands for "no robot comes there", where a number must be finite."""
+_MAX_ROBOTS_OF_THOROUGH_SEARCH = 8
+"""Plans for larger teams are not also searched by removing two or three goals at once."""
+
+
+class TeamSituation(NamedTuple):
+    """Where the robots of a team are, and were to go, from the view of the first one, which plans."""
+
+    positions: Array
+    """(k, 2) m"""
+    former_goals: Array
+    """(k, 2) m, goals in the former plan."""
+    is_fixed: BoolArray
+    """(k,) Whether each robot stays at its former goal; never the first one."""
+    other_positions: Array
+    """(o, 2) m, of robots that stay where they are and that nobody plans for."""
+
+
+class MinSavings(NamedTuple):
+    """Fractions of the cost that changes of a plan must save."""
+
+    relocation: float
+    """Saving of all relocations together."""
+    own_cell: float
+    """Saving of a relocation of the first robot within its own cell, if all others are fixed."""
+    swap: float = 0.0
+    """Fraction of the sum of squared path lengths that an exchange of goals must save."""
+
+
+def compute_node_weights(
+    planner: GridPlanner, density: Density | None = None, *, only_known: bool = False
+) -> Array:
+    """Compute the weights w of the nodes.
+
+    Parameters
+    ----------
+    planner : GridPlanner
+    density : Density or None
+        Factor of each node; None is 1 everywhere.
+    only_known : bool
+        Whether unknown cells do not count at all. Otherwise they count by their openness.
+
+    Returns
+    -------
+    (m,) array
+        Number of cells that each node stands for, times the density.
+    """
+    weights = planner.free_cells if only_known else planner.expected_free_cells
+    if density is not None and not density.is_uniform:
+        weights = weights * density.evaluate(planner.nodes)
+    return weights
+
+
+def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_savings: MinSavings) -> Array:
+    """Compute goals of a team with a low coverage cost, by few relocations.
+
+    Parameters
+    ----------
+    planner : GridPlanner
+        Of the robot that plans.
+    weights : (m,) array
+        Of the nodes, as `compute_node_weights` returns them.
+    team : TeamSituation
+    min_savings : MinSavings
+
+    Returns
+    -------
+    (k, 2) array, m
+        The former goals if the planning robot cannot go anywhere.
+
+    Notes
+    -----
+    Lloyd's iteration from the former plan on, in turn with interchange (`robocov.k_median`); if all but the
+    first robot are fixed, that one goes to the best position of its own cell. Goals are assigned such that
+    the sum of the squared path lengths is minimal: the assignment then stays the same while the robots move,
+    and their paths do not cross. As they also go elsewhere, to look around, they exchange goals only if that
+    saves the fraction `MinSavings.swap` of the sum.
+    """
+    home = planner.find_own_node(team.positions[0])
+    if home < 0:
+        return team.former_goals
+    is_reached = np.isfinite(planner.get_distances(home))
+    is_usable = is_reached[planner.sources]
+    sources = planner.sources[is_usable]
+    is_target = is_reached & (weights > 0.0)
+    if len(sources) < len(team.positions) or not is_target.any():
+        return team.former_goals
+    distances = planner.source_distances[is_usable]
+    other_distances = np.minimum(planner.compute_distances_from(team.other_positions), UNREACHABLE_M)
+    # All other robots together are one more source, the last one, which is fixed.
+    target_distances = np.vstack([distances[:, is_target], other_distances[is_target]])
+    table = np.ascontiguousarray((target_distances * weights[is_target]).T)
+
+    chosen = _choose_former_sources(planner.nodes[sources], team)
+    chosen = _improve_sources(table, chosen, team, min_savings.relocation)
+    if team.is_fixed[1:].all():
+        from_team = np.column_stack([distances[:, sources[chosen]], other_distances[sources]])
+        is_in_own_cell = np.append(from_team.argmin(axis=1) == 0, False)
+        with_others = np.append(chosen, len(sources))
+        chosen = move_first_source(table, with_others, is_in_own_cell, min_savings.own_cell)[:-1]
+    return _assign_goals(
+        planner.nodes[sources], distances[:, sources[chosen]], chosen, team, min_savings.swap
+    )
+
+
+def _choose_former_sources(nodes: Array, team: TeamSituation) -> IntArray:
+    """Return the source nearest to each former goal, no two the same; fixed robots choose first."""
+    chosen = np.full(len(team.positions), -1, dtype=np.intp)
+    for robot in np.argsort(~team.is_fixed, kind="stable").tolist():
+        square = ((nodes - team.former_goals[robot]) ** 2).sum(axis=1)
+        square[chosen[chosen >= 0]] = np.inf
+        chosen[robot] = square.argmin()
+    return chosen
+
+
+def _improve_sources(table: Array, chosen: IntArray, team: TeamSituation, min_saving: float) -> IntArray:
+    """Return sources, (k,), of a lower cost; the last column of the table stands for all other robots."""
+    # The order does not depend on who plans, so that all choose the same of two equally good plans.
+    order = np.lexsort(team.former_goals.T)
+    others = table.shape[1] - 1
+    improved_sources = improve_sources(
+        table,
+        np.append(chosen[order], others),
+        np.append(team.is_fixed[order], True),
+        min_saving,
+        removals=len(chosen) <= _MAX_ROBOTS_OF_THOROUGH_SEARCH,
+    )
+    result = chosen.copy()
+    result[order] = improved_sources[:-1]
+    return result
+
+
+def _assign_goals(
+    nodes: Array, distances: Array, chosen: IntArray, team: TeamSituation, min_saving: float
+) -> Array:
+    """Return the goals in the order of the robots, (k, 2) m, such that squared paths are short.
+
+    `distances` are those from all sources, whose positions are `nodes`, to the chosen ones, (c, k) m.
+    """
+    mobile = np.flatnonzero(~team.is_fixed)
+    starts = [int(((nodes - team.positions[robot]) ** 2).sum(axis=1).argmin()) for robot in mobile]
+    square = np.minimum(distances[starts][:, mobile] ** 2, UNREACHABLE_M)
+    _, assignment = scipy.optimize.linear_sum_assignment(square)
+    unchanged = np.arange(len(mobile))
+    if min_saving:
+        assigned_sum = square[unchanged, assignment].sum()
+        unchanged_sum = square[unchanged, unchanged].sum()
+        if assigned_sum > (1.0 - min_saving) * unchanged_sum:
+            assignment = unchanged
+    goals = team.former_goals.copy()
+    goals[mobile] = nodes[chosen[mobile[assignment]]]
+    return goals

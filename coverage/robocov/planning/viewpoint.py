@@ -1,0 +1,72 @@
+"""Where a robot looks at what it has not seen of its own cell."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.planning.grid_planner import GridPlanner
+
+_MIN_VIEWPOINT_DISTANCE_M = 0.6
+"""A robot does not go to look from closer to a point from which it has looked already."""
+
+
+def find_viewpoint(
+    planner: GridPlanner,
+    cell_distances: Array,
+    path_lengths: Array,
+    min_stake: float,
+    former_viewpoints: Sequence[Array],
+) -> Array | None:
+    """Find where to look at the unknown patch of a robot's own cell that may matter most.
+
+    Parameters
+    ----------
+    planner : GridPlanner
+    cell_distances : (m,) array, m
+        Distances from the robot's goal to the nodes of its own cell, 0 for all other nodes.
+    path_lengths : (m,) array, m
+        Distances of all nodes from where the robot is.
+    min_stake : float
+        Stake below which a patch is not worth a look, in cells times metres.
+    former_viewpoints : sequence of (2,) arrays, m
+        Where the robot has looked from already.
+
+    Returns
+    -------
+    (2,) array or None, m
+        Centre of a free cell at the border of the patch. None if no stake is high enough.
+
+    Notes
+    -----
+    The stake of a patch is what it is expected to add to the cost: the inside of an obstacle hardly adds
+    anything. The viewpoint maximises the stake over one metre plus the path length.
+    """
+    window = planner.window
+    raster = planner.known_map.raster
+    frontier = planner.frontier
+    unknown = planner.unknown_area
+    stakes = np.bincount(
+        unknown.patches,
+        cell_distances[unknown.nodes] * unknown.expected_cells,
+        minlength=1 + unknown.patches.max(initial=0),
+    )
+    frontier_stakes = stakes[frontier.patches]
+    is_worth = frontier_stakes > min_stake
+    if not is_worth.any():
+        return None
+    # The free cells to the right of, above, to the left of and below each unknown one.
+    row = frontier.rows[is_worth, None] + [0, 1, 0, -1]
+    column = frontier.columns[is_worth, None] + [1, 0, -1, 0]
+    node = row // window.stride * window.columns + column // window.stride
+    node = np.clip(node, 0, len(path_lengths) - 1)
+    value = frontier.is_side_free[is_worth] * frontier_stakes[is_worth, None] / (1.0 + path_lengths[node])
+    corner = raster.compute_centers(np.array(window.first_row), np.array(window.first_column))
+    min_distance = _MIN_VIEWPOINT_DISTANCE_M / raster.cell_size
+    for x, y in (np.array(former_viewpoints).reshape(-1, 2) - corner) / raster.cell_size:
+        value[(x - column) ** 2 + (y - row) ** 2 < min_distance**2] = 0.0
+    best = value.argmax()
+    if not value.flat[best] > 0.0:
+        return None
+    cell = np.array([column.flat[best], row.flat[best]])
+    return np.asarray(corner + cell * raster.cell_size)

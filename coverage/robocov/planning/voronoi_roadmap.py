@@ -1,0 +1,210 @@
+"""Generalized Voronoi graph of free space: the points as far from one wall as from another.
+
+It is the roadmap of Choset and Burdick (IJRR 19, 2000), on a grid: a thinning of the free cells that keeps
+how they are connected, loops, and what is halfway between two walls that face each other.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy import ndimage
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import kernel
+
+_MIN_FACING_ANGLE_RAD = math.radians(120.0)
+"""Angle between the directions to two walls from which they face each other."""
+_NEIGHBOURS = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)])
+"""The neighbours of a cell in a circle; every second one, from the first on, shares a side with it."""
+
+
+class VoronoiRoadmap(NamedTuple):
+    """Vertices along the generalized Voronoi graph of free space, each with the cells next to it."""
+
+    vertices: IntArray
+    """(v, 2) Row and column of the cells where they are."""
+    distances: Array
+    """(v, v) Distances along the graph, in sides of cells; infinite if it is in pieces."""
+    vertex_of_cell: IntArray
+    """(rows, columns) The vertex that each cell belongs to, -1 for none."""
+
+    @classmethod
+    def build(
+        cls, is_roomy: BoolArray, is_free: BoolArray, spacing: float, max_vertices: int
+    ) -> VoronoiRoadmap:
+        """Build the roadmap of the cells in which a robot fits.
+
+        Parameters
+        ----------
+        is_roomy : (rows, columns) bool array
+            Cells that the graph may consist of.
+        is_free : (rows, columns) bool array
+            Cells that are divided among the vertices.
+        spacing : float
+            Minimum distance from one vertex to the next, in cells.
+        max_vertices : int
+            Approximate maximum number of vertices.
+        """
+        is_graph = find_voronoi_cells(is_roomy)
+        steps = max(1, math.ceil(max(spacing, np.count_nonzero(is_graph) / max_vertices)))
+        first_cells, vertex_of_cell = _group_cells(is_graph, steps, _NEIGHBOURS)
+        vertices = np.column_stack(np.divmod(first_cells, is_roomy.shape[1]))
+        starts, ends = _list_adjacent_groups(vertex_of_cell)
+        lengths = np.sqrt(((vertices[starts] - vertices[ends]) ** 2).sum(axis=1))
+        graph = csr_array((lengths, (starts, ends)), shape=(len(vertices), len(vertices)))
+        _spread_groups(vertex_of_cell, is_free, _NEIGHBOURS[::2])
+        return cls(
+            vertices=vertices,
+            distances=dijkstra(graph, directed=False),
+            vertex_of_cell=vertex_of_cell,
+        )
+
+
+def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
+    """Find the cells of the generalized Voronoi graph of free cells.
+
+    Parameters
+    ----------
+    is_free : (rows, columns) bool array
+        Everything next to the array counts as wall.
+
+    Returns
+    -------
+    (rows, columns) bool array
+        Lines one or two cells wide.
+
+    Notes
+    -----
+    Cells are removed from the walls inwards if that changes no connection (distance-ordered homotopic
+    thinning, Pudney 1998), except for those whose nearest wall is in quite another direction than that of the
+    next cell: branches into corners vanish, those into rooms do not.
+    """
+    is_graph = np.pad(is_free, 1)
+    wall_distance, nearest_wall = ndimage.distance_transform_edt(is_graph, return_indices=True)
+    is_between_walls = np.zeros_like(is_graph)
+    for axis in (0, 1):
+        before = (*(slice(None),) * axis, slice(None, -1))
+        after = (*(slice(None),) * axis, slice(1, None))
+        gap = np.sqrt((np.diff(nearest_wall, axis=axis + 1) ** 2).sum(axis=0))
+        # Two walls at that distance, in directions that differ by the angle, are this far apart.
+        distance = np.maximum(wall_distance[before], wall_distance[after])
+        is_facing = gap > 2.0 * distance * math.sin(0.5 * _MIN_FACING_ANGLE_RAD) + 1.0
+        is_between_walls[before] |= is_facing
+        is_between_walls[after] |= is_facing
+    order = np.flatnonzero(is_graph)
+    order = order[np.argsort(wall_distance.ravel()[order], kind="stable")]
+    _thin(is_graph, is_between_walls & is_graph, order, _NEIGHBOURS)
+    return is_graph[1:-1, 1:-1]
+
+
+@kernel
+def _thin(is_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbours: IntArray) -> None:
+    """Remove cells in an order, again and again, as long as there are some that connect nothing."""
+    columns = is_graph.shape[1]
+    has_changed = True
+    while has_changed:
+        has_changed = False
+        for cell in order:
+            row = cell // columns
+            column = cell % columns
+            if not is_graph[row, column] or must_stay[row, column]:
+                continue
+            if _count_crossings(is_graph, row, column, neighbours) == 1:
+                is_graph[row, column] = False
+                has_changed = True
+
+
+@kernel
+def _count_crossings(is_graph: BoolArray, row: int, column: int, neighbours: IntArray) -> int:
+    """Return Hilditch's crossing number: 1 if the neighbours of a cell stay connected without it."""
+    crossings = 0
+    for k in range(0, 8, 2):
+        first = (k + 1) % 8
+        second = (k + 2) % 8
+        if not is_graph[row + neighbours[k, 0], column + neighbours[k, 1]] and (
+            is_graph[row + neighbours[first, 0], column + neighbours[first, 1]]
+            or is_graph[row + neighbours[second, 0], column + neighbours[second, 1]]
+        ):
+            crossings += 1
+    return crossings
+
+
+@kernel
+def _group_cells(is_graph: BoolArray, max_steps: int, neighbours: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the first cell of each group, and the group of each cell, (rows, columns), -1 for none.
+
+    A group consists of the cells that are at most a number of steps from its first one, and in no other one.
+    """
+    rows, columns = is_graph.shape
+    group = np.full(is_graph.shape, -1)
+    first_cells = np.empty(is_graph.size, dtype=np.intp)
+    queue = np.empty(is_graph.size, dtype=np.intp)
+    steps = np.empty(is_graph.size, dtype=np.intp)
+    groups = 0
+    for first in range(is_graph.size):
+        if not is_graph[first // columns, first % columns] or group[first // columns, first % columns] >= 0:
+            continue
+        first_cells[groups] = first
+        group[first // columns, first % columns] = groups
+        queue[0] = first
+        steps[0] = 0
+        head = 0
+        tail = 1
+        while head < tail:
+            row = queue[head] // columns
+            column = queue[head] % columns
+            step = steps[head]
+            head += 1
+            for k in range(len(neighbours)):
+                i = row + neighbours[k, 0]
+                j = column + neighbours[k, 1]
+                is_inside = 0 <= i < rows and 0 <= j < columns
+                if step < max_steps and is_inside and is_graph[i, j] and group[i, j] < 0:
+                    group[i, j] = groups
+                    queue[tail] = i * columns + j
+                    steps[tail] = step + 1
+                    tail += 1
+        groups += 1
+    return first_cells[:groups], group
+
+
+def _list_adjacent_groups(group: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the pairs of groups with cells next to each other, the smaller number first."""
+    rows, columns = group.shape
+    pairs = []
+    for up, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        here = group[: rows - up, max(0, -right) : columns - max(0, right)]
+        there = group[up:, max(0, right) : columns + min(0, right)]
+        is_border = (here >= 0) & (there >= 0) & (here != there)
+        pairs.append(np.sort(np.column_stack([here[is_border], there[is_border]]), axis=1))
+    starts, ends = np.unique(np.concatenate(pairs), axis=0).T
+    return starts, ends
+
+
+@kernel
+def _spread_groups(group: IntArray, is_free: BoolArray, neighbours: IntArray) -> None:
+    """Give each free cell the group of the nearest cell that is in one, by the number of steps."""
+    rows, columns = is_free.shape
+    queue = np.empty(is_free.size, dtype=np.intp)
+    head = 0
+    tail = 0
+    for cell in range(is_free.size):
+        if group[cell // columns, cell % columns] >= 0:
+            queue[tail] = cell
+            tail += 1
+    while head < tail:
+        row = queue[head] // columns
+        column = queue[head] % columns
+        head += 1
+        for k in range(len(neighbours)):
+            i = row + neighbours[k, 0]
+            j = column + neighbours[k, 1]
+            if 0 <= i < rows and 0 <= j < columns and is_free[i, j] and group[i, j] < 0:
+                group[i, j] = group[row, column]
+                queue[tail] = i * columns + j
+                tail += 1

@@ -1,0 +1,110 @@
+"""The part of a raster that carries the nodes of a lattice."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocov.arrays import Array
+from robocov.planning.raster import Raster
+
+CellValue = TypeVar("CellValue", bound=np.generic)
+
+
+class Window(NamedTuple):
+    """The part of a raster that carries nodes, one in the middle of each square block of cells."""
+
+    first_row: int
+    """Row of the lowest cells."""
+    first_column: int
+    """Column of the leftmost cells."""
+    rows: int
+    """Number of rows of nodes."""
+    columns: int
+    """Number of columns of nodes."""
+    stride: int
+    """Number of cells along the side of a block."""
+
+    @classmethod
+    def build_around(cls, raster: Raster, center: Array, reach: float, max_nodes: int) -> Window:
+        """Build the window of the finest blocks that covers the surroundings of a point.
+
+        Parameters
+        ----------
+        raster : Raster
+        center : (2,) array, m
+        reach : float, m
+            What is at most that far away is in the window; infinite for the whole raster. The window moves in
+            steps of a quarter of the reach, and therefore stays the same while the centre hardly moves.
+        max_nodes : int
+        """
+        rows, columns = raster.shape
+        row, column = raster.find_cells(np.asarray(center, dtype=float))
+        if math.isinf(reach):
+            half_width = rows + columns
+        else:
+            half_width = max(4, math.ceil(reach / raster.cell_size))
+        low_row, high_row = _compute_stepped_interval(int(row), half_width, rows)
+        low_column, high_column = _compute_stepped_interval(int(column), half_width, columns)
+        height = high_row - low_row
+        width = high_column - low_column
+        stride = max(1, math.floor(math.sqrt(height * width / max_nodes)))
+        while math.ceil(height / stride) * math.ceil(width / stride) > max_nodes:
+            stride += 1
+        return cls(
+            first_row=low_row,
+            first_column=low_column,
+            rows=math.ceil(height / stride),
+            columns=math.ceil(width / stride),
+            stride=stride,
+        )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of rows and columns of cells; the last ones may be beyond the raster."""
+        return self.rows * self.stride, self.columns * self.stride
+
+    @property
+    def block_shape(self) -> tuple[int, int, int, int]:
+        """Shape of the cells by blocks: nodes along y, cells of each, nodes along x, cells of each."""
+        return self.rows, self.stride, self.columns, self.stride
+
+    def crop(self, cells: NDArray[CellValue], fill: CellValue | bool) -> NDArray[CellValue]:
+        """Crop an array of cells to the window.
+
+        Parameters
+        ----------
+        cells : (rows of the raster, columns of the raster) array
+        fill
+            Value of the window's cells beyond the raster.
+
+        Returns
+        -------
+        (h, w) array
+            Its shape is that of the window, `shape`.
+        """
+        height, width = self.shape
+        cropped = cells[
+            self.first_row : self.first_row + height, self.first_column : self.first_column + width
+        ]
+        missing_rows = height - cropped.shape[0]
+        missing_columns = width - cropped.shape[1]
+        if missing_rows == 0 and missing_columns == 0:
+            return cropped
+        return np.pad(cropped, ((0, missing_rows), (0, missing_columns)), constant_values=fill)
+
+    def compute_nodes(self, raster: Raster) -> Array:
+        """Compute the positions of the nodes, (m, 2) m, row by row."""
+        row, column = np.mgrid[: self.rows, : self.columns].reshape(2, -1) * self.stride + self.stride // 2
+        return raster.compute_centers(row + self.first_row, column + self.first_column)
+
+
+def _compute_stepped_interval(middle: int, half_width: int, count: int) -> tuple[int, int]:
+    """Return the first cell and the cell past the last one, both in steps, within `count` cells."""
+    step = max(1, half_width // 4)
+    low = (middle - half_width) // step * step
+    high = -((-middle - half_width - 1) // step) * step
+    return max(0, low), min(count, high)
