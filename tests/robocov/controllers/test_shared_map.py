@@ -142,7 +142,7 @@ def test_what_one_has_mistaken_is_corrected_by_whoever_sees_it() -> None:
     scans.hit[1] = True
     told = surveyed([free, nothing, free, nothing], seen, scans, around)
     assert told[0] is told[1] and told[2] is told[3] and told[0] is not told[2]
-    assert told[0].blocked[20, 30] and not told[2].blocked[20, 30]
+    assert told[0].is_blocked[20, 30] and not told[2].is_blocked[20, 30]
     assert (told[0].state >= WALL).sum() == 1
 
 
