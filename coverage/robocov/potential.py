@@ -16,7 +16,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.observation.neighbours import find_bin, sort_into_bins
+from robocov.observation.bins import find_bin, sort_into_bins
 
 CONTACT_DISTANCE = 0.01
 """Distance below which the repulsion no longer grows, m: a tenth of a robot's radius."""

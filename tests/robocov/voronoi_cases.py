@@ -11,6 +11,7 @@ import pytest
 from hypothesis import strategies as st
 
 from robocov.locational_cost import Performance, Sensing, SquaredDistance
+from robocov.observation import Cells
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
@@ -136,6 +137,12 @@ def assert_exact(cells: VoronoiPartition, region: Region) -> None:
         assert cells.polar_moment[robot] == pytest.approx(
             polar, abs=ROUNDING * region.area * reach(cells, region) ** 2
         )
+
+
+def compute_moment_about_centroid(cells: Cells) -> Array:
+    """Return J_{V,C}, (n,) m⁴, by the parallel axis theorem, equation (3)."""
+    lever = cells.generators - cells.centroid
+    return cells.polar_moment - cells.mass * (lever[:, 0] ** 2 + lever[:, 1] ** 2)
 
 
 def reach(cells: VoronoiPartition, region: Region) -> float:

@@ -14,7 +14,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, StartError, describe_unknown_name, quote
 from robocov.metrics import TOUCHING
 from robocov.observation import Decision, Observations, Scanning, Snapshot
-from robocov.observation.neighbours import find_close_pairs
+from robocov.observation.close_pairs import find_close_pairs
 from robocov.observation.region import Region
 from robocov.record import Record
 from robocov.simulation import Simulation, SimulationBatch

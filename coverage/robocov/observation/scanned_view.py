@@ -1,4 +1,4 @@
-"""Visible free space of a scan: how far it reaches, and which corners hide more of it."""
+"""The free space in view of a range scan: how far it extends, and which corners hide more of it."""
 
 import math
 from typing import NamedTuple
@@ -8,87 +8,160 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.density.base import Density
-from robocov.observation import Observations, Scanning
+from robocov.observation.observations import Observations
+from robocov.observation.scans import Scanning
 
-_CHECKS = 4  # parts of a way between which it is looked for walls
+_PATH_PARTS = 4
+"""Number of parts of a path between which it is checked for walls."""
+_MIN_DISTANCE_M = 1e-9
+"""Distance that is used instead of a smaller one, by which is divided."""
+_STEP_DECREASE = 0.5
+"""Factor of the step if the gradient has turned by more than a right angle."""
+_STEP_INCREASE = 1.2
+"""Factor of the step otherwise."""
 
 
 class View(NamedTuple):
-    """Points that the rays of each robot met in its last scan."""
+    """Points at which the rays of each robot ended in its last scan."""
 
-    distances: Array  # (n, rays) m, no more than the sensing range
-    hit: BoolArray  # (n, rays), whether they met anything
+    distances: Array
+    """(n, rays) m, at most the sensing range."""
+    hit: BoolArray
+    """(n, rays) Whether there is an obstacle."""
 
 
 class Windows(NamedTuple):
-    """Edges of views that begin at a corner, and with which the view turns round it; in the order of robots.
+    """Edges of views that begin at a corner and turn about it when the robot moves; sorted by robot.
 
-    Seen from a place p, a corner v at the distance ρ hides what is behind it. When p moves by d, the point
+    Seen from a position p, a corner v at the distance ρ hides what is behind it. When p moves by d, the point
     of the edge at the distance s from p moves by -(d · t) (s - ρ)/ρ, where t is the unit vector across the
-    edge, away from the obstacle: the view grows by t (s - ρ)/ρ for every metre of the edge and of the way.
+    edge, away from the obstacle. The view thus grows by t (s - ρ)/ρ per metre of the edge and of the motion.
     """
 
-    robot: IntArray  # (w,)
-    ray: IntArray  # (w,), the first that passes the corner
-    across: Array  # (w, 2), t, by which a robot has to move to see more
-    corner: Array  # (w,) m, ρ
+    robot: IntArray
+    """(w,)"""
+    ray: IntArray
+    """(w,) The first ray that passes the corner."""
+    across: Array
+    """(w, 2) t, the direction in which the robot has to move to see more."""
+    corner: Array
+    """(w,) m, ρ."""
 
 
-def compute_view(seen: Observations, before: View | None, scanning: Scanning, reach: Array) -> View:
-    """Return what the last scan shows; all in range, (n,) m, is free for a robot that has not scanned yet."""
+def compute_view(seen: Observations, previous: View | None, scanning: Scanning, reach: Array) -> View:
+    """Return the view of the last scan.
+
+    Parameters
+    ----------
+    seen : Observations
+        Their scan, if there is one, is the last.
+    previous : View or None
+        The view at the previous step. None: there was no scan yet, and all in range is taken to be free.
+    scanning : Scanning
+        Settings of the scans.
+    reach : (n,) array, m
+        Maximum distance of each robot's view.
+    """
     if seen.scans is not None:
         return View(np.minimum(seen.scans.distances, reach[:, None]), seen.scans.hit)
-    if before is not None:
-        return before
-    shape = len(reach), scanning.rays
-    return View(np.broadcast_to(reach[:, None], shape), np.zeros(shape, dtype=bool))
+    if previous is not None:
+        return previous
+    shape = (len(reach), scanning.rays)
+    return View(distances=np.broadcast_to(reach[:, None], shape), hit=np.zeros(shape, dtype=bool))
 
 
 def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Windows:
-    """Return where the view in (rays, 2) directions opens by more than `jump` (m) from one ray to the next.
+    """Find where views become deeper from one ray to the next.
 
-    A wall seen at a low angle opens the view, too: along it 1/distance is a sinusoid of the angle, so that
-    two rays tell where the next one meets it, and only what is beyond that counts.
+    The view of a wall at a low angle becomes deeper as well. Along a wall 1/distance is a sinusoid of the
+    angle, so that two rays predict where the next one meets it: only a view beyond that counts.
+
+    Parameters
+    ----------
+    view : View
+    directions : (rays, 2) array
+        Unit vectors along the rays.
+    reach : (n,) array, m
+        Maximum distance of each robot's view.
+    jump : float, m
+        Minimum increase of the depth.
     """
-    distances, hit = view
-    inverse = 1.0 / np.maximum(distances, 1e-9)
-    step = 2.0 * np.cos(2.0 * np.pi / len(directions))
-    parts = []
+    robots = []
+    rays = []
+    across = []
+    corners = []
     for side in (1, -1):
-        near, met, before = np.roll(distances, side, 1), np.roll(hit, side, 1), np.roll(hit, 2 * side, 1)
-        line = step * np.roll(inverse, side, 1) - np.roll(inverse, 2 * side, 1)
-        wall = 1.0 / np.maximum(line, 1.0 / reach[:, None])
-        beyond = np.where(before, np.maximum(wall, near), near)
-        robot, ray = np.nonzero(met & (distances > beyond + jump))
-        across = side * directions[ray][:, ::-1] * [-1.0, 1.0]
-        parts.append((robot, ray, across, near[robot, ray]))
-    robot, ray, across, corner = (np.concatenate(both) for both in zip(*parts, strict=True))
+        nearer = np.roll(view.distances, side, axis=1)
+        is_window = np.roll(view.hit, side, axis=1) & (
+            view.distances > _predict_depth(view, reach, side) + jump
+        )
+        robot, ray = np.nonzero(is_window)
+        robots.append(robot)
+        rays.append(ray)
+        across.append(side * directions[ray][:, ::-1] * [-1.0, 1.0])
+        corners.append(nearer[robot, ray])
+    robot = np.concatenate(robots)
     order = np.argsort(robot, kind="stable")
-    return Windows(robot[order], ray[order], across[order], corner[order])
+    return Windows(
+        robot=robot[order],
+        ray=np.concatenate(rays)[order],
+        across=np.concatenate(across)[order],
+        corner=np.concatenate(corners)[order],
+    )
+
+
+def _predict_depth(view: View, reach: Array, side: int) -> Array:
+    """Return the depth of each ray, (n, rays) m, if the wall of the two rays before it goes on straight."""
+    inverse = 1.0 / np.maximum(view.distances, _MIN_DISTANCE_M)
+    factor = 2.0 * np.cos(2.0 * np.pi / view.distances.shape[1])
+    predicted = factor * np.roll(inverse, side, axis=1) - np.roll(inverse, 2 * side, axis=1)
+    wall = 1.0 / np.maximum(predicted, 1.0 / reach[:, None])
+    nearer = np.roll(view.distances, side, axis=1)
+    is_wall = np.roll(view.hit, 2 * side, axis=1)
+    return np.where(is_wall, np.maximum(wall, nearer), nearer)
 
 
 def evaluate_density(density: Density | None, points: Array) -> Array:
-    """Return φ at (..., 2) points (m), as an array of their shape."""
+    """Return φ at points of shape (..., 2) in metres, as an array of shape (...); without a density 1."""
     if density is None:
         return np.ones(points.shape[:-1])
     return density.evaluate(points.reshape(-1, 2)).reshape(points.shape[:-1])
 
 
-def compute_step_fractions(gradient: Array, before: Array | None, step: Array | None) -> Array:
-    """Return the part of full speed, (n,), with which robots follow gradients, (n, 2), that leap.
+def compute_step_fractions(gradient: Array, previous: Array | None, step: Array | None) -> Array:
+    """Compute the fraction of full speed with which robots follow gradients that jump.
 
-    Areas in view have ridges, such as doors, from both sides of which the gradient leads back: at each
-    turn by more than a right angle the step is halved, and otherwise it grows again.
+    Areas in view have ridges, such as doors, from both sides of which the gradient leads back. The step is
+    halved each time when the gradient turns by more than a right angle, and grows again otherwise.
+
+    Parameters
+    ----------
+    gradient, previous : (n, 2) arrays
+        The gradients after this scan and after the scan before; None if there was none.
+    step : (n,) array or None
+        The fractions after the scan before; None if there was none.
+
+    Returns
+    -------
+    (n,) array
+        At most 1.
     """
-    if before is None or step is None:
+    if previous is None or step is None:
         return np.ones(len(gradient))
-    turned = (gradient * before).sum(axis=1) < 0.0
-    return np.where(turned, 0.5 * step, np.minimum(1.2 * step, 1.0))
+    has_turned = (gradient * previous).sum(axis=1) < 0.0
+    return np.where(has_turned, _STEP_DECREASE * step, np.minimum(_STEP_INCREASE * step, 1.0))
 
 
 @kernel
 def is_behind_wall(x: float, y: float, walls: Array) -> bool:
-    """Return whether a place, relative to the robot, is farther away than the wall that it sees there."""
+    """Return whether a point, relative to the robot, is farther away than the wall in its direction.
+
+    Parameters
+    ----------
+    x, y : float, m
+    walls : (rays,) array, m
+        Distances of the walls along the robot's rays; infinite where there is none.
+    """
     rays = len(walls)
     ray = math.floor(math.atan2(y, x) * (rays / (2.0 * math.pi)) + 0.5) % rays
     return bool(x * x + y * y > walls[ray] ** 2)
@@ -96,8 +169,18 @@ def is_behind_wall(x: float, y: float, walls: Array) -> bool:
 
 @kernel
 def is_path_clear(x: float, y: float, dx: float, dy: float, walls: Array) -> bool:
-    """Return whether the way (dx, dy) from a place in view leads past no wall that the robot sees."""
-    clear = True
-    for k in range(1, _CHECKS):
-        clear = clear and not is_behind_wall(x + dx * k / _CHECKS, y + dy * k / _CHECKS, walls)
-    return clear
+    """Return whether no wall that the robot sees is in front of a straight path.
+
+    Parameters
+    ----------
+    x, y : float, m
+        Start of the path, in view of the robot and relative to it.
+    dx, dy : float, m
+        Length of the path.
+    walls : (rays,) array, m
+        As for `is_behind_wall`.
+    """
+    for k in range(1, _PATH_PARTS):
+        if is_behind_wall(x + dx * k / _PATH_PARTS, y + dy * k / _PATH_PARTS, walls):
+            return False
+    return True

@@ -26,7 +26,7 @@ HALF_ANGLE = 4
 CELL = 5
 """Column of a piece: the cell that it bounds."""
 BEYOND = 6
-"""Column of a piece: the robot on the other side, or `density.base.REGION`."""
+"""Column of a piece: the robot on the other side, or `robocov.density.cell_edges.REGION`."""
 
 _MAX_SERIES_SQUARE = 0.04
 """sin² of the half angle up to which the series is used: the closed form divides rounding errors by it."""

@@ -7,7 +7,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.environment import Environment, Point
 from robocov.errors import StartError
-from robocov.observation.neighbours import find_close_pairs
+from robocov.observation.close_pairs import find_close_pairs
 from robocov.potential import GOLDEN_ANGLE
 from robocov.team import Team
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.errors import ParameterError
-from robocov.observation.neighbours import find_close_pairs
+from robocov.observation.close_pairs import find_close_pairs
 from robocov.team import Team
 from robocov.world.bodies import MAX_TEAMS_PER_SPACE, Obstacles, compute_mover_states
 from robocov.world.contacts import ContactSolver, FreeSpace

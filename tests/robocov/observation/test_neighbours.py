@@ -6,7 +6,8 @@ from hypothesis import strategies as st
 from voronoi_cases import SQUARE
 
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours, find_close_pairs
+from robocov.observation.close_pairs import find_close_pairs
+from robocov.observation.neighbours import Neighbours
 
 
 @given(n=st.integers(1, 120), reach=st.floats(0.0, 8.0), seed=st.integers(0, 2**32))

@@ -1,0 +1,115 @@
+"""Pairs of points that are close to each other."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocov.arrays import Array, IntArray
+from robocov.compiled import kernel
+from robocov.observation.bins import find_bin, sort_into_bins
+
+_INITIAL_NEIGHBOURS = 8
+"""Number of neighbours of each point for which there is room at first."""
+
+
+class ClosePairs(NamedTuple):
+    """Directed pairs of points, sorted by first, then second."""
+
+    first: IntArray
+    """(m,)"""
+    second: IntArray
+    """(m,)"""
+    distance: Array
+    """(m,) m"""
+
+
+def find_close_pairs(positions: Array, reach: float) -> ClosePairs:
+    """Find the directed pairs of points that are at most `reach` apart.
+
+    Parameters
+    ----------
+    positions : (n, 2) array, m
+    reach : float, m
+        May be infinite.
+
+    Examples
+    --------
+    >>> pairs = find_close_pairs(np.array([[0.0, 0.0], [1.0, 0.0], [5.0, 0.0]]), 2.0)
+    >>> pairs.first, pairs.second, pairs.distance
+    (array([0, 1]), array([1, 0]), array([1., 1.]))
+    """
+    _, pairs = find_pairs_in_range(positions, np.full(len(positions), reach))
+    return pairs
+
+
+@kernel
+def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePairs]:
+    """Find the directed pairs of points whose distance is at most the smaller of their ranges.
+
+    Parameters
+    ----------
+    points : (n, 2) array, m
+    ranges : (n,) array, m
+
+    Returns
+    -------
+    indptr : (n + 1,) int array
+        ``pairs.second[indptr[i]:indptr[i + 1]]`` belong to point i.
+    pairs : ClosePairs
+    """
+    n = len(points)
+    indptr = np.zeros(n + 1, np.intp)
+    first = np.empty(_INITIAL_NEIGHBOURS * n, np.intp)
+    second = np.empty(_INITIAL_NEIGHBOURS * n, np.intp)
+    distance = np.empty(_INITIAL_NEIGHBOURS * n)
+    if n == 0:
+        return indptr, ClosePairs(first, second, distance)
+    starts = np.empty(2 * n + 8, np.intp)
+    order = np.empty(n, np.intp)
+    bins = sort_into_bins(points, 0, n, ranges.max(), starts, order)
+    total = 0
+    for i in range(n):
+        if total + n > len(second):
+            room = 2 * (total + n)
+            first = _enlarge(first, total, room)
+            second = _enlarge(second, total, room)
+            distance = _enlarge(distance, total, room)
+        begin = total
+        row = find_bin(points[i, 1] - bins.low, bins.scale)
+        column = find_bin(points[i, 0] - bins.left, bins.scale)
+        for r in range(max(row - 1, 0), min(row + 2, bins.rows)):
+            # The bins of adjacent columns follow each other.
+            low = starts[r * bins.columns + max(column - 1, 0)]
+            high = starts[r * bins.columns + min(column + 2, bins.columns)]
+            for k in range(low, high):
+                j = order[k]
+                dx = points[j, 0] - points[i, 0]
+                dy = points[j, 1] - points[i, 1]
+                separation = np.sqrt(dx * dx + dy * dy)
+                if j != i and separation <= min(ranges[i], ranges[j]):
+                    first[total] = i
+                    _insert(second, distance, begin, total, j, separation)
+                    total += 1
+        indptr[i + 1] = total
+    return indptr, ClosePairs(first[:total].copy(), second[:total].copy(), distance[:total].copy())
+
+
+@kernel
+def _enlarge(values: NDArray[Any], used: int, room: int) -> NDArray[Any]:
+    """Return a longer array that begins with the used values."""
+    larger = np.empty(room, values.dtype)
+    larger[:used] = values[:used]
+    return larger
+
+
+@kernel
+def _insert(second: IntArray, distance: Array, begin: int, end: int, point: int, separation: float) -> None:
+    """Insert a point into the ascending points of one row, from `begin` to `end`."""
+    k = end
+    while k > begin and second[k - 1] > point:
+        second[k] = second[k - 1]
+        distance[k] = distance[k - 1]
+        k -= 1
+    second[k] = point
+    distance[k] = separation

@@ -1,0 +1,155 @@
+"""What a controller decides at a step, and the checks of what controllers return."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import ParameterError, quote
+from robocov.observation.cells import Cells
+
+
+@dataclass(slots=True, eq=False)
+class Decision:
+    """Forces that a controller commands, and the quantities that explain them."""
+
+    forces: Array
+    """(n, 2) N, the driving force of each robot before any limit; viscosity is added by the world."""
+    goals: Array | None = None
+    """(n, 2) m, where each robot heads for; nan without a goal. None if the controller knows no goals."""
+    terms: Mapping[str, Array] = field(default_factory=dict)
+    """The forces by cause (``attraction``, ``repulsion_robots``, ``repulsion_obstacle``, ...), (n, 2) N."""
+    cells: Cells | None = None
+    """The cells that the controller used."""
+    memory: Any = None
+    """Memory of the robots; the controller gets it back at the next decision."""
+
+
+def check_decision(returned: Any, count: int, controller: str, time: float, source: str = "") -> Decision:
+    """Check that a decision can be carried out and recorded, and return it with its arrays as floats.
+
+    Parameters
+    ----------
+    returned : object
+        What the controller's ``decide`` returned.
+    count : int
+        Number of robots.
+    controller : str
+        Its name, for messages.
+    time : float, s
+    source : str
+        File and line of its ``decide``, for messages, as " (mine.py, line 12)".
+
+    Returns
+    -------
+    Decision
+        The same object if its arrays are floats already.
+
+    Raises
+    ------
+    ParameterError
+        If it is no decision, or its forces are not finite numbers of shape (count, 2).
+    """
+    where = f"controller {controller!r}: decide(seen, memory)"
+    when = f" at {time:.3f} s{source}"
+    if not isinstance(returned, Decision):
+        hint = " (is a return statement missing?)" if returned is None else ""
+        raise ParameterError(f"{where} returned {quote(returned)}{hint}{when}, expected a Decision")
+    decision: Decision = returned
+    forces = _to_rows(decision.forces, count, f"{where} returned forces", when)
+    goals = decision.goals
+    if goals is not None:
+        goals = _to_rows(goals, count, f"{where} returned goals", when)
+    if forces is not decision.forces or goals is not decision.goals:
+        decision = replace(decision, forces=forces, goals=goals)
+    if not _is_finite(forces):
+        robot = int(np.flatnonzero(~np.isfinite(forces).all(axis=1))[0])
+        got = f"the force {forces[robot].tolist()} for robot {robot + 1}{when}"
+        raise ParameterError(f"{where} returned {got}, expected two finite numbers in newtons")
+    return decision
+
+
+def copy_decision(decision: Decision, controller: str, source: str = "") -> Decision:
+    """Copy the arrays of a checked decision, because a user's controller may reuse its own.
+
+    Parameters
+    ----------
+    decision : Decision
+        As `check_decision` returns it.
+    controller, source : str
+        As for `check_decision`.
+
+    Raises
+    ------
+    ParameterError
+        If its terms are no forces of all robots, or its cells are no cells.
+    """
+    where = f"controller {controller!r}: decide(seen, memory) returned"
+    if not isinstance(decision.terms, Mapping):
+        raise ParameterError(f"{where} terms {quote(decision.terms)}{source}, expected a dict of forces")
+    terms = {}
+    for name, term in decision.terms.items():
+        rows = _to_rows(term, len(decision.forces), f"{where} the term {quote(name)}", source)
+        terms[name] = rows.copy()
+    if decision.cells is not None and not isinstance(decision.cells, Cells):
+        got = f"{quote(decision.cells)}{source}"
+        raise ParameterError(f"{where} cells {got}, expected what robocov.partition returns, or None")
+    goals = None if decision.goals is None else decision.goals.copy()
+    return replace(decision, forces=decision.forces.copy(), goals=goals, terms=terms)
+
+
+def check_forces(values: Any, count: int, name: str) -> Array:
+    """Check forces that do not come from a controller, and return them as an array of floats.
+
+    Parameters
+    ----------
+    values : array-like of shape (count, 2), N
+    count : int
+        Number of robots.
+    name : str
+        What messages call them.
+
+    Raises
+    ------
+    ParameterError
+        If they are not finite numbers of that shape.
+    """
+    forces = _to_rows(values, count, name)
+    if not _is_finite(forces):
+        raise ParameterError(f"{name}: expected finite newtons, got {quote(forces.tolist())}")
+    return forces
+
+
+def to_numbers(values: object) -> Array | None:
+    """Convert real numbers to an array of floats; return None if that is not possible.
+
+    An array of floats is returned as it is. Complex numbers, strings and objects are not real numbers,
+    whatever they could be converted to.
+    """
+    if isinstance(values, np.ndarray) and values.dtype == np.float64:
+        return values
+    try:
+        array = np.asarray(values)
+        return array.astype(np.float64) if array.dtype.kind in "biuf" else None
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def _is_finite(forces: Array) -> bool:
+    # A sum of squares is faster, and is finite if all forces are, unless they are huge.
+    return isfinite(np.vdot(forces, forces)) or bool(np.isfinite(forces).all())
+
+
+def _to_rows(values: Any, count: int, name: str, when: str = "") -> Array:
+    """Convert two numbers for each robot to an array, which is returned as it is if it is one already."""
+    array = to_numbers(values)
+    if array is None:
+        raise ParameterError(f"{name} {quote(values)}{when}, expected numbers of shape {(count, 2)}")
+    if array.shape != (count, 2):
+        raise ParameterError(f"{name} of shape {array.shape}{when}, expected {(count, 2)}")
+    return array

@@ -1,0 +1,76 @@
+"""Range scans: what a controller asks for, and what its robots get."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray
+from robocov.errors import require_number
+
+MAX_RAYS = 3600
+"""Maximum number of rays of a scan: one for each tenth of a degree."""
+
+_MAX_PERIOD_S = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class Scanning:
+    """Settings of range scans, which a controller requests by its attribute ``scanning``.
+
+    Parameters
+    ----------
+    rays : int
+        Number of rays, evenly spread round a full turn; the first points along +x.
+    period : float, s
+        Time between two scans, rounded to whole steps. The first scan is at the start.
+
+    Raises
+    ------
+    ParameterError
+        If a value is out of range.
+    """
+
+    rays: int = 120
+    period: float = 0.5
+
+    def __post_init__(self) -> None:
+        require_number("scanning.rays", self.rays, 1, MAX_RAYS, whole=True)
+        require_number("scanning.period", self.period, 0.0, _MAX_PERIOD_S, "s")
+
+    def count_steps(self, dt: float) -> int:
+        """Return the number of steps of `dt` seconds from one scan to the next, at least one.
+
+        Examples
+        --------
+        >>> Scanning(period=0.5).count_steps(0.02)
+        25
+        """
+        return max(1, round(self.period / dt))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scans:
+    """One scan of each robot, by its own range sensor; row i belongs to robot i alone."""
+
+    distances: Array
+    """(n, rays) m, to the first obstacle along each ray; the robot's sensing range if there is none."""
+    hit: BoolArray
+    """(n, rays) Whether there is an obstacle within the sensing range."""
+
+    @property
+    def rays(self) -> int:
+        """Number of rays of each robot."""
+        return int(self.distances.shape[1])
+
+    @property
+    def headings(self) -> Array:
+        """Unit vectors along the rays, (rays, 2)."""
+        return compute_headings(self.rays)
+
+
+def compute_headings(rays: int) -> Array:
+    """Compute unit vectors evenly round a full turn, (rays, 2); the first points along +x."""
+    angle = np.arange(rays) * (2.0 * np.pi / rays)
+    return np.column_stack([np.cos(angle), np.sin(angle)])

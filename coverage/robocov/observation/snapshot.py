@@ -1,0 +1,48 @@
+"""One step of a simulation: the state, the observations and the decision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from robocov.arrays import Array, BoolArray
+from robocov.errors import format_count
+from robocov.observation.decisions import Decision
+from robocov.observation.observations import Observations
+
+
+@dataclass(slots=True, eq=False)
+class Snapshot:
+    """The state of a simulation at one time, what was observed in it, and what was decided."""
+
+    seen: Observations
+    decision: Decision
+    truth: Array | None = None
+    """(n, 2) m, the true positions, if they differ from those that the robots observe."""
+    working: BoolArray | None = None
+    """(n,) Which robots have joined and have not failed; None: all."""
+    inbox: Any = None
+    """The messages that the robots then have; None if they know the others as they are."""
+
+    def __repr__(self) -> str:
+        return f"<Snapshot at {self.time:.2f} s, {format_count(len(self.positions), 'robot')}>"
+
+    @property
+    def time(self) -> float:
+        """Simulation time, s."""
+        return self.seen.time
+
+    @property
+    def positions(self) -> Array:
+        """True positions of the robots, (n, 2) m."""
+        return self.seen.positions if self.truth is None else self.truth
+
+    @property
+    def velocities(self) -> Array:
+        """Velocities, (n, 2) m/s."""
+        return self.seen.velocities
+
+    @property
+    def steering(self) -> Array | None:
+        """Heading and turning rate of unicycles, (n, 2) rad and rad/s; None in a team of points."""
+        return self.seen.steering
