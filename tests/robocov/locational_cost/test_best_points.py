@@ -18,7 +18,7 @@ from robocov.locational_cost import (
     compute_gradients,
     compute_locational_costs,
 )
-from robocov.locational_cost.best_points import _downhill, find_best_points
+from robocov.locational_cost.best_points import _compute_descent_step, find_best_points
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition, partition_by_travel_time
@@ -223,7 +223,7 @@ def test_the_worst_cells_end_in_time(family: Family, monkeypatch: pytest.MonkeyP
             for f in FUNCTIONS:
                 found = find_best_points(cells, f)
                 with monkeypatch.context() as patch:
-                    patch.setattr(module, "_ROUNDS", module._ROUNDS // 2)
+                    patch.setattr(module, "_MAX_ITERATIONS", module._MAX_ITERATIONS // 2)
                     early = find_best_points(cells, f)
                 np.testing.assert_allclose(early, found, rtol=0, atol=1e-6 * region.diameter)
 
@@ -282,7 +282,7 @@ def test_steps_go_down_by_the_sizes_of_the_eigenvalues(numbers: list[float]) -> 
     values, axes = np.linalg.eigh([[xx, xy], [xy, yy]])
     if np.abs(values).min() < 1e-6:
         return
-    step = np.array(_downhill(*slope.tolist(), xx, xy, yy))
+    step = np.array(_compute_descent_step(*slope.tolist(), xx, xy, yy))
     np.testing.assert_allclose(step, -axes @ (axes.T @ slope / np.abs(values)), rtol=1e-6, atol=1e-7)
 
 

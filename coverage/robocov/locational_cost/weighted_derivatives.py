@@ -1,0 +1,115 @@
+"""Gradient and Hessian of the locational cost for any density, by quadrature.
+
+A cell is divided into the triangles that the point itself spans with the edges. In the coordinates
+q = p + u (e(t) - p), where e(t) runs along an edge, distance and direction from p are smooth, so that Gauss's
+rule converges quickly where φ is smooth. If φ jumps within a cell, the error is of the order of the
+distance between the nodes.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.density import Density
+from robocov.locational_cost.performance import Performance, Sensing
+from robocov.observation import Cells
+
+_NODES_ALONG = 16
+"""Nodes along an edge."""
+_NODES_OUTWARD = 12
+"""Nodes from the point to an edge."""
+
+
+class WeightedDerivatives(NamedTuple):
+    """Derivatives of the cost that is to be minimized with respect to the points, (n,) each."""
+
+    x: Array
+    y: Array
+    xx: Array
+    xy: Array
+    yy: Array
+
+
+def compute_weighted_derivatives(
+    cells: Cells, density: Density, f: Performance, size: Array, points: Array, is_needed: BoolArray
+) -> WeightedDerivatives:
+    """Compute gradients and Hessians of weighted locational costs with respect to the points.
+
+    Parameters
+    ----------
+    cells : Cells
+        n cells.
+    density : Density
+    f : Performance
+        `Distance` or `Sensing`, whose sign is reversed: the cost is to be minimized.
+    size : (n,) array, m
+        Upper bounds of the diameters of the cells.
+    points : (n, 2) array, m
+        Relative to the generators.
+    is_needed : (n,) bool array
+        Cells for which the derivatives are computed.
+
+    Returns
+    -------
+    WeightedDerivatives
+        Zero for the other cells.
+    """
+    edges = cells.edges
+    selected = np.flatnonzero(is_needed[edges.cell])
+    cell = edges.cell[selected]
+    t_nodes, t_weights = _build_gauss_rule(_NODES_ALONG)
+    u_nodes, u_weights = _build_outward_rule(f, size, cell)
+    start = edges.start[selected] - points[cell]
+    end = edges.end[selected] - points[cell]
+    # Offsets of the nodes from the point, by edge, node along it and node outward: (e, 16, 12, 2).
+    rim = start[:, None] + (end - start)[:, None] * t_nodes[:, None]
+    offset = rim[:, :, None, :] * u_nodes[:, None, :, None]
+    double_area = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
+    weight = double_area[:, None, None] * t_weights[:, None] * u_weights[:, None, :]
+    positions = offset + (cells.generators + points)[cell][:, None, None]
+    weight = weight * density.evaluate(positions.reshape(-1, 2)).reshape(weight.shape)
+    dx = offset[..., 0]
+    dy = offset[..., 1]
+    # The gradient of the integrand is -first (dx, dy), its Hessian first I + second (dx, dy)ᵀ (dx, dy).
+    square = dx * dx + dy * dy
+    if isinstance(f, Sensing):
+        inverse = 1.0 / (square + f.height**2)
+        first = 2.0 * weight * inverse * inverse
+        second = -8.0 * weight * inverse * inverse * inverse
+    else:
+        inverse = 1.0 / np.sqrt(np.maximum(square, 1e-300))
+        first = weight * inverse
+        second = -weight * inverse * inverse * inverse
+    count = len(points)
+    return WeightedDerivatives(
+        x=_sum_by_cell(-first * dx, cell, count),
+        y=_sum_by_cell(-first * dy, cell, count),
+        xx=_sum_by_cell(first + second * dx * dx, cell, count),
+        xy=_sum_by_cell(second * dx * dy, cell, count),
+        yy=_sum_by_cell(first + second * dy * dy, cell, count),
+    )
+
+
+def _build_gauss_rule(count: int) -> tuple[Array, Array]:
+    """Return nodes and weights of Gauss's rule on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    return 0.5 * (nodes + 1.0), 0.5 * weights
+
+
+def _build_outward_rule(f: Performance, size: Array, cell: IntArray) -> tuple[Array, Array]:
+    """Return nodes u from the point to each edge, and their weights times u, (e, 12) each."""
+    plain_nodes, plain_weights = _build_gauss_rule(_NODES_OUTWARD)
+    nodes = np.tile(plain_nodes, (len(size), 1))
+    weights = np.tile(plain_weights, (len(size), 1))
+    if isinstance(f, Sensing):
+        # The nodes are as close to the point as f is steep there.
+        bend = np.arcsinh(np.maximum(size / f.height, 1e-3))[:, None]
+        weights = weights * bend * np.cosh(bend * nodes) / np.sinh(bend)
+        nodes = np.sinh(bend * nodes) / np.sinh(bend)
+    return nodes[cell], (nodes * weights)[cell]
+
+
+def _sum_by_cell(integrand: Array, cell: IntArray, count: int) -> Array:
+    """Return the sums of an integrand over the nodes of each cell, (n,)."""
+    return np.asarray(np.bincount(cell, integrand.sum(axis=(1, 2)), count))
