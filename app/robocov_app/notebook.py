@@ -19,7 +19,7 @@ from robocov.cost import DEFAULT_LATTICE, CoverageResult
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, format_count, quote
 from robocov.mapfile import load_map, save_map
-from robocov.metrics import CostHistory, cost_history
+from robocov.metrics import CostHistory, compute_cost_history
 from robocov.record import Record
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -156,7 +156,7 @@ def _history_to_show(record: Record) -> CostHistory | None:
     span = float(record.time[-1] - record.time[0])
     rate = min(COST_SAMPLES / span, 10.0) if span > 0.0 else 0.0
     try:
-        return cost_history(record, built_cost(record.environment, DEFAULT_LATTICE, quiet=True), rate)
+        return compute_cost_history(record, built_cost(record.environment, DEFAULT_LATTICE, quiet=True), rate)
     except RobocovError:  # a map without a free site, a robot in an obstacle
         return None
 

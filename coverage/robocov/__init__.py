@@ -38,9 +38,9 @@ if TYPE_CHECKING:  # isort: off
     from robocov.lower_bound import LowerBound, compute_lower_bound
     from robocov.mapfile import build_map_schema, list_bundled_maps, load_map, save_map
     from robocov.mapfile.check import check_map
-    from robocov.metrics import cost_history, settled_at, summarise
+    from robocov.metrics import compute_cost_history, find_settling_time, summarise
     from robocov.metrics.results import Results, read_results
-    from robocov.metrics.run_metrics import RunMetrics, run_metrics
+    from robocov.metrics.run_metrics import RunMetrics, compute_run_metrics
     from robocov.observation import Decision, Observations, Snapshot
     from robocov.observation.neighbours import Neighbours
     from robocov.observation.region import Region
@@ -71,9 +71,9 @@ _NAMES = {
     "lower_bound": "LowerBound compute_lower_bound",
     "mapfile": "build_map_schema list_bundled_maps load_map save_map",
     "mapfile.check": "check_map",
-    "metrics": "cost_history settled_at summarise",
+    "metrics": "compute_cost_history find_settling_time summarise",
     "metrics.results": "Results read_results",
-    "metrics.run_metrics": "RunMetrics run_metrics",
+    "metrics.run_metrics": "RunMetrics compute_run_metrics",
     "observation": "Decision Observations Snapshot",
     "observation.neighbours": "Neighbours",
     "observation.region": "Region",
@@ -98,12 +98,11 @@ __all__ = [
     "OutputError", "OwnView", "ParameterError", "PointsStart", "PolygonObstacle", "RangeSensor", "Rapf",
     "Raster", "Record", "Region", "Results", "RobocovError", "Rpf", "RunMetrics", "Simulation",
     "SimulationBatch", "Snapshot", "StartError", "Team", "TeamState", "TimeVaryingCost", "Uniform",
-    "UniformStart", "VoronoiPartition",
-    "WallObstacle", "WeightedArea", "WeightedCells", "WeightedPolygons", "World", "build_map_schema",
-    "check_map", "choice", "compute_lower_bound", "cost_history", "find_optimum", "gain", "generate_map",
-    "list_bundled_maps", "load_map", "make_controller", "partition", "partition_by_travel_time",
-    "read_results", "read_team", "run_metrics", "save_map", "settled_at", "show",
-    "summarise",
+    "UniformStart", "VoronoiPartition", "WallObstacle", "WeightedArea", "WeightedCells",
+    "WeightedPolygons", "World", "build_map_schema", "check_map", "choice", "compute_cost_history",
+    "compute_lower_bound", "compute_run_metrics", "find_optimum", "find_settling_time", "gain",
+    "generate_map", "list_bundled_maps", "load_map", "make_controller", "partition",
+    "partition_by_travel_time", "read_results", "read_team", "save_map", "show", "summarise",
 ]
 # fmt: on
 

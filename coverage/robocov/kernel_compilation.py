@@ -32,7 +32,7 @@ from robocov.cost import CoverageCost
 from robocov.density import Density, Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
 from robocov.environment import Environment, PolygonObstacle
 from robocov.files.writing import replace_file
-from robocov.metrics import cost_history, summarise
+from robocov.metrics import compute_cost_history, summarise
 from robocov.simulation import Simulation
 from robocov.team import Team
 
@@ -68,7 +68,7 @@ def call_step_kernels() -> None:
 def call_summary_kernels() -> None:
     """Call the kernels of a run's metrics."""
     record = Simulation(_MAP, Rapf(), _place_robots(2)).run(0.1)
-    summarise(record, cost_history(record, CoverageCost(_MAP, 2)))
+    summarise(record, compute_cost_history(record, CoverageCost(_MAP, 2)))
 
 
 def call_large_team_kernels() -> None:

@@ -54,6 +54,8 @@ ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points
 TURNING = "steering"  # the array of teams that turn, which others do not have
 _LARGEST = {"time": 1e9, "positions": 1e7, "velocities": 1e300, "forces": 1e300, TURNING: 1e9}
 """Largest numbers in the arrays that are finite throughout, s, m, m/s, N, rad and rad/s."""
+TIME_ROUNDING_S = 5e-7
+"""Difference between times that is taken for rounding: times are sums of control periods."""
 
 Seconds: TypeAlias = Annotated[float, Field(gt=0, le=1e6), wanted("a number above 0 (s)")]
 Time: TypeAlias = Annotated[float, Field(ge=0, le=1e9), wanted("a number from 0 (s)")]

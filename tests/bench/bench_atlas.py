@@ -31,7 +31,7 @@ from robocov import (
     settled_at,
 )
 from robocov.environment import WallObstacle
-from robocov.metrics import path_lengths
+from robocov.metrics import compute_path_lengths
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.running import reference
 
@@ -97,7 +97,7 @@ def ended(name: str, on: str, changes: dict[str, float]) -> tuple[float, float, 
     cost = CoverageCost(rooms, suite.LATTICE)(record.positions[-1]).mean_distance
     rest = settled_at(record.time, record.positions)
     gap = cost / reference(on, suite.TEAM)["mean_distance_m"] - 1.0
-    return gap, math.nan if rest is None else rest, float(path_lengths(record.positions).mean())
+    return gap, math.nan if rest is None else rest, float(compute_path_lengths(record.positions).mean())
 
 
 def ranges(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:

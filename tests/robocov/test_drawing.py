@@ -16,7 +16,7 @@ from robocov.cost import CoverageCost
 from robocov.drawing import drawing_backend
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError
-from robocov.metrics import cost_history
+from robocov.metrics import compute_cost_history
 from robocov.record import Record
 from robocov.simulation import Simulation
 
@@ -74,7 +74,7 @@ def test_another_backend_is_asked_for_by_name(
 ) -> None:
     offering(monkeypatch, matplotlib="robocov_app.notebook", sketches="sketches")
     cost = CoverageCost(empty, 8)
-    result, history = cost(record.positions[-1]), cost_history(record, cost, 2.0)
+    result, history = cost(record.positions[-1]), compute_cost_history(record, cost, 2.0)
     for thing, name in (
         (empty, "plot_environment"),
         (record, "plot_record"),

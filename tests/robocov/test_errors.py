@@ -100,8 +100,8 @@ STILL = rc.Simulation(ROOMS, rc.Rapf(), ONE).run(0.0)
         (lambda: rc.load_map(3), "map: 3, but a path, or the name of a bundled map, was wanted"),
         (lambda: rc.Simulation(ROOMS, rc.Rapf, ONE), "controller: expected a controller"),
         (lambda: rc.make_controller(3), "controller: 3, but a name, as in 'rapf' or 'mine.py:MyController'"),
-        (lambda: rc.cost_history("run", rc.CoverageCost(ROOMS, 4)), "record: 'run', but a Record, as "),
-        (lambda: rc.cost_history(STILL, ROOMS), "cost: <Environment Rooms, 12 x 9 m"),
+        (lambda: rc.compute_cost_history("run", rc.CoverageCost(ROOMS, 4)), "record: 'run', but a Record, "),
+        (lambda: rc.compute_cost_history(STILL, ROOMS), "cost: <Environment Rooms, 12 x 9 m"),
         (
             lambda: ROOMS.start().sample(0),
             "start 'corridor': robots: expected a whole number of at least 1, got 0",

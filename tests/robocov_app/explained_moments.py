@@ -7,7 +7,7 @@ import pytest
 from drawn_run import SQUARE
 
 from robocov import Simulation, Team
-from robocov.metrics import SETTLED_WINDOW
+from robocov.metrics import SETTLED_WINDOW_S
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
 from robocov_app.viewer.explain import Line, Report, explain
@@ -50,7 +50,7 @@ def moment(
 def run(simulation: Simulation, seconds: float) -> list[Report]:
     """Let a run go on, and explain all robots at its end with what they did of late."""
     past = [snapshot.positions for snapshot in simulation.snapshots(seconds)]
-    recent = np.array(past[-round(SETTLED_WINDOW / simulation.dt) - 1 :: 8])
+    recent = np.array(past[-round(SETTLED_WINDOW_S / simulation.dt) - 1 :: 8])
     team, environment = simulation.team, simulation.environment
     return [
         explain(simulation.observe_and_decide(), team, environment, robot, recent=recent[:, robot])

@@ -8,7 +8,7 @@ from drawn_run import ROOMS, SQUARE
 
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
-from robocov.metrics import CostHistory, cost_history, summarise
+from robocov.metrics import CostHistory, compute_cost_history, summarise
 from robocov.record import Record
 from robocov.team import Team
 from robocov_app.report.results import FIGURES, Entry, Result
@@ -147,7 +147,7 @@ def watched(entries: list[Entry], environment: Environment = ROOMS, **walking: f
 def saved_run(folder: Path, record: Record) -> Run:
     """Write the folder of a run with its real cost."""
     folder.mkdir(parents=True)
-    history = cost_history(record, CoverageCost(record.environment, 16), 5.0)
+    history = compute_cost_history(record, CoverageCost(record.environment, 16), 5.0)
     run = Run(record, history, summarise(record, history))
     save_numbers(run, folder, 16)
     return run

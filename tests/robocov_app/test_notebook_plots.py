@@ -17,7 +17,7 @@ from PIL import Image
 from robocov.cost import CoverageCost
 from robocov.drawing import Drawable
 from robocov.errors import ParameterError
-from robocov.metrics import cost_history
+from robocov.metrics import compute_cost_history
 from robocov_app import notebook as drawing_backend
 from robocov_app.figures.page import tone
 from robocov_app.figures.runs import plot_comparison, plot_environment, plot_trajectories
@@ -36,7 +36,7 @@ RUN = run_of(ROOMS, 5)
 COST = CoverageCost(ROOMS, 32)
 # made-up runs go through walls: their ends and a few moments that are free will do
 RESULT = COST(RUN.positions[-1])
-HISTORY = cost_history(RUN.thinned(0.0), COST, 1.0)
+HISTORY = compute_cost_history(RUN.thinned(0.0), COST, 1.0)
 THINGS = [ROOMS, RUN, RESULT, HISTORY]
 IDS = ["environment", "record", "result", "history"]
 

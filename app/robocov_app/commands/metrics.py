@@ -36,7 +36,7 @@ class Arguments(PlotOptions):
 
 def command(options: Arguments) -> None:
     from robocov.files.result_folder import extended
-    from robocov.metrics.run_metrics import COLUMNS, run_metrics, time_near_final
+    from robocov.metrics.run_metrics import COLUMNS, compute_run_metrics, find_time_near_final
     from robocov.record import nearest_moments
     from robocov_app.figures.runs import Measured
     from robocov_app.runs.saved import load_saved
@@ -49,13 +49,13 @@ def command(options: Arguments) -> None:
             record, history = saved.record, saved.history
             total = len(nearest_moments(record.time, options.rate))
             with progress(f"measuring {record.label}", total, quiet=options.json) as update:
-                metrics = run_metrics(record, options.rate, counting(update))
+                metrics = compute_run_metrics(record, options.rate, counting(update))
             target = result.new / saved.folder.relative_to(folder)
             target.mkdir(exist_ok=True)
             write_csv(target / "metrics.csv", ",".join(COLUMNS.values()), metrics.rows())
             measured.append(Measured(record.label, record.controller, metrics))
             about = {"folder": str(saved.folder), "controller": record.controller, "label": record.label}
-            near = None if history is None or not len(history.time) else time_near_final(history)
+            near = None if history is None or not len(history.time) else find_time_near_final(history)
             figures = {"free_area_m2": metrics.free_area, **metrics.final(), "near_final_s": near}
             answers.append(about | figures)
     if options.plot is not None:

@@ -12,7 +12,7 @@ from robocov.arrays import Array, BoolArray
 from robocov.cost import CoverageCost, CoverageResult, TimeVaryingCost
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, StartError, describe_unknown_name, quote
-from robocov.metrics import TOUCHING
+from robocov.metrics import MAX_CONTACT_GAP_M
 from robocov.observation import Decision, Observations, Scanning, Snapshot
 from robocov.observation.close_pairs import find_close_pairs
 from robocov.observation.region import Region
@@ -324,16 +324,16 @@ def _find_touching(simulation: Simulation | SimulationBatch) -> BoolArray:
     positions = simulation.positions.reshape(-1, 2)
     working = simulation.working.ravel()
     radius = np.broadcast_to(simulation.team.radius, shape).ravel()
-    nearest = simulation.sensor.find_nearest_points(positions, radius + TOUCHING)
+    nearest = simulation.sensor.find_nearest_points(positions, radius + MAX_CONTACT_GAP_M)
     touching = working & ~np.isnan(nearest[:, 0])
-    reach = 2.0 * float(radius.max()) + TOUCHING
+    reach = 2.0 * float(radius.max()) + MAX_CONTACT_GAP_M
     # Robots of different runs are moved far apart, so that only pairs of one run are close.
     run = np.arange(len(positions)) // robots
     moved_apart = positions + (2.0 * (simulation.environment.region.diameter + reach) * run)[:, None]
     first, second, _ = find_close_pairs(moved_apart, 1.001 * reach)
     if len(first) > 0:
         x, y = (positions[first] - positions[second]).T
-        is_contact = np.sqrt(x * x + y * y) <= radius[first] + radius[second] + TOUCHING
+        is_contact = np.sqrt(x * x + y * y) <= radius[first] + radius[second] + MAX_CONTACT_GAP_M
         touching[first[is_contact & working[first] & working[second]]] = True
     return touching.reshape(shape)
 

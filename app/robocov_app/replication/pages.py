@@ -14,7 +14,7 @@ from markupsafe import Markup
 from robocov import __version__
 from robocov.files.result_folder import for_results
 from robocov.files.writing import replace_file
-from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
+from robocov.metrics import SETTLED_DISTANCE_M, SETTLED_WINDOW_S
 from robocov.record import Record, versions
 from robocov.text import escape_controls
 from robocov_app.figures.files import save_figure
@@ -207,7 +207,7 @@ def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
     known(t=claims, contender=contenders, studies=studies, timing=step_times)
     known(bar=interval_bar, amount=amount, described=described, counts=verdict_counts)
     known(account_of=evidence.account_of, units=UNITS, team=TEAM, robots=ROBOTS)
-    known(settled=(SETTLED_DISTANCE, SETTLED_WINDOW), resamples=RESAMPLES)
+    known(settled=(SETTLED_DISTANCE_M, SETTLED_WINDOW_S), resamples=RESAMPLES)
     known(page=PAGE, beyond_page=BEYOND_PAGE, version=__version__, plan=plan, quick=plan.name == "quick")
     own = (ASSETS / "paper.css").read_text("utf-8")
     style = Markup(theme_rules(":root") + replay_css() + asset("report.css") + own)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from robocov.arrays import Array
 from robocov.controllers.gains import Value, value_text
 from robocov.errors import format_count
-from robocov.metrics.run_metrics import RunMetrics, run_metrics
+from robocov.metrics.run_metrics import RunMetrics, compute_run_metrics
 from robocov_app.figures import results as drawing
 from robocov_app.figures.curves import DISTANCE, TIME
 from robocov_app.figures.results import MOST_LEVELS, Band, Dependence, Pairs, Sample
@@ -282,7 +282,7 @@ def measure_plots(result: Result, runs: Sequence[ReplayRun], looks: Looks, key: 
     measured = []
     for record in (run.record for run in runs):
         seconds = float(record.time[-1] - record.time[0])
-        measured.append(run_metrics(record, _MEASURED / seconds if seconds > 0.0 else 0.0))
+        measured.append(compute_run_metrics(record, _MEASURED / seconds if seconds > 0.0 else 0.0))
     parting = any((metrics.components != metrics.components[0]).any() for metrics in measured)
     curves = [
         (title, label, unit, [(metrics.time, of(metrics)) for metrics in measured])

@@ -21,7 +21,7 @@ from robocov.files.array_files import ArrayCache
 from robocov.files.result_folder import settle
 from robocov.files.strictjson import read_document
 from robocov.mapfile import from_json, to_json
-from robocov.metrics import CostHistory, mean_over_run
+from robocov.metrics import CostHistory, compute_mean_over_run
 from robocov.metrics.results import read_history, read_results
 from robocov.optimum import find_optimum
 from robocov.record import Record
@@ -365,7 +365,7 @@ def _figures(summary: Any, history: CostHistory | None) -> dict[str, float | Non
         if figures["mean_distance_m"] is None and np.isfinite(final):
             figures["mean_distance_m"] = final
         if figures["mean_distance_over_run_m"] is None and np.isfinite(history.mean_distance).all():
-            figures["mean_distance_over_run_m"] = mean_over_run(history.time, history.mean_distance)
+            figures["mean_distance_over_run_m"] = compute_mean_over_run(history.time, history.mean_distance)
     return figures
 
 

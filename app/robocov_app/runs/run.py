@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from robocov.cost import CoverageCost
 from robocov.files.result_folder import ResultFolder
-from robocov.metrics import CostHistory, cost_history, sample_moments, summarise
+from robocov.metrics import CostHistory, compute_cost_history, select_sampled_moments, summarise
 from robocov.record import Record
 from robocov_app.runs.spec import COST_RATE, RunSpec
 from robocov_app.terminal.interruption import Interruption
@@ -43,8 +43,8 @@ def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: 
     rate = COST_RATE
     if stop.requested and record.time[-1] > 0:
         rate = min(rate, STOPPED_SAMPLES / float(record.time[-1]))
-    with progress("coverage cost", len(sample_moments(record, rate)), quiet=quiet) as update:
-        history = cost_history(record, cost, rate, counting(update))
+    with progress("coverage cost", len(select_sampled_moments(record, rate)), quiet=quiet) as update:
+        history = compute_cost_history(record, cost, rate, counting(update))
     return Run(record, history, summarise(record, history))
 
 

@@ -19,8 +19,8 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import RobocovError
 from robocov.mapfile import from_json
-from robocov.metrics import cost_history, summarise
-from robocov.metrics.run_metrics import figures_of
+from robocov.metrics import compute_cost_history, summarise
+from robocov.metrics.run_metrics import compute_final_metrics
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.record import Record, versions
 from robocov.simulation import Simulation
@@ -80,7 +80,7 @@ def perform(task: Task) -> Outcome:
         try:
             environment, cost = prepared(task)
             record, effort = measured(task, environment)
-            history = cost_history(record, cost, task.cost_hz)
+            history = compute_cost_history(record, cost, task.cost_hz)
             # of all moments: what is kept of them is for people to look at
             summary = finite(summarise(record, history))
             path = summary["path_length_m"]
@@ -94,7 +94,7 @@ def perform(task: Task) -> Outcome:
             files = {"run.json": json_text(content).encode(), "record.npz": arrays.getvalue()}
             files["cost.csv"] = csv_text(*cost_table(history)).encode()
             if task.metrics:
-                figures |= finite(figures_of(record, history))
+                figures |= finite(compute_final_metrics(record, history))
                 files[EFFORT] = json_text(effort).encode()
             return Outcome(files, figures)
         except BaseException as error:  # a user's controller may raise anything

@@ -13,7 +13,7 @@ import shapely
 
 from robocov.arrays import Array
 from robocov.environment import Environment, WallObstacle
-from robocov.metrics import SETTLED_DISTANCE, TOUCHING
+from robocov.metrics import MAX_CONTACT_GAP_M, SETTLED_DISTANCE_M
 from robocov.observation import Decision, Snapshot
 from robocov.team import Team
 from robocov_app.viewer.presenter import Presenter
@@ -136,7 +136,7 @@ class _Case:
         largest = max(map(abs, self.forces.values()), default=0.0)
         self.balanced = abs(self.resultant) <= max(0.1 * largest, 0.1 * self.mass, NOTHING)
         near = [thing for thing in (self.solid, *self.others) if thing is not None]
-        self.touched = [thing for thing in near if thing.gap <= TOUCHING]
+        self.touched = [thing for thing in near if thing.gap <= MAX_CONTACT_GAP_M]
         pressed = [thing.name for thing in self.touched if _along(self.resultant, thing.offset) > 0.1]
         self.held_by = "" if self.balanced else " and ".join(pressed)
         self.stuck = self.aim is not None and abs(self.aim.offset) > FAR and self.aim.hidden != ""
@@ -165,8 +165,8 @@ def _aim(decision: Decision, environment: Environment, here: complex, robot: int
         hidden = "outside the map"
     elif not environment.free.intersects(point):
         hidden = "inside an obstacle"
-    elif shapely.difference(way, environment.free).length > TOUCHING:
-        across = shapely.difference(way, environment.boundary_polygon).length > TOUCHING
+    elif shapely.difference(way, environment.free).length > MAX_CONTACT_GAP_M:
+        across = shapely.difference(way, environment.boundary_polygon).length > MAX_CONTACT_GAP_M
         hidden = "behind the outer wall" if across else "behind an obstacle"
     return _Thing("its centroid" if centroid else "its goal", goal - here, hidden=hidden)
 
@@ -174,10 +174,10 @@ def _aim(decision: Decision, environment: Environment, here: complex, robot: int
 def _solid(environment: Environment, here: complex, point: complex | None, radius: float) -> _Thing | None:
     if point is None:
         line = shapely.shortest_line(shapely.Point(here.real, here.imag), environment.free.boundary)
-        if line is None or line.length > radius + TOUCHING:
+        if line is None or line.length > radius + MAX_CONTACT_GAP_M:
             return None
         point = _row(shapely.get_coordinates(line), 1) or here
-    place, name, nearest = shapely.Point(point.real, point.imag), "the obstacle", TOUCHING
+    place, name, nearest = shapely.Point(point.real, point.imag), "the obstacle", MAX_CONTACT_GAP_M
     for shape in environment.obstacles:
         if (distance := float(shape.polygon.distance(place))) < nearest:
             nearest, name = distance, "the wall" if isinstance(shape, WallObstacle) else "the obstacle"
@@ -211,7 +211,7 @@ def _motion(case: _Case, recent: Array | None) -> str:
     if walked > 3.0 * max(_SWAY, float(np.hypot(*np.ptp(path, axis=0)))):
         return "trembling"  # to and fro, however wide
     net = complex(*(path[-1] - path[0]))
-    if abs(net) >= SETTLED_DISTANCE:
+    if abs(net) >= SETTLED_DISTANCE_M:
         return "moving" if speed > 0.1 * SLOW else rest
     if speed <= SLOW:
         return rest
@@ -263,7 +263,7 @@ def _verdict(case: _Case, motion: str) -> str:
         pushed = f"a force of {_force(abs(case.resultant))} {_compass(case.resultant)} acts on it"
         return f"{_length(abs(aim.offset))} from {aim.name}, not at rest: {pushed}" if aim else pushed
     if aim and abs(aim.offset) <= FAR:
-        near = "on" if abs(aim.offset) <= SETTLED_DISTANCE else f"{_length(abs(aim.offset))} from"
+        near = "on" if abs(aim.offset) <= SETTLED_DISTANCE_M else f"{_length(abs(aim.offset))} from"
         return f"arrived: at rest {near} {aim.name}" + (f", which is {aim.hidden}" if aim.hidden else "")
     loaded = any(abs(vector) >= NOTHING for vector in case.forces.values())
     why = f"held by {held}" if held else "the forces balance" if loaded else "no force acts on it"

@@ -1,4 +1,4 @@
-"""The results of a sweep, read back: a table that need not fit into memory, and the runs behind its rows."""
+"""The results of a sweep, read from its folder: a table of any size, and the runs behind its rows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from robocov.errors import InputError, describe_unknown_name, format_count, quote
 from robocov.files.csv_cells import unquote_cell
-from robocov.metrics import CostHistory
+from robocov.metrics.cost_history import CostHistory
 from robocov.optional_imports import import_optional
 from robocov.record import Record
 from robocov.text import escape_controls
@@ -22,24 +22,47 @@ from robocov.text import escape_controls
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-_HISTORY = ("time_s", "mean_distance_m", "cost_m3", "uncovered_area_m2")
-_TIME = "mean_time_s"
-"""A last column, where robots are not equally fast."""
+_HISTORY_COLUMNS = ("time_s", "mean_distance_m", "cost_m3", "uncovered_area_m2")
+"""Columns of ``cost.csv``."""
+_MEAN_TIME_COLUMN = "mean_time_s"
+"""A last column, if robots have different maximum speeds."""
 
-_KINDS = dict.fromkeys(("map", "controller", "start", "run", "error"), "string")
-_KINDS |= dict.fromkeys(("robots", "seed", "contacts", "stuck_robots"), "int64")
-"""Kinds of columns of every study, where they hold no floats."""
+_COLUMN_KINDS = {
+    "map": "string",
+    "controller": "string",
+    "start": "string",
+    "run": "string",
+    "error": "string",
+    "robots": "int64",
+    "seed": "int64",
+    "contacts": "int64",
+    "stuck_robots": "int64",
+}
+"""Kinds of the columns of every study that do not contain floats."""
 
-_SHOWN_ROWS = 10
-"""Rows that notebooks show."""
+_MAX_SHOWN_ROWS = 10
+"""Number of rows that notebooks show."""
 
 
 class Results:
-    """The table of a sweep, one row a run, and the folders of the runs; all is read when it is asked for.
+    """The table of a sweep, one row for each run, and the folders of the runs.
 
-    Its `columns` say what was run (``map``, ``controller``, ``robots``, ``start``, ``seed``, gains, whatever
-    else was varied), the figures with their units, the name of the run's folder (``run``), and its ``error``.
+    Files are read when their content is asked for.
 
+    Parameters
+    ----------
+    folder : Path
+        The folder of the sweep.
+
+    Attributes
+    ----------
+    folder : Path
+    columns : tuple of str
+        What was varied (``map``, ``controller``, ``robots``, ``start``, ``seed``, gains and others), figures
+        by names that end in their units, the name of the run's folder (``run``), and its ``error``.
+
+    Examples
+    --------
     >>> results = read_results("study")  # doctest: +SKIP
     >>> results.to_pandas().groupby("controller")["mean_distance_m"].median()  # doctest: +SKIP
     """
@@ -47,20 +70,20 @@ class Results:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._table = folder / "results.csv"
-        self.columns: tuple[str, ...] = tuple(next(_lines(self._table), ()))
+        self.columns: tuple[str, ...] = tuple(next(_read_lines(self._table), ()))
         if not {"run", "error"} <= set(self.columns):
-            raise InputError(f"{self._table}: line 1: the header of a table of results was wanted")
+            raise InputError(f"{self._table}: line 1: expected the header of a table of results")
 
     def __len__(self) -> int:
-        """Number of runs, failed ones included."""
-        return sum(1 for _ in _lines(self._table)) - 1
+        """Return the number of runs, failed ones included."""
+        return sum(1 for _ in _read_lines(self._table)) - 1
 
     def __repr__(self) -> str:
         return f"<Results {self.folder}, {format_count(len(self), 'run')}>"
 
     @property
     def study(self) -> dict[str, Any]:
-        """The content of ``study.json``: what was to be run; an InputError where it cannot be read."""
+        """The content of ``study.json``, which describes the sweep; raises InputError if it is unreadable."""
         path = self.folder / "study.json"
         try:
             return dict(json.loads(path.read_bytes()))
@@ -68,85 +91,119 @@ class Results:
             raise InputError(f"{path}: cannot be read: {error}") from error
 
     def rows(self, columns: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
-        """Yield the rows in order, as dicts by column, all columns or those named; None where nothing is.
+        """Yield the rows in order, as dicts by column.
 
-        Raises InputError when there is no such column; the message gives the nearest.
+        Parameters
+        ----------
+        columns : sequence of str, or None
+            By default all columns. Empty cells are None.
+
+        Raises
+        ------
+        InputError
+            If there is no such column; the message suggests the nearest name.
         """
         for name in columns or ():
             if name not in self.columns:
                 raise InputError(f"{self.folder}: {describe_unknown_name('column', name, self.columns)}")
-        return read_rows(self._table, self._kinds(), columns)
+        return read_rows(self._table, self._read_kinds(), columns)
 
     def to_pandas(self, columns: Sequence[str] | None = None) -> DataFrame:
-        """Return the rows as a data frame, as `rows`; pandas comes with ``robocov[pandas]``."""
-        pandas, names, kinds = (
-            import_optional("pandas", "pandas"),
-            list(columns or self.columns),
-            self._kinds(),
-        )
+        """Return the rows as a data frame.
+
+        It needs ``robocov[pandas]``. Parameters and errors are those of `rows`.
+        """
+        pandas = import_optional("pandas", "pandas")
+        names = list(columns or self.columns)
         frame: DataFrame = pandas.DataFrame(list(self.rows(names)), columns=names)
-        empty = [name for name in names if kinds.get(name) != "string" and frame[name].isna().all()]
-        return frame.astype(dict.fromkeys(empty, float))
+        kinds = self._read_kinds()
+        empty_columns = [name for name in names if kinds.get(name) != "string" and frame[name].isna().all()]
+        return frame.astype(dict.fromkeys(empty_columns, float))
 
     def failures(self) -> list[dict[str, Any]]:
-        """Return the rows of the runs that failed, as dicts by column; why is in ``error``."""
+        """Return the rows of the runs that failed, as dicts by column; ``error`` is the message."""
         return [row for row in self.rows() if row["error"] is not None]
 
     def record(self, run: str | int | Mapping[str, Any]) -> Record:
-        """Return the record of a run; its moments are as far apart as the study wanted it.
+        """Read the record of a run.
 
-        A run is named by its folder, the number of its row, or the row. Raises InputError when there is no
-        such run, or it failed.
+        Parameters
+        ----------
+        run : str, int or mapping
+            The name of its folder, the number of its row, or the row itself.
+
+        Raises
+        ------
+        InputError
+            If there is no such run, or it failed.
         """
-        return Record.load(self._folder_of(run))
+        return Record.load(self._find_run_folder(run))
 
     def history(self, run: str | int | Mapping[str, Any]) -> CostHistory:
-        """Return the coverage cost along a run, which is named as in `record`; it raises the same."""
-        return read_history(self._folder_of(run) / "cost.csv")
+        """Read the coverage cost along a run; parameters and errors are those of `record`."""
+        return read_history(self._find_run_folder(run) / "cost.csv")
 
-    def _kinds(self) -> dict[str, str]:
-        """Return the kinds of columns that are known; a table without its study is read all the same."""
+    def _read_kinds(self) -> dict[str, str]:
+        """Return the kinds of the columns that are known; a table without its study can be read, too."""
         try:
-            return _KINDS | {each["name"]: str(each["kind"]) for each in self.study["columns"]}
+            study_kinds = {column["name"]: str(column["kind"]) for column in self.study["columns"]}
         except (InputError, KeyError, TypeError, ValueError):
-            return _KINDS
+            return _COLUMN_KINDS
+        return _COLUMN_KINDS | study_kinds
 
-    def _folder_of(self, run: str | int | Mapping[str, Any]) -> Path:
-        if isinstance(run, int | np.integer):
-            number, count = int(run), len(self)
-            if not -count <= number < count:
-                raise InputError(f"{self.folder}: row {number}, but there are {format_count(count, 'row')}")
-            run = str(next(islice(self.rows(["run"]), number % count, None))["run"])
-        elif not isinstance(run, str):
-            run = str(run["run"])
-        folder = self.folder / "runs" / run
-        if not run or Path(run).name != run or not folder.is_dir():
-            raise InputError(f"{self.folder}: there is no run {quote(run)}")
+    def _find_run_folder(self, run: str | int | Mapping[str, Any]) -> Path:
+        name = self._find_run_name(run)
+        folder = self.folder / "runs" / name
+        if not name or Path(name).name != name or not folder.is_dir():
+            raise InputError(f"{self.folder}: there is no run {quote(name)}")
         error = folder / "error.json"
         if error.is_file():
-            raise InputError(f"{folder}: the run failed: {_reason(error)}")
+            raise InputError(f"{folder}: the run failed: {_read_error(error)}")
         return folder
 
+    def _find_run_name(self, run: str | int | Mapping[str, Any]) -> str:
+        if isinstance(run, str):
+            return run
+        if not isinstance(run, int | np.integer):
+            return str(run["run"])
+        number = int(run)
+        count = len(self)
+        if not -count <= number < count:
+            raise InputError(f"{self.folder}: row {number}, but there are {format_count(count, 'row')}")
+        row = next(islice(self.rows(["run"]), number % count, None))
+        return str(row["run"])
+
     def _repr_html_(self) -> str:
-        """Show the first rows in notebooks."""
-        head, count = list(islice(self.rows(), _SHOWN_ROWS)), len(self)
-        cells = [[f"<th>{escape(name)}</th>" for name in self.columns]]
-        cells += [[f"<td>{escape(_cell(row[name]))}</td>" for name in self.columns] for row in head]
-        rows = [f"<tr>{''.join(row)}</tr>" for row in cells]
+        """Return the first rows as HTML, for notebooks."""
+        first_rows = list(islice(self.rows(), _MAX_SHOWN_ROWS))
+        header = "".join(f"<th>{escape(name)}</th>" for name in self.columns)
+        body = []
+        for row in first_rows:
+            cells = "".join(f"<td>{escape(_format_cell(row[name]))}</td>" for name in self.columns)
+            body.append(f"<tr>{cells}</tr>")
+        count = len(self)
         caption = f"{format_count(count, 'run')} of {escape(str(self.folder))}"
-        if count > len(head):
-            caption += f"; the first {len(head)}"
+        if count > len(first_rows):
+            caption += f"; the first {len(first_rows)}"
         return escape_controls(
             f'<div style="overflow-x: auto"><table style="white-space: nowrap"><caption>{caption}</caption>'
-            f"<thead>{rows[0]}</thead><tbody>{''.join(rows[1:])}</tbody></table></div>"
+            f"<thead><tr>{header}</tr></thead><tbody>{''.join(body)}</tbody></table></div>"
         )
 
 
 def read_results(folder: Path | str) -> Results:
-    """Return the results in the folder of a sweep.
+    """Read the results of a sweep.
 
-    While the sweep is still going on, or was killed, they are those that are there. Raises InputError when
-    the folder holds no sweep, or its table cannot be read.
+    While the sweep is running, or if it was stopped, they are those of the finished runs.
+
+    Parameters
+    ----------
+    folder : Path or str
+
+    Raises
+    ------
+    InputError
+        If it is not the folder of a sweep, or its table cannot be read.
     """
     folder = Path(folder)
     if not (folder / "results.csv").is_file():
@@ -157,19 +214,37 @@ def read_results(folder: Path | str) -> Results:
 def read_rows(
     table: Path, kinds: Mapping[str, str], columns: Sequence[str] | None = None
 ) -> Iterator[dict[str, Any]]:
-    """Yield the rows of ``results.csv`` as dicts; `kinds` are those that Parquet has, by column."""
-    lines = _lines(table)
+    """Yield the rows of ``results.csv`` as dicts by column.
+
+    Parameters
+    ----------
+    table : Path
+    kinds : mapping of str to str
+        Kinds of columns, as those of Parquet: "string", "int64" or "double".
+    columns : sequence of str, or None
+        By default all columns.
+
+    Raises
+    ------
+    InputError
+        If the table cannot be read; the message names the row.
+    """
+    lines = _read_lines(table)
     names = next(lines)
-    chosen = [(name, names.index(name), kinds.get(name)) for name in columns or names]
-    for k, line in enumerate(lines):
+    selected = list(columns or names)
+    positions = [names.index(name) for name in selected]
+    for number, line in enumerate(lines):
+        row = {}
         try:
-            yield {name: _value(line[at], kind) for name, at, kind in chosen}
+            for name, position in zip(selected, positions, strict=True):
+                row[name] = _parse_value(line[position], kinds.get(name))
         except (ValueError, IndexError) as error:
-            raise InputError(f"{table}: row {k}: cannot be read: {error}") from error
+            raise InputError(f"{table}: row {number}: cannot be read: {error}") from error
+        yield row
 
 
-def _lines(table: Path) -> Iterator[list[str]]:
-    """Yield the header, and then the rows as texts."""
+def _read_lines(table: Path) -> Iterator[list[str]]:
+    """Yield the header of a table, and then its rows, as texts."""
     try:
         with table.open(encoding="utf-8", newline="") as file:
             yield from csv.reader(file)
@@ -178,27 +253,46 @@ def _lines(table: Path) -> Iterator[list[str]]:
 
 
 def read_history(path: Path) -> CostHistory:
-    """Return what is in a file ``cost.csv``; the InputError where it is none names the line."""
+    """Read a file ``cost.csv``.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        If it cannot be read; the message names the line.
+    """
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
     names = lines[0].split(",") if lines else []
-    if names not in (list(_HISTORY), [*_HISTORY, _TIME]):
-        raise InputError(f"{path}: line 1: the header {','.join(_HISTORY)} was wanted")
+    if names not in (list(_HISTORY_COLUMNS), [*_HISTORY_COLUMNS, _MEAN_TIME_COLUMN]):
+        raise InputError(f"{path}: line 1: expected the header {','.join(_HISTORY_COLUMNS)}")
     rows = np.empty((len(lines) - 1, len(names)))
-    for k, line in enumerate(lines[1:]):
+    for row, line in enumerate(lines[1:]):
         cells = line.split(",")
         try:
-            # a single number would do for all columns
-            rows[k] = [float(cells[column]) for column in range(max(len(cells), len(names)))]
-        except (ValueError, IndexError):
-            wanted = f"{len(names)} numbers were wanted"
-            raise InputError(f"{path}: line {k + 2}: {quote(line)}, but {wanted}") from None
-    return CostHistory(*rows.T)
+            values = [float(cell) for cell in cells]
+        except ValueError:
+            values = []
+        if len(values) != len(names):
+            raise InputError(f"{path}: line {row + 2}: expected {len(names)} numbers, got {quote(line)}")
+        rows[row] = values
+    columns = dict(zip(names, rows.T, strict=True))
+    return CostHistory(
+        time=columns["time_s"],
+        mean_distance=columns["mean_distance_m"],
+        cost=columns["cost_m3"],
+        uncovered_area=columns["uncovered_area_m2"],
+        mean_time=columns.get(_MEAN_TIME_COLUMN),
+    )
 
 
-def _value(text: str, kind: str | None) -> Any:
+def _parse_value(text: str, kind: str | None) -> Any:
+    """Return the value of a cell; None if it is empty."""
     if not text or kind == "string":
         return unquote_cell(text) or None
     if kind == "int64":
@@ -206,17 +300,21 @@ def _value(text: str, kind: str | None) -> Any:
     try:
         return float(text)
     except ValueError:
-        if kind is None:  # the table of an earlier version, whose study does not say that these are words
+        if kind is None:
+            # Studies of earlier versions do not list the columns that contain text.
             return unquote_cell(text)
         raise
 
 
-def _reason(path: Path) -> str:
+def _read_error(path: Path) -> str:
+    """Return the message of a run that failed."""
     try:
         return str(json.loads(path.read_bytes())["error"])
     except (OSError, ValueError, KeyError, TypeError):
-        return "why cannot be read"
+        return "the reason cannot be read"
 
 
-def _cell(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else "" if value is None else str(value)
+def _format_cell(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,25 +1,25 @@
-"""Metrics of a run over time: coverage, visible area, energy, path lengths, connectivity, clearance."""
+"""Metrics of a run over time: areas, energy, path lengths, connectivity and clearance."""
+
+from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from robocov.arrays import Array, IntArray
 from robocov.errors import ParameterError, format_count, quote
-from robocov.metrics import CostHistory, clearances, robot_gaps
-from robocov.metrics.sight import covered
-from robocov.observation.neighbours import Neighbours
+from robocov.metrics.clearance import compute_clearances, measure_robot_gaps
+from robocov.metrics.connectivity import measure_connectivity
+from robocov.metrics.cost_history import CostHistory
+from robocov.metrics.visible_area import compute_covered_areas
 from robocov.record import Record, nearest_moments
 
-RATE = 2.0
-"""Moments a second at which areas and graphs are looked at where nothing else is said."""
-
-NEAR_FINAL = 0.05
-"""A cost counts as that of the end when it is within this part of it."""
+DEFAULT_RATE_HZ = 2.0
+"""Moments per simulated second at which areas and graphs are measured."""
+NEAR_FINAL_TOLERANCE = 0.05
+"""Relative deviation from the final cost within which a cost counts as final."""
 
 COLUMNS = {
     "time": "time_s",
@@ -39,137 +39,173 @@ COLUMNS = {
 
 @dataclass(frozen=True, eq=False)
 class RunMetrics:
-    """Metrics along a run, at K of its moments. Only robots that work count."""
+    """Metrics along a run, at K of its moments. Only working robots count."""
 
     time: Array
-    """Simulated time of each moment, s; (K,), as all arrays."""
+    """Simulation time, s; (K,), as all arrays."""
     sensed_area: Array
     """Free area within the sensing range of a robot and in its line of sight, m²."""
     range_area: Array
-    """Free area within the sensing range of a robot, walls or not, m² (blanket coverage by discs)."""
+    """Free area within the sensing range of a robot, regardless of walls, m² (blanket coverage by discs)."""
     visible_area: Array
     """Free area in line of sight of a robot at any distance, m² (the guards of an art gallery)."""
     work: Array
-    """Integral of ``|F v|`` so far, all robots together, J; F is the controller's force before any limit."""
+    """Integral of ``|F v|`` so far, sum over the robots, J; F is the controller's force before any limit."""
     effort: Array
-    """Integral of ``|F|²`` so far, all robots together, N² s."""
+    """Integral of ``|F|²`` so far, sum over the robots, N² s."""
     path_length: Array
-    """Distance travelled so far, mean over the robots, m."""
+    """Path length so far, mean over the robots, m."""
     components: IntArray
-    """Parts into which the team falls that hear each other, see `connections`."""
+    """Number of components of the communication graph, see `connectivity.measure_connectivity`."""
     algebraic_connectivity: Array
-    """Second smallest eigenvalue of the Laplacian of who hears whom; 0 for a team in several parts."""
+    """Second smallest eigenvalue of the Laplacian of this graph; 0 for several components."""
     wall_clearance: Array
-    """Smallest gap between a robot's rim and a wall since the moment before, m; inf for none."""
+    """Smallest gap between a robot's rim and a wall since the previous moment, m; inf for none."""
     robot_clearance: Array
-    """Smallest gap between the rims of two robots since the moment before, m; inf for none."""
+    """Smallest gap between the rims of two robots since the previous moment, m; inf for none."""
     free_area: float
-    """Free area of the map, of which the areas are parts, m²."""
+    """Free area of the map, m²."""
 
     def __repr__(self) -> str:
-        share = f"{self.sensed_area[-1] / self.free_area:.0%} of the free area sensed at the end"
-        return f"<RunMetrics {format_count(len(self.time), 'moment')}, {self.time[-1]:.1f} s, {share}>"
+        moments = format_count(len(self.time), "moment")
+        sensed_fraction = self.sensed_area[-1] / self.free_area
+        return (
+            f"<RunMetrics {moments}, {self.time[-1]:.1f} s, "
+            f"{sensed_fraction:.0%} of the free area sensed at the end>"
+        )
 
     def rows(self) -> list[tuple[float, ...]]:
-        """Return the rows of ``metrics.csv``, under `COLUMNS`."""
+        """Return the rows of ``metrics.csv``, whose columns are `COLUMNS`."""
         return list(zip(*(getattr(self, name).tolist() for name in COLUMNS), strict=True))
 
     def final(self) -> dict[str, float | None]:
-        """Return the figures of the whole run by their names with units: those of the end.
+        """Return the figures at the end of the run, by names that end in their units.
 
-        Clearances are the smallest of the run, None where there is none.
+        Clearances are the smallest of the run, and None if they are infinite.
         """
-        found: dict[str, float | None] = {}
+        figures: dict[str, float | None] = {}
         for name, column in COLUMNS.items():
-            if name != "time":
-                values = getattr(self, name)
-                value = float(values.min() if name.endswith("clearance") else values[-1])
-                found[column] = value if np.isfinite(value) else None
-        return found
+            if name == "time":
+                continue
+            values = getattr(self, name)
+            value = float(values.min() if name.endswith("clearance") else values[-1])
+            figures[column] = value if np.isfinite(value) else None
+        return figures
 
 
-def run_metrics(
-    record: Record, rate: float = RATE, on_sample: Callable[[], None] | None = None
+class _Integrals(NamedTuple):
+    """Integrals from the start of a run to each moment, (T,) each, as the attributes of `RunMetrics`."""
+
+    work: Array
+    effort: Array
+    path_length: Array
+
+
+def compute_run_metrics(
+    record: Record, rate: float = DEFAULT_RATE_HZ, on_sample: Callable[[], None] | None = None
 ) -> RunMetrics:
-    """Measure a run, `rate` times a second and at its last moment; `on_sample` is called after each.
+    """Compute the metrics of a run.
 
-    Energy and ways are integrated over all moments of the record. Raises ParameterError when the rate is
-    negative or not finite.
+    Parameters
+    ----------
+    record : Record
+    rate : float, Hz
+        Moments per simulated second at which the metrics are given. The last moment is always one of them.
+        Energy and path lengths are integrated over all moments of the record.
+    on_sample : callable or None
+        Called after each moment, to report progress.
+
+    Raises
+    ------
+    ParameterError
+        If the rate is negative or not finite.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rooms = rc.load_map("rooms")
+    >>> record = rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(6, seed=0)).run(2.0)
+    >>> rc.compute_run_metrics(record, rate=1.0).time
+    array([0., 1., 2.])
     """
     if not 0.0 <= rate < np.inf:
-        raise ParameterError(f"rate: {quote(rate)} Hz, but a finite number from 0 was wanted")
+        raise ParameterError(f"rate: expected a finite number of at least 0 Hz, got {quote(rate)}")
     moments = nearest_moments(record.time, rate)
-    team, working = record.team, record.working
-    since = np.concatenate([[0], moments[:-1] + 1])
-    areas, graphs = [], []
-    for k in moments.tolist():
-        some = np.flatnonzero(working[k])
-        places = record.positions[k, some]
-        free = record.environment.at(float(record.time[k])).free
-        areas.append(covered(free, places, team.sensing_range[some]))
-        graphs.append(connections(places, team.communication_range[some]))
+    areas = []
+    graphs = []
+    for moment in moments.tolist():
+        robots = np.flatnonzero(record.working[moment])
+        positions = record.positions[moment, robots]
+        free = record.environment.at(float(record.time[moment])).free
+        areas.append(compute_covered_areas(free, positions, record.team.sensing_range[robots]))
+        graphs.append(measure_connectivity(positions, record.team.communication_range[robots]))
         if on_sample is not None:
             on_sample()
-    parts, connectivity = np.array(graphs).T
-    gaps = clearances(record).min(axis=1), robot_gaps(record)[0]
-    # in the order of the class
-    columns: list[Any] = [record.time[moments], *np.array(areas).T, *_integrals(record)[:, moments]]
-    columns += [parts.astype(np.intp), connectivity, *(np.minimum.reduceat(gap, since) for gap in gaps)]
-    columns.append(float(record.environment.free_area))
-    return RunMetrics(*columns)
+    integrals = _integrate(record)
+    interval_starts = np.concatenate([[0], moments[:-1] + 1])
+    wall_gaps = compute_clearances(record).min(axis=1)
+    robot_gaps = measure_robot_gaps(record).smallest
+    return RunMetrics(
+        time=record.time[moments],
+        sensed_area=np.array([area.sensed for area in areas]),
+        range_area=np.array([area.within_range for area in areas]),
+        visible_area=np.array([area.visible for area in areas]),
+        work=integrals.work[moments],
+        effort=integrals.effort[moments],
+        path_length=integrals.path_length[moments],
+        components=np.array([graph.components for graph in graphs], dtype=np.intp),
+        algebraic_connectivity=np.array([graph.algebraic_connectivity for graph in graphs]),
+        wall_clearance=np.minimum.reduceat(wall_gaps, interval_starts),
+        robot_clearance=np.minimum.reduceat(robot_gaps, interval_starts),
+        free_area=float(record.environment.free_area),
+    )
 
 
-def connections(places: Array, ranges: Array) -> tuple[int, float]:
-    """Return the number of components of the graph of who hears whom, and its algebraic connectivity.
+def find_time_near_final(history: CostHistory, tolerance: float = NEAR_FINAL_TOLERANCE) -> float:
+    """Find the time from which on the mean distance stays near its final value.
 
-    Two robots hear each other when they are in range of each other. The algebraic connectivity is the second
-    smallest eigenvalue of the graph's Laplacian: 0 where it falls apart or there is one robot, n where all n
-    robots hear each other.
+    Parameters
+    ----------
+    history : CostHistory
+    tolerance : float
+        Relative deviation from the final value, in both directions.
 
-    Source: M. Fiedler, *Algebraic connectivity of graphs*, Czechoslovak Mathematical Journal 23 (1973).
-
-    >>> connections(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]), np.full(3, 1.0))
-    (1, 1.0)
-    """
-    n = len(places)
-    if n == 0:
-        return 0, 0.0
-    neighbours = Neighbours.from_ranges(places, ranges)
-    if neighbours.is_complete:
-        return 1, float(n) if n > 1 else 0.0
-    one, other = neighbours.list_pairs()
-    parts = int(connected_components(coo_array((np.ones(len(one)), (one, other)), (n, n)), directed=False)[0])
-    if n == 1 or parts > 1:
-        return parts, 0.0
-    laplacian = np.diag(np.bincount(one).astype(float))
-    laplacian[one, other] = -1.0
-    # whole numbers in the matrix: what is less than this is rounding
-    return parts, round(float(np.linalg.eigvalsh(laplacian)[1]), 12)
-
-
-def time_near_final(history: CostHistory, part: float = NEAR_FINAL) -> float:
-    """Return from when on the mean distance stays within `part` of what it is at the end, s.
-
-    Both ways: also a cost that was lower before counts as being away from its end.
+    Returns
+    -------
+    float, s
     """
     cost = history.mean_distance
-    away = np.flatnonzero(~(np.abs(cost - cost[-1]) <= part * cost[-1]))
-    return float(history.time[min(away.max(initial=-1) + 1, len(cost) - 1)])
+    is_near = np.abs(cost - cost[-1]) <= tolerance * cost[-1]
+    last_away = int(np.flatnonzero(~is_near).max(initial=-1))
+    return float(history.time[min(last_away + 1, len(cost) - 1)])
 
 
-def figures_of(record: Record, history: CostHistory) -> Mapping[str, float | None]:
-    """Return the metrics of the end of a run, with that from when on its cost was that of the end."""
-    return {**run_metrics(record, 0.0).final(), "near_final_s": time_near_final(history)}
+def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, float | None]:
+    """Return the metrics at the end of a run, and the time from which on its cost was near the final one."""
+    return {
+        **compute_run_metrics(record, rate=0.0).final(),
+        "near_final_s": find_time_near_final(history),
+    }
 
 
-def _integrals(record: Record) -> Array:
-    """Return work, effort and mean way from the first moment to each one, (3, T)."""
+def _integrate(record: Record) -> _Integrals:
+    """Return work, effort and mean path length from the start of a run to each moment.
+
+    A force is constant until the next moment; its power in between follows the trapezoidal rule.
+    """
     forces = np.where(record.working[:, :, None], record.forces, 0.0)
     power = np.abs((forces * record.velocities).sum(axis=-1)).sum(axis=1)
-    square = (forces**2).sum(axis=(1, 2))
+    squared_force = (forces**2).sum(axis=(1, 2))
     step = np.diff(record.time)
     distances = np.sqrt((np.diff(record.positions, axis=0) ** 2).sum(axis=-1))
-    moved = np.where(record.travelled, distances, 0.0).mean(axis=1)
-    # the force holds until the next moment; what it does meanwhile, by the trapezoidal rule
-    parts = 0.5 * (power[1:] + power[:-1]) * step, square[:-1] * step, moved
-    return np.array([np.concatenate([[0.0], np.cumsum(part)]) for part in parts])
+    travelled = np.where(record.travelled, distances, 0.0).mean(axis=1)
+    return _Integrals(
+        work=_accumulate(0.5 * (power[1:] + power[:-1]) * step),
+        effort=_accumulate(squared_force[:-1] * step),
+        path_length=_accumulate(travelled),
+    )
+
+
+def _accumulate(increments: Array) -> Array:
+    """Return sums of the increments before each moment, starting with 0."""
+    return np.concatenate([[0.0], np.cumsum(increments)])

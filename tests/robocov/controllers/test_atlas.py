@@ -15,7 +15,7 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
 from robocov.mapfile import load_map
-from robocov.metrics import clearances, contacts
+from robocov.metrics import compute_clearances, count_contacts
 from robocov.planning.discovered_map import UNKNOWN
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -80,14 +80,14 @@ def test_who_turns_back_before_a_gap_does_not_touch_its_rim() -> None:
     ]  # fmt: skip
     team = Team.homogeneous(6, sensing_range=6.0)
     record = Simulation(load_map("gaps"), Atlas(), places, team, dt=0.02).run(11.0)
-    assert clearances(record).min() > 0.005
+    assert compute_clearances(record).min() > 0.005
 
 
 @pytest.mark.slow
 def test_nothing_is_touched_on_the_way() -> None:
     record = simulation().run(25.0)
-    clearance = clearances(record)
-    assert contacts(record, clearance) == 0
+    clearance = compute_clearances(record)
+    assert count_contacts(record, clearance) == 0
     assert clearance.min() > 0.005
 
 

@@ -9,7 +9,7 @@ from robocov.controllers import Dispersion
 from robocov.controllers.driving import approach, drive, limit_approach_speed, neighbour_offsets
 from robocov.environment import Environment
 from robocov.mapfile import load_map
-from robocov.metrics import settled_at
+from robocov.metrics import find_settling_time
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.simulation import Simulation, TeamState
@@ -91,7 +91,7 @@ def test_robots_leave_each_others_reach_and_rest() -> None:
     record = simulation.run(40.0)
     apart = np.hypot(*(record.positions[-1][:, None] - record.positions[-1]).T) + 99 * np.eye(9)
     assert apart.min() > 1.9
-    assert settled_at(record.time, record.positions) is not None
+    assert find_settling_time(record.time, record.positions) is not None
 
 
 def test_nobody_near_and_nothing_to_do() -> None:

@@ -13,7 +13,7 @@ from robocov.conditions.perception import Perception
 from robocov.controllers import Atlas
 from robocov.controllers.localization import Estimates, localized, wary
 from robocov.environment import Environment
-from robocov.metrics import clearances, contacts
+from robocov.metrics import compute_clearances, count_contacts
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
@@ -132,4 +132,4 @@ def test_atlas_touches_nobody_though_positions_are_noisy() -> None:
     for seed in range(4):
         conditions = Conditions(position_noise=0.1, seed=seed)
         record = Simulation(room, Atlas(), starts, conditions=conditions).run(12.0)
-        assert contacts(record, clearances(record)) == 0
+        assert count_contacts(record, compute_clearances(record)) == 0

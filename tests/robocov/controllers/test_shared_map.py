@@ -12,7 +12,7 @@ from robocov.controllers.shared_map import Circle, Situation, assigned, circles,
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
-from robocov.metrics import clearances, contacts
+from robocov.metrics import compute_clearances, count_contacts
 from robocov.observation import Observations, Scans
 from robocov.observation.neighbours import Neighbours
 from robocov.planning.discovered_map import FREE, UNKNOWN, WALL, DiscoveredMap
@@ -54,8 +54,8 @@ def situation(state: np.ndarray, at: list[list[float]]) -> Situation:
 @pytest.mark.parametrize("name", LAWS)
 def test_the_team_covers_both_rooms_touches_nothing_and_rests(name: str) -> None:
     record = simulation(name).run(40.0)
-    clearance = clearances(record)
-    assert contacts(record, clearance) == 0 and clearance.min() > 0.005
+    clearance = compute_clearances(record)
+    assert count_contacts(record, clearance) == 0 and clearance.min() > 0.005
     cost = CoverageCost(ROOMS, lattice=32)
     rapf = Simulation(ROOMS, Rapf(), CORNER, dt=0.05).run(40.0)
     assert cost(record.positions[-1]).mean_distance < 0.9 * cost(rapf.positions[-1]).mean_distance
@@ -70,7 +70,7 @@ def test_with_short_ranges_nothing_is_touched_and_all_come_to_rest(
     name: str, limits: dict[str, float]
 ) -> None:
     record = simulation(name, **limits).run(120.0)
-    assert contacts(record, clearances(record)) == 0
+    assert count_contacts(record, compute_clearances(record)) == 0
     assert np.abs(record.positions[-1] - record.positions[-40]).max() < 0.02
 
 

@@ -12,7 +12,7 @@ from robocov.controllers.tangentbug import Mode, end_of_contour, free_distances
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
-from robocov.metrics import settled_at
+from robocov.metrics import find_settling_time
 from robocov.observation import compute_headings
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -58,7 +58,7 @@ def test_a_goal_in_an_obstacle_is_projected_onto_its_boundary() -> None:
     block = Environment("block", SQUARE, (PolygonObstacle(((4, 4.2), (6.4, 4.2), (6.4, 6.4), (4, 6.4))),))
     simulation = Simulation(block, TangentBug(), [[1.0, 8.0]], dt=DT)
     record = simulation.run(35.0)
-    assert settled_at(record.time, record.positions) is not None
+    assert find_settling_time(record.time, record.positions) is not None
     # the middle (5, 5) is 0.8 from the lower side, 1 from the left one
     np.testing.assert_allclose(record.positions[-1, 0], [5.0, 4.05], atol=0.3)
 
@@ -67,7 +67,7 @@ def test_a_goal_behind_the_end_of_the_world_is_given_up() -> None:
     """In an L the centroid of the hull may be outside: nobody follows the walls for ever."""
     corner = Environment("corner", ((0, 0), (10, 0), (10, 2), (2, 2), (2, 10), (0, 10)))
     record = Simulation(corner, TangentBug(), [[1.0, 1.0]], dt=DT).run(40.0)
-    assert settled_at(record.time, record.positions) is not None
+    assert find_settling_time(record.time, record.positions) is not None
 
 
 def test_in_a_convex_room_it_is_lloyd() -> None:

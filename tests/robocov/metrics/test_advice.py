@@ -8,7 +8,7 @@ import pytest
 from robocov.controllers import Lloyd, Rapf
 from robocov.environment import Environment, PolygonObstacle
 from robocov.mapfile import load_map
-from robocov.metrics import clearances
+from robocov.metrics import compute_clearances
 from robocov.metrics.advice import advise, count_zigzags, find_trembling
 from robocov.record import Record
 from robocov.simulation import Simulation
@@ -36,7 +36,7 @@ def rooms_at(dt: float) -> Record:
 
 
 def notes_on(record: Record) -> list[str]:
-    return advise(record, clearances(record))
+    return advise(record, compute_clearances(record))
 
 
 def test_a_control_period_that_is_too_long_is_told() -> None:

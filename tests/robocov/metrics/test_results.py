@@ -188,7 +188,7 @@ def test_notebooks_show_the_first_rows(folder: Path, tmp_path: Path) -> None:
         (
             "results.csv",
             b"",
-            "results.csv: line 1: the header of a table of results was wanted",
+            "results.csv: line 1: expected the header of a table of results",
         ),
         ("results.csv", b"a,b\n1,2\n", "results.csv: line 1: "),
         ("results.csv", b"\xff\xfe", "results.csv: cannot be read: "),
@@ -219,7 +219,7 @@ def test_without_pandas_the_extra_is_named(folder: Path, monkeypatch: pytest.Mon
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "line 1: the header time_s,mean_distance_m,cost_m3,uncovered_area_m2 was wanted"),
+        ("", "line 1: expected the header time_s,mean_distance_m,cost_m3,uncovered_area_m2"),
         ("time_s\n", "line 1: the header "),
         ("time_s,mean_distance_m,cost_m3,uncovered_area_m2\n1,2,3,4\n1,2\n", "line 3: '1,2', but 4 numbers"),
         (

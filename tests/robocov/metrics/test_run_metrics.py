@@ -11,7 +11,13 @@ from robocov.controllers import Rapf
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
 from robocov.metrics import CostHistory
-from robocov.metrics.run_metrics import COLUMNS, connections, figures_of, run_metrics, time_near_final
+from robocov.metrics.run_metrics import (
+    COLUMNS,
+    compute_final_metrics,
+    compute_run_metrics,
+    find_time_near_final,
+    measure_connectivity,
+)
 from robocov.record import Record
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -39,7 +45,7 @@ def test_integrals_are_those_of_plain_loops(record: Record) -> None:
             work += step * sum(power) / 2
             effort += step * record.forces[k, robot] @ record.forces[k, robot]
             way += np.hypot(*(record.positions[k + 1, robot] - record.positions[k, robot])) / 3
-    metrics = run_metrics(record, 5.0)
+    metrics = compute_run_metrics(record, 5.0)
     assert metrics.work[0] == metrics.effort[0] == metrics.path_length[0] == 0.0
     assert metrics.work[-1] == pytest.approx(work, rel=1e-12)
     assert metrics.effort[-1] == pytest.approx(effort, rel=1e-12)
@@ -48,7 +54,7 @@ def test_integrals_are_those_of_plain_loops(record: Record) -> None:
 
 
 def test_the_rate_says_how_often_and_changes_no_figure_of_the_run(record: Record) -> None:
-    often, rarely = run_metrics(record, 30.0), run_metrics(record, 0.0)
+    often, rarely = compute_run_metrics(record, 30.0), compute_run_metrics(record, 0.0)
     assert (len(often.time), len(rarely.time)) == (121, 2)
     assert often.final() == pytest.approx(rarely.final())
     for column, row in zip(COLUMNS.values(), np.array(often.rows()).T, strict=True):
@@ -62,7 +68,7 @@ def test_clearances_are_the_smallest_since_the_moment_before(record: Record) -> 
         for i, j in ((0, 1), (0, 2), (1, 2))
     ]
     smallest = np.min(gaps, axis=0)
-    metrics = run_metrics(record, 1.0)
+    metrics = compute_run_metrics(record, 1.0)
     assert metrics.robot_clearance[0] == pytest.approx(smallest[0])
     assert metrics.robot_clearance[1] == pytest.approx(smallest[1:31].min())
     assert metrics.final()["robot_clearance_m"] == pytest.approx(smallest.min())
@@ -71,7 +77,7 @@ def test_clearances_are_the_smallest_since_the_moment_before(record: Record) -> 
 
 
 def test_areas_are_parts_of_the_free_area(record: Record) -> None:
-    metrics = run_metrics(record)
+    metrics = compute_run_metrics(record)
     assert metrics.free_area == pytest.approx(ROOM.free.area)
     assert (metrics.sensed_area <= metrics.range_area + 1e-9).all()
     assert (metrics.visible_area <= metrics.free_area + 1e-9).all()
@@ -79,7 +85,7 @@ def test_areas_are_parts_of_the_free_area(record: Record) -> None:
 
 
 def test_one_robot_has_no_other_to_be_near_to() -> None:
-    alone = run_metrics(Simulation(ROOM, Rapf(), [[1, 1]]).run(0.5))
+    alone = compute_run_metrics(Simulation(ROOM, Rapf(), [[1, 1]]).run(0.5))
     assert alone.final()["robot_clearance_m"] is None
     assert alone.components.tolist() == [1, 1]
     assert alone.algebraic_connectivity.tolist() == [0.0, 0.0]
@@ -97,7 +103,7 @@ def test_connectivity_is_that_of_the_laplacian_written_down(n: int, reach: float
     ]
     laplacian = np.diag(np.sum(linked, axis=1)) - np.array(linked, dtype=float)
     values = np.linalg.eigvalsh(laplacian)
-    parts, connectivity = connections(places, ranges)
+    parts, connectivity = measure_connectivity(places, ranges)
     assert parts == int((values < 1e-9).sum())
     assert connectivity == pytest.approx(max(values[1], 0.0), abs=1e-9)
     assert (connectivity == 0.0) == (parts > 1)
@@ -106,10 +112,10 @@ def test_connectivity_is_that_of_the_laplacian_written_down(n: int, reach: float
 def test_a_path_a_ring_and_everybody() -> None:
     turn = np.arange(6) * np.pi / 3
     ring = np.column_stack([np.cos(turn), np.sin(turn)])
-    assert connections(ring, np.full(6, 1.01)) == (1, pytest.approx(1.0))  # 2 - 2 cos(2 pi / 6)
-    assert connections(ring, np.full(6, np.inf)) == (1, 6.0)
-    assert connections(ring, np.full(6, 0.5)) == (6, 0.0)
-    assert connections(np.empty((0, 2)), np.empty(0)) == (0, 0.0)
+    assert measure_connectivity(ring, np.full(6, 1.01)) == (1, pytest.approx(1.0))  # 2 - 2 cos(2 pi / 6)
+    assert measure_connectivity(ring, np.full(6, np.inf)) == (1, 6.0)
+    assert measure_connectivity(ring, np.full(6, 0.5)) == (6, 0.0)
+    assert measure_connectivity(np.empty((0, 2)), np.empty(0)) == (0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -123,11 +129,11 @@ def test_a_path_a_ring_and_everybody() -> None:
     ],
 )
 def test_the_time_from_which_on_the_cost_is_that_of_the_end(values: list[float], expected: float) -> None:
-    assert time_near_final(history(values)) == expected
+    assert find_time_near_final(history(values)) == expected
 
 
 def test_figures_for_a_table(record: Record) -> None:
-    figures = figures_of(record, history([2.0, 1.0, 1.0]))
+    figures = compute_final_metrics(record, history([2.0, 1.0, 1.0]))
     assert figures["near_final_s"] == 1.0
     assert set(figures) == {*COLUMNS.values(), "near_final_s"} - {"time_s"}
 
@@ -135,4 +141,4 @@ def test_figures_for_a_table(record: Record) -> None:
 @pytest.mark.parametrize("rate", [-1.0, float("nan"), float("inf")])
 def test_rates_that_are_none(record: Record, rate: float) -> None:
     with pytest.raises(ParameterError, match="rate: "):
-        run_metrics(record, rate)
+        compute_run_metrics(record, rate)

@@ -16,7 +16,7 @@ from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, RobocovError
 from robocov.files.writing import replace_file
 from robocov.mapfile import from_json
-from robocov.metrics import sample_moments
+from robocov.metrics import select_sampled_moments
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.record import ARRAYS, Record, Recorder
 from robocov.simulation import Simulation
@@ -421,7 +421,7 @@ class TestMoments:
         assert again.positions.tobytes() == thin.positions.tobytes()
         # costs are asked for at the same times as those of the whole record
         for rate in (1.0, 2.5, 5.0):
-            times = [run.time[sample_moments(run, rate)].tolist() for run in (record, again)]
+            times = [run.time[select_sampled_moments(run, rate)].tolist() for run in (record, again)]
             assert times[0] == times[1]
 
     @pytest.mark.parametrize("rate", [-1.0, np.inf, np.nan])

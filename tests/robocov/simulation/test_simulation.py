@@ -22,7 +22,7 @@ from robocov.density import Uniform
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle
 from robocov.errors import ParameterError, StartError
 from robocov.mapfile import load_map
-from robocov.metrics import clearances, contacts
+from robocov.metrics import compute_clearances, count_contacts
 from robocov.observation import Decision, Observations
 from robocov.record import ARRAYS, Record
 from robocov.simulation import Simulation, TeamState
@@ -137,13 +137,13 @@ def test_rapf_ends_below_rpf_among_obstacles_and_touches_nothing() -> None:
     starts = rooms.start().sample(6, seed=0)
     rapf, rpf = (Simulation(rooms, each, starts, dt=1 / 30).run(40.0) for each in (Rapf(), Rpf()))
     assert cost(rapf.positions[-1]).mean_distance < 0.95 * cost(rpf.positions[-1]).mean_distance
-    assert contacts(rapf, clearances(rapf)) == 0
+    assert count_contacts(rapf, compute_clearances(rapf)) == 0
 
 
 def test_two_hundred_robots_on_the_large_map() -> None:
     campus = load_map("campus")
     record = Simulation(campus, Rapf(), campus.start().sample(200, seed=0)).run(15.0)
-    clearance = clearances(record)
+    clearance = compute_clearances(record)
     assert clearance.min() > -2e-3
     moved = np.hypot(*(record.positions[-1] - record.positions[0]).T)
     assert np.median(moved) > 0.5

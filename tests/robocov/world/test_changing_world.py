@@ -8,7 +8,7 @@ from robocov.controllers import Rapf
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError, StartError
-from robocov.metrics import clearances, contacts, cost_history, summarise
+from robocov.metrics import compute_clearances, compute_cost_history, count_contacts, summarise
 from robocov.record import Record
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -89,7 +89,7 @@ def test_when_all_have_failed_the_run_goes_on() -> None:
     record = Simulation(HALL, Rapf(), STARTS, conditions=conditions).run(6.0)
     assert not record.working[-1].any()
     assert (record.positions[-1] == record.positions[15]).all()
-    history = cost_history(record, CoverageCost(HALL, 16), 2.0)
+    history = compute_cost_history(record, CoverageCost(HALL, 16), 2.0)
     assert np.isnan(history.mean_distance[-1])
     assert history.uncovered_area[-1] == pytest.approx(80.0)
     assert summarise(record, history)["stuck_robots"] is None
@@ -99,7 +99,7 @@ def test_cost_counts_who_works() -> None:
     conditions = Conditions(failures=((1, 0.3), (2, 0.3)), joins=((3, 0.3),))
     record = Simulation(HALL, Rapf(), STARTS, conditions=conditions).run(0.5)
     cost = CoverageCost(HALL, 32)
-    history = cost_history(record, cost, 60.0)
+    history = compute_cost_history(record, cost, 60.0)
     for k in (0, 10, 20, 30):
         counted = record.working[k]
         assert history.mean_distance[k] == cost(record.positions[k][counted]).mean_distance
@@ -113,13 +113,13 @@ def test_clearance_is_to_walls_and_to_robots_that_failed() -> None:
     places = np.array([[2.0, 4.0], [6.0, 4.0]])
     conditions = Conditions(failures=((2, 0.0),), position_noise=0.3, sensing_noise=0.3)
     record = Simulation(HALL, Rapf(), places, conditions=conditions).run(0.1)
-    gap = clearances(record)
+    gap = compute_clearances(record)
     assert gap[0, 0] == pytest.approx(2.0 - 0.1, abs=1e-6)  # the left wall, whatever the sensor said
     assert np.isinf(gap[:, 1]).all()
     near = np.array([[5.79, 4.0], [6.0, 4.0]])
     touching = Simulation(HALL, Rapf(), near, conditions=Conditions(failures=((2, 0.0),))).run(0.0)
-    assert clearances(touching)[0, 0] == pytest.approx(0.01, abs=1e-6)
-    assert contacts(touching, clearances(touching) - 0.01) == 1
+    assert compute_clearances(touching)[0, 0] == pytest.approx(0.01, abs=1e-6)
+    assert count_contacts(touching, compute_clearances(touching) - 0.01) == 1
 
 
 def test_others_sense_who_failed() -> None:
@@ -144,7 +144,9 @@ def test_many_robots_touch_only_while_they_work() -> None:
     team = Team.homogeneous(len(grid), radius=0.1)
     conditions = Conditions(joins=tuple((k + 1, 5.0, (0.5, 0.5)) for k in range(1, 60)))
     record = Simulation(HALL, Rapf(), grid, team, conditions=conditions).run(0.1)
-    assert contacts(record, clearances(record)) == 0  # those that will join are all in one place until then
+    assert (
+        count_contacts(record, compute_clearances(record)) == 0
+    )  # those that will join are all in one place until then
 
 
 def test_a_run_under_conditions_is_saved_and_read(tmp_path: object) -> None:

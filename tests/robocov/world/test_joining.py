@@ -10,9 +10,9 @@ from robocov.conditions import Conditions, JoinedRobot
 from robocov.controllers import Lloyd
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import ParameterError
-from robocov.metrics import clearances, path_lengths
+from robocov.metrics import compute_clearances, compute_path_lengths
 from robocov.metrics.advice import advise
-from robocov.metrics.run_metrics import run_metrics
+from robocov.metrics.run_metrics import compute_run_metrics
 from robocov.record import Record
 from robocov.simulation import Simulation
 
@@ -30,12 +30,12 @@ def run_with(*joins: tuple[object, ...], duration: float = 3.0) -> Record:
 @pytest.mark.parametrize("place", [(19.0, 9.0), (10.0, 5.0), (20.0, 10.0), (0.0, 0.0)])
 def test_the_path_of_a_robot_begins_where_it_joins(place: tuple[float, float]) -> None:
     record = run_with((3, 1.0, place))
-    lengths = path_lengths(record.positions, record.travelled)
+    lengths = compute_path_lengths(record.positions, record.travelled)
     since = int(np.argmax(record.present[:, 2]))
-    np.testing.assert_array_equal(lengths[2], path_lengths(record.positions[since:])[2])
+    np.testing.assert_array_equal(lengths[2], compute_path_lengths(record.positions[since:])[2])
     assert 0.0 < lengths[2] <= 2.0  # at 1 m/s
-    assert run_metrics(record).path_length[-1] == pytest.approx(lengths.mean())
-    np.testing.assert_array_equal(lengths[:2], path_lengths(record.positions)[:2])
+    assert compute_run_metrics(record).path_length[-1] == pytest.approx(lengths.mean())
+    np.testing.assert_array_equal(lengths[:2], compute_path_lengths(record.positions)[:2])
 
 
 def test_a_robot_that_joins_beside_a_wall_is_moved_and_that_is_recorded(tmp_path: Path) -> None:
@@ -101,8 +101,8 @@ def test_a_robot_that_was_put_elsewhere_by_hand_did_not_travel_there() -> None:
     positions[20:, 1] += 5.0
     session = {"placed": [{"time_s": float(record.time[20]), "robots": [7]}], "robots": [4, 7, 9]}
     moved = replace(record, positions=positions, session=session)
-    usual = path_lengths(record.positions)
-    lengths = path_lengths(moved.positions, moved.travelled)
+    usual = compute_path_lengths(record.positions)
+    lengths = compute_path_lengths(moved.positions, moved.travelled)
     np.testing.assert_allclose(lengths[[0, 2]], usual[[0, 2]])
     step = np.hypot(*(record.positions[20, 1] - record.positions[19, 1]))
     assert lengths[1] == pytest.approx(usual[1] - step)
@@ -113,4 +113,4 @@ def test_ordinary_records_travel_in_every_step() -> None:
     record = run_with()
     assert record.joined == () and record.travelled.all()
     assert "events" not in record.to_json()
-    assert advise(record, clearances(record)) == []
+    assert advise(record, compute_clearances(record)) == []

@@ -12,7 +12,7 @@ from robocov.controllers import Lloyd, Rapf
 from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle, WallObstacle
 from robocov.errors import StartError
-from robocov.metrics import MOVING_RATE, clearances, cost_history
+from robocov.metrics import MAX_RATE_WITH_MOVING_OBSTACLES_HZ, compute_clearances, compute_cost_history
 from robocov.simulation import Simulation, TeamState
 
 
@@ -134,8 +134,8 @@ def test_a_simulation_that_begins_later_has_the_obstacles_where_they_are_then() 
 
 def test_cost_is_of_the_map_as_it_is() -> None:
     record = Simulation(HALL, Rapf(), [[1.0, 3.0], [7.0, 3.0], [3.0, 4.0]]).run(3.0)
-    history = cost_history(record, CoverageCost(HALL, 24), 10.0)
-    np.testing.assert_allclose(np.diff(history.time), 1.0 / MOVING_RATE)
+    history = compute_cost_history(record, CoverageCost(HALL, 24), 10.0)
+    np.testing.assert_allclose(np.diff(history.time), 1.0 / MAX_RATE_WITH_MOVING_OBSTACLES_HZ)
     for time, mean in zip(history.time.tolist(), history.mean_distance.tolist(), strict=True):
         k = round(time * 60)
         assert mean == CoverageCost(HALL.at(time), 24)(record.positions[k]).mean_distance
@@ -164,6 +164,6 @@ def test_who_is_run_over_covers_nothing() -> None:
 
 def test_clearance_is_to_where_it_was() -> None:
     record = Simulation(HALL, Rapf(k_rep=0.0, k_att=0.0), [[5.0, 1.0]]).run(4.0)
-    gap = clearances(record)[:, 0]
+    gap = compute_clearances(record)[:, 0]
     # the cart's rim comes from 2.6 m at half a metre a second, then it pushes
     np.testing.assert_allclose(gap[:60], np.minimum(2.3 - 0.5 * record.time[:60], 0.9), atol=2e-3)

@@ -245,13 +245,13 @@ def arrays(folder: Path, **changes) -> None:
         ),
         (
             lambda run: (run / "cost.csv").write_text("t,J\n"),
-            "{run}/cost.csv: line 1: the header time_s,mean_distance_m,cost_m3,uncovered_area_m2 was wanted",
+            "{run}/cost.csv: line 1: expected the header time_s,mean_distance_m,cost_m3,uncovered_area_m2",
         ),
         (
             lambda run: (run / "cost.csv").write_text(
                 "time_s,mean_distance_m,cost_m3,uncovered_area_m2\n0,1,2,3\n1,2,3\n"
             ),
-            "{run}/cost.csv: line 3: '1,2,3', but 4 numbers were wanted",
+            "{run}/cost.csv: line 3: expected 4 numbers, got '1,2,3'",
         ),
         (
             lambda run: (run / "cost.csv").write_text(

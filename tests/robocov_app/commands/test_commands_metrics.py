@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 from called import SHORT, complaint
 
-from robocov.metrics.run_metrics import COLUMNS, run_metrics
+from robocov.metrics.run_metrics import COLUMNS, compute_run_metrics
 from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.runs import artifacts
@@ -29,7 +29,7 @@ def test_each_run_gets_its_table(folder: Path, capsys: pytest.CaptureFixture[str
     for name in ("rapf", "rpf"):
         header, *rows = (folder / name / "metrics.csv").read_text().splitlines()
         assert header.split(",") == list(COLUMNS.values())
-        expected = run_metrics(Record.load(folder / name), 4.0)
+        expected = compute_run_metrics(Record.load(folder / name), 4.0)
         assert len(rows) == len(expected.time) == 5
         assert [float(cell) for cell in rows[-1].split(",")] == [float(x) for x in expected.rows()[-1]]
 

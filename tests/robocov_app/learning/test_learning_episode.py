@@ -11,7 +11,7 @@ from robocov.controllers import Rapf
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import InputError, ParameterError, StartError
-from robocov.metrics import clearances, contacts
+from robocov.metrics import compute_clearances, count_contacts
 from robocov.simulation import Simulation
 from robocov_app.learning import CoverageTask, ObservationLayout
 from robocov_app.learning.episode import Episode, drawn_episode
@@ -81,9 +81,9 @@ def test_contacts_are_told_and_cost(empty: Environment) -> None:
         decrease = (before - episode.result.mean_distance) / episode.reference
         np.testing.assert_allclose(outcome.rewards, decrease - 0.5 * outcome.contact, atol=1e-12)
     record = episode.record()
-    clear = clearances(record)
+    clear = compute_clearances(record)
     expected = ((clear[1:] <= 1e-3) * record.dt).sum(axis=0)
-    assert contacts(record, clear) == 1
+    assert count_contacts(record, clear) == 1
     np.testing.assert_allclose(touched, expected, atol=1e-12)
     assert touched[0] > 0.3 and not touched[1:].any()
 

@@ -8,7 +8,7 @@ import pytest
 from reported_results import entry, falling, result_of, walk
 
 from robocov.metrics import CostHistory
-from robocov.metrics.run_metrics import run_metrics
+from robocov.metrics.run_metrics import compute_run_metrics
 from robocov.team import Team
 from robocov_app.report.groups import styles
 from robocov_app.report.plots import MOST_MEASURED, MOST_ROBOTS, measure_plots
@@ -36,7 +36,7 @@ def test_every_metric_has_a_plot_of_all_runs_with_its_end_in_words() -> None:
     runs = [run_of(seconds=2.0), run_of("rpf", seconds=2.0)]
     plots = plots_of(runs)
     assert list(plots) == ["Sensed", "Seen", "Energy", "Path", "Clearance", "Distance kept"]
-    metrics = run_metrics(runs[0].record, 15.0)
+    metrics = compute_run_metrics(runs[0].record, 15.0)
     assert f"to {metrics.path_length[-1]:.4g} m; RPF" in plots["Path"]
     assert f"to {100.0 * metrics.visible_area[-1] / metrics.free_area:.4g} %" in plots["Seen"]
     assert len({svg.partition('id="')[2].partition('"')[0] for svg in plots.values()}) == len(plots)
@@ -47,7 +47,7 @@ def test_what_tells_nothing_is_left_out() -> None:
     apart = run_of()
     team = replace(apart.record.team, communication_range=np.full(4, 3.0))
     apart = replace(apart, record=replace(apart.record, team=team))
-    parts = run_metrics(apart.record, 5.0).components
+    parts = compute_run_metrics(apart.record, 5.0).components
     assert len(set(parts.tolist())) > 1
     assert "Connectivity" in plots_of([apart])
 

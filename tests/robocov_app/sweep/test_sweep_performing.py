@@ -14,7 +14,7 @@ import pytest
 from swept import HEAD, ROOM, controller, small_study
 
 from robocov.cost import CoverageCost
-from robocov.metrics import cost_history, summarise
+from robocov.metrics import compute_cost_history, summarise
 from robocov.metrics.results import read_history
 from robocov.record import ARRAYS, Record
 from robocov_app.sweep.study import Study, StudyMap, Task, tasks_of
@@ -48,7 +48,7 @@ def test_a_run_is_that_of_the_task(tmp_path: Path) -> None:
     assert record.dt == task.dt
 
     history = read_history(tmp_path / "cost.csv")
-    expected = cost_history(whole, CoverageCost(ROOM, task.lattice), task.cost_hz)
+    expected = compute_cost_history(whole, CoverageCost(ROOM, task.lattice), task.cost_hz)
     assert np.array_equal(history.mean_distance, expected.mean_distance)
     assert len(history.time) == 6 * 2 + 1
 
@@ -56,7 +56,7 @@ def test_a_run_is_that_of_the_task(tmp_path: Path) -> None:
 def test_figures_are_those_of_all_moments_not_of_those_that_are_kept(tmp_path: Path) -> None:
     task = first(small_study(duration=6.0, controllers=("lloyd",), robots=(5,), record_hz=0.0))
     whole = simulated(task, ROOM)
-    history = cost_history(whole, CoverageCost(ROOM, task.lattice), task.cost_hz)
+    history = compute_cost_history(whole, CoverageCost(ROOM, task.lattice), task.cost_hz)
     summary = summarise(whole, history)
     outcome = perform(task)
     assert list(outcome.figures) == list(FIGURES)

@@ -13,7 +13,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.environment import Environment, Point
 from robocov.errors import ParameterError, RobocovError
-from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
+from robocov.metrics import SETTLED_DISTANCE_M, SETTLED_WINDOW_S
 from robocov.observation import Snapshot
 from robocov_app.render.scene import Sensed
 from robocov_app.viewer.session import changes
@@ -208,7 +208,7 @@ class Session:
 
     def recent(self, pane: Pane, number: int) -> Array:
         """Return where a robot was during the last seconds before the moment looked at, (k, 2) m."""
-        last, first, places = self._number, self.history.at(self.time - SETTLED_WINDOW), []
+        last, first, places = self._number, self.history.at(self.time - SETTLED_WINDOW_S), []
         for k in range(first, last + 1, max(1, (last - first) // 30)):
             state = self.history[k].states.get(pane.number)
             if state is not None and number in state.setup.numbers:
@@ -275,13 +275,13 @@ class Session:
             self.settled = self._has_settled()
 
     def _has_settled(self) -> bool:
-        if self.hand is not None or self.end < SETTLED_WINDOW:
+        if self.hand is not None or self.end < SETTLED_WINDOW_S:
             return False
-        before = self.history[self.history.at(self.end - SETTLED_WINDOW)]
+        before = self.history[self.history.at(self.end - SETTLED_WINDOW_S)]
         for pane in self.panes:
             state = before.states[pane.number]
             alike, places = state.setup is pane.setup, pane.simulation.positions
-            if not alike or np.hypot(*(places - state.positions).T).max() >= SETTLED_DISTANCE:
+            if not alike or np.hypot(*(places - state.positions).T).max() >= SETTLED_DISTANCE_M:
                 return False
         return True
 

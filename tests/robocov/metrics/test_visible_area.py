@@ -7,7 +7,7 @@ from cost_cases import OFFICE
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov.metrics.sight import covered, views
+from robocov.metrics.visible_area import compute_covered_areas, compute_visibility_polygons
 
 seeds = st.integers(0, 2**32 - 1)
 ROOMS = shapely.box(0, 0, 6, 3) - shapely.box(2.9, 0, 3.1, 2)
@@ -37,7 +37,7 @@ def test_what_is_seen_is_what_segments_reach(seed: int, name: str) -> None:
     place = targets[rng.integers(len(targets))] + rng.uniform(-0.01, 0.01, 2)
     if not shapely.contains_xy(free, *place):
         return
-    (view,) = views(free, place[None])
+    (view,) = compute_visibility_polygons(free, place[None])
     # places on the rim of the view are for rounding to decide
     clear = shapely.distance(view.boundary, shapely.points(targets)) > 1e-9
     inside = shapely.contains_xy(view, *targets.T)
@@ -46,13 +46,13 @@ def test_what_is_seen_is_what_segments_reach(seed: int, name: str) -> None:
 
 def test_a_convex_room_is_seen_whole_from_anywhere() -> None:
     walls = shapely.box(0, 0, 4, 3)
-    for view in views(walls, np.array([[0.1, 0.1], [2.0, 1.5], [3.999, 2.999]])):
+    for view in compute_visibility_polygons(walls, np.array([[0.1, 0.1], [2.0, 1.5], [3.999, 2.999]])):
         assert view.area == pytest.approx(12.0, rel=1e-12)
 
 
 def test_corners_in_line_with_the_eye() -> None:
     """From (0.5, 2) the two corners of the wall's head are on one level ray, which grazes it."""
-    (view,) = views(ROOMS, np.array([[0.5, 2.0]]))
+    (view,) = compute_visibility_polygons(ROOMS, np.array([[0.5, 2.0]]))
     assert view.area == pytest.approx(2.9 * 3 + 3.1 * 1, rel=1e-12)
 
 
@@ -63,7 +63,7 @@ def test_covered_areas_are_those_of_a_fine_lattice_and_of_buffers(seed: int, n: 
     free = OFFICE.free
     targets = lattice(free, 90)
     places = targets[rng.choice(len(targets), n, replace=False)]
-    found = covered(free, places, np.full(n, reach))
+    found = compute_covered_areas(free, places, np.full(n, reach))
     discs = shapely.union_all(shapely.buffer(shapely.points(places), reach, quad_segs=1000))
     assert found.within_range == pytest.approx(shapely.intersection(discs, free).area, rel=1e-4)
     seen = np.stack([seen_one_by_one(free, place, targets) for place in places])
@@ -76,17 +76,17 @@ def test_covered_areas_are_those_of_a_fine_lattice_and_of_buffers(seed: int, n: 
 
 def test_a_disc_in_the_open_and_one_behind_a_wall() -> None:
     walls = shapely.box(0, 0, 10, 10)
-    assert covered(walls, np.array([[5.0, 5.0]]), np.array([2.0])).sensed == pytest.approx(
+    assert compute_covered_areas(walls, np.array([[5.0, 5.0]]), np.array([2.0])).sensed == pytest.approx(
         4 * np.pi, rel=5e-5
     )
     halves = shapely.box(0, 0, 4, 4) - shapely.box(1.9, 0, 2.1, 4)
-    found = covered(halves, np.array([[1.0, 2.0]]), np.array([np.inf]))
+    found = compute_covered_areas(halves, np.array([[1.0, 2.0]]), np.array([np.inf]))
     assert found == pytest.approx((1.9 * 4, 1.9 * 4, 1.9 * 4))
-    found = covered(halves, np.array([[1.0, 2.0]]), np.array([3.0]))
+    found = compute_covered_areas(halves, np.array([[1.0, 2.0]]), np.array([3.0]))
     assert found.within_range > found.visible == pytest.approx(1.9 * 4)
 
 
 def test_robots_that_are_nowhere_cover_nothing() -> None:
     walls = ROOMS
-    assert covered(walls, np.empty((0, 2)), np.empty(0)) == (0.0, 0.0, 0.0)
-    assert covered(walls, np.array([[3.0, 1.0]]), np.array([2.0])) == (0.0, 0.0, 0.0)
+    assert compute_covered_areas(walls, np.empty((0, 2)), np.empty(0)) == (0.0, 0.0, 0.0)
+    assert compute_covered_areas(walls, np.array([[3.0, 1.0]]), np.array([2.0])) == (0.0, 0.0, 0.0)

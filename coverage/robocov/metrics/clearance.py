@@ -1,0 +1,156 @@
+"""Gaps between robots and walls, gaps between robots, and contacts."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array, IntArray
+from robocov.compiled import kernel
+from robocov.record import Record
+from robocov.sensor import RangeSensor
+from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
+
+MAX_CONTACT_GAP_M = 1e-3
+"""Gap below which two bodies are in contact."""
+
+_FIRST_REACH_M = 1.0
+"""Range of the first query for a nearest wall; the time of a query grows with its range."""
+_REACH_FACTOR = 4.0
+"""Factor between the ranges of successive queries."""
+
+
+class RobotGaps(NamedTuple):
+    """Gaps between the rims of robots along a run."""
+
+    smallest: Array
+    """(T,) m, the smallest gap between two working robots at each moment; inf if fewer than two work."""
+    contacts: int
+    """Number of times that two robots came into contact."""
+
+
+def compute_clearances(record: Record) -> Array:
+    """Compute the gap between each robot's rim and the nearest wall.
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    (T, n) array, m
+        inf for robots that do not work. Moving obstacles and robots that have failed are walls.
+    """
+    if record.conditions is not None or record.environment.has_moving_obstacles:
+        return _compute_clearances_by_queries(record)
+    return _compute_clearances_from_record(record)
+
+
+def _compute_clearances_from_record(record: Record) -> Array:
+    """Return the clearances among walls that do not change, from the obstacle points that robots sensed.
+
+    The nearest walls of robots that sensed none are queried here.
+    """
+    positions = record.positions.reshape(-1, 2)
+    nearest = record.obstacle_points.reshape(-1, 2).copy()
+    rows = np.flatnonzero(np.isnan(nearest[:, 0]))
+    if len(rows) > 0:
+        sensor = RangeSensor(build_solid_pieces(record.environment))
+        reach = _FIRST_REACH_M
+        while len(rows) > 0:
+            nearest[rows] = sensor.find_nearest_points(positions[rows], np.full(len(rows), reach))
+            rows = rows[np.isnan(nearest[rows, 0])]
+            reach *= _REACH_FACTOR
+    distances = np.sqrt(((positions - nearest) ** 2).sum(axis=1)).reshape(record.positions.shape[:2])
+    return np.asarray(distances - record.team.radius)
+
+
+def _compute_clearances_by_queries(record: Record) -> Array:
+    """Return the clearances where robots sensed with noise, or walls change."""
+    environment = record.environment
+    working = record.working
+    radius = record.team.radius
+    sensor = RangeSensor(build_solid_pieces(environment), build_movers(environment))
+    has_failed = record.present & ~working
+    width, height = np.ptp(environment.region.vertices, axis=0)
+    reach = np.full(len(radius), float(np.hypot(width, height)))
+    clearances = np.full(working.shape, np.inf)
+    for moment, positions in enumerate(record.positions):
+        failed_robots = np.column_stack([positions, radius])[has_failed[moment]]
+        sensor.set_time(float(record.time[moment]), failed_robots)
+        rows = np.flatnonzero(working[moment])
+        nearest = sensor.find_nearest_points(positions[rows], reach[rows])
+        distances = np.sqrt(((positions[rows] - nearest) ** 2).sum(axis=1))
+        clearances[moment, rows] = distances - radius[rows]
+    return clearances
+
+
+def count_contacts(record: Record, clearances: Array) -> int:
+    """Count how many times a robot came into contact with a wall or with another robot.
+
+    Parameters
+    ----------
+    record : Record
+    clearances : (T, n) array, m
+        As `compute_clearances` returns them. A robot that has failed is a wall.
+    """
+    touches = clearances <= MAX_CONTACT_GAP_M
+    touches_at_start = touches[0].sum()
+    begins_to_touch = touches[1:] & ~touches[:-1]
+    return int(touches_at_start + begins_to_touch.sum()) + measure_robot_gaps(record).contacts
+
+
+def measure_robot_gaps(record: Record) -> RobotGaps:
+    """Measure the gaps between the rims of working robots, and count their contacts.
+
+    Parameters
+    ----------
+    record : Record
+    """
+    positions = np.where(record.working[:, :, None], record.positions, np.nan)
+    smallest = np.full(len(positions), np.inf)
+    contacts = _measure_gaps(
+        positions=positions,
+        radius=np.array(record.team.radius),
+        order=positions[:, :, 0].argsort(axis=1),
+        smallest=smallest,
+    )
+    return RobotGaps(smallest, contacts)
+
+
+@kernel
+def _measure_gaps(positions: Array, radius: Array, order: IntArray, smallest: Array) -> int:
+    """Write the smallest gap of each moment to `smallest`, (T,) m; return the number of contacts.
+
+    `order`, (T, n), lists the robots by x. Those that do not work, whose positions are nan, come last.
+    """
+    max_diameter = 0.0
+    for i in range(len(radius)):
+        max_diameter = max(max_diameter, 2.0 * radius[i])
+    contacts = 0
+    for t in range(len(positions)):
+        for a in range(len(radius)):
+            i = order[t, a]
+            for b in range(a + 1, len(radius)):
+                j = order[t, b]
+                min_gap = positions[t, j, 0] - positions[t, i, 0] - max_diameter
+                # Robots further along x are not closer; the comparison is false for nan.
+                if not min_gap <= max(smallest[t], MAX_CONTACT_GAP_M):
+                    break
+                radii = radius[i] + radius[j]
+                distance = _compute_distance(positions, t, i, j)
+                smallest[t] = min(smallest[t], distance - radii)
+                if distance <= radii + MAX_CONTACT_GAP_M and not (
+                    t > 0 and _compute_distance(positions, t - 1, i, j) <= radii + MAX_CONTACT_GAP_M
+                ):
+                    contacts += 1
+    return contacts
+
+
+@kernel
+def _compute_distance(positions: Array, t: int, i: int, j: int) -> float:
+    return math.sqrt(
+        (positions[t, i, 0] - positions[t, j, 0]) ** 2 + (positions[t, i, 1] - positions[t, j, 1]) ** 2
+    )

@@ -1,0 +1,62 @@
+"""Connectivity of the communication graph of a team."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from robocov.arrays import Array
+from robocov.observation.neighbours import Neighbours
+
+_EIGENVALUE_DECIMALS = 12
+"""The Laplacian consists of whole numbers; further decimals of its eigenvalues are rounding errors."""
+
+
+class Connectivity(NamedTuple):
+    """Connectivity of a graph."""
+
+    components: int
+    """Number of connected components."""
+    algebraic_connectivity: float
+    """Second smallest eigenvalue of the graph's Laplacian; 0 for a graph in several components."""
+
+
+def measure_connectivity(positions: Array, ranges: Array) -> Connectivity:
+    """Measure the connectivity of the communication graph.
+
+    Two robots are linked if each is in the communication range of the other.
+
+    Parameters
+    ----------
+    positions : (n, 2) array, m
+    ranges : (n,) array, m
+        Communication ranges.
+
+    Notes
+    -----
+    The algebraic connectivity is n where all n robots are linked, and 0 for a single one. Source: M. Fiedler,
+    *Algebraic connectivity of graphs*, Czechoslovak Mathematical Journal 23 (1973).
+
+    Examples
+    --------
+    >>> measure_connectivity(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]), np.full(3, 1.0))
+    Connectivity(components=1, algebraic_connectivity=1.0)
+    """
+    n = len(positions)
+    if n == 0:
+        return Connectivity(0, 0.0)
+    neighbours = Neighbours.from_ranges(positions, ranges)
+    if neighbours.is_complete:
+        return Connectivity(1, float(n) if n > 1 else 0.0)
+    robot, neighbour = neighbours.list_pairs()
+    adjacency = coo_array((np.ones(len(robot)), (robot, neighbour)), (n, n))
+    components, _ = connected_components(adjacency, directed=False)
+    if n == 1 or components > 1:
+        return Connectivity(int(components), 0.0)
+    laplacian = np.diag(np.bincount(robot).astype(float))
+    laplacian[robot, neighbour] = -1.0
+    second_eigenvalue = float(np.linalg.eigvalsh(laplacian)[1])
+    return Connectivity(int(components), round(second_eigenvalue, _EIGENVALUE_DECIMALS))

@@ -1,0 +1,143 @@
+"""The coverage cost along a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.cost import CoverageCost, TimeVaryingCost
+from robocov.drawing import Drawable
+from robocov.errors import format_count, require_type
+from robocov.record import Record, nearest_moments
+
+DEFAULT_RATE_HZ = 10.0
+"""Samples of the coverage cost per simulated second."""
+MAX_RATE_WITH_MOVING_OBSTACLES_HZ = 1.0
+"""The same where obstacles move, and each moment has a map of its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class CostHistory(Drawable):
+    """The coverage cost (22) along a run, at K of its moments."""
+
+    _drawn_as = "history"
+
+    time: Array
+    """(K,) s"""
+    mean_distance: Array
+    """(K,) m"""
+    cost: Array
+    """(K,) m³"""
+    uncovered_area: Array
+    """(K,) m²"""
+    mean_time: Array | None = None
+    """(K,) s, mean over the area of the time after which the first robot can be there, each at its own
+    maximum speed. None if all robots have the same."""
+
+    def __repr__(self) -> str:
+        first = float(self.mean_distance[0])
+        last = float(self.mean_distance[-1])
+        moments = format_count(len(self.time), "moment")
+        return f"<CostHistory {moments}, {self.time[-1]:.1f} s, mean distance {first:.3f} to {last:.3f} m>"
+
+
+def compute_cost_history(
+    record: Record,
+    cost: CoverageCost,
+    rate: float = DEFAULT_RATE_HZ,
+    on_sample: Callable[[], None] | None = None,
+) -> CostHistory:
+    """Compute the coverage cost along a run.
+
+    Only working robots count, and moving obstacles are at their positions of each moment.
+
+    Parameters
+    ----------
+    record : Record
+    cost : CoverageCost
+        Cost of the record's environment.
+    rate : float, Hz
+        Samples per simulated second, see `select_sampled_moments`.
+    on_sample : callable or None
+        Called after each sample, to report progress.
+
+    Raises
+    ------
+    ParameterError
+        If `record` or `cost` is of another type.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rooms = rc.load_map("rooms")
+    >>> record = rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(6, seed=0)).run(2.0)
+    >>> history = rc.compute_cost_history(record, rc.CoverageCost(rooms, lattice=16), rate=1.0)
+    >>> history.time
+    array([0., 1., 2.])
+    """
+    require_type("record", record, Record, 'a Record, as Simulation.run and Record.load("run") return,')
+    require_type("cost", cost, CoverageCost, "a CoverageCost")
+    moments = select_sampled_moments(record, rate)
+    samples = len(moments)
+    mean_distance = np.empty(samples)
+    value = np.empty(samples)
+    uncovered_area = np.empty(samples)
+    has_mixed_speeds = record.team.has_mixed_speeds
+    mean_time = np.full(samples, np.nan)
+    cost_at_time = TimeVaryingCost(cost)
+    for sample, moment in enumerate(moments):
+        time = float(record.time[moment])
+        positions = record.positions[moment]
+        working = None if record.conditions is None else record.working[moment]
+        figures = cost_at_time.compute_figures(time, positions, working)
+        mean_distance[sample], value[sample], uncovered_area[sample] = figures
+        if has_mixed_speeds:
+            result = cost_at_time(time, positions, working, record.team.max_speed)
+            if result is not None:
+                mean_time[sample] = result.mean_time
+        if on_sample is not None:
+            on_sample()
+    return CostHistory(
+        time=record.time[moments],
+        mean_distance=mean_distance,
+        cost=value,
+        uncovered_area=uncovered_area,
+        mean_time=mean_time if has_mixed_speeds else None,
+    )
+
+
+def select_sampled_moments(record: Record, rate: float) -> list[int]:
+    """Return the row numbers of the moments nearest to multiples of 1/rate, and of the last moment.
+
+    Parameters
+    ----------
+    record : Record
+    rate : float, Hz
+        At most `MAX_RATE_WITH_MOVING_OBSTACLES_HZ` is used where obstacles move.
+    """
+    if record.environment.has_moving_obstacles:
+        rate = min(rate, MAX_RATE_WITH_MOVING_OBSTACLES_HZ)
+    return [int(moment) for moment in nearest_moments(record.time, rate)]
+
+
+def compute_mean_over_run(time: Array, values: Array) -> float:
+    """Compute the mean over time of values sampled along a run, by the trapezoidal rule.
+
+    Parameters
+    ----------
+    time : (K,) array, s
+        Ascending.
+    values : (K,) array
+
+    Examples
+    --------
+    >>> compute_mean_over_run(np.array([0.0, 1.0, 3.0]), np.array([4.0, 2.0, 2.0]))
+    2.3333333333333335
+    """
+    duration = float(time[-1] - time[0])
+    if duration == 0.0:
+        return float(values[-1])
+    return float(np.trapezoid(values, time)) / duration

@@ -1,0 +1,116 @@
+"""Motion of a team along a run: settling, path lengths and stuck robots."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray
+from robocov.record import TIME_ROUNDING_S
+
+SETTLED_WINDOW_S = 4.0
+"""Time within which a robot at rest does not get away from its position."""
+SETTLED_DISTANCE_M = 0.05
+"""Net displacement in this time below which a robot is at rest."""
+
+STUCK_WINDOW_S = 5.0
+"""Time within which a stuck robot does not get away from its position."""
+STUCK_DISTANCE_M = 0.05
+"""Net displacement in this time below which a robot may be stuck."""
+MIN_STUCK_GOAL_DISTANCE_M = 0.5
+"""Distance from its goal above which a robot that does not move is stuck."""
+
+
+def find_settling_time(
+    time: Array,
+    positions: Array,
+    window: float = SETTLED_WINDOW_S,
+    distance: float = SETTLED_DISTANCE_M,
+) -> float | None:
+    """Find when the team came to rest.
+
+    Parameters
+    ----------
+    time : (T,) array, s
+        Evenly spaced.
+    positions : (T, n, 2) array, m
+    window : float, s
+    distance : float, m
+
+    Returns
+    -------
+    float or None
+        The first time from which on no robot's net displacement over any `window` reaches `distance`, in
+        seconds; None if the team still moved at the end.
+
+    Notes
+    -----
+    Speed is no criterion: a robot may tremble in one place for ever.
+
+    Examples
+    --------
+    >>> time = np.arange(0.0, 12.0)
+    >>> x = np.minimum(time, 3.0)
+    >>> find_settling_time(time, np.stack([x, 0.0 * x], axis=1)[:, None, :])
+    3.0
+    """
+    dt = float(time[1] - time[0]) if len(time) > 1 else 0.0
+    span = round(window / dt) if dt > 0 else 0
+    if span == 0 or len(time) <= span:
+        return None
+    displacement = positions[span:] - positions[:-span]
+    is_moving = (np.sqrt((displacement**2).sum(axis=-1)) >= distance).any(axis=1)
+    first_at_rest = int(np.flatnonzero(is_moving).max(initial=-1)) + 1
+    return float(time[first_at_rest]) if first_at_rest < len(is_moving) else None
+
+
+def compute_path_lengths(positions: Array, travelled: BoolArray | None = None) -> Array:
+    """Compute the length of each robot's path.
+
+    Parameters
+    ----------
+    positions : (T, n, 2) array, m
+    travelled : (T - 1, n) bool array, optional
+        Mask of the displacements that count, as `Record.travelled`; by default all do.
+
+    Returns
+    -------
+    (n,) array, m
+
+    Examples
+    --------
+    >>> compute_path_lengths(np.array([[[0.0, 0.0]], [[3.0, 4.0]], [[3.0, 5.0]]]))
+    array([6.])
+    """
+    lengths = np.sqrt((np.diff(positions, axis=0) ** 2).sum(axis=-1))
+    if travelled is not None:
+        lengths = np.where(travelled, lengths, 0.0)
+    return np.asarray(lengths.sum(axis=0))
+
+
+def count_stuck_robots(time: Array, positions: Array, goals: Array) -> int | None:
+    """Count the robots that are far from their goals at the end, but no longer approach them.
+
+    A robot is stuck if its distance from its goal exceeds `MIN_STUCK_GOAL_DISTANCE_M` and its net
+    displacement over the last `STUCK_WINDOW_S` is below `STUCK_DISTANCE_M`.
+
+    Parameters
+    ----------
+    time : (T,) array, s
+    positions : (T, n, 2) array, m
+    goals : (T, n, 2) array, m
+        nan where a robot has no goal.
+
+    Returns
+    -------
+    int or None
+        None if no robot has a goal, or the run is shorter than this time.
+    """
+    window_start = float(time[-1]) - STUCK_WINDOW_S
+    has_goal = ~np.isnan(goals[-1]).any(axis=1)
+    if not has_goal.any() or window_start < float(time[0]) - TIME_ROUNDING_S:
+        return None
+    earlier = int(np.searchsorted(time, window_start + TIME_ROUNDING_S, side="right")) - 1
+    displacement = np.sqrt(((positions[-1] - positions[earlier]) ** 2).sum(axis=-1))
+    goal_distance = np.sqrt(((goals[-1] - positions[-1]) ** 2).sum(axis=-1))
+    is_stuck = (displacement < STUCK_DISTANCE_M) & (goal_distance > MIN_STUCK_GOAL_DISTANCE_M)
+    return int(is_stuck.sum())

@@ -1,0 +1,79 @@
+"""The summary of a run that ``run.json`` contains."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from robocov.metrics.advice import advise
+from robocov.metrics.clearance import compute_clearances, count_contacts
+from robocov.metrics.cost_history import CostHistory, compute_mean_over_run
+from robocov.metrics.motion import compute_path_lengths, count_stuck_robots, find_settling_time
+from robocov.record import Record
+
+MIN_REPORTED_OFFSET_M = 5e-4
+"""Distance between the requested and the actual position of a robot that joins, from which it is reported."""
+
+
+def summarise(record: Record, history: CostHistory) -> dict[str, Any]:
+    """Summarise a run, as ``run.json`` contains it.
+
+    Parameters
+    ----------
+    record : Record
+    history : CostHistory
+        The coverage cost along the run.
+
+    Returns
+    -------
+    dict
+        Figures by names that end in their units; ``notes`` lists remarks, if there are any.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rooms = rc.load_map("rooms")
+    >>> record = rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(6, seed=0)).run(1.0)
+    >>> history = rc.compute_cost_history(record, rc.CoverageCost(rooms, lattice=16))
+    >>> rc.summarise(record, history)["contacts"]
+    0
+    """
+    clearances = compute_clearances(record)
+    summary: dict[str, Any] = {
+        "mean_distance_m": float(history.mean_distance[-1]),
+        "mean_distance_over_run_m": compute_mean_over_run(history.time, history.mean_distance),
+    }
+    if history.mean_time is not None:
+        summary["mean_time_s"] = float(history.mean_time[-1])
+    path_lengths = compute_path_lengths(record.positions, record.travelled)
+    summary |= {
+        "cost_m3": float(history.cost[-1]),
+        "uncovered_area_m2": float(history.uncovered_area[-1]),
+        "settled_at_s": find_settling_time(record.time, record.positions),
+        "contacts": count_contacts(record, clearances),
+        "min_clearance_m": float(clearances.min()),
+        "path_length_m": path_lengths.tolist(),
+        "stuck_robots": count_stuck_robots(record.time, record.positions, record.goals),
+    }
+    notes = [*_describe_moved_joins(record), *advise(record, clearances)]
+    if notes:
+        summary["notes"] = notes
+    return summary
+
+
+def _describe_moved_joins(record: Record) -> list[str]:
+    """Return a sentence for each robot that joined at another position than the requested one."""
+    notes = []
+    for joined in record.joined:
+        if joined.offset >= MIN_REPORTED_OFFSET_M:
+            place = _format_point(joined.place)
+            requested = _format_point(joined.requested)
+            notes.append(
+                f"Robot {joined.robot} joined at {joined.time:.4g} s at {place}, {joined.offset:.2g} m from "
+                f"{requested}, which is too near to a wall or another robot."
+            )
+    return notes
+
+
+def _format_point(point: tuple[float, float]) -> str:
+    x, y = point
+    return f"[{x:.4g}, {y:.4g}]"
