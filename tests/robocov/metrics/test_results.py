@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import robocov as rc
-from robocov import extras
+from robocov import optional_imports
 from robocov.errors import InputError, RobocovError
 from robocov.metrics.results import read_history, read_results
 
@@ -211,7 +211,7 @@ def test_without_pandas_the_extra_is_named(folder: Path, monkeypatch: pytest.Mon
     def missing(name: str) -> None:
         raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
-    monkeypatch.setattr(extras.importlib, "import_module", missing)
+    monkeypatch.setattr(optional_imports.importlib, "import_module", missing)
     with pytest.raises(RobocovError, match=r'pip install "robocov\[pandas\]"'):
         read_results(folder).to_pandas()
 
@@ -220,11 +220,14 @@ def test_without_pandas_the_extra_is_named(folder: Path, monkeypatch: pytest.Mon
     ("text", "message"),
     [
         ("", "line 1: expected the header time_s,mean_distance_m,cost_m3,uncovered_area_m2"),
-        ("time_s\n", "line 1: the header "),
-        ("time_s,mean_distance_m,cost_m3,uncovered_area_m2\n1,2,3,4\n1,2\n", "line 3: '1,2', but 4 numbers"),
+        ("time_s\n", "line 1: expected the header "),
+        (
+            "time_s,mean_distance_m,cost_m3,uncovered_area_m2\n1,2,3,4\n1,2\n",
+            "line 3: expected 4 numbers, got '1,2'",
+        ),
         (
             "time_s,mean_distance_m,cost_m3,uncovered_area_m2\n1,2,three,4\n",
-            "line 2: '1,2,three,4', but 4 num",
+            "line 2: expected 4 numbers, got '1,2,three,4'",
         ),
     ],
 )

@@ -257,7 +257,7 @@ def arrays(folder: Path, **changes) -> None:
             lambda run: (run / "cost.csv").write_text(
                 "time_s,mean_distance_m,cost_m3,uncovered_area_m2\n7\n"
             ),
-            "{run}/cost.csv: line 2: '7', but 4 numbers were wanted",
+            "{run}/cost.csv: line 2: expected 4 numbers, got '7'",
         ),
         (lambda run: (run / "cost.csv").write_bytes(b"\xff\xfe"), "{run}/cost.csv: cannot be read"),
         (lambda run: edited(run / "run.json", dt_s=0.1), "{run}/record.npz: time: moments 0.1 s apart"),
