@@ -95,7 +95,7 @@ def ended(name: str, on: str, changes: dict[str, float]) -> tuple[float, float, 
     start = rooms.start(None).sample(suite.TEAM, seed=0, radius=suite.RADIUS)
     record = Simulation(rooms, make_controller(name), start, team).run(120.0)
     cost = CoverageCost(rooms, suite.LATTICE)(record.positions[-1]).mean_distance
-    rest = settled_at(record.time, record.positions)
+    rest = find_settling_time(record.time, record.positions)
     gap = cost / reference(on, suite.TEAM)["mean_distance_m"] - 1.0
     return gap, math.nan if rest is None else rest, float(compute_path_lengths(record.positions).mean())
 
