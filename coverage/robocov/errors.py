@@ -1,15 +1,15 @@
-"""The errors that robocov raises on purpose, and the words of their messages.
+"""The errors that robocov raises on purpose, and helpers for their messages.
 
     RobocovError
-    ├── InputError            what a user gave cannot be used (exit status 2)
-    │   ├── MapError          a map file, with line, column and JSON path of the place
+    ├── InputError            an input cannot be used (exit status 2)
+    │   ├── MapError          a map file, with line, column and JSON path of the mistake
     │   ├── StartError        a start without room for the team
     │   └── ParameterError    a gain, a limit, a name of a controller
     ├── ControllerEndedError  a user's controller ended Python (exit status 1)
     └── OutputError           a result cannot be written (exit status 2)
 
-Every message is one line and names the source (file or argument), the place in it,
-the value found there and what was wanted.
+Every message is one line: the source (a file or an argument), the place in it, what was expected there, and
+the value that was found instead.
 """
 
 from __future__ import annotations
@@ -28,8 +28,11 @@ if TYPE_CHECKING:
 
 JsonPath: TypeAlias = tuple[str | int, ...]
 """Keys and indices, from the whole document inwards."""
-_LONGEST = 60
-"""Characters of a value or a name that are told."""
+_MAX_QUOTED_CHARACTERS = 60
+"""Longer values and names are cut in messages."""
+_MAX_SUMMARIZED_NAMES = 3
+_MIN_SIMILARITY = 0.5
+"""Similarity, as `difflib` measures it, from which a known name is suggested."""
 
 
 class RobocovError(Exception):
@@ -37,14 +40,22 @@ class RobocovError(Exception):
 
 
 class InputError(RobocovError):
-    """Something that the user gave cannot be used."""
+    """An input cannot be used."""
 
 
 class Mistake(NamedTuple):
-    """Something wrong in a JSON document, at a value, at one that is missing, or at the path's last key.
+    """A mistake in a JSON document.
 
-    `text` tells the place, the value found there and what was wanted; `line` and `column`, in characters from
-    1, are None where there is no file.
+    Attributes
+    ----------
+    path : tuple of str and int
+        Path of the value that is wrong or missing.
+    text : str
+        The place, what was expected there, and the value that was found.
+    at_key : bool
+        Whether the last key of the path is wrong, rather than its value.
+    line, column : int or None
+        Where the mistake is in the file, in lines and characters from 1; None if there is no file.
     """
 
     path: JsonPath
@@ -54,23 +65,57 @@ class Mistake(NamedTuple):
     column: int | None = None
 
     @classmethod
-    def at(cls, path: JsonPath, what: str, *, at_key: bool = False) -> Mistake:
-        """Return the mistake that `what` is wrong at `path`."""
-        return cls(path, f"{format_path(path)}: {what}" if path else what, at_key)
+    def at_path(cls, path: JsonPath, message: str, *, at_key: bool = False) -> Mistake:
+        """Build a mistake whose text begins with its path.
 
-    def told(self, where: str) -> str:
-        """Return its message, which begins as compilers' do, ``mine.json:14:9: ...``: terminals link that."""
-        return f"{where}{'' if self.line is None else f':{self.line}:{self.column}'}: {self.text}"
+        Parameters
+        ----------
+        path : tuple of str and int
+        message : str
+            What is wrong.
+        at_key : bool
+            Whether the last key of the path is wrong, rather than its value.
+
+        Returns
+        -------
+        Mistake
+        """
+        text = f"{format_path(path)}: {message}" if path else message
+        return cls(path, text, at_key)
+
+    def format_message(self, where: str) -> str:
+        """Format the mistake as compilers do, ``mine.json:14:9: ...``, so that terminals link to the line.
+
+        Parameters
+        ----------
+        where : str
+            Name of the document.
+
+        Returns
+        -------
+        str
+        """
+        if self.line is None:
+            return f"{where}: {self.text}"
+        return f"{where}:{self.line}:{self.column}: {self.text}"
 
 
 class MapError(InputError):
-    """A map cannot be used; the message names the file, the place in it, the value and what was wanted.
+    """A map or another document cannot be used.
 
-    `mistakes` are at places in the file, which messages call `where`, the first at `line` and `column`; there
-    are `unlisted` ones beside these.
+    Attributes
+    ----------
+    mistakes : tuple of Mistake
+        At most `MAX_LISTED`, in the order of the document.
+    unlisted : int
+        Number of further mistakes.
+    where : str
+        Name of the document.
+    line, column : int or None
+        Place of the first mistake.
     """
 
-    MOST_LISTED = 20  # to find the line of each takes as long as reading the file
+    MAX_LISTED = 20  # Finding the line of a mistake takes as long as reading the file.
     mistakes: tuple[Mistake, ...] = ()
     unlisted: int = 0
     where: str = ""
@@ -78,13 +123,33 @@ class MapError(InputError):
     column: int | None = None
 
     @classmethod
-    def of(cls, where: str, mistakes: Sequence[Mistake], unlisted: int = 0) -> MapError:
-        """Return the error of a document with at least one mistake, of which `MOST_LISTED` are kept."""
+    def from_mistakes(cls, where: str, mistakes: Sequence[Mistake], unlisted: int = 0) -> MapError:
+        """Build the error of a document.
+
+        Parameters
+        ----------
+        where : str
+            Name of the document.
+        mistakes : sequence of Mistake
+            At least one.
+        unlisted : int
+            Number of mistakes in addition to these.
+
+        Returns
+        -------
+        MapError
+        """
+        first = mistakes[0]
+        message = first.format_message(where)
         others = len(mistakes) - 1 + unlisted
-        error = cls(f"{mistakes[0].told(where)}{f' (and {others} more)' if others else ''}")
-        error.mistakes, error.where = tuple(mistakes[: cls.MOST_LISTED]), where
+        if others > 0:
+            message += f" (and {others} more)"
+        error = cls(message)
+        error.mistakes = tuple(mistakes[: cls.MAX_LISTED])
         error.unlisted = others + 1 - len(error.mistakes)
-        error.line, error.column = mistakes[0].line, mistakes[0].column
+        error.where = where
+        error.line = first.line
+        error.column = first.column
         return error
 
 
@@ -105,107 +170,305 @@ class OutputError(RobocovError):
 
 
 def quote(value: object) -> str:
-    """Return `value` as it is quoted in messages: its repr on one line, cut where it is long."""
+    """Format a value for a message: its `repr` on one line, cut if it is long.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> quote("rapf"), quote([1, 2])
+    ("'rapf'", '[1, 2]')
+    """
     try:
         text = repr(value)
-    except Exception:  # an object of a user may have no usable one
+    except Exception:  # Objects of users may have no usable one.
         text = f"<{type(value).__name__}>"
     return _cut(" ".join(text.split()))
 
 
 def quote_json(value: object) -> str:
-    """Return `value` as it is quoted in messages about JSON."""
+    """Format a value as JSON for a message, cut if it is long.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> quote_json({"radius": None})
+    '{"radius": null}'
+    """
     return _cut(json.dumps(value, default=repr))
 
 
 def to_one_line(text: object) -> str:
-    """Return `text` as one line of a message, with escapes for line breaks and other control characters."""
+    """Return a text as one line of a message, with escapes for line breaks and other control characters.
+
+    Parameters
+    ----------
+    text : object
+        Converted by `str`.
+
+    Returns
+    -------
+    str
+    """
     return escape_controls(str(text), single_line=True)
 
 
 def describe_error(error: Exception) -> str:
-    """Return why the system refused something, on one line."""
-    return to_one_line((isinstance(error, OSError) and error.strerror) or error)
+    """Return why the operating system refused something, on one line.
+
+    Parameters
+    ----------
+    error : Exception
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> describe_error(FileNotFoundError(2, "No such file or directory", "map.json"))
+    'No such file or directory'
+    """
+    if isinstance(error, OSError) and error.strerror:
+        return to_one_line(error.strerror)
+    return to_one_line(error)
 
 
 def format_path(path: Sequence[str | int]) -> str:
-    """Return `path` as messages show it; very long keys are cut.
+    """Format the path of a value in a JSON document; very long keys are cut.
 
+    Parameters
+    ----------
+    path : sequence of str and int
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
     >>> format_path(("obstacles", 2, "the lobby", "radius"))
     'obstacles[2]["the lobby"].radius'
     """
     text = ""
     for step in path:
         name = step if isinstance(step, int) else _cut(step)
-        if isinstance(name, str) and name.replace("-", "_").replace("$", "_").isidentifier():
+        if isinstance(name, str) and _is_plain_key(name):
             text += f".{name}" if text else name
         else:
             text += f"[{json.dumps(name)}]"
     return text
 
 
+def _is_plain_key(name: str) -> bool:
+    """Return whether a key needs no quotes in a path."""
+    return name.replace("-", "_").replace("$", "_").isidentifier()
+
+
 def is_number(value: object, kind: type = Real) -> TypeGuard[Any]:
-    """Return whether `value` is a number of some kind, also one of numpy's; a bool is none."""
+    """Return whether a value is a number of some kind, also one of numpy's, but not a `bool`.
+
+    Parameters
+    ----------
+    value : object
+    kind : type
+        Class from `numbers`.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> is_number(2.5), is_number(2.5, Integral), is_number(True)
+    (True, False, False)
+    """
     return isinstance(value, kind) and not isinstance(value, bool)
 
 
 def require_number(
-    name: str, value: Any, least: float, most: float, unit: str = "", *, whole: bool = False
+    name: str, value: Any, minimum: float, maximum: float, unit: str = "", *, whole: bool = False
 ) -> float:
-    """Return a number in its range; raise ParameterError when it is none, or out of it."""
-    if not is_number(value, Integral if whole else Real) or not least <= value <= most:
-        wanted = f"a {'whole ' if whole else ''}number from {least:g} to {most:g} {unit}".rstrip()
-        raise ParameterError(f"{name}: {quote(value)}, but {wanted} was wanted")
+    """Return a number, or raise an error if it is none or out of range.
+
+    Parameters
+    ----------
+    name : str
+        Name of the parameter in the message.
+    value : object
+    minimum, maximum : float
+        Range, including both.
+    unit : str
+    whole : bool
+        Whether only whole numbers are accepted.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ParameterError
+        If the value is not a number in the range.
+
+    Examples
+    --------
+    >>> require_number("radius", 0.2, 0.01, 1e6, "m")
+    0.2
+    """
+    kind = Integral if whole else Real
+    if not is_number(value, kind) or not minimum <= value <= maximum:
+        description = "a whole number" if whole else "a number"
+        expected = f"{description} from {minimum:g} to {maximum:g} {unit}".rstrip()
+        raise ParameterError(f"{name}: {quote(value)}, but {expected} was wanted")
     return float(value)
 
 
 def to_floats(
-    name: str, values: Any, wanted: str, kind: type[InputError] = ParameterError
+    name: str, values: Any, expected: str, error_type: type[InputError] = ParameterError
 ) -> NDArray[np.float64]:
-    """Return numbers as a new array of floats; raise an error of some kind where they are none.
+    """Convert numbers to a new array of floats.
 
+    Parameters
+    ----------
+    name : str
+        Name of the parameter in the message.
+    values : array_like
+    expected : str
+        Description of the numbers in the message.
+    error_type : type
+        Kind of the error.
+
+    Returns
+    -------
+    array
+
+    Raises
+    ------
+    InputError
+        Of the given kind, if the values cannot be converted.
+
+    Examples
+    --------
+    >>> to_floats("starts", [[1, 2]], "[x, y] of each robot")
+    array([[1., 2.]])
     >>> to_floats("starts", "abc", "[x, y] of each robot")
     Traceback (most recent call last):
     robocov.errors.ParameterError: starts: 'abc', but [x, y] of each robot was wanted
     """
-    import numpy as np  # not before there are numbers: `robocov bench` first asks for one thread
+    # Imported only now, because `robocov bench` limits the number of threads before numpy is loaded.
+    import numpy as np
 
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        raise kind(f"{name}: {quote(values)}, but {wanted} was wanted") from None
+        raise error_type(f"{name}: {quote(values)}, but {expected} was wanted") from None
 
 
-def require_type(name: str, value: object, kind: type, wanted: str) -> None:
-    """Raise a ParameterError unless a value is of a kind."""
+def require_type(name: str, value: object, kind: type, expected: str) -> None:
+    """Raise an error unless a value has a type.
+
+    Parameters
+    ----------
+    name : str
+        Name of the parameter in the message.
+    value : object
+    kind : type
+    expected : str
+        Description of the type in the message.
+
+    Raises
+    ------
+    ParameterError
+        If the value has another type.
+    """
     if not isinstance(value, kind):
-        raise ParameterError(f"{name}: {quote(value)}, but {wanted} was wanted")
+        raise ParameterError(f"{name}: {quote(value)}, but {expected} was wanted")
 
 
 def summarize_names(names: Sequence[str]) -> str:
-    """Return the first three of some names, and how many more there are: a, b, c and 1 more."""
-    more = len(names) - 3
-    return ", ".join(names[:3]) + (f" and {more} more" if more > 0 else "")
+    """Return the first three names, and the number of the others.
+
+    Parameters
+    ----------
+    names : sequence of str
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> summarize_names(["a", "b", "c", "d"])
+    'a, b, c and 1 more'
+    """
+    text = ", ".join(names[:_MAX_SUMMARIZED_NAMES])
+    others = len(names) - _MAX_SUMMARIZED_NAMES
+    return f"{text} and {others} more" if others > 0 else text
 
 
-def format_count(count: int, thing: str) -> str:
-    """Return how many things there are, in words: 1 robot, 6 robots."""
-    return f"{count} {thing}{'' if count == 1 else 's'}"
+def format_count(count: int, noun: str) -> str:
+    """Format a number of things.
+
+    Parameters
+    ----------
+    count : int
+    noun : str
+        Singular; the plural ends in s.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> format_count(1, "robot"), format_count(6, "robot")
+    ('1 robot', '6 robots')
+    """
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def describe_unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
-    """Return the message for a name that is not among `known`, with the nearest one.
+    """Return the message for an unknown name, with the most similar known one.
 
+    Parameters
+    ----------
+    kind : str
+        What is named.
+    name : str
+    known : iterable of str
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
     >>> describe_unknown_name("controller", "rapff", ["lloyd", "rapf", "rpf"])
     "unknown controller 'rapff': did you mean 'rapf'? (known: lloyd, rapf, rpf)"
     """
     names = sorted(known)
-    near = get_close_matches(name.lower(), names, n=1, cutoff=0.5)
-    hint = f": did you mean {quote(near[0])}?" if near else ""
-    return (
-        f"unknown {kind} {quote(name)}{hint} (known: {', '.join(_cut(to_one_line(each)) for each in names)})"
-    )
+    message = f"unknown {kind} {quote(name)}"
+    for similar_name in get_close_matches(name.lower(), names, n=1, cutoff=_MIN_SIMILARITY):
+        message += f": did you mean {quote(similar_name)}?"
+    listing = ", ".join(_cut(to_one_line(known_name)) for known_name in names)
+    return f"{message} (known: {listing})"
 
 
 def _cut(text: str) -> str:
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
+    if len(text) <= _MAX_QUOTED_CHARACTERS:
+        return text
+    return f"{text[: _MAX_QUOTED_CHARACTERS - 3]}..."

@@ -44,9 +44,12 @@ def test_strange_names_leave_messages_readable() -> None:
 
 
 def test_one_is_told_and_the_others_are_counted() -> None:
-    mistakes = [Mistake.at(("boundary", k), "3, but a point was wanted") for k in range(3)]
-    assert str(MapError.of("m.json", mistakes[:1])) == "m.json: boundary[0]: 3, but a point was wanted"
-    error = MapError.of("m.json", mistakes, 4)
+    mistakes = [Mistake.at_path(("boundary", k), "3, but a point was wanted") for k in range(3)]
+    assert (
+        str(MapError.from_mistakes("m.json", mistakes[:1]))
+        == "m.json: boundary[0]: 3, but a point was wanted"
+    )
+    error = MapError.from_mistakes("m.json", mistakes, 4)
     assert isinstance(error, MapError)
     assert str(error) == "m.json: boundary[0]: 3, but a point was wanted (and 6 more)"
     assert error.mistakes == tuple(mistakes)
@@ -54,7 +57,7 @@ def test_one_is_told_and_the_others_are_counted() -> None:
 
 
 def test_with_a_line_it_begins_as_compilers_do() -> None:
-    error = MapError.of("m.json", [Mistake((), "empty", line=14, column=9)])
+    error = MapError.from_mistakes("m.json", [Mistake((), "empty", line=14, column=9)])
     assert str(error) == "m.json:14:9: empty"
     assert (error.line, error.column) == (14, 9)
 
@@ -65,7 +68,7 @@ def test_an_error_without_a_place_has_no_line() -> None:
 
 
 def test_the_whole_document_needs_no_place() -> None:
-    assert Mistake.at((), "[], but an object was wanted").text == "[], but an object was wanted"
+    assert Mistake.at_path((), "[], but an object was wanted").text == "[], but an object was wanted"
 
 
 def test_keys_that_are_no_names_are_quoted() -> None:

@@ -233,8 +233,8 @@ class JsonFile:
 
     def refused(self, at: Steps, value: object, wanted: str) -> MapError:
         """Return the error of a value at a place: what is there, what was wanted."""
-        mistake = Mistake.at(at, f"{quote_json(value)}, but {wanted} wanted")
-        return located(MapError.of(self.where, [mistake]), self._content, self.where)
+        mistake = Mistake.at_path(at, f"{quote_json(value)}, but {wanted} wanted")
+        return located(MapError.from_mistakes(self.where, [mistake]), self._content, self.where)
 
     def positions(self, value: Any, at: Steps, least: int, fewest: int, most: int) -> Array:
         """Return the points of a list as (k, d), d from `fewest` to `most`; missing dimensions are nan."""

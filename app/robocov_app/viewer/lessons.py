@@ -23,7 +23,7 @@ def load_lesson(path: Path = FIRST) -> SavedSession:
     """Return the lesson in a session file; MapError as `load_session`, or where there is none in it."""
     saved = load_session(path)
     if saved.lesson is None:
-        raise MapError.of(str(path), [Mistake.at(("lesson",), "missing")])
+        raise MapError.from_mistakes(str(path), [Mistake.at_path(("lesson",), "missing")])
     return saved
 
 

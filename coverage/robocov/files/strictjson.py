@@ -99,10 +99,10 @@ def parse(text: str | bytes, where: str) -> Any:
         value = json.loads(text, object_pairs_hook=_Object.of_pairs, parse_int=_whole_number)
     except json.JSONDecodeError as error:
         at, what = _syntax(text, error)
-        raise MapError.of(where, [_placed(Mistake((), what), text, at)]) from None
+        raise MapError.from_mistakes(where, [_placed(Mistake((), what), text, at)]) from None
     except RecursionError:
         too_deep = _placed(Mistake((), _TOO_DEEP), text, depth_offset(text, MAX_DEPTH))
-        raise MapError.of(where, [too_deep]) from None
+        raise MapError.from_mistakes(where, [too_deep]) from None
     try:
         require_json(value, where)
     except MapError as error:
@@ -169,19 +169,19 @@ def located(error: MapError, text: str | bytes, where: str) -> MapError:
         ]
     except RecursionError:  # beside the place, something is nested as deep as parsing goes
         return error
-    return MapError.of(to_one_line(where), found, error.unlisted)
+    return MapError.from_mistakes(to_one_line(where), found, error.unlisted)
 
 
 def require_json(value: object, where: str) -> None:
     """Raise `MapError` unless `value` is made of what JSON has: finite numbers, text, lists and objects."""
     if mistake := _first_mistake(value, ()):
-        raise MapError.of(where, [mistake])
+        raise MapError.from_mistakes(where, [mistake])
 
 
 def _first_mistake(value: Any, path: JsonPath) -> Mistake | None:
     if not isinstance(value, (dict, list, tuple)):
         what = _wrong(value)
-        return None if what is None else Mistake.at(path, what)
+        return None if what is None else Mistake.at_path(path, what)
     if len(path) >= MAX_DEPTH:
         return Mistake(path, f"{format_path(path[:4])}...: {_TOO_DEEP}")
     if isinstance(value, dict):
@@ -191,7 +191,7 @@ def _first_mistake(value: Any, path: JsonPath) -> Mistake | None:
                 text = f"{at}key {quote(key)}, but text that UTF-8 can hold was wanted"
                 return Mistake((*path, key), text, at_key=True)
         if isinstance(value, _Object) and value.twice is not None:
-            return Mistake.at((*path, value.twice), "given twice, but once was wanted", at_key=True)
+            return Mistake.at_path((*path, value.twice), "given twice, but once was wanted", at_key=True)
     for key, item in value.items() if isinstance(value, dict) else enumerate(value):
         # most of a large file is numbers: no call, no path for each
         if not (type(item) is float and math.isfinite(item)):
@@ -290,7 +290,7 @@ def _decoded(text: str | bytes, where: str) -> str:
         before = body[: error.start].decode("utf-8")
         found = f"byte 0x{body[error.start]:02x} at offset {error.start + len(text) - len(body)}"
         what = f"{found}: not UTF-8, but JSON in UTF-8 was wanted"
-        raise MapError.of(where, [_placed(Mistake((), what), before, len(before))]) from None
+        raise MapError.from_mistakes(where, [_placed(Mistake((), what), before, len(before))]) from None
 
 
 def _syntax(text: str, error: json.JSONDecodeError) -> tuple[int, str]:
@@ -360,7 +360,7 @@ def check_header(document: object, where: str, form: str, version: int) -> None:
     """Raise `MapError` on what is not of a format, or of another version, before its content is looked at."""
     if not isinstance(document, dict):
         kind = f"a JSON object with a {form.removeprefix('robocov-')}"
-        raise MapError.of(where, [Mistake((), f"{quote_json(document)}, but {kind} was wanted")])
+        raise MapError.from_mistakes(where, [Mistake((), f"{quote_json(document)}, but {kind} was wanted")])
     for key, right in (("format", form), ("version", version)):
         found = document.get(key)
         if type(found) is type(right) and found == right:
@@ -369,7 +369,7 @@ def check_header(document: object, where: str, form: str, version: int) -> None:
         newer = type(found) is int and key == "version" and found > version
         what = f"{state}, but {quote_json(right)} was wanted"
         what += "; it was written by a newer robocov" if newer else ""
-        raise MapError.of(where, [Mistake.at((key,), what)])
+        raise MapError.from_mistakes(where, [Mistake.at_path((key,), what)])
 
 
 def refused(error: ValidationError, where: str, mistake: Callable[[ErrorDetails], Mistake]) -> MapError:
@@ -377,13 +377,13 @@ def refused(error: ValidationError, where: str, mistake: Callable[[ErrorDetails]
     details = error.errors(include_url=False, include_context=False)
     # a misspelt key is also a missing one: naming the key that is there helps more
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
-    listed = [mistake(detail) for detail in details[: MapError.MOST_LISTED]]
-    return MapError.of(where, listed, len(details) - len(listed))
+    listed = [mistake(detail) for detail in details[: MapError.MAX_LISTED]]
+    return MapError.from_mistakes(where, listed, len(details) - len(listed))
 
 
 def _mistake(detail: ErrorDetails) -> Mistake:
     path = tuple(step for step in detail["loc"] if step != "[key]")
     if detail["type"] == "missing":
-        return Mistake.at(path, "missing")
+        return Mistake.at_path(path, "missing")
     words = detail["msg"] if detail["type"] == "wanted" else _WORDS.get(detail["type"], "another value")
-    return Mistake.at(path, f"{quote_json(detail['input'])}, but {words} was wanted")
+    return Mistake.at_path(path, f"{quote_json(detail['input'])}, but {words} was wanted")

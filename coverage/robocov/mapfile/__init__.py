@@ -223,10 +223,12 @@ def _density(model: DensityModel, boundary: Ring, folder: Path | None, where: st
         try:
             greys = _greys(_content(str(model.picture), folder))
         except InputError as error:
-            raise MapError.of(where, [Mistake.at(at, f"{quote_json(model.picture)}: {error}")]) from None
+            raise MapError.from_mistakes(
+                where, [Mistake.at_path(at, f"{quote_json(model.picture)}: {error}")]
+            ) from None
         values = np.round(low + (high - low) * greys, _GREY_DIGITS)
         if not values.max() > 0.0:
-            raise MapError.of(where, [Mistake.at(at, NOTHING)])
+            raise MapError.from_mistakes(where, [Mistake.at_path(at, NOTHING)])
     x, y = zip(*boundary, strict=True)
     x_min, y_min, x_max, y_max = model.extent or (min(x), min(y), max(x), max(y))
     return Raster(values[::-1], (x_min, y_min, x_max, y_max), model.interpolation)

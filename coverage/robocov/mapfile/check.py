@@ -54,7 +54,7 @@ def check_rules(environment: Environment, where: str) -> None:
         for k, area in enumerate(environment.density.areas):
             found += _polygon_mistakes(("density", "areas", k), area)
     if found := found or list(_space_mistakes(environment)):
-        raise MapError.of(where, found)
+        raise MapError.from_mistakes(where, found)
 
 
 def _ring_mistakes(at: JsonPath, ring: Ring) -> Iterator[Mistake]:
@@ -64,14 +64,16 @@ def _ring_mistakes(at: JsonPath, ring: Ring) -> Iterator[Mistake]:
     size, flat = f"{extent[0]:g} x {extent[1]:g} m", _FLAT * float(extent.max()) ** 2
     count = len(set(map(tuple, ring)))
     if count < 3:
-        yield Mistake.at(at, f"{format_count(count, 'different point')}, but at least 3 were wanted")
+        yield Mistake.at_path(at, f"{format_count(count, 'different point')}, but at least 3 were wanted")
     elif extent.max() > LARGEST:
-        yield Mistake.at(at, f"{size}, but at most {LARGEST / 1000:g} km was wanted")
+        yield Mistake.at_path(at, f"{size}, but at most {LARGEST / 1000:g} km was wanted")
     elif extent.min() < SMALLEST:
-        yield Mistake.at(at, f"{size}, but at least {SMALLEST * 1000:g} mm each way was wanted")
+        yield Mistake.at_path(at, f"{size}, but at least {SMALLEST * 1000:g} mm each way was wanted")
     # a ring that crosses itself may have no area either
     elif shapely.convex_hull(polygon := Polygon(points)).area <= flat:
-        yield Mistake.at(at, f"area {polygon.area:g} m², but points that are not on one line were wanted")
+        yield Mistake.at_path(
+            at, f"area {polygon.area:g} m², but points that are not on one line were wanted"
+        )
     elif not polygon.is_valid:
         yield _crossing(at, points, polygon)
 
@@ -82,11 +84,11 @@ def _line_mistakes(at: JsonPath, line: Ring, thing: str) -> Iterator[Mistake]:
     extent = np.ptp(points, axis=0)
     if extent.max() > LARGEST:
         size = f"{extent[0]:g} x {extent[1]:g} m"
-        yield Mistake.at(at, f"{size}, but at most {LARGEST / 1000:g} km was wanted")
+        yield Mistake.at_path(at, f"{size}, but at most {LARGEST / 1000:g} km was wanted")
     elif extent.max() < SMALLEST:
         length = float(np.hypot(*np.diff(points, axis=0).T).sum())
         size = f"{length:g} m long" if thing == "wall" else f"{extent.max():g} m wide"
-        yield Mistake.at(at, f"a {thing} {size}, but at least {SMALLEST * 1000:g} mm was wanted")
+        yield Mistake.at_path(at, f"a {thing} {size}, but at least {SMALLEST * 1000:g} mm was wanted")
 
 
 def _crossing(at: JsonPath, points: Array, polygon: Polygon) -> Mistake:
@@ -105,7 +107,7 @@ def _crossing(at: JsonPath, points: Array, polygon: Polygon) -> Mistake:
     found = (
         f"the edge from here meets the edge from {format_path((*at, second))} near [{spot[0]:g}, {spot[1]:g}]"
     )
-    return Mistake.at((*at, first), f"{found}, but a ring that does not meet itself was wanted")
+    return Mistake.at_path((*at, first), f"{found}, but a ring that does not meet itself was wanted")
 
 
 def _polygon_mistakes(at: JsonPath, shape: PolygonObstacle | WeightedArea) -> Iterator[Mistake]:
@@ -121,11 +123,13 @@ def _polygon_mistakes(at: JsonPath, shape: PolygonObstacle | WeightedArea) -> It
     for k, hole in enumerate(shape.holes):
         path = (*at, "holes", k)
         if not shell.covers(Polygon(hole)):
-            yield Mistake.at(
+            yield Mistake.at_path(
                 path, f"sticks out of {format_path((*at, 'vertices'))}, but a hole inside was wanted"
             )
         elif not Polygon(shape.vertices, [*good, hole]).is_valid:
-            yield Mistake.at(path, "meets the outline or another hole, but a hole apart from them was wanted")
+            yield Mistake.at_path(
+                path, "meets the outline or another hole, but a hole apart from them was wanted"
+            )
         else:
             good.append(hole)
 
@@ -133,16 +137,20 @@ def _polygon_mistakes(at: JsonPath, shape: PolygonObstacle | WeightedArea) -> It
 def _space_mistakes(environment: Environment) -> Iterator[Mistake]:
     """Yield what is wrong with the map as a whole, once each part is good."""
     if len(environment.region.vertices) < 3:
-        yield Mistake.at(("boundary",), "its convex hull is a line, but a region with an area was wanted")
+        yield Mistake.at_path(
+            ("boundary",), "its convex hull is a line, but a region with an area was wanted"
+        )
         return
     if environment.free.is_empty:
-        yield Mistake.at(("obstacles",), "no free space is left inside the boundary, but some was wanted")
+        yield Mistake.at_path(
+            ("obstacles",), "no free space is left inside the boundary, but some was wanted"
+        )
         return
     density = environment.density
     # integrals take a second to load what they need
     if density is not None and not (density.min_value > 0.0 or environment.free_masses.sum() > 0.0):
         what = "all places in the free space count 0, but a weight above 0 was wanted"
-        yield Mistake.at(("density",), what)
+        yield Mistake.at_path(("density",), what)
     for name in environment.starts:
         yield from _start_mistakes(environment, name)
 
@@ -155,9 +163,11 @@ def _start_mistakes(environment: Environment, name: str) -> Iterator[Mistake]:
         inside = shapely.contains_properly(environment.free, shapely.points(points))
         for k in np.flatnonzero(~inside).tolist():
             found = f"[{points[k, 0]:g}, {points[k, 1]:g}] is inside an obstacle or outside the boundary"
-            yield Mistake.at((*at, "positions", k), f"{found}, but a free place was wanted")
+            yield Mistake.at_path((*at, "positions", k), f"{found}, but a free place was wanted")
         if len(np.unique(points, axis=0)) < len(points):
-            yield Mistake.at((*at, "positions"), "one place is given twice, but one place a robot was wanted")
+            yield Mistake.at_path(
+                (*at, "positions"), "one place is given twice, but one place a robot was wanted"
+            )
         return
     if _plainly_has_room(environment, spec):
         return
@@ -168,7 +178,7 @@ def _start_mistakes(environment: Environment, name: str) -> Iterator[Mistake]:
         if isinstance(spec, DiscStart):
             what = f"the disc of radius {spec.radius:g} m at [{spec.center[0]:g}, {spec.center[1]:g}]"
         wanted = f"room for a robot of radius {DEFAULT_RADIUS:g} m was wanted"
-        yield Mistake.at(at, f"{what} has no room, but {wanted}")
+        yield Mistake.at_path(at, f"{what} has no room, but {wanted}")
 
 
 def _plainly_has_room(environment: Environment, spec: DiscStart | UniformStart) -> bool:

@@ -297,7 +297,7 @@ def validate(document: object, where: str) -> MapModel:
         raise refused(error, where, _mistake) from None
     mistakes = _raster_mistakes if isinstance(model.density, RasterModel) else _weight_mistakes
     if model.density is not None and (found := list(mistakes(model.density))):
-        raise MapError.of(where, found)
+        raise MapError.from_mistakes(where, found)
     return model
 
 
@@ -340,20 +340,20 @@ def _mistake(detail: ErrorDetails) -> Mistake:
     found = "missing" if detail["type"] == "missing" else quote_json(value)
     steps = [k for k, step in enumerate(loc) if isinstance(step, str)]
     wanted = _WANTED[str(loc[steps[-1]])][len(loc) - 1 - steps[-1]]
-    return Mistake.at(tuple(loc), f"{found}, but {wanted} was wanted")
+    return Mistake.at_path(tuple(loc), f"{found}, but {wanted} was wanted")
 
 
 def _kind_mistake(path: tuple[str | int, ...], value: object, kinds: list[str]) -> Mistake:
     """Return what is wrong with an obstacle, a start or a density whose kind is not known."""
     wanted = f"one of {', '.join(kinds)}"
     if not isinstance(value, dict):
-        return Mistake.at(path, f"{quote_json(value)}, but an object whose kind is {wanted} was wanted")
+        return Mistake.at_path(path, f"{quote_json(value)}, but an object whose kind is {wanted} was wanted")
     path = (*path, "kind")
     if "kind" not in value:
-        return Mistake.at(path, f"missing, but {wanted} was wanted")
+        return Mistake.at_path(path, f"missing, but {wanted} was wanted")
     near = get_close_matches(str(value["kind"]).lower(), kinds, n=1, cutoff=0.5)
     hint = f" (did you mean {near[0]!r}?)" if near else ""
-    return Mistake.at(path, f"{quote_json(value['kind'])}, but {wanted} was wanted{hint}")
+    return Mistake.at_path(path, f"{quote_json(value['kind'])}, but {wanted} was wanted{hint}")
 
 
 def _not_one_of(model: Model, one: str, other: str) -> str | None:
@@ -369,37 +369,39 @@ def _weight_mistakes(model: DensityModel) -> Iterator[Mistake]:
     for k, peak in enumerate(peaks):
         at: JsonPath = ("density", "peaks", k)
         if what := _not_one_of(peak, "sigma", "covariance"):
-            yield Mistake.at(at, what)
+            yield Mistake.at_path(at, what)
         elif peak.covariance is not None:
             (a, b), (c, d) = peak.covariance
             smaller_eigenvalue = 0.5 * (a + d) - math.hypot(0.5 * (a - d), b)
             if b != c or not smaller_eigenvalue >= SMALLEST**2 or a * d - b * c <= 1e-9 * a * d:
                 wanted = f"positive definite matrix of at least ({SMALLEST * 1000:g} mm)² each way"
                 what = f"{quote_json(peak.covariance)}, but a symmetric, {wanted} was wanted"
-                yield Mistake.at((*at, "covariance"), what)
+                yield Mistake.at_path((*at, "covariance"), what)
     if not getattr(model, _BASES[model.kind]) and not any(part.weight for part in (*peaks, *areas)):
-        yield Mistake.at(("density", "weight") if model.kind == "uniform" else ("density",), NOTHING)
+        yield Mistake.at_path(("density", "weight") if model.kind == "uniform" else ("density",), NOTHING)
 
 
 def _raster_mistakes(model: RasterModel) -> Iterator[Mistake]:
     if what := _not_one_of(model, "rows", "picture"):
-        yield Mistake.at(("density",), what)
+        yield Mistake.at_path(("density",), what)
         return
     if model.extent is not None:
         x_min, y_min, x_max, y_max = model.extent
         sides = x_max - x_min, y_max - y_min
         if not (min(sides) >= SMALLEST and max(sides) <= LARGEST):
             wanted = f"[x_min, y_min, x_max, y_max] with sides from {SMALLEST:g} to {LARGEST:.0f} m"
-            yield Mistake.at(("density", "extent"), f"{quote_json(model.extent)}, but {wanted} was wanted")
+            yield Mistake.at_path(
+                ("density", "extent"), f"{quote_json(model.extent)}, but {wanted} was wanted"
+            )
     if model.rows is not None:
         for name in ("black", "white"):
             if getattr(model, name) is not None:
-                yield Mistake.at(("density", name), "is for a picture, but there are rows of numbers")
+                yield Mistake.at_path(("density", name), "is for a picture, but there are rows of numbers")
         widths = [len(row) for row in model.rows]
         for k, width in enumerate(widths):
             if width != widths[0]:
                 what = f"{width} numbers, but {widths[0]}, as in the first row, were wanted"
-                yield Mistake.at(("density", "rows", k), what)
+                yield Mistake.at_path(("density", "rows", k), what)
                 return
         if not max(map(max, model.rows)) >= LIGHTEST:
-            yield Mistake.at(("density", "rows"), NOTHING)
+            yield Mistake.at_path(("density", "rows"), NOTHING)

@@ -224,8 +224,8 @@ def test_of_very_many_mistakes_some_are_listed_and_all_counted(place: Callable[[
     starts = {"given": {"kind": "points", "positions": [place(k) for k in range(50)]}}
     with pytest.raises(MapError, match=r"\(and 49 more\)$") as caught:
         parse_map(json.dumps(changed("starts", starts)), "m.json")
-    assert len(caught.value.mistakes) == MapError.MOST_LISTED
-    assert caught.value.unlisted == 50 - MapError.MOST_LISTED
+    assert len(caught.value.mistakes) == MapError.MAX_LISTED
+    assert caught.value.unlisted == 50 - MapError.MAX_LISTED
 
 
 @pytest.mark.slow

@@ -125,7 +125,7 @@ def _lines(outcome: MapReport | InputError, former: MapReport | None = None) -> 
         yield str(outcome)
     else:
         for mistake in sorted(outcome.mistakes, key=lambda each: (each.line or 0, each.column or 0)):
-            yield mistake.told(outcome.where)
+            yield mistake.format_message(outcome.where)
         if outcome.unlisted:
             yield f"{outcome.where}: and {outcome.unlisted} more mistakes"
 

@@ -79,7 +79,7 @@ class _Reader:
 
     def refuse(self, path: JsonPath, what: str, *, at_key: bool = False) -> NoReturn:
         at = f"{format_path(path[:-1] if at_key else path)}: " if path[: -1 if at_key else None] else ""
-        raise MapError.of(self._where, [Mistake(path, at + what, at_key)])
+        raise MapError.from_mistakes(self._where, [Mistake(path, at + what, at_key)])
 
     def typed(self, kind: type[_Read], value: Any, path: JsonPath, wanted: str) -> _Read:
         if not isinstance(value, kind):

@@ -262,7 +262,9 @@ def _node(touch: TouchModel, nodes: list[Node], refuse: Callable[..., None]) -> 
 
 
 def _refuse(where: str, *path: str | int, value: object, wanted: str) -> None:
-    raise MapError.of(where, [Mistake.at(path, f"{quote_json(value)}, but {wanted} was wanted")])
+    raise MapError.from_mistakes(
+        where, [Mistake.at_path(path, f"{quote_json(value)}, but {wanted} was wanted")]
+    )
 
 
 class _Maps:
@@ -288,7 +290,7 @@ class _Maps:
                 return from_json(model)
             except MapError as error:
                 words = f"maps[{number}]: {str(error).removeprefix('map: ')}"
-                raise MapError.of(self.where, [Mistake(("maps", number), words)]) from None
+                raise MapError.from_mistakes(self.where, [Mistake(("maps", number), words)]) from None
         refuse = partial(_refuse, self.where, "maps", number)
         if model.bundled not in list_bundled_maps():
             refuse("bundled", value=model.bundled, wanted="the name of a bundled map")
@@ -320,15 +322,15 @@ def _mistake(detail: Any) -> Mistake:
     tags = [k for k in range(2, len(steps)) if steps[k - 2] in ("changes", "added", "maps", "gains")]
     path = tuple(step for k, step in enumerate(steps) if k not in tags)
     if detail["type"] in ("refused", "missing"):
-        return Mistake.at(path, "missing" if detail["type"] == "missing" else str(detail["msg"]))
+        return Mistake.at_path(path, "missing" if detail["type"] == "missing" else str(detail["msg"]))
     if detail["type"] == "extra_forbidden":
-        return Mistake.at(path, "unknown key", at_key=True)
+        return Mistake.at_path(path, "unknown key", at_key=True)
     if detail["type"] in ("model_type", "dataclass_type"):
-        return Mistake.at(path, f"{quote_json(detail['input'])}, but an object was wanted")
+        return Mistake.at_path(path, f"{quote_json(detail['input'])}, but an object was wanted")
     if (tag := _TAG.match(str(detail["msg"]))) is not None:
         wanted = f"one of {tag['known']} was wanted"
-        return Mistake.at((*path, tag["key"]), f"{quote_json(tag['found'])}, but {wanted}")
+        return Mistake.at_path((*path, tag["key"]), f"{quote_json(tag['found'])}, but {wanted}")
     words = str(detail["msg"]).removeprefix("Input should be ").replace("a valid integer", "an integer")
     words = words.replace("a valid ", "a ")
     words = re.sub(r".* should have (.*?)( after validation)?, not \d+", r"\1", words)
-    return Mistake.at(path, f"{quote_json(detail['input'])}, but {words} was wanted")
+    return Mistake.at_path(path, f"{quote_json(detail['input'])}, but {words} was wanted")
