@@ -36,8 +36,9 @@ from robocov.compiled import kernel
 from robocov.cost import CoverageCost
 from robocov.environment import GRID_M, Environment
 from robocov.errors import ParameterError, require_number
-from robocov.geodesic import BINS, seen_corners
 from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_visible
+from robocov.geodesic.corner_graph import find_visible_corners
+from robocov.geodesic.geodesics import SOURCE_BINS
 from robocov.geodesic.walls import Walls
 from robocov.k_median import Beat
 from robocov.team import DEFAULT_RADIUS
@@ -179,7 +180,7 @@ def _bounds(
             work.vertices[k, 0], work.vertices[k, 1] = triangles[t, k, 0] - x, triangles[t, k, 1] - y
             r = max(r, np.hypot(work.vertices[k, 0], work.vertices[k, 1]))
             work.sums[k] = 0.0
-        count = seen_corners(known.walls, index, 0, 0, work.near)
+        count = find_visible_corners(known.walls, index, 0, 0, work.near)
         for j in range(count):
             work.lengths[j] = np.hypot(x - corners[work.near[j], 0], y - corners[work.near[j], 1])
         for c in range(len(prices)):
@@ -251,7 +252,7 @@ class _Dual:
             raise ParameterError(f"lattice: {cost.lattice}, but no site that counts is where the robots are")
         self.reached = float(weights @ result.distances[self.sites])
 
-        points, corners = cost.points[self.sites], np.ascontiguousarray(geodesics.walls.corners[:, :2])
+        points, corners = cost.points[self.sites], geodesics.walls.corners
         sites, _ = geodesics.snap_to_free_space(points)
         from_corners = np.ascontiguousarray(geodesics.compute_grid_distances(corners, sites).T)
         self._known = _Known(geodesics.walls, sites, weights, from_corners)
@@ -335,7 +336,7 @@ class _Dual:
         def fill(index: AngularWallIndex, *_: object) -> int:
             return int(_bounds(self._known, index, steps, triangles, places, work, out))
 
-        self._geodesics.run_with_index(1, BINS, fill)
+        self._geodesics.run_with_index(1, SOURCE_BINS, fill)
         return places, *(out * unit)
 
     def proved(self, prices: Array, part: float, beat: Beat) -> tuple[float, Array]:

@@ -180,8 +180,8 @@ def test_the_same_call_gives_the_same_bits():
         ({"radius": 3.0}, ParameterError, "radius: 3 m, but no such robot fits where the positions are"),
         ({"precision": 0.0}, ParameterError, "precision: 0.0, but a number from 1e-05 to 1 was wanted"),
         ({"lattice": 0}, ParameterError, "lattice: 0, but a whole number from 1 to 4096 was wanted"),
-        ({"positions": [[3.0, 3.0]]}, InputError, "positions[0] = [3, 3] is 1 m outside the free space"),
-        ({"positions": []}, InputError, "positions: none, but at least one robot was wanted"),
+        ({"positions": [[3.0, 3.0]]}, InputError, "positions[0]: expected a point inside the boundary"),
+        ({"positions": []}, InputError, "positions: expected at least one robot, got none"),
     ],
 )
 def test_what_is_wrong_is_named(words, error, message):

@@ -1,9 +1,13 @@
-"""The nearest robot of every site, and the way to it: equation (22) without the mean.
+"""The nearest robot of every site, and the path to it: equation (22) without the mean.
 
-Most sites see the robot that is nearest as the crow flies. The others are reached by way of a corner, or
-from another robot in view that is nearer than that. Of robots that are equally far that of the lowest
-number counts.
+Most sites see the robot that is nearest in a straight line. The others are reached by way of a corner, or
+from another robot that they see and that is nearer than that. Of robots that are equally far, the one of the
+lowest number counts.
+
+All lengths are in grid steps, except for the result.
 """
+
+from __future__ import annotations
 
 from typing import NamedTuple
 
@@ -11,372 +15,448 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
-from robocov.geodesic import Graph, relax
+from robocov.cost.corner_views import CornerViews
+from robocov.cost.lattice import SLOTS, TILES_PER_GROUP, Tiles
 from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_box_hidden, is_visible
-from robocov.geodesic.walls import (
-    LEAF_SIZE,
-    Walls,
-    can_bend_at_corner,
-    compute_squared_box_distance,
-    skip_subtree,
-)
+from robocov.geodesic.box_tree import LEAF_SIZE, compute_squared_box_distance
+from robocov.geodesic.corner_graph import CornerGraph, CornerPaths, CornerQueue, relax_paths
+from robocov.geodesic.walls import Walls, can_bend_at_corner
 
-GROUP = 16
-"""Tiles that are looked at together first."""
+_MAX_SMALL_TEAM = 12
+"""Maximum number of robots whose views are not limited: each of so few is tested with most sites."""
 
-TILE = 4
-"""Cells along a side of a tile."""
-
-SLOTS = TILE**2
-
-_FEW = 12
-"""Robots of which it is known from the beginning what they see, however far: each is asked of most sites."""
-
-
-class Tiles(NamedTuple):
-    """The sites of a lattice in square tiles, neighbours together, grid steps; a tile need not be full."""
-
-    places: Array
-    """(2, t, SLOTS) x and y; of a slot without a site those of another one of the tile."""
-    facts: IntArray
-    """(2, t, SLOTS) Their numbers in the lattice, -1 without a site, and which component holds them."""
-    boxes: Array
-    """(t, 4) Around the sites of each tile,"""
-    groups: Array
-    """around each `GROUP` tiles,"""
-    tree: Array
-    """and the `build_box_tree` of the first."""
-
-
-class CornerViews(NamedTuple):
-    """Sites visible from each corner, in rows of one corner and one tile, sorted by tile."""
-
-    first: IntArray
-    """(t + 1,) The rows of a tile are those from its own `first` up to the next."""
-    rows: IntArray
-    """(r, 2) The corner, and a bit for each site of the tile: whether it is in useful view."""
-    spans: Array
-    """(r, 2) Distances of the nearest and the farthest of these sites."""
+_REACH_PADDING = 1e-9
+"""Added to the reach of a robot's view, relative to it: far more than rounding."""
 
 
 class CostMap(NamedTuple):
-    """All that is known before the robots."""
+    """Everything that is known before the robots."""
 
     walls: Walls
-    graph: Graph
+    graph: CornerGraph
     tiles: Tiles
     views: CornerViews
 
 
-class Work(NamedTuple):
-    """The search from n robots: room for it, and in the end the shortest ways."""
+class Search(NamedTuple):
+    """Scratch space and results of the search from n robots."""
 
-    sight: AngularWallIndex
-    """Visible walls of each robot."""
-    lists: IntArray
-    """(3, n) Robots: all of them, those near a group of tiles, those near a tile."""
-    queue: IntArray
-    """(2, k + 1) See `relax`."""
+    wall_index: AngularWallIndex
+    """The walls that each robot sees."""
+    reach: Array
+    """(n,) Distance of the farthest site to which a robot is the nearest in a straight line."""
+    all_robots: IntArray
+    """(n,) Numbers of all robots."""
+    group_robots: IntArray
+    """(n,) Robots that may be the nearest to a site of a group of tiles."""
+    tile_robots: IntArray
+    """(n,) Robots that may be the nearest to a site of a tile."""
+    queue: CornerQueue
+    corner_paths: CornerPaths
+    """The shortest paths from the robots to the corners."""
     hidden: IntArray
-    """(t,) A bit for each site of a tile: whether it does not see its nearest robot."""
-    to_corners: Array
-    """(k,) Length of the way to each corner, grid steps, inf where none leads."""
-    corner_ways: IntArray
-    """(k, 3) The robot where it begins, the corners where it bends first and last, -1 for none."""
-    to_sites: Array
-    """(t, SLOTS) Length of the way to each site, grid steps, inf where none leads."""
-    ways: IntArray
-    """(3, t, SLOTS) The robot where it begins, the corner where it bends last, -1 for none; and the robot
-    that is nearest as the crow flies."""
+    """(t,) Bit s is set if the site in slot s does not see the robot that is nearest in a straight line."""
+    nearest_robot: IntArray
+    """(t, SLOTS) The robot that is nearest to each site in a straight line."""
+    site_length: Array
+    """(t, SLOTS) Length of the shortest path to each site, inf if there is none."""
+    site_robot: IntArray
+    """(t, SLOTS) The robot from which it leads, -1 for none."""
+    site_corner: IntArray
+    """(t, SLOTS) The last corner at which it bends, -1 for none."""
+
+    @classmethod
+    def allocate(cls, wall_index: AngularWallIndex, robots: int, corners: int, tiles: int) -> Search:
+        """Allocate a search for a number of robots, corners and tiles."""
+        return cls(
+            wall_index=wall_index,
+            reach=np.empty(robots),
+            all_robots=np.arange(robots),
+            group_robots=np.empty(robots, np.int64),
+            tile_robots=np.empty(robots, np.int64),
+            queue=CornerQueue.allocate(corners),
+            corner_paths=CornerPaths.allocate(corners),
+            hidden=np.empty(tiles, np.int64),
+            nearest_robot=np.empty((tiles, SLOTS), np.int64),
+            site_length=np.empty((tiles, SLOTS)),
+            site_robot=np.empty((tiles, SLOTS), np.int64),
+            site_corner=np.empty((tiles, SLOTS), np.int64),
+        )
+
+
+class SitePaths(NamedTuple):
+    """The shortest paths to m sites from the robots of r teams."""
+
+    distance: Array
+    """(r, m) m, inf if no robot can reach the site."""
+    owner: IntArray
+    """(r, m) The robot from which the path leads, -1 for none."""
+    first_corner: IntArray
+    """(r, m) The first corner at which it bends, -1 for none."""
+    last_corner: IntArray
+    """(r, m) The last corner at which it bends, -1 for none."""
+
+    @classmethod
+    def allocate(cls, teams: int, sites: int) -> SitePaths:
+        """Allocate paths for a number of teams and sites."""
+        shape = (teams, sites)
+        return cls(
+            distance=np.empty(shape),
+            owner=np.empty(shape, np.int64),
+            first_corner=np.empty(shape, np.int64),
+            last_corner=np.empty(shape, np.int64),
+        )
 
 
 @kernel
-def corner_views(
-    walls: Walls, tiles: Tiles, begin: int, end: int, index: AngularWallIndex, rows: IntArray, spans: Array
-) -> int:
-    """Write what the corners from `begin` to `end` see: corner, tile, mask of a row, and its span.
+def find_site_paths(
+    cost_map: CostMap, search: Search, teams: Array, is_covered: BoolArray, unit: float, paths: SitePaths
+) -> bool:
+    """Find the shortest paths to all sites from the robots of each of several teams.
 
-    Return how many rows there are, -1 if there is no room.
+    Parameters
+    ----------
+    cost_map : CostMap
+    search : Search
+        Scratch space.
+    teams : (r, n, 2) array, grid steps
+        Positions of the robots.
+    is_covered : (r, c) bool array
+        Whether each component of the free space contains robots of each team.
+    unit : float, m
+        Length of a grid step.
+    paths : SitePaths
+        Result.
+
+    Returns
+    -------
+    bool
+        Whether there were enough entries in the index.
     """
-    corners, tree, used, leaves = walls.corners, tiles.tree, 0, len(tiles.tree) // 2
-    for k in range(begin, end):
-        if add_walls(walls, index, 0, corners[k, 0], corners[k, 1], np.inf, 0) < 0:
-            return -1
-        node = 1
-        while node:
-            if tree[node, 0] == np.inf or is_box_hidden(tree, node, index, 0):
-                node = skip_subtree(node)
-                continue
-            if node < leaves:
-                node *= 2
-                continue
-            leaf = (node - leaves) * LEAF_SIZE
-            for tile in range(leaf, min(leaf + LEAF_SIZE, len(tiles.boxes))):
-                if used == len(rows):
-                    return -1
-                if not is_box_hidden(tiles.boxes, tile, index, 0):
-                    rows[used, 0], rows[used, 1] = k, tile
-                    rows[used, 2] = _seen_sites(walls, index, tiles, k, tile, spans[used])
-                    used += rows[used, 2] != 0
-            node = skip_subtree(node)
-    return used
+    tiles = cost_map.tiles
+    for team in range(len(teams)):
+        if not _find_team_paths(cost_map, search, teams[team], is_covered[team]):
+            return False
+        for tile in range(len(tiles.boxes)):
+            for slot in range(SLOTS):
+                site = tiles.site[tile, slot]
+                if site >= 0:
+                    last_corner = search.site_corner[tile, slot]
+                    first_corner = search.corner_paths.first_corner[last_corner] if last_corner >= 0 else -1
+                    paths.distance[team, site] = search.site_length[tile, slot] * unit
+                    paths.owner[team, site] = search.site_robot[tile, slot]
+                    paths.first_corner[team, site] = first_corner
+                    paths.last_corner[team, site] = last_corner
+    return True
 
 
 @kernel
-def _seen_sites(walls: Walls, index: AngularWallIndex, tiles: Tiles, k: int, tile: int, span: Array) -> int:
-    """Return the mask of a tile's sites in useful view of a corner; write their span."""
-    mask, least, most = 0, np.inf, 0.0
-    for s in range(SLOTS):
-        x, y = tiles.places[0, tile, s], tiles.places[1, tile, s]
-        if (
-            tiles.facts[0, tile, s] >= 0
-            and can_bend_at_corner(walls.corners, k, x, y)
-            and is_visible(walls, index, 0, x, y)
-        ):
-            mask |= 1 << s
-            dx, dy = x - walls.corners[k, 0], y - walls.corners[k, 1]
-            length = np.sqrt(dx * dx + dy * dy)
-            least, most = min(least, length), max(most, length)
-    span[0], span[1] = least, most
-    return mask
+def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covered: BoolArray) -> bool:
+    """Find the paths from robots at (n, 2); return whether there were enough entries in the index."""
+    tiles = cost_map.tiles
+    _find_nearest_robots(tiles, search, robots)
+    used = 0
+    for i in range(len(robots)):
+        reach = np.inf
+        if len(robots) > _MAX_SMALL_TEAM:
+            reach = search.reach[i] * (1.0 + _REACH_PADDING)
+        used = add_walls(
+            cost_map.walls, search.wall_index, i, robots[i, 0], robots[i, 1], reach * reach, used
+        )
+        if used < 0:
+            return False
+    is_any_hidden = False
+    for tile in range(len(tiles.boxes)):
+        _find_hidden_sites(cost_map, search, tile, is_covered)
+        is_any_hidden = is_any_hidden or search.hidden[tile] != 0
+    if is_any_hidden:
+        _find_corner_paths(cost_map, search, robots)
+        _find_hidden_site_paths(cost_map, search, robots)
+    return True
 
 
 @kernel
-def _perhaps_nearest(
-    boxes: Array, k: int, index: AngularWallIndex, given: IntArray, count: int, out: IntArray
+def _find_nearest_robots(tiles: Tiles, search: Search, robots: Array) -> None:
+    """Find the robot that is nearest to each site in a straight line."""
+    for i in range(len(robots)):
+        search.reach[i] = 0.0
+    group_count = 0
+    for tile in range(len(tiles.boxes)):
+        if tile % TILES_PER_GROUP == 0:
+            group = tile // TILES_PER_GROUP
+            group_count = _list_possibly_nearest(
+                tiles.group_boxes, group, robots, search.all_robots, len(robots), search.group_robots
+            )
+        count = _list_possibly_nearest(
+            tiles.boxes, tile, robots, search.group_robots, group_count, search.tile_robots
+        )
+        _find_nearest_robots_of_tile(tiles, search, robots, tile, count)
+
+
+@kernel
+def _list_possibly_nearest(
+    boxes: Array, box: int, robots: Array, candidates: IntArray, count: int, result: IntArray
 ) -> int:
-    """Write which of `count` given robots may be nearest to a place in a box; return how many."""
+    """List which of the first `count` candidates may be nearest to a point of a box; return how many."""
     bound2 = np.inf
-    for j in range(count):
-        x, y = index.sources[given[j], 0], index.sources[given[j], 1]
-        dx, dy = max(x - boxes[k, 0], boxes[k, 2] - x), max(y - boxes[k, 1], boxes[k, 3] - y)
+    for k in range(count):
+        x = robots[candidates[k], 0]
+        y = robots[candidates[k], 1]
+        dx = max(x - boxes[box, 0], boxes[box, 2] - x)
+        dy = max(y - boxes[box, 1], boxes[box, 3] - y)
         bound2 = min(bound2, dx * dx + dy * dy)
-    return _within(boxes, k, index, bound2, given, count, out)
+    return _list_within(boxes, box, robots, bound2, candidates, count, result)
 
 
 @kernel
-def _within(
-    boxes: Array, k: int, index: AngularWallIndex, bound2: float, given: IntArray, count: int, out: IntArray
+def _list_within(
+    boxes: Array, box: int, robots: Array, bound2: float, candidates: IntArray, count: int, result: IntArray
 ) -> int:
-    """Write which of `count` given robots are not farther from a box than a bound; return how many."""
+    """List which of the first `count` candidates are within a squared distance of a box; return how many."""
     found = 0
-    for j in range(count):
-        i = given[j]
-        if compute_squared_box_distance(boxes, k, index.sources[i, 0], index.sources[i, 1]) <= bound2:
-            out[found] = i
+    for k in range(count):
+        i = candidates[k]
+        if compute_squared_box_distance(boxes, box, robots[i, 0], robots[i, 1]) <= bound2:
+            result[found] = i
             found += 1
     return found
 
 
 @kernel
-def _paths_to_corners(known: CostMap, work: Work) -> None:
-    """Write the shortest ways to the corners."""
-    corners, boxes, n = known.walls.corners, known.walls.corner_boxes, len(work.sight.sources)
-    everyone, some, leaves, waiting = work.lists[0], work.lists[1], len(boxes) // 2, 0
-    index, queue, distance, ways = work.sight, work.queue, work.to_corners, work.corner_ways
-    for k in range(len(corners)):
-        if k % LEAF_SIZE == 0:
-            near = _perhaps_nearest(boxes, leaves + k // LEAF_SIZE, index, everyone, n, some)
-        best, nearest = np.inf, -1
-        for j in range(near):
-            dx, dy = corners[k, 0] - index.sources[some[j], 0], corners[k, 1] - index.sources[some[j], 1]
-            if dx * dx + dy * dy < best:
-                best, nearest = dx * dx + dy * dy, some[j]
-        distance[k], ways[k, 0], queue[1, k] = np.inf, n, 0
-        waiting = _straight_to_corner(known.walls, work, k, nearest, waiting)
-    # few of the other robots matter once it is known how far the nearest one has to go, if not straight
-    relax(known.graph, distance, ways, queue, waiting)
-    waiting = 0
-    for k in range(len(corners)):
-        if k % LEAF_SIZE == 0:
-            bound = 0.0
-            for j in range(k, min(k + LEAF_SIZE, len(corners))):
-                bound = max(bound, distance[j])
-            near = _within(boxes, leaves + k // LEAF_SIZE, index, bound * bound, everyone, n, some)
-        for j in range(near):
-            waiting = _straight_to_corner(known.walls, work, k, some[j], waiting)
-    relax(known.graph, distance, ways, queue, waiting)
+def _find_nearest_robots_of_tile(tiles: Tiles, search: Search, robots: Array, tile: int, count: int) -> None:
+    """Find which of the first `count` of `tile_robots` is nearest to each site, the first of equals."""
+    length = search.site_length
+    nearest_robot = search.nearest_robot
+    for slot in range(SLOTS):
+        length[tile, slot] = np.inf
+    for k in range(count):
+        i = search.tile_robots[k]
+        x = robots[i, 0]
+        y = robots[i, 1]
+        # Without branches, so that several slots are computed at once. The lengths are still squared.
+        for slot in range(SLOTS):
+            dx = tiles.x[tile, slot] - x
+            dy = tiles.y[tile, slot] - y
+            length2 = dx * dx + dy * dy
+            best2 = length[tile, slot]
+            nearest_robot[tile, slot] = i if length2 < best2 else nearest_robot[tile, slot]
+            length[tile, slot] = length2 if length2 < best2 else best2
+    for slot in range(SLOTS):
+        i = nearest_robot[tile, slot]
+        length[tile, slot] = np.sqrt(length[tile, slot])
+        search.site_robot[tile, slot] = i
+        search.site_corner[tile, slot] = -1
+        search.reach[i] = max(search.reach[i], length[tile, slot])
 
 
 @kernel
-def _straight_to_corner(walls: Walls, work: Work, k: int, i: int, waiting: int) -> int:
-    """Write the straight way from a robot to a corner if it is the shortest; return how many then wait."""
-    distance, ways, x, y = work.to_corners, work.corner_ways, walls.corners[k, 0], walls.corners[k, 1]
-    from_x, from_y = work.sight.sources[i, 0], work.sight.sources[i, 1]
-    away = np.sqrt((x - from_x) * (x - from_x) + (y - from_y) * (y - from_y))
+def _find_hidden_sites(cost_map: CostMap, search: Search, tile: int, is_covered: BoolArray) -> None:
+    """Find the sites of a tile that do not see the robot that is nearest in a straight line."""
+    tiles = cost_map.tiles
+    mask = 0
+    for slot in range(SLOTS):
+        if not is_covered[tiles.component[tile, slot]]:
+            search.site_length[tile, slot] = np.inf
+            search.site_robot[tile, slot] = -1
+        elif tiles.site[tile, slot] >= 0:
+            x = tiles.x[tile, slot]
+            y = tiles.y[tile, slot]
+            if not is_visible(cost_map.walls, search.wall_index, search.nearest_robot[tile, slot], x, y):
+                search.site_length[tile, slot] = np.inf
+                mask |= 1 << slot
+    search.hidden[tile] = mask
+
+
+@kernel
+def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None:
+    """Find the shortest paths from the robots to the corners."""
+    walls = cost_map.walls
+    boxes = walls.corner_boxes
+    first_leaf = len(boxes) // 2
+    paths = search.corner_paths
+    waiting = 0
+    count = 0
+    for corner in range(len(walls.corners)):
+        if corner % LEAF_SIZE == 0:
+            leaf = first_leaf + corner // LEAF_SIZE
+            count = _list_possibly_nearest(
+                boxes, leaf, robots, search.all_robots, len(robots), search.group_robots
+            )
+        paths.length[corner] = np.inf
+        paths.source[corner] = len(robots)
+        search.queue.is_waiting[corner] = False
+        nearest = _find_nearest_candidate(search, robots, count, walls.corners[corner])
+        waiting = _take_straight_path(walls, search, corner, nearest, waiting)
+    relax_paths(cost_map.graph, paths, search.queue, waiting)
+    # Only robots that are closer than the length of these paths can shorten them.
+    waiting = 0
+    for corner in range(len(walls.corners)):
+        if corner % LEAF_SIZE == 0:
+            leaf = first_leaf + corner // LEAF_SIZE
+            bound = 0.0
+            for other in range(corner, min(corner + LEAF_SIZE, len(walls.corners))):
+                bound = max(bound, paths.length[other])
+            count = _list_within(
+                boxes, leaf, robots, bound * bound, search.all_robots, len(robots), search.group_robots
+            )
+        for k in range(count):
+            waiting = _take_straight_path(walls, search, corner, search.group_robots[k], waiting)
+    relax_paths(cost_map.graph, paths, search.queue, waiting)
+
+
+@kernel
+def _find_nearest_candidate(search: Search, robots: Array, count: int, point: Array) -> int:
+    """Return which of the first `count` of `group_robots` is nearest to a point in a straight line."""
+    best2 = np.inf
+    nearest = -1
+    for k in range(count):
+        i = search.group_robots[k]
+        dx = point[0] - robots[i, 0]
+        dy = point[1] - robots[i, 1]
+        if dx * dx + dy * dy < best2:
+            best2 = dx * dx + dy * dy
+            nearest = i
+    return nearest
+
+
+@kernel
+def _take_straight_path(walls: Walls, search: Search, corner: int, robot: int, waiting: int) -> int:
+    """Take the straight path from a robot to a corner if it is the shortest; return how many corners wait."""
+    paths = search.corner_paths
+    corner_x = walls.corners[corner, 0]
+    corner_y = walls.corners[corner, 1]
+    x = search.wall_index.positions[robot, 0]
+    y = search.wall_index.positions[robot, 1]
+    length = np.sqrt((corner_x - x) * (corner_x - x) + (corner_y - y) * (corner_y - y))
+    is_tie = length == paths.length[corner]
     if (
-        (away < distance[k] or (away == distance[k] and i < ways[k, 0]))
-        and can_bend_at_corner(walls.corners, k, from_x, from_y)
-        and is_visible(walls, work.sight, i, x, y)
+        (length < paths.length[corner] or (is_tie and robot < paths.source[corner]))
+        and can_bend_at_corner(walls.corners, walls.corner_walls, corner, x, y)
+        and is_visible(walls, search.wall_index, robot, corner_x, corner_y)
     ):
-        distance[k], ways[k, 0], ways[k, 1], ways[k, 2] = away, i, k, -1
-        if not work.queue[1, k]:
-            work.queue[0, waiting], work.queue[1, k] = k, 1
+        paths.length[corner] = length
+        paths.source[corner] = robot
+        paths.first_corner[corner] = corner
+        paths.previous_corner[corner] = -1
+        if not search.queue.is_waiting[corner]:
+            search.queue.is_waiting[corner] = True
+            search.queue.corners[waiting] = corner
             waiting += 1
     return waiting
 
 
 @kernel
-def _nearest_robots(tiles: Tiles, tile: int, count: int, work: Work) -> None:
-    """Write the nearest of `count` robots to the sites of a tile as the crow flies, of equals the first."""
-    to_sites, ways, sources = work.to_sites, work.ways, work.sight.sources
-    for s in range(SLOTS):
-        to_sites[tile, s] = np.inf
-    for j in range(count):
-        i = work.lists[2, j]
-        x, y = sources[i, 0], sources[i, 1]
-        for s in range(SLOTS):
-            dx, dy = tiles.places[0, tile, s] - x, tiles.places[1, tile, s] - y
-            away2, best = dx * dx + dy * dy, to_sites[tile, s]
-            ways[2, tile, s] = i if away2 < best else ways[2, tile, s]
-            to_sites[tile, s] = away2 if away2 < best else best
-    for s in range(SLOTS):
-        i, away = ways[2, tile, s], np.sqrt(to_sites[tile, s])
-        to_sites[tile, s], ways[0, tile, s], ways[1, tile, s] = away, i, -1
-        sources[i, 2] = max(sources[i, 2], away)
-
-
-@kernel
-def _hide(known: CostMap, work: Work, tile: int, covered: BoolArray) -> bool:
-    """Note which sites of a tile do not see their nearest robot; return whether there are any."""
-    facts, to_sites, ways, mask = known.tiles.facts, work.to_sites, work.ways, 0
-    for s in range(SLOTS):
-        i, x, y = ways[2, tile, s], known.tiles.places[0, tile, s], known.tiles.places[1, tile, s]
-        if not covered[facts[1, tile, s]]:
-            to_sites[tile, s], ways[0, tile, s] = np.inf, -1
-        elif facts[0, tile, s] >= 0 and not is_visible(known.walls, work.sight, i, x, y):
-            to_sites[tile, s] = np.inf
-            mask |= 1 << s
-    work.hidden[tile] = mask
-    return mask != 0
-
-
-@kernel
-def _by_corners(known: CostMap, work: Work, tile: int) -> None:
-    """Write the shortest ways to the hidden sites of a tile by a corner."""
-    places, views, corners = known.tiles.places, known.views, known.walls.corners
-    to_sites, ways, hidden, bound = work.to_sites, work.ways, work.hidden[tile], np.inf
-    # a row cannot be the best for any of them where another one is better for all
-    for row in range(views.first[tile], views.first[tile + 1]):
-        if hidden & ~views.rows[row, 1] == 0:
-            bound = min(bound, work.to_corners[views.rows[row, 0]] + views.spans[row, 1])
-    for row in range(views.first[tile], views.first[tile + 1]):
-        k, mask = views.rows[row, 0], views.rows[row, 1] & hidden
-        begin, owner = work.to_corners[k], work.corner_ways[k, 0]
-        if mask == 0 or begin + views.spans[row, 0] > bound or begin == np.inf:
-            continue
-        for s in range(SLOTS):
-            if (mask >> s) & 1:
-                dx, dy = places[0, tile, s] - corners[k, 0], places[1, tile, s] - corners[k, 1]
-                total, best = begin + np.sqrt(dx * dx + dy * dy), to_sites[tile, s]
-                if total < best or (total == best and owner < ways[0, tile, s]):
-                    to_sites[tile, s], ways[0, tile, s], ways[1, tile, s] = total, owner, k
-
-
-@kernel
-def _farthest(work: Work, tile: int) -> float:
-    """Return the longest of the ways to the hidden sites of a tile."""
-    hidden, farthest = work.hidden[tile], 0.0
-    for s in range(SLOTS):
-        if (hidden >> s) & 1:
-            farthest = max(farthest, work.to_sites[tile, s])
-    return farthest
-
-
-@kernel
-def _from_another(known: CostMap, work: Work, tile: int, i: int) -> None:
-    """Write the straight ways from a robot to the hidden sites of a tile where they are the shortest."""
-    to_sites, ways, index, hidden = work.to_sites, work.ways, work.sight, work.hidden[tile]
-    from_x, from_y = index.sources[i, 0], index.sources[i, 1]
-    for s in range(SLOTS):
-        if (hidden >> s) & 1:
-            x, y = known.tiles.places[0, tile, s], known.tiles.places[1, tile, s]
-            dx, dy = x - from_x, y - from_y
-            away, best = np.sqrt(dx * dx + dy * dy), to_sites[tile, s]
-            if (
-                (away < best or (away == best and i < ways[0, tile, s]))
-                and i != ways[2, tile, s]
-                and is_visible(known.walls, index, i, x, y)
-            ):
-                to_sites[tile, s], ways[0, tile, s], ways[1, tile, s] = away, i, -1
-
-
-@kernel
-def _unhide(known: CostMap, work: Work) -> None:
-    """Write the ways to the sites that do not see the robot that is nearest as the crow flies."""
-    tiles, index, lists = known.tiles, work.sight, work.lists
-    for group in range(len(tiles.groups)):
-        begin, end, bound = group * GROUP, min(group * GROUP + GROUP, len(tiles.boxes)), -1.0
-        for tile in range(begin, end):
-            if work.hidden[tile]:
-                _by_corners(known, work, tile)
-                bound = max(bound, _farthest(work, tile))
+def _find_hidden_site_paths(cost_map: CostMap, search: Search, robots: Array) -> None:
+    """Find the paths to the sites that do not see the robot that is nearest in a straight line."""
+    tiles = cost_map.tiles
+    for group in range(len(tiles.group_boxes)):
+        first = group * TILES_PER_GROUP
+        end = min(first + TILES_PER_GROUP, len(tiles.boxes))
+        bound = -1.0
+        for tile in range(first, end):
+            if search.hidden[tile]:
+                _take_corner_paths(cost_map, search, tile)
+                bound = max(bound, _find_longest_hidden(search, tile))
         if bound < 0.0:
             continue
-        # whoever else is nearer than by way of a corner may see the site
-        near = _within(tiles.groups, group, index, bound * bound, lists[0], len(index.sources), lists[1])
-        for tile in range(begin, end):
-            if work.hidden[tile]:
-                bound = _farthest(work, tile)
-                some = _within(tiles.boxes, tile, index, bound * bound, lists[1], near, lists[2])
-                for j in range(some):
-                    if not is_box_hidden(tiles.boxes, tile, index, lists[2, j]):
-                        _from_another(known, work, tile, lists[2, j])
-
-
-@kernel
-def _team_paths(known: CostMap, work: Work, robots: Array, covered: BoolArray) -> bool:
-    """Write the ways of the nearest of (n, 2) robots; return whether there was room for what they see."""
-    tiles, index, lists, n = known.tiles, work.sight, work.lists, len(robots)
-    for i in range(n):
-        lists[0, i], index.sources[i, 2] = i, 0.0
-        index.sources[i, 0], index.sources[i, 1] = robots[i, 0], robots[i, 1]
-    for tile in range(len(tiles.boxes)):
-        if tile % GROUP == 0:
-            near = _perhaps_nearest(tiles.groups, tile // GROUP, index, lists[0], n, lists[1])
-        _nearest_robots(
-            tiles, tile, _perhaps_nearest(tiles.boxes, tile, index, lists[1], near, lists[2]), work
+        # A site may see another robot that is nearer than by way of a corner.
+        group_count = _list_within(
+            tiles.group_boxes,
+            group,
+            robots,
+            bound * bound,
+            search.all_robots,
+            len(robots),
+            search.group_robots,
         )
-    used, any_hidden = 0, False
-    for i in range(n):
-        reach = index.sources[i, 2] * (1.0 + 1e-9) if n > _FEW else np.inf
-        used = add_walls(known.walls, index, i, robots[i, 0], robots[i, 1], reach * reach, used)
-        if used < 0:
-            return False
-    for tile in range(len(tiles.boxes)):
-        any_hidden = _hide(known, work, tile, covered) or any_hidden
-    if any_hidden:
-        _paths_to_corners(known, work)
-        _unhide(known, work)
-    return True
+        for tile in range(first, end):
+            if search.hidden[tile]:
+                bound = _find_longest_hidden(search, tile)
+                count = _list_within(
+                    tiles.boxes,
+                    tile,
+                    robots,
+                    bound * bound,
+                    search.group_robots,
+                    group_count,
+                    search.tile_robots,
+                )
+                for k in range(count):
+                    _take_straight_paths(cost_map, search, tile, search.tile_robots[k])
 
 
 @kernel
-def site_paths(
-    known: CostMap, work: Work, teams: Array, covered: BoolArray, unit: float, out: Array, ways: IntArray
-) -> bool:
-    """Write the ways of the nearest robots of each of some teams; return whether there was room.
+def _take_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
+    """Take the shortest paths to the hidden sites of a tile by way of a corner."""
+    tiles = cost_map.tiles
+    views = cost_map.views
+    corners = cost_map.walls.corners
+    paths = search.corner_paths
+    hidden = search.hidden[tile]
+    first = views.first_row[tile]
+    end = views.first_row[tile + 1]
+    # A corner cannot be the best for any site if another one is better for all of them.
+    bound = np.inf
+    for row in range(first, end):
+        if hidden & ~views.mask[row] == 0:
+            bound = min(bound, paths.length[views.corner[row]] + views.farthest[row])
+    for row in range(first, end):
+        corner = views.corner[row]
+        mask = views.mask[row] & hidden
+        to_corner = paths.length[corner]
+        if mask == 0 or to_corner + views.nearest[row] > bound or to_corner == np.inf:
+            continue
+        robot = paths.source[corner]
+        for slot in range(SLOTS):
+            if (mask >> slot) & 1:
+                dx = tiles.x[tile, slot] - corners[corner, 0]
+                dy = tiles.y[tile, slot] - corners[corner, 1]
+                length = to_corner + np.sqrt(dx * dx + dy * dy)
+                if _is_shorter(search, tile, slot, length, robot):
+                    search.site_length[tile, slot] = length
+                    search.site_robot[tile, slot] = robot
+                    search.site_corner[tile, slot] = corner
 
-    Parameters
-    ----------
-    teams : (r, n, 2)
-    covered : (r, c)
-        Which components of the free space hold robots of each.
-    unit : float, m
-        Of a grid step.
-    out : (r, m) m
-    ways : (r, 3, m)
-        The robot where each way begins, the corners where it bends first and last, -1 for none, by site.
-    """
-    facts = known.tiles.facts
-    for r in range(len(teams)):
-        if not _team_paths(known, work, teams[r], covered[r]):
-            return False
-        for tile in range(facts.shape[1]):
-            for s in range(SLOTS):
-                site, last = facts[0, tile, s], work.ways[1, tile, s]
-                if site >= 0:
-                    out[r, site] = work.to_sites[tile, s] * unit
-                    ways[r, 0, site], ways[r, 2, site] = work.ways[0, tile, s], last
-                    ways[r, 1, site] = work.corner_ways[last, 1] if last >= 0 else -1
-    return True
+
+@kernel
+def _is_shorter(search: Search, tile: int, slot: int, length: float, robot: int) -> bool:
+    """Return whether a path is shorter than the known one to a site, or as long from a lower robot."""
+    known = search.site_length[tile, slot]
+    is_tie: bool = length == known
+    return length < known or (is_tie and robot < search.site_robot[tile, slot])
+
+
+@kernel
+def _find_longest_hidden(search: Search, tile: int) -> float:
+    """Return the length of the longest path to a hidden site of a tile."""
+    hidden = search.hidden[tile]
+    longest = 0.0
+    for slot in range(SLOTS):
+        if (hidden >> slot) & 1:
+            longest = max(longest, search.site_length[tile, slot])
+    return longest
+
+
+@kernel
+def _take_straight_paths(cost_map: CostMap, search: Search, tile: int, robot: int) -> None:
+    """Take the straight paths from a robot to the hidden sites of a tile if they are the shortest."""
+    tiles = cost_map.tiles
+    index = search.wall_index
+    if is_box_hidden(tiles.boxes, tile, index, robot):
+        return
+    hidden = search.hidden[tile]
+    for slot in range(SLOTS):
+        if (hidden >> slot) & 1:
+            x = tiles.x[tile, slot]
+            y = tiles.y[tile, slot]
+            dx = x - index.positions[robot, 0]
+            dy = y - index.positions[robot, 1]
+            length = np.sqrt(dx * dx + dy * dy)
+            if (
+                _is_shorter(search, tile, slot, length, robot)
+                and robot != search.nearest_robot[tile, slot]
+                and is_visible(cost_map.walls, index, robot, x, y)
+            ):
+                search.site_length[tile, slot] = length
+                search.site_robot[tile, slot] = robot
+                search.site_corner[tile, slot] = -1

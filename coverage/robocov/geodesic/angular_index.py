@@ -1,8 +1,9 @@
 """Visibility among walls: for each source, the walls that face it in angular bins.
 
-A wall a → b (free space on its left) hides a target q from a source p iff p is not behind it, q is behind
-it, and the segment meets it, ends included. Touching a vertex of an obstacle from outside may therefore hide;
-a path by way of that vertex is as short. The walls that end in p are left out: there, the sectors decide.
+A wall a → b (free space on its left) hides a target q from a source p if and only if p is not behind it, q is
+behind it, and the segment from p to q meets it, ends included. Touching a vertex of an obstacle from outside
+may therefore hide; a path by way of that vertex is as short. The walls that end in p are left out: there, the
+sectors decide.
 """
 
 from __future__ import annotations
@@ -13,218 +14,307 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
-from robocov.geodesic.walls import (
-    LEAF_SIZE,
-    Walls,
-    compute_squared_box_distance,
-    contains_direction,
-    cross,
-    find_vertex,
-    skip_subtree,
-)
+from robocov.geodesic.box_tree import LEAF_SIZE, compute_squared_box_distance, skip_subtree
+from robocov.geodesic.grid import cross
+from robocov.geodesic.walls import Walls, contains_direction, find_vertex, get_relative_ends
 
-_PAD = 1e-9
+_PADDING = 1e-9
 """Added to the angles that a wall spans, and taken off its distance: far more than rounding, at no cost."""
 
-_CHAIN = 16
-"""Walls in a row that are looked at together."""
+_MAX_CHAIN = 16
+"""Maximum number of consecutive walls that are examined together."""
+
+_MAX_SIDE_ERROR = 2.0**55
+"""More than the rounding errors of sums of products of grid coordinates."""
+
+_MAX_TREE_DEPTH = 64
+"""Nodes that may wait for a visit, at most one for each level of the tree."""
 
 
 class AngularWallIndex(NamedTuple):
-    """The walls that face each of n sources, in angular bins, grid steps."""
+    """The walls that face each of n sources, in angular bins, in grid steps.
 
-    sources: Array
-    """(n, 3) Where they are, and the squared distance up to which walls are held."""
-    limits: Array
-    """(n, bins, 2) Squared distances up to which nothing, and from which on all, is hidden."""
+    All squared distances have the suffix 2.
+    """
+
+    positions: Array
+    """(n, 2) Positions of the sources."""
+    reach2: Array
+    """(n,) Distances up to which walls are in the index."""
+    clear2: Array
+    """(n, bins) Distances up to which nothing is hidden, -1 if the source is a vertex: there, the sectors
+    decide first."""
+    horizon2: Array
+    """(n, bins) Distances beyond which everything is hidden."""
     head: IntArray
     """(n, bins) The last entry of each bin, -1 for none."""
-    entries: IntArray
-    """(m, 2) A wall, and the entry of the same bin before, -1 for none."""
+    entry_wall: IntArray
+    """(m,) The wall of each entry."""
+    entry_before: IntArray
+    """(m,) The entry before in the same bin, -1 for none."""
     stack: IntArray
-    """Nodes of the tree that are to be looked at."""
+    """Nodes of the tree that wait for a visit."""
 
     @classmethod
     def allocate(cls, n: int, bins: int, entries: int) -> AngularWallIndex:
-        """Return room for the index of so many sources, for `add_walls`; bins are a power of 2."""
+        """Allocate an index, to be filled by `add_walls`.
+
+        Parameters
+        ----------
+        n : int
+            Number of sources.
+        bins : int
+            Number of angular bins of each source, a power of 2.
+        entries : int
+            Maximum number of entries of all sources together.
+
+        Returns
+        -------
+        AngularWallIndex
+        """
         return cls(
-            np.empty((n, 3)), np.empty((n, bins, 2)), np.empty((n, bins), np.int64),
-            np.empty((entries, 2), np.int64), np.empty(64, np.int64),
-        )  # fmt: skip
+            positions=np.empty((n, 2)),
+            reach2=np.empty(n),
+            clear2=np.empty((n, bins)),
+            horizon2=np.empty((n, bins)),
+            head=np.empty((n, bins), np.int64),
+            entry_wall=np.empty(entries, np.int64),
+            entry_before=np.empty(entries, np.int64),
+            stack=np.empty(_MAX_TREE_DEPTH, np.int64),
+        )
 
 
 @kernel
 def compute_pseudo_angle(dx: float, dy: float) -> float:
-    """Return a number in [0, 4] that grows with the direction's angle, without trigonometry.
+    """Compute a number from 0 to 4 that grows with the angle of a direction, without trigonometry.
 
+    Examples
+    --------
     >>> [compute_pseudo_angle(dx, dy) for dx, dy in ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))]
     [0.0, 1.0, 2.0, 3.0]
     """
-    part = dy / max(abs(dx) + abs(dy), 1e-300)
-    return 1.0 + part if dx >= 0.0 else 3.0 - part
+    slope = dy / max(abs(dx) + abs(dy), 1e-300)
+    return 1.0 + slope if dx >= 0.0 else 3.0 - slope
 
 
 @kernel
-def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, i: int) -> bool:
-    """Return whether all of a box is hidden from source i: beyond the horizon in every bin where it lies."""
-    x, y, limits = index.sources[i, 0], index.sources[i, 1], index.limits
-    least = compute_squared_box_distance(boxes, node, x, y) * (1.0 - _PAD)
-    if least == 0.0:
+def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int) -> bool:
+    """Return whether all of a box is beyond the horizon of a source, in every bin that the box meets."""
+    x = index.positions[source, 0]
+    y = index.positions[source, 1]
+    distance2 = compute_squared_box_distance(boxes, node, x, y) * (1.0 - _PADDING)
+    if distance2 == 0.0:
         return False
-    bins = limits.shape[1]
-    half_x, half_y = 0.5 * (boxes[node, 2] - boxes[node, 0]), 0.5 * (boxes[node, 3] - boxes[node, 1])
-    dx, dy = boxes[node, 0] + half_x - x, boxes[node, 1] + half_y - y
-    # a pseudo-angle grows by at most the angle, of which a half turn is at most pi/2 by its sine
-    wide = np.sqrt((half_x * half_x + half_y * half_y) / (dx * dx + dy * dy)) * (0.5 * np.pi) + _PAD
+    bins = index.horizon2.shape[1]
+    half_width = 0.5 * (boxes[node, 2] - boxes[node, 0])
+    half_height = 0.5 * (boxes[node, 3] - boxes[node, 1])
+    dx = boxes[node, 0] + half_width - x
+    dy = boxes[node, 1] + half_height - y
+    # A pseudo-angle grows at most as fast as the angle. The angle of half the box is at most pi/2 times its
+    # sine, which is the half diagonal over the distance of the centre.
+    sine2 = (half_width * half_width + half_height * half_height) / (dx * dx + dy * dy)
+    half_angle = np.sqrt(sine2) * (0.5 * np.pi) + _PADDING
     angle = compute_pseudo_angle(dx, dy)
-    first, last = int(np.floor((angle - wide) * (bins * 0.25))), int(np.floor((angle + wide) * (bins * 0.25)))
-    for k in range(first, min(last, first + bins - 1) + 1):  # noqa: SIM110, kernels are plain loops
-        if limits[i, k & (bins - 1), 1] >= least:
+    scale = bins * 0.25
+    first = int(np.floor((angle - half_angle) * scale))
+    last = int(np.floor((angle + half_angle) * scale))
+    for k in range(first, min(last, first + bins - 1) + 1):
+        if index.horizon2[source, k & (bins - 1)] >= distance2:
             return False
     return True
 
 
 @kernel
 def add_walls(
-    walls: Walls, index: AngularWallIndex, i: int, x: float, y: float, reach2: float, used: int
+    walls: Walls, index: AngularWallIndex, source: int, x: float, y: float, reach2: float, used: int
 ) -> int:
-    """Enter the walls around (x, y), not inside an obstacle, as source i.
+    """Add a source to an index, with the walls around it.
 
-    `used` entries are taken already; return how many are then, -1 if there is no room.
+    Parameters
+    ----------
+    walls : Walls
+    index : AngularWallIndex
+        Is changed.
+    source : int
+        Number of the source.
+    x, y : float, grid steps
+        Its position, not inside an obstacle.
+    reach2 : float
+        Squared distance up to which walls are added.
+    used : int
+        Number of entries that other sources use.
+
+    Returns
+    -------
+    int
+        Number of entries that are used now, -1 if there are too few.
     """
-    boxes, leaves, bins, limits = walls.boxes, len(walls.boxes) // 2, index.limits.shape[1], index.limits
+    boxes = walls.boxes
     stack = index.stack
-    index.sources[i, 0], index.sources[i, 1], index.sources[i, 2] = x, y, reach2
-    for k in range(bins):
-        limits[i, k, 0], limits[i, k, 1], index.head[i, k] = reach2, np.inf, -1
-    stack[0], height = 1, 1
+    leaves = len(boxes) // 2
+    bins = index.head.shape[1]
+    _reset_source(index, source, x, y, reach2)
+    stack[0] = 1
+    height = 1
     while height:
         height -= 1
         node = stack[height]
-        if compute_squared_box_distance(boxes, node, x, y) >= reach2 or is_box_hidden(boxes, node, index, i):
+        if compute_squared_box_distance(boxes, node, x, y) >= reach2:
+            continue
+        if is_box_hidden(boxes, node, index, source):
             continue
         if node < leaves:
-            # the nearer half first: what it hides need not be looked at
-            near = 2 * node + int(
-                compute_squared_box_distance(boxes, 2 * node + 1, x, y)
-                < compute_squared_box_distance(boxes, 2 * node, x, y)
-            )
-            stack[height], stack[height + 1] = near ^ 1, near
+            # The nearer half comes first: what it hides need not be visited.
+            left2 = compute_squared_box_distance(boxes, 2 * node, x, y)
+            right2 = compute_squared_box_distance(boxes, 2 * node + 1, x, y)
+            nearer = 2 * node + int(right2 < left2)
+            stack[height] = nearer ^ 1
+            stack[height + 1] = nearer
             height += 2
             continue
-        begin = (node - leaves) * LEAF_SIZE
-        for wall in range(begin, min(begin + LEAF_SIZE, len(walls.ends))):
-            if used + bins > len(index.entries):
+        first = (node - leaves) * LEAF_SIZE
+        for wall in range(first, min(first + LEAF_SIZE, len(walls.ends))):
+            if used + bins > len(index.entry_wall):
                 return -1
-            if walls.facts[wall, 2]:
-                used = _enter(walls, wall, index, i, used)
+            if walls.hides[wall]:
+                used = _add_wall(walls, wall, index, source, used)
     if find_vertex(walls.vertices, x, y) >= 0:
-        # its sectors decide before the walls do
         for k in range(bins):
-            limits[i, k, 0] = -1.0
+            index.clear2[source, k] = -1.0
     return used
 
 
 @kernel
-def _enter(walls: Walls, wall: int, index: AngularWallIndex, i: int, used: int) -> int:
-    """Enter a wall into the bins that it spans, if it faces the source; return how many entries are used."""
-    px, py, limits, ends = index.sources[i, 0], index.sources[i, 1], index.limits, walls.ends
-    ax, ay, bx, by = ends[wall, 0] - px, ends[wall, 1] - py, ends[wall, 2] - px, ends[wall, 3] - py
-    ux, uy = bx - ax, by - ay
+def _reset_source(index: AngularWallIndex, source: int, x: float, y: float, reach2: float) -> None:
+    """Place a source where no wall is in its way."""
+    index.positions[source, 0] = x
+    index.positions[source, 1] = y
+    index.reach2[source] = reach2
+    for k in range(index.head.shape[1]):
+        index.clear2[source, k] = reach2
+        index.horizon2[source, k] = np.inf
+        index.head[source, k] = -1
+
+
+@kernel
+def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, used: int) -> int:
+    """Add a wall to the bins that it spans, if it faces the source; return the number of used entries."""
+    x = index.positions[source, 0]
+    y = index.positions[source, 1]
+    ax, ay, bx, by = get_relative_ends(walls.ends, wall, x, y)
+    ux = bx - ax
+    uy = by - ay
     side = cross(ax, ay, ux, uy)
-    # in line with the wall: it hides nothing unless the source is on it, ends apart
+    # A wall in line with the source hides nothing, unless the source is on it, but not at its ends.
     if side < 0.0 or (side == 0.0 and ax * bx + ay * by >= 0.0):
         return used
     along = min(max(-(ax * ux + ay * uy) / (ux * ux + uy * uy), 0.0), 1.0)
-    nx, ny = ax + along * ux, ay + along * uy
-    near = (nx * nx + ny * ny) * (1.0 - _PAD)
-    if near >= index.sources[i, 2]:
+    nearest_x = ax + along * ux
+    nearest_y = ay + along * uy
+    near2 = (nearest_x * nearest_x + nearest_y * nearest_y) * (1.0 - _PADDING)
+    if near2 >= index.reach2[source]:
         return used
-    # seen from its front, a wall runs counter-clockwise from a to b, by at most a half turn
-    bins = limits.shape[1]
+    far2 = max(ax * ax + ay * ay, bx * bx + by * by) * (1.0 + _PADDING)
+    # Seen from its front, a wall runs counter-clockwise from a to b, by at most a half turn.
+    bins = index.head.shape[1]
     scale = bins * 0.25
-    start, stop = compute_pseudo_angle(ax, ay), compute_pseudo_angle(bx, by)
+    start = compute_pseudo_angle(ax, ay)
+    stop = compute_pseudo_angle(bx, by)
     if stop < start:
         stop += 4.0
-    low, high = int(np.floor((start - _PAD) * scale)), int(np.floor((stop + _PAD) * scale))
-    inner_low, inner_high = int(np.ceil((start + _PAD) * scale)), int(np.floor((stop - _PAD) * scale))
-    far = max(ax * ax + ay * ay, bx * bx + by * by) * (1.0 + _PAD)
+    low = int(np.floor((start - _PADDING) * scale))
+    high = int(np.floor((stop + _PADDING) * scale))
+    inner_low = int(np.ceil((start + _PADDING) * scale))
+    inner_high = int(np.floor((stop - _PADDING) * scale))
     for place in range(low, min(high, low + bins - 1) + 1):
         k = place & (bins - 1)
-        if near > limits[i, k, 1]:
+        if near2 > index.horizon2[source, k]:
             continue
-        limits[i, k, 0] = min(limits[i, k, 0], near)
-        index.entries[used, 0], index.entries[used, 1] = wall, index.head[i, k]
-        index.head[i, k] = used
+        index.clear2[source, k] = min(index.clear2[source, k], near2)
+        index.entry_wall[used] = wall
+        index.entry_before[used] = index.head[source, k]
+        index.head[source, k] = used
         used += 1
-        # what is farther than all of a wall across the whole bin is hidden by that one
+        # Everything farther than a wall across the whole bin is hidden by that wall.
         if inner_low <= place < inner_high:
-            limits[i, k, 1] = min(limits[i, k, 1], far)
+            index.horizon2[source, k] = min(index.horizon2[source, k], far2)
+    # The last bin is covered only in part; the walls that follow this one may cover the rest.
     last = inner_high & (bins - 1)
-    if inner_low <= inner_high < low + bins and far < limits[i, last, 1]:
-        far = _chained(walls, wall, px, py, stop, (inner_high + 1) / scale, far)
-        limits[i, last, 1] = min(limits[i, last, 1], far)
+    if inner_low <= inner_high < low + bins and far2 < index.horizon2[source, last]:
+        chain_far2 = _find_chain_end(walls, wall, x, y, stop, (inner_high + 1) / scale, far2)
+        index.horizon2[source, last] = min(index.horizon2[source, last], chain_far2)
     return used
 
 
 @kernel
-def _chained(walls: Walls, wall: int, px: float, py: float, angle: float, wanted: float, far: float) -> float:
-    """Return the farthest of a chain of walls that faces the source up to an angle, inf for none."""
-    ends = walls.ends
-    for _ in range(_CHAIN):
-        ax, ay = ends[wall, 2] - px, ends[wall, 3] - py
-        wall = walls.facts[wall, 0]
+def _find_chain_end(
+    walls: Walls, wall: int, x: float, y: float, angle: float, last_angle: float, far2: float
+) -> float:
+    """Follow walls that face (x, y) from one pseudo-angle to another; return their largest squared distance.
+
+    The result is inf if the walls do not reach the last angle. `far2` is the distance of those before.
+    """
+    for _ in range(_MAX_CHAIN):
+        ax = walls.ends[wall, 2] - x
+        ay = walls.ends[wall, 3] - y
+        wall = walls.following[wall]
         if wall < 0:
             break
-        bx, by = ends[wall, 2] - px, ends[wall, 3] - py
+        bx = walls.ends[wall, 2] - x
+        by = walls.ends[wall, 3] - y
         if cross(ax, ay, bx - ax, by - ay) <= 0.0:
             break
         stop = compute_pseudo_angle(bx, by)
-        while stop < angle - _PAD:
+        while stop < angle - _PADDING:
             stop += 4.0
-        angle, far = stop, max(far, (bx * bx + by * by) * (1.0 + _PAD))
-        if angle - _PAD >= wanted:
-            return far
+        angle = stop
+        far2 = max(far2, (bx * bx + by * by) * (1.0 + _PADDING))
+        if angle - _PADDING >= last_angle:
+            return far2
     return np.inf
 
 
 @kernel
-def is_visible(walls: Walls, index: AngularWallIndex, i: int, x: float, y: float) -> bool:
-    """Return whether source i sees a target, at any distance; from a vertex into its free space only."""
-    dx, dy = x - index.sources[i, 0], y - index.sources[i, 1]
-    away2 = dx * dx + dy * dy
-    bins = index.limits.shape[1]
+def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: float) -> bool:
+    """Return whether a source sees a point at any distance; from a vertex only into its free space."""
+    dx = x - index.positions[source, 0]
+    dy = y - index.positions[source, 1]
+    distance2 = dx * dx + dy * dy
+    bins = index.clear2.shape[1]
     k = min(int(compute_pseudo_angle(dx, dy) * (bins * 0.25)), bins - 1)
-    # this decides most
-    if away2 <= index.limits[i, k, 0]:
+    # These two comparisons decide most cases.
+    if distance2 <= index.clear2[source, k]:
         return True
-    if away2 > index.limits[i, k, 1]:
+    if distance2 > index.horizon2[source, k]:
         return False
-    return _sees_past(walls, index, i, k, dx, dy)
+    return _is_visible_past_walls(walls, index, source, k, dx, dy)
 
 
 @kernel
-def _sees_past(walls: Walls, index: AngularWallIndex, i: int, k: int, dx: float, dy: float) -> bool:
-    """Return whether source i sees what is at (dx, dy) from it, in bin k, by looking at each wall."""
-    px, py = index.sources[i, 0], index.sources[i, 1]
-    if index.limits[i, k, 0] < 0.0 and not contains_direction(
-        walls.first, walls.sectors, find_vertex(walls.vertices, px, py), dx, dy
-    ):
-        return False
-    if dx * dx + dy * dy > index.sources[i, 2]:
-        return _unhidden(walls, px, py, dx, dy)
-    at = index.head[i, k]
-    while at >= 0:
-        if _hides(walls.ends, index.entries[at, 0], px, py, dx, dy):
+def _is_visible_past_walls(
+    walls: Walls, index: AngularWallIndex, source: int, k: int, dx: float, dy: float
+) -> bool:
+    """Return whether a source sees what is at (dx, dy) from it, in bin k, by testing every wall there."""
+    x = index.positions[source, 0]
+    y = index.positions[source, 1]
+    if index.clear2[source, k] < 0.0:
+        vertex = find_vertex(walls.vertices, x, y)
+        if not contains_direction(walls, vertex, dx, dy):
             return False
-        at = index.entries[at, 1]
+    if dx * dx + dy * dy > index.reach2[source]:
+        return _is_segment_free(walls, x, y, dx, dy)
+    entry = index.head[source, k]
+    while entry >= 0:
+        if _hides(walls.ends, index.entry_wall[entry], x, y, dx, dy):
+            return False
+        entry = index.entry_before[entry]
     return True
 
 
 @kernel
-def _hides(ends: Array, wall: int, px: float, py: float, dx: float, dy: float) -> bool:
-    """Return whether a wall that faces p hides what is at (dx, dy) from there."""
-    ax, ay, bx, by = ends[wall, 0] - px, ends[wall, 1] - py, ends[wall, 2] - px, ends[wall, 3] - py
+def _hides(ends: Array, wall: int, x: float, y: float, dx: float, dy: float) -> bool:
+    """Return whether a wall that faces (x, y) hides what is at (dx, dy) from there."""
+    ax, ay, bx, by = get_relative_ends(ends, wall, x, y)
     return (
         cross(bx - ax, by - ay, dx - ax, dy - ay) < 0.0
         and cross(ax, ay, dx, dy) >= 0.0
@@ -233,32 +323,47 @@ def _hides(ends: Array, wall: int, px: float, py: float, dx: float, dy: float) -
 
 
 @kernel
-def _unhidden(walls: Walls, px: float, py: float, dx: float, dy: float) -> bool:
-    """Return whether no wall hides what is at (dx, dy) from p, by looking along the segment."""
-    boxes, ends, leaves = walls.boxes, walls.ends, len(walls.boxes) // 2
-    low_x, high_x, low_y, high_y = px + min(dx, 0.0), px + max(dx, 0.0), py + min(dy, 0.0), py + max(dy, 0.0)
+def _faces(ends: Array, wall: int, x: float, y: float) -> bool:
+    """Return whether (x, y) is in front of a wall, or on it, but not at its ends."""
+    ax, ay, bx, by = get_relative_ends(ends, wall, x, y)
+    side: float = cross(ax, ay, bx - ax, by - ay)
+    return side > 0.0 or (side == 0.0 and ax * bx + ay * by < 0.0)
+
+
+@kernel
+def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> bool:
+    """Return whether no wall hides what is at (dx, dy) from (x, y), by a search along the segment."""
+    boxes = walls.boxes
+    leaves = len(boxes) // 2
     node = 1
     while node:
-        if (
-            boxes[node, 0] > high_x or boxes[node, 2] < low_x
-            or boxes[node, 1] > high_y or boxes[node, 3] < low_y
-        ):  # fmt: skip
+        if _is_box_off_segment(boxes, node, x, y, dx, dy):
             node = skip_subtree(node)
-            continue
-        half_x, half_y = 0.5 * (boxes[node, 2] - boxes[node, 0]), 0.5 * (boxes[node, 3] - boxes[node, 1])
-        side = dx * (boxes[node, 1] + half_y - py) - dy * (boxes[node, 0] + half_x - px)
-        if abs(side) * (1.0 - _PAD) > (abs(dx) * half_y + abs(dy) * half_x) * (1.0 + _PAD) + 2.0**55:
-            node = skip_subtree(node)
-            continue
-        if node < leaves:
+        elif node < leaves:
             node *= 2
-            continue
-        begin = (node - leaves) * LEAF_SIZE
-        for wall in range(begin, min(begin + LEAF_SIZE, len(ends))):
-            ax, ay, bx, by = ends[wall, 0] - px, ends[wall, 1] - py, ends[wall, 2] - px, ends[wall, 3] - py
-            side = cross(ax, ay, bx - ax, by - ay)
-            faces = side > 0.0 or (side == 0.0 and ax * bx + ay * by < 0.0)
-            if faces and walls.facts[wall, 2] and _hides(ends, wall, px, py, dx, dy):
-                return False
-        node = skip_subtree(node)
+        else:
+            first = (node - leaves) * LEAF_SIZE
+            for wall in range(first, min(first + LEAF_SIZE, len(walls.ends))):
+                if (
+                    walls.hides[wall]
+                    and _faces(walls.ends, wall, x, y)
+                    and _hides(walls.ends, wall, x, y, dx, dy)
+                ):
+                    return False
+            node = skip_subtree(node)
     return True
+
+
+@kernel
+def _is_box_off_segment(boxes: Array, node: int, x: float, y: float, dx: float, dy: float) -> bool:
+    """Return whether a box certainly does not meet the segment from (x, y) to what is at (dx, dy) from it."""
+    if boxes[node, 0] > x + max(dx, 0.0) or boxes[node, 2] < x + min(dx, 0.0):
+        return True
+    if boxes[node, 1] > y + max(dy, 0.0) or boxes[node, 3] < y + min(dy, 0.0):
+        return True
+    half_width = 0.5 * (boxes[node, 2] - boxes[node, 0])
+    half_height = 0.5 * (boxes[node, 3] - boxes[node, 1])
+    side = dx * (boxes[node, 1] + half_height - y) - dy * (boxes[node, 0] + half_width - x)
+    size: float = abs(dx) * half_height + abs(dy) * half_width
+    distance: float = abs(side) * (1.0 - _PADDING)
+    return distance > size * (1.0 + _PADDING) + _MAX_SIDE_ERROR

@@ -17,7 +17,8 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.geodesic.angular_index import AngularWallIndex, add_walls, compute_pseudo_angle
-from robocov.geodesic.walls import Grid, Walls, build_walls
+from robocov.geodesic.grid import Grid
+from robocov.geodesic.walls import Walls, build_walls
 
 _BINS = 512
 """Angular bins of a robot's view."""
@@ -125,7 +126,7 @@ def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterato
     components = shapely.orient_polygons(shapely.get_parts(free))
     walls = build_walls(shapely.transform(shapely.multipolygons(components), grid.snap))
     # The hull of the map hides nothing, but is visible itself.
-    walls.facts[:, 2] = 1
+    walls.hides[:] = True
     index = AngularWallIndex.allocate(1, _BINS, 64 * _BINS)
     for position in grid.snap(positions):
         while True:
@@ -133,7 +134,7 @@ def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterato
             entries = add_walls(walls, index, 0, x, y, np.inf, 0)
             if entries >= 0:
                 break
-            index = AngularWallIndex.allocate(1, _BINS, 2 * len(index.entries))
+            index = AngularWallIndex.allocate(1, _BINS, 2 * len(index.entry_wall))
         sectors = _find_sectors(walls, index, entries, position)
         walls_from_robot = walls.ends[sectors.wall] - np.tile(position, 2)
         first_corners = _intersect(walls_from_robot, sectors.start)
@@ -146,7 +147,7 @@ def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterato
 
 def _find_sectors(walls: Walls, index: AngularWallIndex, entries: int, position: Array) -> _Sectors:
     """Return the sectors of the view from a position; the index has so many entries of walls that face it."""
-    facing_walls = np.unique(index.entries[:entries, 0])
+    facing_walls = np.unique(index.entry_wall[:entries])
     ends = walls.ends[facing_walls].reshape(-1, 2) - position
     start = np.unique(np.arctan2(ends[:, 1], ends[:, 0]))
     end = np.append(start[1:], start[0] + 2.0 * np.pi)
@@ -173,10 +174,10 @@ def _find_nearest_walls(ends: Array, index: AngularWallIndex, rays: Array, neare
         min_distance = np.inf
         entry = index.head[0, int(compute_pseudo_angle(x, y) * (_BINS * 0.25)) & (_BINS - 1)]
         while entry >= 0:
-            wall = index.entries[entry, 0]
+            wall = index.entry_wall[entry]
             # From the source to the first end a, and from there along the wall u.
-            ax = ends[wall, 0] - index.sources[0, 0]
-            ay = ends[wall, 1] - index.sources[0, 1]
+            ax = ends[wall, 0] - index.positions[0, 0]
+            ay = ends[wall, 1] - index.positions[0, 1]
             ux = ends[wall, 2] - ends[wall, 0]
             uy = ends[wall, 3] - ends[wall, 1]
             # The ray meets the line of the wall where a + s u = t (x, y).
@@ -187,7 +188,7 @@ def _find_nearest_walls(ends: Array, index: AngularWallIndex, rays: Array, neare
                 if 0.0 <= s <= 1.0 and 0.0 < t < min_distance:
                     min_distance = t
                     nearest[m] = wall
-            entry = index.entries[entry, 1]
+            entry = index.entry_before[entry]
 
 
 def _intersect(walls: Array, angles: Array) -> Array:

@@ -83,9 +83,9 @@ def test_rooms_without_a_robot_are_uncovered_whatever_the_speed() -> None:
 @pytest.mark.parametrize(
     ("speeds", "message"),
     [
-        ([1.0], "a number for each of 2 robots was wanted"),
-        ([1.0, 0.0], r"speeds\[1\]: 0.0 m/s, but a number above 0 was wanted"),
-        ([np.nan, 1.0], r"speeds\[0\]: nan"),
+        ([1.0], r"expected a number for each of 2 robots, got \[1.0\]"),
+        ([1.0, 0.0], r"speeds\[1\]: expected a number above 0 m/s, got 0.0"),
+        ([np.nan, 1.0], r"speeds\[0\]: expected a number above 0 m/s, got nan"),
         (["fast", 1.0], "a number for each of 2 robots"),
     ],
 )

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import shapely
 
-from robocov.cost import CoverageCost, _lattice_of
-from robocov.cost.site_paths import GROUP, TILE
+from robocov.cost import CoverageCost
+from robocov.cost.lattice import TILE_SIDE, TILES_PER_GROUP, build_lattice
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError
 from robocov.geodesic import Geodesics
@@ -15,7 +15,7 @@ SQUARE = ((2.0, 1.0), (6.0, 1.0), (6.0, 4.0), (2.0, 4.0))
 
 def lattice(side, *obstacles):
     environment = Environment("test", SQUARE, obstacles)
-    return environment, *_lattice_of(Geodesics(environment), side)
+    return environment, *build_lattice(Geodesics(environment), side)
 
 
 def test_the_sites_are_the_free_cell_centres_row_by_row():
@@ -31,21 +31,24 @@ def test_the_sites_are_the_free_cell_centres_row_by_row():
 @pytest.mark.parametrize("side", [1, 3, 20, 37])
 def test_tiles_are_squares_of_cells(side):
     _, sites, tiles = lattice(side)
-    full = tiles.facts[0] >= 0
-    number, places = tiles.facts[0][full], tiles.places[:, full].T
+    is_full = tiles.site >= 0
+    number = tiles.site[is_full]
+    places = np.column_stack([tiles.x[is_full], tiles.y[is_full]])
     row, column = np.divmod(sites.cells[number], side)
     np.testing.assert_array_equal(np.sort(number), np.arange(len(sites.cells)))
     # one tile, one square
-    tile = np.nonzero(full)[0]
-    square = row // TILE * side + column // TILE
+    tile = np.nonzero(is_full)[0]
+    square = row // TILE_SIDE * side + column // TILE_SIDE
     pairs = set(zip(tile.tolist(), square.tolist(), strict=True))
     assert len(pairs) == len(set(square.tolist())) == len(tiles.boxes)
-    for boxes in (tiles.boxes[tile], tiles.groups[tile // GROUP]):
+    for boxes in (tiles.boxes[tile], tiles.group_boxes[tile // TILES_PER_GROUP]):
         assert (boxes[:, :2] <= places).all() and (places <= boxes[:, 2:]).all()
 
 
 def test_a_lattice_without_a_free_cell_is_refused():
-    with pytest.raises(ParameterError, match="none of its sites is free"):
+    with pytest.raises(
+        ParameterError, match="lattice: expected at least one site in the free space, got none with 1 cells"
+    ):
         lattice(1, CircleObstacle((4.0, 3.0), 0.5))
 
 

@@ -34,7 +34,7 @@ def indexed(geodesics, points, reach, bins=64):
 def seen(geodesics, index, targets):
     """Return which of the targets each source sees."""
     return np.array(
-        [[is_visible(geodesics.walls, index, i, *q) for q in targets] for i in range(len(index.sources))]
+        [[is_visible(geodesics.walls, index, i, *q) for q in targets] for i in range(len(index.positions))]
     )
 
 

@@ -208,15 +208,18 @@ def test_points_a_hair_inside_an_obstacle_are_on_its_wall(depth):
 @pytest.mark.parametrize("point", [(0.5, 0.4), (1.1, 0.5), (-1e-3, 0.2), (1e9, 0.0)])
 def test_points_outside_the_free_space_are_named(point):
     with pytest.raises(
-        InputError, match=r"positions\[1\] = \[.*\] is .* m outside the free space of map 'test'"
+        InputError,
+        match=r"positions\[1\]: expected a point .* of map 'test', got \[.*\], .* m outside the free space",
     ):
         Geodesics(SLANTED).snap_to_free_space([[0.1, 0.1], point])
 
 
 def test_points_that_are_no_numbers_are_named():
-    with pytest.raises(InputError, match=r"positions\[0\] = \[nan, 1\]: finite numbers"):
+    with pytest.raises(InputError, match=r"positions\[0\]: expected finite numbers, got \[nan, 1\]"):
         Geodesics(SLANTED).snap_to_free_space([[np.nan, 1.0]])
-    with pytest.raises(InputError, match=r"positions: an array of shape \(3,\)"):
+    with pytest.raises(
+        InputError, match=r"positions: expected an array of shape \(n, 2\), .* got shape \(3,\)"
+    ):
         Geodesics(SLANTED).snap_to_free_space([1.0, 2.0, 3.0])
 
 

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import Environment, PolygonObstacle
-from robocov.geodesic.walls import Grid, build_walls, can_bend_at_corner, count_windings, cross, find_vertex
+from robocov.geodesic.grid import Grid, cross
+from robocov.geodesic.walls import build_walls, can_bend_at_corner, count_windings, find_vertex
 
 SIZE = 8.0
 
@@ -25,17 +26,17 @@ def walls(*obstacles, boundary=HALL):
 
 
 def corners(walls):
-    return sorted(map(tuple, (walls.corners[:, :2] * SIZE / 2.0**48).tolist()))
+    return sorted(map(tuple, (walls.corners * SIZE / 2.0**48).tolist()))
 
 
 def hiding(walls):
-    return int(walls.facts[:, 2].sum())
+    return int(walls.hides.sum())
 
 
 def test_an_empty_square_has_neither_corners_nor_walls_that_hide():
     empty = walls()
     assert len(empty.corners) == hiding(empty) == 0
-    assert len(empty.sectors) == len(empty.ends) == 4
+    assert len(empty.sector_walls) == len(empty.ends) == 4
 
 
 def test_corners_are_where_free_space_turns_round_an_obstacle():
@@ -56,10 +57,10 @@ def test_vertices_in_line_are_no_corners():
 def test_a_pinch_has_two_narrow_sectors_and_no_corner(touching):
     pinch = walls(box(3, 3, 5, 5), touching)
     at = find_vertex(pinch.vertices, 5.0 / 8 * 2.0**48, 5.0 / 8 * 2.0**48)
-    sectors = pinch.sectors[slice(*pinch.first[at : at + 2])]
-    assert len(sectors) == 2
+    sectors = slice(pinch.first_sector[at], pinch.first_sector[at + 1])
+    assert len(pinch.sector_walls[sectors]) == 2
     assert (5.0, 5.0) not in corners(pinch)
-    assert not sectors[:, 4].any()
+    assert not pinch.sector_is_corner[sectors].any()
 
 
 def test_a_straight_wall_past_a_pinch_is_a_corner():
@@ -83,7 +84,9 @@ def test_useful_points_of_a_corner_are_those_beside_its_walls():
         (4.001, 6): False,
     }
     x, y = (np.array(list(points)) / SIZE * 2.0**48).T
-    found = [can_bend_at_corner(room.corners, 0, *point) for point in zip(x, y, strict=True)]
+    found = [
+        can_bend_at_corner(room.corners, room.corner_walls, 0, *point) for point in zip(x, y, strict=True)
+    ]
     assert found == list(points.values())
 
 

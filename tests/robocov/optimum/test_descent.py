@@ -11,7 +11,8 @@ from scipy.spatial.distance import pdist
 
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-from robocov.optimum import ConfigurationSpace, _direction, descend
+from robocov.optimum import ConfigurationSpace, descend
+from robocov.optimum.descent import _compute_quasi_newton_direction, _LearntStep
 
 OFFICE = Environment(
     "office",
@@ -32,7 +33,7 @@ EMPTY = Environment("empty", ((0, 0), (6, 0), (6, 6), (0, 6)))
 def starts(seed, count):
     """Return places in the room that are far enough apart."""
     rng = np.random.default_rng(seed)
-    positions = ROOM.nearest(rng.uniform((0, 0), (12, 8), (count, 2)), np.zeros(count, dtype=int))
+    positions = ROOM.find_nearest(rng.uniform((0, 0), (12, 8), (count, 2)), np.zeros(count, dtype=int))
     assert positions is not None
     return positions
 
@@ -49,11 +50,11 @@ def test_robots_are_moved_to_where_they_fit(seed, count):
     rng = np.random.default_rng(seed)
     # half of them in heaps
     wanted = np.where(rng.random((count, 1)) < 0.5, rng.uniform((-2, -2), (14, 10), (count, 2)), [5.0, 4.0])
-    positions = ROOM.nearest(wanted, np.zeros(count, dtype=int))
+    positions = ROOM.find_nearest(wanted, np.zeros(count, dtype=int))
     assert positions is not None
     assert clear(positions, RADIUS, OFFICE.free)
     # what fits stays
-    again = ROOM.nearest(positions, np.zeros(count, dtype=int))
+    again = ROOM.find_nearest(positions, np.zeros(count, dtype=int))
     np.testing.assert_array_equal(again, positions)
 
 
@@ -61,16 +62,16 @@ def test_where_robots_do_not_fit_there_is_no_place():
     closet = Environment("closet", ((0, 0), (1, 0), (1, 1), (0, 1)))
     room = ConfigurationSpace(closet.free, 0.2)
     middle = np.full((5, 2), 0.5)
-    assert room.nearest(middle[:4], np.zeros(4, dtype=int)) is not None
-    assert room.nearest(middle, np.zeros(5, dtype=int)) is None
+    assert room.find_nearest(middle[:4], np.zeros(4, dtype=int)) is not None
+    assert room.find_nearest(middle, np.zeros(5, dtype=int)) is None
 
 
 def test_robots_stay_in_their_component():
     halves = Environment("halves", EMPTY.boundary, (WallObstacle(((3.5, 0), (3.5, 6)), 0.1),))
     room = ConfigurationSpace(halves.free, 0.1)
-    assert [part.centroid.x < 3.5 for part in room.parts] == [True, False]
+    assert [part.centroid.x < 3.5 for part in room.components] == [True, False]
     wanted = np.array([[5.0, 2.0], [1.0, 2.0]])
-    positions = room.nearest(wanted, np.array([0, 1]))
+    positions = room.find_nearest(wanted, np.array([0, 1]))
     np.testing.assert_allclose(positions, [[3.348, 2.0], [3.652, 2.0]], atol=1e-9)
     result = descend(CoverageCost(halves, 24), room, positions, np.array([0, 1]))
     np.testing.assert_allclose(result.positions, [[1.725, 3.0], [4.775, 3.0]], atol=0.03)
@@ -89,7 +90,7 @@ def test_the_end_is_a_local_minimum_that_is_never_above_the_start(seed, count):
     rng = np.random.default_rng(seed)
     for size in (0.2, 0.02, 0.002):
         for _ in range(8):
-            moved = ROOM.nearest(
+            moved = ROOM.find_nearest(
                 result.positions + size * rng.normal(size=(count, 2)), np.zeros(count, dtype=int)
             )
             assert moved is None or COST(moved).mean_distance >= result.mean_distance * (1.0 - 2e-5)
@@ -140,9 +141,9 @@ def test_what_was_learnt_of_a_quadratic_leads_to_its_minimum():
     learnt = deque()
     for step in steps:
         bend = (bowl @ step.ravel()).reshape(2, 2)
-        learnt.append((step, bend))
+        learnt.append(_LearntStep(step, bend))
     slope = rng.normal(size=(2, 2))
-    way = _direction(slope, np.ones((2, 1)), learnt)
+    way = _compute_quasi_newton_direction(slope, np.ones((2, 1)), learnt)
     np.testing.assert_allclose(bowl @ way.ravel(), -slope.ravel(), atol=1e-12)
 
 

@@ -18,7 +18,8 @@ from robocov.errors import ParameterError
 from robocov.generator import generate_map
 from robocov.k_median import seed_sources
 from robocov.mapfile import load_map
-from robocov.optimum import _Search, find_optimum
+from robocov.optimum import find_optimum
+from robocov.optimum.search import _Search
 
 
 def room(width, height, *obstacles, name="room"):
@@ -201,7 +202,7 @@ def test_rooms_are_never_given_up_for_a_lower_mean(monkeypatch):
         # what is far from most is there
         return np.argsort(table.sum(axis=0))[::-1][:count]
 
-    monkeypatch.setattr("robocov.optimum.seeded", all_in_the_small_one)
+    monkeypatch.setattr("robocov.optimum.search.seed_sources", all_in_the_small_one)
     search = _Search(halves, CoverageCost(halves, 32), 3, 0.1)
     drawn = search.places[all_in_the_small_one(search.table, 3, None)]
     best = find_optimum(halves, 3, lattice=32, restarts=1)
@@ -225,10 +226,10 @@ def test_places_for_robots_fill_the_room():
     where = load_map("museum")
     search = _Search(where, CoverageCost(where, 32), 6, 0.1)
     assert 500 < len(search.places) < 900
-    (part,) = search.room.parts
+    (part,) = search.space.components
     assert shapely.covers(part, shapely.points(search.places)).all()
     apart = pdist(search.places).min()
-    assert apart >= search.room.spacing
+    assert apart >= search.space.spacing
     # no place of the room is farther from all of them than they are from each other
     assert part.difference(shapely.MultiPoint(search.places).buffer(1.5 * apart)).area < 1e-6 * part.area
 
@@ -248,10 +249,10 @@ def test_a_crowded_room():
     best = find_optimum(closet, 16, lattice=32, restarts=2)
     assert (pdist(best.positions) >= 0.2).all()
     with pytest.raises(
-        ParameterError, match=r"robots: 60 of radius 0\.1 m, but there is room for about \d\d in map"
+        ParameterError, match=r"robots: expected at most about \d\d, as many as fit with radius 0\.1 m in map"
     ):
         find_optimum(closet, 60, lattice=32)
-    with pytest.raises(ParameterError, match="there is no room for any in map 'closet'"):
+    with pytest.raises(ParameterError, match=r"robots: expected at most about 0, .* in map 'closet'"):
         find_optimum(closet, 1, radius=0.7)
 
 
@@ -271,9 +272,9 @@ def test_larger_robots_keep_farther_away():
         ({"robots": 2.0}, "robots: 2.0, but"),
         ({"restarts": 0}, "restarts: 0, but a whole number from 1 to 100000 was wanted"),
         ({"restarts": True}, "restarts: True, but"),
-        ({"seed": -1}, "seed: -1, but a whole number of at least 0 was wanted"),
-        ({"radius": 0.0}, "radius: 0.0 m, but a number above 0 was wanted"),
-        ({"radius": float("nan")}, "radius: nan m, but"),
+        ({"seed": -1}, "seed: expected a whole number of at least 0, got -1"),
+        ({"radius": 0.0}, "radius: expected a number above 0 m, got 0.0"),
+        ({"radius": float("nan")}, "radius: expected a number above 0 m, got nan"),
         ({"lattice": 0}, "lattice: 0, but a whole number from 1 to 4096 was wanted"),
     ],
 )

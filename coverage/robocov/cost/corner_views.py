@@ -1,0 +1,147 @@
+"""Which sites each corner sees: known before the robots."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array, IntArray
+from robocov.compiled import kernel
+from robocov.cost.lattice import SLOTS, Tiles
+from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_box_hidden, is_visible
+from robocov.geodesic.box_tree import LEAF_SIZE, skip_subtree
+from robocov.geodesic.walls import Walls, can_bend_at_corner
+
+
+class CornerViews(NamedTuple):
+    """The sites that each corner sees, with one row for each corner and tile, sorted by tile."""
+
+    first_row: IntArray
+    """(t + 1,) The rows of tile k are those from ``first_row[k]`` up to ``first_row[k + 1]``."""
+    corner: IntArray
+    """(r,)"""
+    mask: IntArray
+    """(r,) Bit s is set if the corner sees the site in slot s, and a shortest path to it can bend there."""
+    nearest: Array
+    """(r,) Distance of the nearest of these sites, grid steps."""
+    farthest: Array
+    """(r,) Distance of the farthest of these sites, grid steps."""
+
+
+def build_corner_views(tiles: int, numbers: IntArray, lengths: Array) -> CornerViews:
+    """Sort what `find_corner_views` has written by tile.
+
+    Parameters
+    ----------
+    tiles : int
+        Number of tiles.
+    numbers : (r, 3) int array
+        Corner, tile and mask.
+    lengths : (r, 2) array, grid steps
+        Distances of the nearest and of the farthest site.
+
+    Returns
+    -------
+    CornerViews
+    """
+    order = np.argsort(numbers[:, 1], kind="stable")
+    numbers = numbers[order]
+    lengths = lengths[order]
+    return CornerViews(
+        first_row=np.searchsorted(numbers[:, 1], np.arange(tiles + 1)),
+        corner=np.ascontiguousarray(numbers[:, 0]),
+        mask=np.ascontiguousarray(numbers[:, 2]),
+        nearest=np.ascontiguousarray(lengths[:, 0]),
+        farthest=np.ascontiguousarray(lengths[:, 1]),
+    )
+
+
+@kernel
+def find_corner_views(
+    walls: Walls,
+    tiles: Tiles,
+    first: int,
+    end: int,
+    index: AngularWallIndex,
+    numbers: IntArray,
+    lengths: Array,
+) -> int:
+    """Find the sites that some corners see.
+
+    Parameters
+    ----------
+    walls : Walls
+    tiles : Tiles
+    first, end : int
+        The corners are those from `first` up to `end`.
+    index : AngularWallIndex
+        Scratch space for one source.
+    numbers : (m, 3) int array
+        Result: corner, tile and mask, see `CornerViews`.
+    lengths : (m, 2) array, grid steps
+        Result: distances of the nearest and of the farthest site.
+
+    Returns
+    -------
+    int
+        Number of rows, -1 if there is not enough space.
+    """
+    corners = walls.corners
+    tree = tiles.tree
+    leaves = len(tree) // 2
+    used = 0
+    for corner in range(first, end):
+        if add_walls(walls, index, 0, corners[corner, 0], corners[corner, 1], np.inf, 0) < 0:
+            return -1
+        node = 1
+        while node:
+            if tree[node, 0] == np.inf or is_box_hidden(tree, node, index, 0):
+                node = skip_subtree(node)
+                continue
+            if node < leaves:
+                node *= 2
+                continue
+            leaf = (node - leaves) * LEAF_SIZE
+            for tile in range(leaf, min(leaf + LEAF_SIZE, len(tiles.boxes))):
+                if used == len(numbers):
+                    return -1
+                if is_box_hidden(tiles.boxes, tile, index, 0):
+                    continue
+                mask = _find_visible_sites(walls, index, tiles, corner, tile, lengths[used])
+                if mask != 0:
+                    numbers[used, 0] = corner
+                    numbers[used, 1] = tile
+                    numbers[used, 2] = mask
+                    used += 1
+            node = skip_subtree(node)
+    return used
+
+
+@kernel
+def _find_visible_sites(
+    walls: Walls, index: AngularWallIndex, tiles: Tiles, corner: int, tile: int, span: Array
+) -> int:
+    """Return the mask of the sites of a tile that a corner sees; write the smallest and largest distance."""
+    corner_x = walls.corners[corner, 0]
+    corner_y = walls.corners[corner, 1]
+    mask = 0
+    nearest = np.inf
+    farthest = 0.0
+    for slot in range(SLOTS):
+        x = tiles.x[tile, slot]
+        y = tiles.y[tile, slot]
+        if (
+            tiles.site[tile, slot] >= 0
+            and can_bend_at_corner(walls.corners, walls.corner_walls, corner, x, y)
+            and is_visible(walls, index, 0, x, y)
+        ):
+            mask |= 1 << slot
+            dx = x - corner_x
+            dy = y - corner_y
+            length = np.sqrt(dx * dx + dy * dy)
+            nearest = min(nearest, length)
+            farthest = max(farthest, length)
+    span[0] = nearest
+    span[1] = farthest
+    return mask

@@ -1,0 +1,320 @@
+"""The coverage cost (22): the mean distance that the nearest robot must travel to reach a point."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import copy
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocov.arrays import Array, BoolArray, compute_weighted_mean, freeze
+from robocov.cost.corner_views import build_corner_views, find_corner_views
+from robocov.cost.lattice import DEFAULT_LATTICE, MAX_LATTICE, build_lattice
+from robocov.cost.result import CoverageResult
+from robocov.cost.site_paths import CostMap, Search, SitePaths, find_site_paths
+from robocov.density.polygon_masses import compute_square_means
+from robocov.environment import Environment, require_environment
+from robocov.errors import InputError, quote, require_number, to_floats
+from robocov.geodesic import Geodesics
+from robocov.geodesic.angular_index import AngularWallIndex
+from robocov.geodesic.geodesics import SOURCE_BINS
+
+
+class CoverageCost:
+    """The coverage cost (22) of one environment on a lattice of sites.
+
+    The region's bounding box is widened to a square, anchored at its lower left corner, and cut into
+    ``lattice²`` square cells; the cell centres in the open free space are the sites. Distances are
+    exact; only the mean over the sites is an approximation of the integral. If the environment has a
+    density φ, each site is weighted by the exact mean of φ over its cell.
+
+    Parameters
+    ----------
+    environment : Environment
+    lattice : int
+        Number of cells along a side.
+    progress : callable, optional
+        Called with the fraction of the preparation that is done. It may raise an exception to stop.
+    geodesics : Geodesics, optional
+        The shortest paths of this very environment, if they are known already.
+
+    Attributes
+    ----------
+    environment : Environment
+    lattice : int
+    geodesics : Geodesics
+    sites : Sites
+    points : (m, 2) array, m
+        Positions of the sites.
+    cells : (m,) int array
+        Numbers of their cells.
+    spacing : float, m
+        Side of a cell.
+    corners : (k, 2) array, m
+        All points where paths can bend.
+    weights : (m,) array or None
+        Mean of φ over the cell of each site, None if all are equal.
+
+    Raises
+    ------
+    ParameterError
+        If `lattice` is not a whole number from 1 to 4096, or so coarse that no site is free.
+
+    Examples
+    --------
+    >>> square = Environment("square", ((0, 0), (1, 0), (1, 1), (0, 1)))
+    >>> cost = CoverageCost(square)
+    >>> round(cost([[0.5, 0.5]]).mean_distance, 3)
+    0.383
+    """
+
+    def __init__(
+        self,
+        environment: Environment,
+        lattice: int = DEFAULT_LATTICE,
+        *,
+        progress: Callable[[float], None] | None = None,
+        geodesics: Geodesics | None = None,
+    ) -> None:
+        require_environment(environment)
+        self.lattice = int(require_number("lattice", lattice, 1, MAX_LATTICE, whole=True))
+        if geodesics is None:
+            beat = None if progress is None else partial(progress, 0.0)
+            geodesics = Geodesics(environment, beat)
+        self.geodesics = geodesics
+        self.corners = freeze(geodesics.corners)
+        self.sites, tiles = build_lattice(geodesics, self.lattice)
+        self.points = self.sites.points
+        self.cells = self.sites.cells
+        self.spacing = self.sites.spacing
+        numbers, lengths = geodesics.run_for_corners(
+            partial(find_corner_views, geodesics.walls, tiles), progress
+        )
+        views = build_corner_views(len(tiles.boxes), numbers, lengths)
+        self._map = CostMap(geodesics.walls, geodesics.graph, tiles, views)
+        self._component_areas = np.array([component.area for component in environment.free.geoms])
+        self._entries_per_robot = 2 * SOURCE_BINS
+        self._set_density(environment)
+
+    def with_density(self, environment: Environment) -> CoverageCost:
+        """Return the coverage cost of an environment that differs only in its density.
+
+        Parameters
+        ----------
+        environment : Environment
+
+        Returns
+        -------
+        CoverageCost
+            It shares everything else with this one.
+        """
+        twin = copy(self)
+        twin._set_density(environment)
+        return twin
+
+    def _set_density(self, environment: Environment) -> None:
+        self.environment = environment
+        self._component_masses = environment.free_masses
+        self._mass = float(self._component_masses.sum())
+        self.weights: Array | None = None
+        density = environment.density
+        if density is not None and not density.is_uniform:
+            self.weights = freeze(compute_square_means(density, self.points, self.spacing))
+
+    def __call__(self, positions: Array, speeds: Array | None = None) -> CoverageResult:
+        """Compute the coverage cost of a team.
+
+        Parameters
+        ----------
+        positions : (n, 2) array, m
+            Positions of the robots, in the free space.
+        speeds : (n,) array, m/s, optional
+            If they are given, the first robot to arrive counts instead of the nearest one, and the cost is in
+            seconds.
+
+        Returns
+        -------
+        CoverageResult
+
+        Raises
+        ------
+        InputError
+            If there is no robot, a robot is outside the free space, or the speeds are not positive numbers,
+            one for each robot. The message names the robot.
+        """
+        positions = to_floats("positions", positions, "[x, y] of each robot in metres", InputError)
+        if not positions.size:
+            raise InputError("positions: expected at least one robot, got none")
+        places, is_inside = self.geodesics.snap_to_free_space(positions)
+        is_covered: BoolArray = np.asarray(is_inside.any(axis=0))
+        if speeds is None:
+            paths = self._find_paths(places[None], is_covered[None])
+            return self._build_result(positions, is_covered, paths, 0)
+        checked_speeds = _require_speeds(speeds, len(positions))
+        paths = self._find_first_arrivals(places, is_inside, checked_speeds)
+        return self._build_result(positions, is_covered, paths, 0, checked_speeds)
+
+    def evaluate_teams(self, positions: Array) -> list[CoverageResult]:
+        """Compute the coverage cost of each of several teams of the same size.
+
+        The results are those of separate calls, but are computed faster.
+
+        Parameters
+        ----------
+        positions : (r, n, 2) array, m
+            Positions of the robots of each team, in the free space.
+
+        Returns
+        -------
+        list of r CoverageResult
+
+        Raises
+        ------
+        InputError
+            If the array has another shape, there is no robot, or one is outside the free space.
+
+        Examples
+        --------
+        >>> square = Environment("square", ((0, 0), (1, 0), (1, 1), (0, 1)))
+        >>> results = CoverageCost(square, 16).evaluate_teams([[[0.5, 0.5]], [[0.25, 0.25]]])
+        >>> [round(result.mean_distance, 2) for result in results]
+        [0.38, 0.49]
+        """
+        teams = to_floats("positions", positions, "[x, y] of each robot of each team in metres", InputError)
+        if teams.ndim != 3 or teams.shape[1] == 0 or teams.shape[2] != 2:
+            raise InputError(
+                f"positions: expected an array of shape (r, n, 2) with n >= 1, got shape {teams.shape}"
+            )
+        places, is_inside = self.geodesics.snap_to_free_space(teams.reshape(-1, 2))
+        is_covered = np.asarray(is_inside.reshape(*teams.shape[:2], is_inside.shape[1]).any(axis=1))
+        paths = self._find_paths(places.reshape(teams.shape), is_covered)
+        return [self._build_result(teams[row], is_covered[row], paths, row) for row in range(len(teams))]
+
+    def _find_paths(self, places: Array, is_covered: BoolArray) -> SitePaths:
+        """Find the paths to the sites from teams at (r, n, 2) grid steps that cover components, (r, c)."""
+        teams, robots, _ = places.shape
+        tiles = len(self._map.tiles.boxes)
+        paths = SitePaths.allocate(teams, len(self.points))
+        while True:
+            entries = self._entries_per_robot * robots + 2 * SOURCE_BINS
+            index = AngularWallIndex.allocate(robots, SOURCE_BINS, entries)
+            search = Search.allocate(index, robots, len(self.corners), tiles)
+            if find_site_paths(self._map, search, places, is_covered, self.geodesics.grid.unit, paths):
+                return paths
+            self._entries_per_robot *= 2
+
+    def _find_first_arrivals(self, places: Array, is_inside: BoolArray, speeds: Array) -> SitePaths:
+        """Find the paths of the robots that arrive first, as those of one team.
+
+        Of robots that are equally fast, the nearest one is the first: there is one search for each speed.
+        """
+        first = SitePaths(
+            distance=np.full((1, len(self.points)), np.inf),
+            owner=np.full((1, len(self.points)), -1),
+            first_corner=np.full((1, len(self.points)), -1),
+            last_corner=np.full((1, len(self.points)), -1),
+        )
+        times = np.full((1, len(self.points)), np.inf)
+        for speed in np.unique(speeds)[::-1]:
+            rows = np.flatnonzero(speeds == speed)
+            is_covered = is_inside[None, rows].any(axis=1)
+            paths = self._find_paths(places[None, rows], np.asarray(is_covered))
+            is_sooner = paths.distance / speed < times
+            times[is_sooner] = paths.distance[is_sooner] / speed
+            first.distance[is_sooner] = paths.distance[is_sooner]
+            first.owner[is_sooner] = rows[paths.owner[is_sooner]]
+            first.first_corner[is_sooner] = paths.first_corner[is_sooner]
+            first.last_corner[is_sooner] = paths.last_corner[is_sooner]
+        return first
+
+    def _build_result(
+        self,
+        positions: Array,
+        is_covered: BoolArray,
+        paths: SitePaths,
+        team: int,
+        speeds: Array | None = None,
+    ) -> CoverageResult:
+        """Build the result of a team at (n, 2) m that covers some components, (c,), from its paths."""
+        distances = paths.distance[team]
+        owner = paths.owner[team]
+        covered_distances = distances
+        covered_owner = owner
+        weights = self.weights
+        mass = self._mass
+        uncovered_area = 0.0
+        if not is_covered.all():
+            is_owned = owner >= 0
+            covered_distances = distances[is_owned]
+            covered_owner = owner[is_owned]
+            weights = None if self.weights is None else self.weights[is_owned]
+            mass = float(self._component_masses[is_covered].sum())
+            uncovered_area = float(self._component_areas[~is_covered].sum())
+        mean_distance = compute_weighted_mean(covered_distances, weights)
+        mean_time = None
+        value = mean_distance * mass
+        if speeds is not None:
+            mean_time = compute_weighted_mean(covered_distances / speeds[covered_owner], weights)
+            value = mean_time * mass
+        return CoverageResult(
+            mean_distance=mean_distance,
+            value=value,
+            uncovered_area=uncovered_area,
+            distances=distances,
+            owner=owner,
+            first_corner=paths.first_corner[team],
+            last_corner=paths.last_corner[team],
+            positions=positions,
+            points=self.points,
+            corners=self.corners,
+            environment=self.environment,
+            sites=self.sites,
+            weights=self.weights,
+            speeds=speeds,
+            mean_time=mean_time,
+        )
+
+    def to_grid(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Arrange values of the sites as an image of the lattice; see `Sites.to_grid`."""
+        return self.sites.to_grid(values)
+
+    def find_path(self, positions: Array, point: Array) -> Array:
+        """Find the shortest path from a point to the nearest robot.
+
+        Parameters
+        ----------
+        positions : (n, 2) array, m
+            Positions of the robots.
+        point : (2,) array, m
+
+        Returns
+        -------
+        (w, 2) array, m
+            Waypoints, with both ends; of shape (0, 2) if no robot can reach the point.
+
+        Raises
+        ------
+        InputError
+            If the point or a robot is outside the free space.
+        """
+        positions = np.asarray(positions, dtype=float)
+        point = np.asarray(point, dtype=float)
+        distances = self.geodesics.compute_distances(point[None], positions)[0]
+        return self.geodesics.find_path(point, positions[int(distances.argmin())])
+
+
+def _require_speeds(speeds: object, robots: int) -> Array:
+    """Return the speeds of a number of robots, (n,) m/s; raise InputError unless they are positive."""
+    try:
+        values = np.array(speeds, dtype=float)
+    except (TypeError, ValueError):
+        values = np.empty(0)
+    if values.shape != (robots,):
+        raise InputError(f"speeds: expected a number for each of {robots} robots, got {quote(speeds)}")
+    for robot, speed in enumerate(values.tolist()):
+        if not 0.0 < speed < np.inf:
+            raise InputError(f"speeds[{robot}]: expected a number above 0 m/s, got {quote(speed)}")
+    return values

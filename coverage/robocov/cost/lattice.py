@@ -1,0 +1,172 @@
+"""The lattice of sites over which the coverage cost is summed, and its division into tiles for kernels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocov.arrays import Array, IntArray, find_run_starts, freeze
+from robocov.errors import ParameterError
+from robocov.geodesic import Geodesics
+from robocov.geodesic.box_tree import build_box_tree, compute_z_order
+
+DEFAULT_LATTICE = 128
+"""Default number of cells along a side."""
+
+MAX_LATTICE = 4096
+"""Maximum number of cells along a side."""
+
+TILE_SIDE = 4
+"""Number of cells along a side of a tile."""
+
+SLOTS = TILE_SIDE**2
+"""Number of cells of a tile."""
+
+TILES_PER_GROUP = 16
+"""Number of consecutive tiles that are bounded together."""
+
+_CELLS_PER_BLOCK = 1 << 18
+"""Number of cells that are located at the same time, which limits the memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sites:
+    """The sites of a lattice: the centres of its cells that are in the free space.
+
+    Attributes
+    ----------
+    lattice : int
+        Number of cells along a side.
+    spacing : float, m
+        Side of a cell.
+    points : (m, 2) array, m
+        Positions, row by row from the lower left.
+    cells : (m,) int array
+        Numbers of their cells among all cells, ``row * lattice + column``.
+    """
+
+    lattice: int
+    spacing: float
+    points: Array
+    cells: IntArray
+
+    def to_grid(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Arrange values of the sites as an image of the whole lattice.
+
+        Parameters
+        ----------
+        values : (m,) array
+
+        Returns
+        -------
+        (lattice, lattice) array
+            The lowest row first. Cells that are not free are nan, or -1 if the values are integers.
+        """
+        fill = np.nan if np.issubdtype(values.dtype, np.inexact) else -1
+        image = np.full(self.lattice**2, fill, dtype=values.dtype)
+        image[self.cells] = values
+        return image.reshape(self.lattice, self.lattice)
+
+
+class Tiles(NamedTuple):
+    """The sites of a lattice in square tiles of `SLOTS` cells, in grid steps.
+
+    Neighbouring tiles have close numbers. A slot whose cell is not free repeats another site of its tile.
+    """
+
+    x: Array
+    """(t, SLOTS) Positions."""
+    y: Array
+    """(t, SLOTS)"""
+    site: IntArray
+    """(t, SLOTS) Number of the site in the lattice, -1 if the cell is not free."""
+    component: IntArray
+    """(t, SLOTS) Component of the free space."""
+    boxes: Array
+    """(t, 4) Low x, low y, high x and high y of the sites of each tile."""
+    group_boxes: Array
+    """(g, 4) The same of `TILES_PER_GROUP` consecutive tiles each."""
+    tree: Array
+    """The box tree of the tiles."""
+
+
+def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
+    """Build the sites of a lattice and their tiles.
+
+    The square over the region's bounding box, anchored at its lower left corner, is cut into ``side²`` cells.
+
+    Parameters
+    ----------
+    geodesics : Geodesics
+        Of the environment.
+    side : int
+        Number of cells along a side.
+
+    Returns
+    -------
+    sites : Sites
+    tiles : Tiles
+
+    Raises
+    ------
+    ParameterError
+        If no site is in the free space.
+    """
+    spacing = geodesics.size / side
+    all_cells = []
+    all_components = []
+    for first in range(0, side * side, _CELLS_PER_BLOCK):
+        cells = np.arange(first, min(first + _CELLS_PER_BLOCK, side * side))
+        centres = _compute_centres(cells, side, spacing, geodesics.grid.origin)
+        is_inside = geodesics.count_windings(geodesics.grid.snap(centres)) == 1
+        is_free = is_inside.any(axis=1)
+        all_cells.append(cells[is_free])
+        all_components.append(is_inside[is_free].argmax(axis=1))
+    cells = np.concatenate(all_cells)
+    if not len(cells):
+        raise ParameterError(
+            f"lattice: expected at least one site in the free space, got none with {side} cells a side; "
+            "choose a finer lattice"
+        )
+    cells.setflags(write=False)
+    points = freeze(_compute_centres(cells, side, spacing, geodesics.grid.origin))
+    sites = Sites(side, spacing, points, cells)
+    return sites, _build_tiles(sites, geodesics.grid.snap(points), np.concatenate(all_components))
+
+
+def _compute_centres(cells: IntArray, side: int, spacing: float, origin: Array) -> Array:
+    """Return the centres of cells, (m, 2) m."""
+    column_row = np.column_stack([cells % side, cells // side])
+    return (column_row + 0.5) * spacing + origin
+
+
+def _build_tiles(sites: Sites, places: Array, component: IntArray) -> Tiles:
+    """Arrange sites at (m, 2) grid steps in tiles."""
+    column = sites.cells % sites.lattice
+    row = sites.cells // sites.lattice
+    tile = compute_z_order(column // TILE_SIDE, row // TILE_SIDE)
+    order = np.argsort(tile, kind="stable")
+    first = find_run_starts(tile[order])
+    count = np.diff(first, append=len(order))
+    slot = np.arange(SLOTS)
+    is_empty = slot >= count[:, None]
+    site = order[np.where(is_empty, 0, slot) + first[:, None]]
+    x = np.ascontiguousarray(places[site, 0])
+    y = np.ascontiguousarray(places[site, 1])
+    low = np.column_stack([x.min(axis=1), y.min(axis=1)])
+    high = np.column_stack([x.max(axis=1), y.max(axis=1)])
+    group_starts = np.arange(0, len(low), TILES_PER_GROUP)
+    group_low = np.minimum.reduceat(low, group_starts)
+    group_high = np.maximum.reduceat(high, group_starts)
+    return Tiles(
+        x=x,
+        y=y,
+        site=np.where(is_empty, -1, site),
+        component=component[site],
+        boxes=np.hstack([low, high]),
+        group_boxes=np.hstack([group_low, group_high]),
+        tree=build_box_tree(low, high),
+    )

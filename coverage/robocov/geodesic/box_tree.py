@@ -1,0 +1,85 @@
+"""Trees of bounding boxes, with which searches skip everything that is out of the way.
+
+A tree is an (2 k, 4) array with rows of low x, low y, high x and high y. Node 1 is the root, and node k
+contains nodes 2 k and 2 k + 1. The second half of the rows are leaves, each of which contains `LEAF_SIZE`
+consecutive items; leaves without any are boxes that start at infinity. Row 0 is not used.
+"""
+
+import numpy as np
+
+from robocov.arrays import Array, IntArray
+from robocov.compiled import kernel
+
+LEAF_SIZE = 8
+"""Number of items of a leaf."""
+
+_Z_ORDER_BITS = 16
+"""Bits of the coordinates of `compute_z_order`."""
+
+
+def build_box_tree(low: Array, high: Array) -> Array:
+    """Build the tree of boxes around items.
+
+    Parameters
+    ----------
+    low, high : (m, 2) array
+        Lower left and upper right corners of the items. Neighbours should be close together in this order.
+
+    Returns
+    -------
+    (2 k, 4) array
+        The tree; k is a power of two.
+    """
+    leaves = 1
+    while leaves * LEAF_SIZE < len(low):
+        leaves *= 2
+    # With the upper bounds negated, all four bounds are minima.
+    items = np.full((leaves * LEAF_SIZE, 4), np.inf)
+    items[: len(low)] = np.hstack([low, -high])
+    level = items.reshape(-1, LEAF_SIZE, 4).min(axis=1)
+    levels = [level]
+    while len(level) > 1:
+        level = level.reshape(-1, 2, 4).min(axis=1)
+        levels.append(level)
+    unused = np.full((1, 4), np.inf)
+    return np.concatenate([unused, *levels[::-1]]) * [1.0, 1.0, -1.0, -1.0]
+
+
+def compute_z_order(column: IntArray, row: IntArray) -> IntArray:
+    """Compute positions along a Z-curve, on which neighbours in the plane are close together.
+
+    Parameters
+    ----------
+    column, row : (n,) int array
+        Coordinates from 0 to 65535.
+
+    Returns
+    -------
+    (n,) int array
+
+    Examples
+    --------
+    >>> compute_z_order(np.array([0, 1, 0, 1]), np.array([0, 0, 1, 1]))
+    array([0, 1, 2, 3])
+    """
+    key = np.zeros(len(column), dtype=np.int64)
+    for bit in range(_Z_ORDER_BITS):
+        key |= ((column >> bit) & 1) << (2 * bit)
+        key |= ((row >> bit) & 1) << (2 * bit + 1)
+    return key
+
+
+@kernel
+def skip_subtree(node: int) -> int:
+    """Return the node that a search visits after a node and all below it, 0 at the end."""
+    while node & 1:
+        node >>= 1
+    return node + 1 if node else 0
+
+
+@kernel
+def compute_squared_box_distance(boxes: Array, node: int, x: float, y: float) -> float:
+    """Compute the squared distance of a point from a box, 0 inside."""
+    dx: float = max(boxes[node, 0] - x, x - boxes[node, 2], 0.0)
+    dy: float = max(boxes[node, 1] - y, y - boxes[node, 3], 0.0)
+    return dx * dx + dy * dy

@@ -1,0 +1,227 @@
+"""The graph of the corners that see each other, and shortest paths in it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import kernel
+from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_box_hidden, is_visible
+from robocov.geodesic.box_tree import LEAF_SIZE, skip_subtree
+from robocov.geodesic.walls import Walls, can_bend_at_corner
+
+
+class CornerGraph(NamedTuple):
+    """The pairs of corners that see each other and can follow each other on a shortest path."""
+
+    first_link: IntArray
+    """(k + 1,) The links of corner i are those from ``first_link[i]`` up to ``first_link[i + 1]``."""
+    neighbour: IntArray
+    """(l,) The corner to which each link leads."""
+    length: Array
+    """(l,) Length of each link, grid steps."""
+
+
+class CornerPaths(NamedTuple):
+    """The shortest paths from the nearest of several sources to all corners."""
+
+    length: Array
+    """(k,) Length, grid steps; inf if no path leads there."""
+    source: IntArray
+    """(k,) The source where the path starts."""
+    first_corner: IntArray
+    """(k,) The first corner at which the path bends, or where it ends if it is straight."""
+    previous_corner: IntArray
+    """(k,) The last corner at which the path bends before its end, -1 if it is straight."""
+
+    @classmethod
+    def allocate(cls, corners: int) -> CornerPaths:
+        """Allocate paths to a number of corners."""
+        return cls(
+            length=np.empty(corners),
+            source=np.empty(corners, np.int64),
+            first_corner=np.empty(corners, np.int64),
+            previous_corner=np.empty(corners, np.int64),
+        )
+
+
+class CornerQueue(NamedTuple):
+    """The corners whose neighbours may be reached by a shorter path; a ring buffer."""
+
+    corners: IntArray
+    """(k + 1,)"""
+    is_waiting: BoolArray
+    """(k,) Whether each corner is in the queue."""
+
+    @classmethod
+    def allocate(cls, corners: int) -> CornerQueue:
+        """Allocate a queue of at most all corners."""
+        return cls(corners=np.empty(corners + 1, np.int64), is_waiting=np.empty(corners, np.bool_))
+
+
+def build_corner_graph(corners: int, pairs: IntArray, lengths: Array) -> CornerGraph:
+    """Build the graph of corners from its links.
+
+    Parameters
+    ----------
+    corners : int
+        Number of corners.
+    pairs : (l, 2) int array
+        Linked corners, each pair once.
+    lengths : (l,) array, grid steps
+
+    Returns
+    -------
+    CornerGraph
+        With each link in both directions.
+    """
+    start = np.concatenate([pairs[:, 0], pairs[:, 1]])
+    end = np.concatenate([pairs[:, 1], pairs[:, 0]])
+    order = np.lexsort((end, start))
+    return CornerGraph(
+        first_link=np.searchsorted(start[order], np.arange(corners + 1)),
+        neighbour=end[order],
+        length=np.tile(lengths, 2)[order],
+    )
+
+
+@kernel
+def find_visible_corners(
+    walls: Walls, index: AngularWallIndex, source: int, first: int, visible: IntArray
+) -> int:
+    """Find the corners that a source sees, and at which a shortest path from it can bend.
+
+    Parameters
+    ----------
+    walls : Walls
+    index : AngularWallIndex
+        With an unlimited reach.
+    source : int
+        Number of the source.
+    first : int
+        Corners of lower numbers are left out.
+    visible : (k,) int array
+        Result: the numbers of the corners.
+
+    Returns
+    -------
+    int
+        How many corners were found.
+    """
+    corners = walls.corners
+    boxes = walls.corner_boxes
+    x = index.positions[source, 0]
+    y = index.positions[source, 1]
+    leaves = len(boxes) // 2
+    count = 0
+    node = 1
+    while node:
+        if boxes[node, 0] == np.inf or is_box_hidden(boxes, node, index, source):
+            node = skip_subtree(node)
+        elif node < leaves:
+            node *= 2
+        else:
+            leaf = (node - leaves) * LEAF_SIZE
+            for corner in range(max(leaf, first), min(leaf + LEAF_SIZE, len(corners))):
+                if can_bend_at_corner(corners, walls.corner_walls, corner, x, y) and is_visible(
+                    walls, index, source, corners[corner, 0], corners[corner, 1]
+                ):
+                    visible[count] = corner
+                    count += 1
+            node = skip_subtree(node)
+    return count
+
+
+@kernel
+def find_links(
+    walls: Walls,
+    visible: IntArray,
+    first: int,
+    end: int,
+    index: AngularWallIndex,
+    pairs: IntArray,
+    lengths: Array,
+) -> int:
+    """Find the links of some corners to those of higher numbers.
+
+    Parameters
+    ----------
+    walls : Walls
+    visible : (k,) int array
+        Scratch space.
+    first, end : int
+        The corners are those from `first` up to `end`.
+    index : AngularWallIndex
+        Scratch space for one source.
+    pairs : (m, 3) int array
+        Result: the two corners of each link, in the first two columns.
+    lengths : (m, 2) array, grid steps
+        Result: the length of each link, in the first column.
+
+    Returns
+    -------
+    int
+        Number of links, -1 if there is not enough space.
+    """
+    corners = walls.corners
+    used = 0
+    for corner in range(first, end):
+        x = corners[corner, 0]
+        y = corners[corner, 1]
+        if add_walls(walls, index, 0, x, y, np.inf, 0) < 0:
+            return -1
+        count = find_visible_corners(walls, index, 0, corner + 1, visible)
+        if used + count > len(pairs):
+            return -1
+        for k in range(count):
+            other_x = corners[visible[k], 0]
+            other_y = corners[visible[k], 1]
+            # A shortest path must be able to bend at both of them.
+            if can_bend_at_corner(corners, walls.corner_walls, corner, other_x, other_y):
+                dx = other_x - x
+                dy = other_y - y
+                pairs[used, 0] = corner
+                pairs[used, 1] = visible[k]
+                lengths[used, 0] = np.sqrt(dx * dx + dy * dy)
+                used += 1
+    return used
+
+
+@kernel
+def relax_paths(graph: CornerGraph, paths: CornerPaths, queue: CornerQueue, waiting: int) -> None:
+    """Shorten paths to corners by way of other corners until none can be shortened.
+
+    Of equally short paths, the one from the source of the lowest number is taken.
+
+    Parameters
+    ----------
+    graph : CornerGraph
+    paths : CornerPaths
+        On entry the straight paths from the sources, of infinite length if there is none.
+    queue : CornerQueue
+        On entry the corners to which there are straight paths, at the beginning of the queue.
+    waiting : int
+        Number of corners in the queue.
+    """
+    size = len(queue.corners)
+    head = 0
+    tail = waiting
+    while head != tail:
+        corner = queue.corners[head]
+        head = head + 1 if head + 1 < size else 0
+        queue.is_waiting[corner] = False
+        for link in range(graph.first_link[corner], graph.first_link[corner + 1]):
+            other = graph.neighbour[link]
+            length = paths.length[corner] + graph.length[link]
+            is_tie = length == paths.length[other]
+            if length < paths.length[other] or (is_tie and paths.source[corner] < paths.source[other]):
+                paths.length[other] = length
+                paths.source[other] = paths.source[corner]
+                paths.first_corner[other] = paths.first_corner[corner]
+                paths.previous_corner[other] = corner
+                if not queue.is_waiting[other]:
+                    queue.is_waiting[other] = True
+                    queue.corners[tail] = other
+                    tail = tail + 1 if tail + 1 < size else 0

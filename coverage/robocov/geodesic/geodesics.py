@@ -1,0 +1,429 @@
+"""Exact shortest distances and paths in the free space of a map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Protocol
+
+import numpy as np
+import shapely
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import kernel
+from robocov.environment import GRID_M, Environment
+from robocov.errors import InputError
+from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_visible
+from robocov.geodesic.corner_graph import (
+    CornerGraph,
+    CornerPaths,
+    CornerQueue,
+    build_corner_graph,
+    find_links,
+    find_visible_corners,
+    relax_paths,
+)
+from robocov.geodesic.grid import Grid
+from robocov.geodesic.walls import Walls, build_walls, count_windings
+
+SOURCE_BINS = 128
+"""Number of angular bins of a source."""
+_CORNER_BINS = 256
+"""The same for a corner, from which many targets are tested."""
+_CORNERS_PER_REPORT = 64
+"""Number of corners between two reports of progress."""
+_TARGETS_PER_BLOCK = 1024
+"""Number of targets whose walls are indexed at the same time."""
+_MIN_ENTRIES_PER_SOURCE = {SOURCE_BINS: 256, _CORNER_BINS: 1 << 14}
+"""Entries of the index for each source at the beginning; twice as many whenever they are not enough."""
+_SNAP_STEPS = 2
+"""Grid steps around the nearest point of a slanted wall among which a free grid point is sought."""
+
+
+class IndexUser(Protocol):
+    """A computation with an index, which returns the number of rows that it has written, -1 if too few."""
+
+    def __call__(self, index: AngularWallIndex, numbers: IntArray, lengths: Array, /) -> int:
+        """Write rows of `numbers` and `lengths`."""
+
+
+class CornerUser(Protocol):
+    """A computation for the corners from `first` up to `end`; see `IndexUser`."""
+
+    def __call__(
+        self, first: int, end: int, index: AngularWallIndex, numbers: IntArray, lengths: Array, /
+    ) -> int:
+        """Write rows of `numbers` and `lengths`."""
+
+
+class Geodesics:
+    """The shortest paths in the free space of one environment.
+
+    The distance of two points is the infimum over the paths in the *open* free space, extended to its
+    closure: no path leads through a point or along an edge where two obstacles touch. A shortest path is a
+    chain of segments that bends only at corners.
+
+    Parameters
+    ----------
+    environment : Environment
+    beat : callable, optional
+        Is called now and then while the graph of the corners is computed. It may raise an exception to stop.
+
+    Attributes
+    ----------
+    grid : Grid
+    size : float, m
+        Side of the square around the region's bounding box.
+    free : shapely.MultiPolygon, grid steps
+        The free space, one polygon for each component.
+    walls : Walls
+    corners : (k, 2) array, m
+    graph : CornerGraph
+
+    Examples
+    --------
+    >>> from robocov.environment import PolygonObstacle
+    >>> wall = PolygonObstacle(((1.0, 0.0), (2.0, 0.0), (2.0, 3.0), (1.0, 3.0)))
+    >>> room = Environment("room", ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)), (wall,))
+    >>> geodesics = Geodesics(room)
+    >>> geodesics.find_path(source=[0.5, 2.0], target=[2.0, 0.0])
+    array([[0.5, 2. ],
+           [1. , 3. ],
+           [2. , 3. ],
+           [2. , 0. ]])
+    >>> geodesics.compute_distances(sources=[[0.5, 2.0]], targets=[[2.0, 0.0], [0.5, 0.0]]).round(3)
+    array([[5.118, 2.   ]])
+    """
+
+    def __init__(self, environment: Environment, beat: Callable[[], None] | None = None) -> None:
+        low_x, low_y, high_x, high_y = environment.region.bounds
+        self.size = max(high_x - low_x, high_y - low_y)
+        self.grid = Grid.from_square(np.array([low_x, low_y]), self.size)
+        self.free = shapely.transform(environment.free, self.grid.snap)
+        self.walls: Walls = build_walls(self.free)
+        self.corners = self.grid.to_metres(self.walls.corners)
+        self._name = environment.name
+        self._entries_per_source = dict(_MIN_ENTRIES_PER_SOURCE)
+        self.graph = self._build_graph(beat)
+
+    def _build_graph(self, beat: Callable[[], None] | None) -> CornerGraph:
+        count = len(self.corners)
+        visible = np.empty(count, np.int64)
+        progress = None if beat is None else lambda _: beat()
+        pairs, lengths = self.run_for_corners(partial(find_links, self.walls, visible), progress)
+        return build_corner_graph(count, pairs[:, :2], lengths[:, 0])
+
+    def run_for_corners(
+        self, compute: CornerUser, progress: Callable[[float], None] | None = None
+    ) -> tuple[IntArray, Array]:
+        """Run a computation for all corners, some at a time.
+
+        Parameters
+        ----------
+        compute : callable
+            Called as ``compute(first, end, index, numbers, lengths)`` for the corners from `first` up to
+            `end`, with an index of one source as scratch space.
+        progress : callable, optional
+            Called with the fraction that is done. It may raise an exception to stop.
+
+        Returns
+        -------
+        numbers : (r, 3) int array
+        lengths : (r, 2) array
+            All rows that `compute` has written.
+        """
+        count = len(self.corners)
+        all_numbers = [np.empty((0, 3), np.int64)]
+        all_lengths = [np.empty((0, 2))]
+        for first in range(0, count, _CORNERS_PER_REPORT):
+            if progress is not None:
+                progress(first / count)
+            end = min(first + _CORNERS_PER_REPORT, count)
+            _, numbers, lengths = self.run_with_index(1, _CORNER_BINS, partial(compute, first, end))
+            all_numbers.append(numbers)
+            all_lengths.append(lengths)
+        return np.concatenate(all_numbers), np.concatenate(all_lengths)
+
+    def run_with_index(
+        self, sources: int, bins: int, compute: IndexUser
+    ) -> tuple[AngularWallIndex, IntArray, Array]:
+        """Run a computation with a new index, again with a larger one as long as there is not enough space.
+
+        Parameters
+        ----------
+        sources : int
+            Number of sources of the index.
+        bins : int
+            Number of bins of each source.
+        compute : callable
+            Called as ``compute(index, numbers, lengths)``. It returns the number of rows that it has written
+            to `numbers` and `lengths`, -1 if there is not enough space there or in the index.
+
+        Returns
+        -------
+        index : AngularWallIndex
+        numbers : (r, 3) int array
+        lengths : (r, 2) array
+        """
+        while True:
+            entries = self._entries_per_source[bins] * sources + 2 * bins
+            index = AngularWallIndex.allocate(sources, bins, entries)
+            numbers = np.empty((entries, 3), np.int64)
+            lengths = np.empty((entries, 2))
+            used = compute(index, numbers, lengths)
+            if used >= 0:
+                return index, numbers[:used].copy(), lengths[:used].copy()
+            self._entries_per_source[bins] *= 2
+
+    def snap_to_free_space(self, points: Array, name: str = "positions") -> tuple[Array, BoolArray]:
+        """Convert points of the free space to grid coordinates.
+
+        Points that are outside it by no more than rounding, 2 µm and 1e-9 of the map's size, are moved to the
+        nearest point inside.
+
+        Parameters
+        ----------
+        points : (n, 2) array, m
+        name : str
+            Name of the points in messages.
+
+        Returns
+        -------
+        places : (n, 2) array, grid steps
+        is_inside : (n, c) bool array
+            Whether each point is in the closure of each component of the free space.
+
+        Raises
+        ------
+        InputError
+            If the points have another shape, are not finite, or are outside the free space.
+        """
+        points = np.asarray(points, dtype=float)
+        if points.ndim != 2 or points.shape[1] != 2:
+            raise InputError(
+                f"{name}: expected an array of shape (n, 2), [x, y] in metres each, got shape {points.shape}"
+            )
+        places = self.grid.snap(points)
+        # A point that is not finite is to the right of all walls, or above them.
+        is_inside = self.count_windings(places) > 0
+        for i in np.flatnonzero(~is_inside.any(axis=1)).tolist():
+            places[i] = self._move_inside(points[i], f"{name}[{i}]")
+            is_inside[i] = self.count_windings(places[i : i + 1])[0] > 0
+        return places, is_inside
+
+    def _move_inside(self, point: Array, name: str) -> Array:
+        """Return the free grid point next to a point in metres; raise InputError if it is too far away."""
+        coordinates = f"[{point[0]:.12g}, {point[1]:.12g}]"
+        if not np.isfinite(point).all():
+            raise InputError(f"{name}: expected finite numbers, got {coordinates}")
+        place = self.grid.snap(point)
+        nearest = self._find_nearest_free(place)
+        depth = float(np.hypot(*(nearest - place))) * self.grid.unit
+        if depth > 2.0 * GRID_M + 1e-9 * self.size:
+            raise InputError(
+                f"{name}: expected a point inside the boundary and outside every obstacle of map "
+                f"{self._name!r}, got {coordinates}, {depth:.3g} m outside the free space"
+            )
+        return nearest
+
+    def count_windings(self, places: Array) -> IntArray:
+        """Count how often the components of the free space wind around points.
+
+        Parameters
+        ----------
+        places : (n, 2) array, grid steps
+
+        Returns
+        -------
+        (n, c) int array
+            1 inside a component, more on its boundary, 0 outside.
+        """
+        windings = np.empty((len(places), len(self.free.geoms)), dtype=np.int64)
+        count_windings(self.walls, np.ascontiguousarray(places), windings)
+        return windings
+
+    def _find_nearest_free(self, place: Array) -> Array:
+        """Return the nearest grid point of the closed free space, to within a few steps."""
+        line = shapely.shortest_line(self.free, shapely.Point(place))
+        foot = np.rint(shapely.get_coordinates(line)[0])
+        # The nearest point of a slanted wall is not a grid point: take the nearest one not behind the wall.
+        steps = np.arange(-_SNAP_STEPS, _SNAP_STEPS + 1.0)
+        around = foot + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+        free = around[(self.count_windings(around) > 0).any(axis=1)]
+        if not len(free):
+            free = self.walls.vertices
+        distance = np.hypot(free[:, 0] - place[0], free[:, 1] - place[1])
+        return np.asarray(free[distance.argmin()])
+
+    def compute_distances(self, sources: Array, targets: Array) -> Array:
+        """Compute the geodesic distances between points.
+
+        Parameters
+        ----------
+        sources : (n, 2) array, m
+        targets : (m, 2) array, m
+
+        Returns
+        -------
+        (n, m) array, m
+            inf if no path leads from the source to the target.
+
+        Raises
+        ------
+        InputError
+            If a point is outside the free space, see `snap_to_free_space`.
+        """
+        starts, _ = self.snap_to_free_space(sources, "sources")
+        ends, _ = self.snap_to_free_space(targets, "targets")
+        return self.compute_grid_distances(starts, ends) * self.grid.unit
+
+    def compute_grid_distances(self, sources: Array, targets: Array) -> Array:
+        """Compute the geodesic distances between points of the free space in grid coordinates.
+
+        Parameters
+        ----------
+        sources : (n, 2) array, grid steps
+        targets : (m, 2) array, grid steps
+
+        Returns
+        -------
+        (n, m) array, grid steps
+        """
+        index, from_sources, _ = self._compute_corner_distances(sources, must_be_straight=False)
+        distances = np.empty((len(sources), len(targets)))
+        for first in range(0, len(targets), _TARGETS_PER_BLOCK):
+            block = slice(first, first + _TARGETS_PER_BLOCK)
+            _, to_targets, _ = self._compute_corner_distances(targets[block], must_be_straight=True)
+            block_distances = np.empty((len(sources), len(to_targets)))
+            _combine_distances(self.walls, index, from_sources, targets[block], to_targets, block_distances)
+            distances[:, block] = block_distances
+        return distances
+
+    def _compute_corner_distances(
+        self, places: Array, *, must_be_straight: bool
+    ) -> tuple[AngularWallIndex, Array, CornerPaths]:
+        """Return the index of places, their distances to corners, (n, k), and the paths from the last one."""
+        corners = len(self.corners)
+        distances = np.empty((len(places), corners))
+        paths = CornerPaths.allocate(corners)
+
+        def fill(index: AngularWallIndex, _numbers: IntArray, _lengths: Array) -> int:
+            used: int = _find_corner_distances(
+                self.walls, index, self.graph, places, must_be_straight, distances, paths
+            )
+            return used
+
+        index, _, _ = self.run_with_index(len(places), SOURCE_BINS, fill)
+        return index, distances, paths
+
+    def find_path(self, source: Array, target: Array) -> Array:
+        """Find a shortest path between two points.
+
+        Parameters
+        ----------
+        source, target : (2,) array, m
+
+        Returns
+        -------
+        (w, 2) array, m
+            Its ends and the corners between them; of shape (0, 2) if there is no path.
+
+        Raises
+        ------
+        InputError
+            If a point is outside the free space.
+        """
+        ends, _ = self.snap_to_free_space(np.stack([source, target]), "ends of the path")
+        index, from_source, paths = self._compute_corner_distances(ends[:1], must_be_straight=False)
+        _, to_target, _ = self._compute_corner_distances(ends[1:], must_be_straight=True)
+        distance = np.empty((1, 1))
+        _combine_distances(self.walls, index, from_source, ends[1:], to_target, distance)
+        if np.isinf(distance[0, 0]):
+            return np.empty((0, 2))
+        by_corner = from_source[0] + to_target[0]
+        corner = -1
+        if by_corner.min(initial=np.inf) <= distance[0, 0]:
+            corner = int(by_corner.argmin())
+        bends = []
+        while corner >= 0:
+            bends.append(corner)
+            corner = int(paths.previous_corner[corner])
+        points = self.grid.to_metres(ends)
+        return np.concatenate([points[:1], self.corners[bends[::-1]], points[1:]])
+
+
+@kernel
+def _find_corner_distances(
+    walls: Walls,
+    index: AngularWallIndex,
+    graph: CornerGraph,
+    points: Array,
+    must_be_straight: bool,
+    distances: Array,
+    paths: CornerPaths,
+) -> int:
+    """Write the distances of (n, 2) points from the corners, (n, k); `paths` are those of the last point.
+
+    Return the number of used entries of the index, -1 if there are too few.
+    """
+    corners = len(walls.corners)
+    queue = CornerQueue(np.empty(corners + 1, np.int64), np.empty(corners, np.bool_))
+    used = 0
+    for i in range(len(points)):
+        x = points[i, 0]
+        y = points[i, 1]
+        used = add_walls(walls, index, i, x, y, np.inf, used)
+        if used < 0:
+            return -1
+        for corner in range(corners):
+            paths.length[corner] = np.inf
+            paths.source[corner] = 0
+            paths.first_corner[corner] = corner
+            paths.previous_corner[corner] = -1
+            queue.is_waiting[corner] = False
+        count = find_visible_corners(walls, index, i, 0, queue.corners)
+        for k in range(count):
+            corner = queue.corners[k]
+            dx = walls.corners[corner, 0] - x
+            dy = walls.corners[corner, 1] - y
+            paths.length[corner] = np.sqrt(dx * dx + dy * dy)
+            queue.is_waiting[corner] = True
+        if not must_be_straight:
+            relax_paths(graph, paths, queue, count)
+        distances[i] = paths.length
+    return used
+
+
+@kernel
+def _combine_distances(
+    walls: Walls,
+    index: AngularWallIndex,
+    from_sources: Array,
+    targets: Array,
+    to_targets: Array,
+    distances: Array,
+) -> None:
+    """Write the distances of the sources of an index from (m, 2) targets, (n, m).
+
+    A path is straight, or it consists of a path from the source to a corner, (n, k), and a straight line from
+    there to the target, (m, k).
+    """
+    corners = np.empty(to_targets.shape[1], np.int64)
+    for j in range(len(targets)):
+        x = targets[j, 0]
+        y = targets[j, 1]
+        count = 0
+        for corner in range(len(corners)):
+            if to_targets[j, corner] < np.inf:
+                corners[count] = corner
+                count += 1
+        for i in range(len(from_sources)):
+            shortest = np.inf
+            if is_visible(walls, index, i, x, y):
+                dx = x - index.positions[i, 0]
+                dy = y - index.positions[i, 1]
+                shortest = np.sqrt(dx * dx + dy * dy)
+            for k in range(count):
+                corner = corners[k]
+                shortest = min(shortest, from_sources[i, corner] + to_targets[j, corner])
+            distances[i, j] = shortest

@@ -1,0 +1,179 @@
+"""Descent of the exact coverage cost from given positions to a local minimum."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy
+
+from robocov.arrays import Array, IntArray
+from robocov.cost import CoverageCost, CoverageResult
+from robocov.optimum.configuration_space import ConfigurationSpace
+
+_MAX_STEPS = 300
+"""Maximum number of steps; some tens are usual."""
+
+_MEMORY = 8
+"""Number of steps from which the curvature is learnt."""
+
+_SUFFICIENT_DECREASE = 1e-4
+"""Fraction of the decrease promised by the gradient that a step must achieve (Armijo's condition)."""
+
+_MAX_QUASI_NEWTON_HALVINGS = 4
+"""Maximum number of trials along the quasi-Newton direction, each half as long as the one before."""
+
+_MAX_GRADIENT_HALVINGS = 14
+"""The same along the scaled gradient."""
+
+_STALL_STEPS = 5
+"""Number of steps over which the decrease is added up."""
+
+_STALL_DECREASE = 1e-7
+"""The descent ends if the sum is below this fraction of the cost."""
+
+_MIN_CURVATURE = 1e-10
+"""Minimum of the curvature along a step, relative to the change of the gradient."""
+
+
+@dataclass(frozen=True, slots=True)
+class _LearntStep:
+    """A step of the descent, from which the curvature is learnt."""
+
+    move: Array
+    """(n, 2) m"""
+    gradient_change: Array
+    """(n, 2)"""
+
+
+def descend(
+    cost: CoverageCost,
+    space: ConfigurationSpace,
+    positions: Array,
+    component: IntArray,
+    beat: Callable[[], None] = lambda: None,
+) -> CoverageResult:
+    """Move robots to a local minimum of the coverage cost.
+
+    Parameters
+    ----------
+    cost : CoverageCost
+    space : ConfigurationSpace
+        Where robots can be.
+    positions : (n, 2) array, m
+        Where the descent starts.
+    component : (n,) int array
+        The component of the free space in which each robot stays.
+    beat : callable, optional
+        Called before each step. It may raise an exception to stop.
+
+    Returns
+    -------
+    CoverageResult
+        Its mean distance is not larger than at the start.
+
+    Notes
+    -----
+    Projected quasi-Newton steps: L-BFGS (Nocedal and Wright, *Numerical Optimization*, algorithm 7.4), scaled
+    by the curvature that Weiszfeld's iteration for the geometric median uses. A step is projected onto the
+    configuration space, and halved until the cost decreases enough. The cost is only piecewise smooth, since
+    sites change owners and paths, and a wall may stop a robot: if the quasi-Newton direction does not lead
+    down, the descent follows the scaled gradient, and learns the curvature again.
+    """
+    descent = _Descent(cost, space, component, cost(positions))
+    decreases: deque[float] = deque(maxlen=_STALL_STEPS)
+    for _ in range(_MAX_STEPS):
+        beat()
+        before = descent.result.mean_distance
+        if not descent.step():
+            break
+        after = descent.result.mean_distance
+        decreases.append(before - after)
+        if len(decreases) == _STALL_STEPS and sum(decreases) < _STALL_DECREASE * after:
+            break
+    return descent.result
+
+
+@dataclass
+class _Descent:
+    """The state of a descent."""
+
+    cost: CoverageCost
+    space: ConfigurationSpace
+    component: IntArray
+    result: CoverageResult
+    learnt: deque[_LearntStep] = field(default_factory=lambda: deque(maxlen=_MEMORY))
+
+    def step(self) -> bool:
+        """Move the robots to a lower cost; return whether that was possible."""
+        gradient = _compute_gradient(self.result)
+        scale = _compute_curvature(self.result, self.cost.spacing / 2.0)[:, None]
+        lower = None
+        if self.learnt:
+            direction = _compute_quasi_newton_direction(gradient, scale, self.learnt)
+            lower = self._search_line(gradient, direction, _MAX_QUASI_NEWTON_HALVINGS)
+        if lower is None:
+            self.learnt.clear()
+            lower = self._search_line(gradient, -gradient / scale, _MAX_GRADIENT_HALVINGS)
+        if lower is None:
+            return False
+        move = lower.positions - self.result.positions
+        change = _compute_gradient(lower) - gradient
+        # The direction leads down only if the cost is convex along all learnt steps.
+        if (move * change).sum() > _MIN_CURVATURE * (change * change).sum():
+            self.learnt.append(_LearntStep(move, change))
+        self.result = lower
+        return True
+
+    def _search_line(self, gradient: Array, direction: Array, halvings: int) -> CoverageResult | None:
+        """Return the result of the longest step, of several, that lowers the cost enough, None for none."""
+        start = self.result
+        for k in range(halvings):
+            positions = self.space.find_nearest(start.positions + 0.5**k * direction, self.component)
+            if positions is None:
+                continue
+            promised = float((gradient * (positions - start.positions)).sum())
+            if not promised < 0.0:
+                continue
+            after = self.cost(positions)
+            if after.mean_distance <= start.mean_distance + _SUFFICIENT_DECREASE * promised:
+                return after
+        return None
+
+
+def _compute_gradient(result: CoverageResult) -> Array:
+    """Return the derivative of the mean distance with respect to the positions, (n, 2)."""
+    if not result.value > 0.0:
+        return np.zeros_like(result.positions)
+    return result.gradient * (result.mean_distance / result.value)
+
+
+def _compute_curvature(result: CoverageResult, min_distance: float) -> Array:
+    """Return the weighted mean over all sites of the inverse distance of the first waypoint, (n,) 1/m."""
+    site = np.flatnonzero(result.owner >= 0)
+    owner = result.owner[site]
+    offset = result.first_waypoints[site] - result.positions[owner]
+    # Without a minimum, a site right at a robot would not let it go.
+    distance = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), min_distance)
+    pull = 1.0 / distance
+    total_weight = float(max(len(site), 1))
+    if result.weights is not None:
+        pull *= result.weights[site]
+        total_weight = float(result.weights[site].sum()) or 1.0
+    curvature = np.bincount(owner, pull, minlength=len(result.positions)) / total_weight
+    return np.where(curvature > 0.0, curvature, 1.0)
+
+
+def _compute_quasi_newton_direction(gradient: Array, scale: Array, learnt: deque[_LearntStep]) -> Array:
+    """Return the L-BFGS direction, (n, 2) m, for an initial curvature of `scale`, (n, 1)."""
+    moves = np.array([step.move for step in learnt]).reshape(len(learnt), -1)
+    changes = np.array([step.gradient_change for step in learnt]).reshape(len(learnt), -1)
+    # SciPy's recursion starts with a curvature of 1: change the coordinates so that it is about that.
+    curvature = np.broadcast_to(scale, gradient.shape).ravel()
+    ratio = changes[-1] @ (changes[-1] / curvature) / (moves[-1] @ changes[-1])
+    root = np.sqrt(curvature * ratio)
+    inverse_hessian = scipy.optimize.LbfgsInvHessProduct(moves * root, changes / root)
+    direction = inverse_hessian @ (gradient.ravel() / root)
+    return np.asarray(-(direction / root).reshape(gradient.shape))

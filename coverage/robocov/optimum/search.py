@@ -1,0 +1,326 @@
+"""The search for the best positions of a team: many restarts, of which the best counts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from numbers import Integral
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+from shapely.geometry.base import BaseGeometry
+
+from robocov.arrays import Array, BoolArray, IntArray, freeze
+from robocov.cost import CoverageCost, CoverageResult
+from robocov.environment import Environment
+from robocov.errors import ParameterError, is_number, quote, require_number
+from robocov.k_median import apply_best_swaps, run_lloyd, seed_sources
+from robocov.optimum.configuration_space import ConfigurationSpace
+from robocov.optimum.descent import descend
+from robocov.team import DEFAULT_RADIUS
+
+MAX_ROBOTS = 500
+MAX_RESTARTS = 100_000
+
+_MIN_SOURCES = 600
+"""About the minimum number of positions for robots in the table."""
+
+_SOURCES_PER_ROBOT = 20
+"""About the minimum number of these for each robot."""
+
+_MAX_TARGETS = 1000
+"""About the maximum number of groups of sites in the table."""
+
+_MAX_CANDIDATES = 200_000
+"""Maximum number of grid points, in the box around a component, from which the positions are chosen."""
+
+_STEPS_PER_SPACING = 3
+"""Number of steps of that grid from one position to the next."""
+
+_UNREACHABLE_SIZES = 1e4
+"""Sizes of the map that stand for the distance to a site that cannot be reached."""
+
+_PROGRESS_AFTER_COST = 0.3
+"""Progress when the cost has been prepared,"""
+
+_PROGRESS_AFTER_TABLE = 0.5
+"""and when the table has been computed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """The best positions of a team that were found on one map, and the coverage cost (22) there.
+
+    Attributes
+    ----------
+    positions : (n, 2) array, m
+        From left to right, in the free space, clear of walls and of each other.
+    mean_distance : float, m
+        As of `CoverageResult`.
+    value : float, m³
+    uncovered_area : float, m²
+        Area of the components of the free space without a robot.
+    costs : (r,) array, m
+        Mean distance with which each restart ended.
+    undescended : (r,) array, m
+        The same before the descent of the exact cost.
+    restart : int
+        The restart that found the positions, the first of equals.
+    """
+
+    positions: Array
+    mean_distance: float
+    value: float
+    uncovered_area: float
+    costs: Array
+    undescended: Array
+    restart: int
+
+    def compute_agreement(self, within: float = 0.005) -> float:
+        """Compute the fraction of restarts that ended close to the best one.
+
+        Parameters
+        ----------
+        within : float
+            Maximum excess of their mean distance, relative to the best one.
+
+        Returns
+        -------
+        float
+        """
+        return float((self.costs <= self.mean_distance * (1.0 + within)).mean())
+
+    def compute_gap(self, mean_distance: float) -> float:
+        """Compute how far a mean distance is above the best one, J / J_ref - 1.
+
+        Parameters
+        ----------
+        mean_distance : float, m
+
+        Returns
+        -------
+        float
+        """
+        return mean_distance / self.mean_distance - 1.0
+
+
+def find_optimum(
+    environment: Environment,
+    robots: int,
+    *,
+    radius: float = DEFAULT_RADIUS,
+    lattice: int = 64,
+    restarts: int = 24,
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> Optimum:
+    """Find the best positions of a team on a map that it knows.
+
+    Parameters
+    ----------
+    environment : Environment
+    robots : int
+        Number of robots.
+    radius : float, m
+        Radius of the robots.
+    lattice : int
+        Number of cells along a side of the lattice, see `CoverageCost`.
+    restarts : int
+        Number of restarts. Each depends only on the seed and its own number: more restarts never give a
+        higher cost.
+    seed : int
+    progress : callable, optional
+        Called now and then with the fraction that is done. It may raise an exception to stop.
+
+    Returns
+    -------
+    Optimum
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is out of range, or the robots do not fit.
+
+    Notes
+    -----
+    The coverage cost (22) has many local minima. Each restart draws positions by k-median++ and improves them
+    on a table of geodesic distances between some hundreds of positions, first by Lloyd's iteration, then by
+    interchange, which leaves most of these minima. At last it descends the exact cost. The best of all
+    restarts is no proof of the global minimum; how many restarts agree with it tells how far to trust it.
+
+    If the free space has several components, the robots first cover as much of its area as they can, the
+    largest components, and then minimise the cost of these. (The cost alone would be lowest with all robots
+    in the smallest room.) Components that are too small for a robot, or without a site of the lattice, are
+    left alone.
+
+    Examples
+    --------
+    >>> square = Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2)))
+    >>> best = find_optimum(square, robots=1, restarts=2)
+    >>> best.positions.round(3)
+    array([[1., 1.]])
+    """
+    _check_parameters(robots, restarts, seed, radius)
+    report = progress or (lambda fraction: None)
+    cost = CoverageCost(environment, lattice, progress=lambda part: report(_PROGRESS_AFTER_COST * part))
+    search = _Search(environment, cost, robots, float(radius))
+    report(_PROGRESS_AFTER_TABLE)
+
+    best: CoverageResult | None = None
+    best_restart = 0
+    outcomes: list[_Outcome] = []
+    # Many restarts end with the same sources: descend from these only once.
+    outcome_by_sources: dict[tuple[int, ...], _Outcome] = {}
+    for restart in range(restarts):
+        fraction = _PROGRESS_AFTER_TABLE + (1.0 - _PROGRESS_AFTER_TABLE) * restart / restarts
+        beat = partial(report, fraction)
+        sources = search.find_sources(np.random.default_rng([seed, restart]), beat)
+        key = tuple(sources.tolist())
+        if key not in outcome_by_sources:
+            positions = search.places[sources]
+            result = descend(cost, search.space, positions, search.component[sources], beat)
+            outcome_by_sources[key] = _Outcome(cost(positions).mean_distance, result.mean_distance)
+            if best is None or _get_rank(result) < _get_rank(best):
+                best = result
+                best_restart = restart
+        outcomes.append(outcome_by_sources[key])
+    report(1.0)
+    assert best is not None
+    from_left_to_right = np.lexsort((best.positions[:, 1], best.positions[:, 0]))
+    return Optimum(
+        positions=freeze(best.positions[from_left_to_right]),
+        mean_distance=best.mean_distance,
+        value=best.value,
+        uncovered_area=best.uncovered_area,
+        costs=freeze([outcome.descended for outcome in outcomes]),
+        undescended=freeze([outcome.undescended for outcome in outcomes]),
+        restart=best_restart,
+    )
+
+
+class _Outcome(NamedTuple):
+    """The mean distances before and after the descent of a restart, m."""
+
+    undescended: float
+    descended: float
+
+
+def _check_parameters(robots: int, restarts: int, seed: int, radius: float) -> None:
+    require_number("robots", robots, 1, MAX_ROBOTS, whole=True)
+    require_number("restarts", restarts, 1, MAX_RESTARTS, whole=True)
+    if not (is_number(seed, Integral) and seed >= 0):
+        raise ParameterError(f"seed: expected a whole number of at least 0, got {quote(seed)}")
+    if not (is_number(radius) and 0.0 < radius < math.inf):
+        raise ParameterError(f"radius: expected a number above 0 m, got {quote(radius)}")
+
+
+def _get_rank(result: CoverageResult) -> tuple[float, float]:
+    """Return what is minimised, the first number before the second."""
+    return result.uncovered_area, result.mean_distance
+
+
+class _Search:
+    """What all restarts share.
+
+    Attributes
+    ----------
+    space : ConfigurationSpace
+    places : (p, 2) array, m
+        The sources of the table: positions for robots.
+    component : (p,) int array
+        Their components of the free space.
+    table : (t, p) array, m
+        Distances of groups of sites from the places, times the weights of the groups.
+    """
+
+    def __init__(self, environment: Environment, cost: CoverageCost, robots: int, radius: float) -> None:
+        self.cost = cost
+        self.robots = robots
+        self.space = ConfigurationSpace(environment.free, radius)
+        _, is_inside = cost.geodesics.snap_to_free_space(cost.points)
+        site_component = is_inside.argmax(axis=1)
+        areas = self.space.components
+        sites = np.bincount(site_component, minlength=len(areas))
+        usable = [k for k, area in enumerate(areas) if not area.is_empty and sites[k]]
+        # Components are sorted by area, the largest first.
+        covered = usable[:robots]
+        covered_area = sum(areas[k].area for k in covered)
+        sources = max(_MIN_SOURCES, _SOURCES_PER_ROBOT * robots)
+        spacing = max(math.sqrt(covered_area / sources), self.space.spacing)
+        places = [_spread_points(areas[k], spacing) for k in covered]
+        self.component = np.repeat(covered, [len(part) for part in places]).astype(np.intp)
+        if len(self.component) < robots:
+            capacity = sum(len(_spread_points(areas[k], self.space.spacing)) for k in usable)
+            raise ParameterError(
+                f"robots: expected at most about {capacity}, as many as fit with radius {radius:g} m in map "
+                f"{environment.name!r}, got {robots}"
+            )
+        self.places = np.concatenate(places)
+        self.table = self._compute_table(site_component, np.isin(site_component, covered))
+
+    def _compute_table(self, site_component: IntArray, is_covered: BoolArray) -> Array:
+        """Compute the table; its targets are one site for each component and square of some cells."""
+        cost = self.cost
+        side = max(1, math.ceil(math.sqrt(np.count_nonzero(is_covered) / _MAX_TARGETS)))
+        row, column = np.divmod(cost.cells, cost.lattice)
+        square = row // side * cost.lattice + column // side
+        group = square * len(self.space.components) + site_component
+        # Take the site nearest to the middle of the square, in whole numbers. Among equally near ones, such
+        # as all of two by two cells, chance decides.
+        row_offset = 2 * (row % side) - side + 1
+        column_offset = 2 * (column % side) - side + 1
+        offset2 = row_offset**2 + column_offset**2
+        chance = np.random.default_rng(0).random(len(group))
+        site = np.flatnonzero(is_covered)
+        site = site[np.lexsort((chance[site], offset2[site], group[site]))]
+        _, first, count = np.unique(group[site], return_index=True, return_counts=True)
+        weight = count if cost.weights is None else np.add.reduceat(cost.weights[site], first)
+        table = cost.geodesics.compute_distances(self.places, cost.points[site[first]])
+        table[np.isinf(table)] = _UNREACHABLE_SIZES * cost.geodesics.size
+        return np.ascontiguousarray((table * weight).T)
+
+    def find_sources(self, rng: np.random.Generator, beat: Callable[[], None]) -> IntArray:
+        """Return the sources with which one restart ends, sorted, (n,).
+
+        The table approximates the cost: an earlier stage counts if its exact cost is lower.
+        """
+        drawn = seed_sources(self.table, self.robots, rng)
+        moved = run_lloyd(self.table, drawn, beat=beat)
+        swapped = apply_best_swaps(self.table, moved, beat)
+        stages = [np.sort(sources) for sources in (swapped, moved, drawn)]
+        return min(stages, key=lambda sources: _get_rank(self.cost(self.places[sources])))
+
+
+def _spread_points(area: BaseGeometry, spacing: float) -> Array:
+    """Return points in an area, (p, 2), at least `spacing` apart: a grid, and points in its gaps."""
+    low_x, low_y, high_x, high_y = area.bounds
+    step = spacing / _STEPS_PER_SPACING
+    step = max(step, math.sqrt((high_x - low_x) * (high_y - low_y) / _MAX_CANDIDATES))
+    columns = int((high_x - low_x) / 2.0 / step)
+    rows = int((high_y - low_y) / 2.0 / step)
+    row_grid, column_grid = np.mgrid[-rows : rows + 1, -columns : columns + 1]
+    row = row_grid.ravel()
+    column = column_grid.ravel()
+    x = (low_x + high_x) / 2.0 + column * step
+    y = (low_y + high_y) / 2.0 + row * step
+    points = np.column_stack([x, y])
+    is_inside = shapely.contains_xy(area, x, y)
+    is_on_grid = is_inside & (row % _STEPS_PER_SPACING == 0) & (column % _STEPS_PER_SPACING == 0)
+    chosen = points[is_on_grid].tolist()
+    rest = points[is_inside & ~is_on_grid]
+    if not chosen:
+        point = area.representative_point()
+        chosen = [[point.x, point.y]]
+    if len(rest):
+        distance = np.asarray(cKDTree(chosen).query(rest)[0])
+        farthest = int(distance.argmax())
+        while distance[farthest] >= _STEPS_PER_SPACING * step:
+            chosen.append(rest[farthest].tolist())
+            offset = rest - rest[farthest]
+            distance = np.minimum(distance, np.hypot(offset[:, 0], offset[:, 1]))
+            farthest = int(distance.argmax())
+    return np.array(chosen)
