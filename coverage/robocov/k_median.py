@@ -1,13 +1,16 @@
-"""The k-median problem on a table of distances: k sources such that each target is near to one of them.
+"""The k-median problem on a table of distances: choose k sources so that each target is near to one.
 
-A table is (m, c), C-contiguous and finite: distances, weighted or not, from m targets to c possible sources.
-Teitz and Bart's interchange, with the bookkeeping of Whitaker (1983) and of Schubert and Rousseeuw's FastPAM
-(2019): one pass over the table gives the cost after every possible swap.
+A table is an array of shape (m, c), C-contiguous and finite: distances, weighted or not, from m targets to c
+possible sources. *Sources* are columns of the table, and their *cost* is the sum over the targets of the
+distance to the nearest one.
+
+The swaps are those of Teitz and Bart, with the bookkeeping of Whitaker (1983) and of Schubert and
+Rousseeuw's FastPAM (2019): one pass over the table computes the cost after every possible swap.
 """
 
 from collections.abc import Callable
 from itertools import combinations
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -15,226 +18,377 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 
 Beat: TypeAlias = Callable[[], None]
-"""Called once a pass; it may raise, to give up."""
+"""Called once per iteration. It may raise, to cancel the computation."""
 
-_FALL = 1e-9  # part of the cost by which a step must lower it, far more than rounding: none is undone
-_PASSES = 60  # rounds of `improve_sources`; a few are usual
-_HARDLY = 1e-4  # part of the sum that a round of `improve_sources` must save
-_REMOVED = (2, 3)  # so many sources are taken away at once
-_TRIED = 4  # so many ways to put them back are tried to the end
+_MIN_SAVING = 1e-9
+"""Fraction of the cost that an iteration must save: far more than rounding, so that none undoes another."""
+_MAX_ROUNDS = 60
+"""Maximum number of rounds of `improve_sources`, of which a few are usual."""
+_MIN_SAVING_OF_ROUND = 1e-4
+"""Fraction of the cost that a round of `improve_sources` must save."""
+_REMOVAL_SIZES = (2, 3)
+"""Numbers of sources that `rebuild_sources` removes at once."""
+_MAX_REBUILT = 4
+"""Number of the most promising removals that `rebuild_sources` completes with Lloyd's iteration."""
+
+
+class _NearestSources(NamedTuple):
+    """The sources nearest to each target, (m,) each.
+
+    `owner` is the number of the nearest source among the sources, not its column.
+    """
+
+    owner: IntArray
+    distance: Array
+    second_distance: Array
 
 
 def seed_sources(table: Array, count: int, rng: np.random.Generator) -> IntArray:
-    """Return (count,) sources by k-means++ (Arthur and Vassilvitskii 2007), with distances for squares."""
-    chosen: list[int] = []
-    nearest = np.ones(len(table))
-    taken = np.zeros(table.shape[1], dtype=bool)
+    """Choose random sources that are far from each other.
+
+    Parameters
+    ----------
+    table : (m, c) array
+    count : int
+        Number of sources k, at most c.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (k,) int array
+
+    Notes
+    -----
+    This is k-means++ (Arthur and Vassilvitskii 2007), with distances in place of squared distances.
+    """
+    sources: list[int] = []
+    distance = np.ones(len(table))
+    is_chosen = np.zeros(table.shape[1], dtype=bool)
     for _ in range(count):
-        chances = np.cumsum(nearest)
-        # where the sources hold all targets already, any other is as good
-        target = int(np.searchsorted(chances, rng.random() * chances[-1], side="right"))
-        target = min(target, len(nearest) - 1)
-        source = int(np.where(taken, np.inf, table[target]).argmin())
-        nearest = np.minimum(nearest, table[:, source]) if chosen else table[:, source].copy()
-        taken[source] = True
-        chosen.append(source)
-    return np.array(chosen, dtype=np.intp)
+        cumulative = np.cumsum(distance)
+        # If all targets are at distance zero, the last one is chosen, which is as good as any.
+        target = int(np.searchsorted(cumulative, rng.random() * cumulative[-1], side="right"))
+        target = min(target, len(distance) - 1)
+        source = int(np.where(is_chosen, np.inf, table[target]).argmin())
+        distance = np.minimum(distance, table[:, source]) if sources else table[:, source].copy()
+        is_chosen[source] = True
+        sources.append(source)
+    return np.array(sources, dtype=np.intp)
 
 
 def choose_greedily(table: Array, count: int) -> IntArray:
-    """Return (count,) sources: one after another that which lowers the sum the most.
+    """Choose sources one after another, each such that the cost is lowest.
 
-    What k sources save, against one that is far from everything, is at least 1 - 1/e of what the best k save
-    (Nemhauser, Wolsey and Fisher 1978).
+    Parameters
+    ----------
+    table : (m, c) array
+    count : int
+        Number of sources k, at most c.
+
+    Returns
+    -------
+    (k,) int array
+
+    Notes
+    -----
+    The sources save at least 1 - 1/e of what the best k sources save, in comparison with one that is far from
+    everything (Nemhauser, Wolsey and Fisher 1978).
     """
-    order = np.arange(count)
-    return _put_back(table, np.zeros(count, dtype=np.intp), order, 0)[1]
+    sources = np.zeros(count, dtype=np.intp)
+    return _replace_sources(table, sources, np.arange(count), 0)[1]
 
 
 def run_lloyd(
     table: Array, sources: IntArray, fixed: BoolArray | None = None, beat: Beat = lambda: None
 ) -> IntArray:
-    """Return (k,) sources after Lloyd's iteration; those that are `fixed` stay."""
-    stay = np.zeros(len(sources), dtype=bool) if fixed is None else fixed
-    former, total = sources, np.inf
+    """Improve sources by Lloyd's iteration: each moves to the best source for the targets nearest to it.
+
+    Parameters
+    ----------
+    table : (m, c) array
+    sources : (k,) int array
+    fixed : (k,) bool array or None
+        Sources that do not change. By default all may change.
+    beat : callable
+        See `Beat`.
+
+    Returns
+    -------
+    (k,) int array
+    """
+    if fixed is None:
+        fixed = np.zeros(len(sources), dtype=bool)
+    previous = sources
+    previous_cost = np.inf
     while True:
         beat()
-        lower, after = _lloyd_step(table, sources, stay)
-        if not lower < total * (1.0 - _FALL):
-            return former
-        former, total, sources = sources, lower, after
-
-
-@kernel
-def _nearest_two(table: Array, sources: IntArray) -> tuple[IntArray, Array, Array]:
-    """Return which source is nearest to each target, how far, and how far the second nearest is."""
-    owner = np.zeros(len(table), dtype=np.intp)
-    nearest, second = np.full(len(table), np.inf), np.full(len(table), np.inf)
-    for t in range(len(table)):
-        for k in range(len(sources)):
-            distance = table[t, sources[k]]
-            if distance < nearest[t]:
-                owner[t], nearest[t], second[t] = k, distance, nearest[t]
-            elif distance < second[t]:
-                second[t] = distance
-    return owner, nearest, second
-
-
-@kernel
-def _lloyd_step(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[float, IntArray]:
-    """Return the sum for the sources, and the best sources for the targets of each."""
-    owner, nearest, _ = _nearest_two(table, sources)
-    total, holds = 0.0, np.zeros(len(sources), dtype=np.bool_)
-    sums = np.zeros((len(sources), table.shape[1]))
-    for t in range(len(table)):
-        total += nearest[t]
-        holds[owner[t]] = True
-        for s in range(table.shape[1]):
-            sums[owner[t], s] += table[t, s]
-    # a source that holds no target stays, and no two may become the same
-    taken = np.zeros(table.shape[1], dtype=np.bool_)
-    for k in range(len(sources)):
-        taken[sources[k]] |= fixed[k] or not holds[k]
-    after = sources.copy()
-    for k in range(len(sources)):
-        if holds[k] and not fixed[k]:
-            after[k] = _least(sums[k], taken)
-            taken[after[k]] = True
-    return total, after
-
-
-@kernel
-def _least(sums: Array, taken: BoolArray) -> int:
-    """Return where the least of the sums is that are not taken."""
-    best, least = -1, np.inf
-    for s in range(len(sums)):
-        if not taken[s] and (best < 0 or sums[s] < least):
-            best, least = s, sums[s]
-    return best
+        cost, next_sources = _apply_lloyd_step(table, sources, fixed)
+        if not cost < previous_cost * (1.0 - _MIN_SAVING):
+            return previous
+        previous = sources
+        previous_cost = cost
+        sources = next_sources
 
 
 def apply_best_swap(table: Array, sources: IntArray, fixed: BoolArray, threshold: float) -> IntArray:
-    """Return the sources after the best swap; the same array where none lowers the sum by the threshold."""
-    before, after, swapped = _best_swap(table, sources, fixed)
-    return swapped if after < before * (1.0 - threshold) else sources
+    """Replace one source by another column, such that the cost is lowest.
 
+    Parameters
+    ----------
+    table : (m, c) array
+    sources : (k,) int array
+    fixed : (k,) bool array
+        Sources that do not change.
+    threshold : float
+        Fraction of the cost that the swap must save.
 
-@kernel
-def _best_swap(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[float, float, IntArray]:
-    """Return the sum, that after the best swap, and the sources then."""
-    owner, nearest, second = _nearest_two(table, sources)
-    with_new = np.zeros(table.shape[1])
-    # without their own source targets go to the new one, or to their second nearest
-    without_own = np.zeros((len(sources), table.shape[1]))
-    total = 0.0
-    for t in range(len(table)):
-        k, near, next_near = owner[t], nearest[t], second[t]
-        total += near
-        for s in range(table.shape[1]):
-            distance = table[t, s]
-            kept = min(distance, near)
-            with_new[s] += kept
-            without_own[k, s] += min(distance, next_near) - kept
-    taken = np.zeros(table.shape[1], dtype=np.bool_)
-    for k in range(len(sources)):
-        taken[sources[k]] = True
-    least, place, source = np.inf, -1, -1
-    for s in range(table.shape[1]):
-        for k in range(len(sources)):
-            after = with_new[s] + without_own[k, s]
-            if after < least and not taken[s] and not fixed[k]:
-                least, place, source = after, k, s
-    swapped = sources.copy()
-    if place >= 0:
-        swapped[place] = source
-    return total, least, swapped
+    Returns
+    -------
+    (k,) int array
+        The same array, if no swap saves enough.
+    """
+    cost, swapped_cost, swapped = _find_best_swap(table, sources, fixed)
+    return swapped if swapped_cost < cost * (1.0 - threshold) else sources
 
 
 def apply_best_swaps(table: Array, sources: IntArray, beat: Beat = lambda: None) -> IntArray:
-    """Return the sources after the best swaps, as long as these lower the cost."""
-    fixed, former = np.zeros(len(sources), dtype=bool), None
-    while sources is not former:
+    """Apply best swaps as long as they lower the cost.
+
+    Parameters
+    ----------
+    table : (m, c) array
+    sources : (k,) int array
+    beat : callable
+        See `Beat`.
+
+    Returns
+    -------
+    (k,) int array
+    """
+    fixed = np.zeros(len(sources), dtype=bool)
+    while True:
         beat()
-        former, sources = sources, apply_best_swap(table, sources, fixed, _FALL)
-    return sources
+        swapped = apply_best_swap(table, sources, fixed, _MIN_SAVING)
+        if swapped is sources:
+            return sources
+        sources = swapped
 
 
 def improve_sources(
     table: Array, sources: IntArray, fixed: BoolArray, threshold: float, *, removals: bool = True
 ) -> IntArray:
-    """Return (k,) sources for which the sum over the targets of the distances to the nearest is low.
+    """Improve sources by Lloyd's iteration in turn with swaps, and with removals where no swap helps.
 
-    Lloyd's iteration in turn with the best swap of one source for another, and, with `removals`, where no
-    swap helps, with taking away two or three and putting them back where each helps most. Those that are
-    `fixed` stay. What all this saves must be more than the part `threshold` of the sum after Lloyd's
-    iteration alone; that one is returned else.
+    Parameters
+    ----------
+    table : (m, c) array
+    sources : (k,) int array
+    fixed : (k,) bool array
+        Sources that do not change.
+    threshold : float
+        Fraction of the cost after Lloyd's iteration alone that everything else must save together.
+    removals : bool
+        Whether `rebuild_sources` is used.
+
+    Returns
+    -------
+    (k,) int array
+        The sources after Lloyd's iteration alone, if the rest does not save enough.
     """
-    near = best = run_lloyd(table, sources, fixed)
+    after_lloyd = run_lloyd(table, sources, fixed)
     if not threshold < 1.0:
-        return near
-    for _ in range(_PASSES):
-        after = apply_best_swap(table, best, fixed, _HARDLY)
-        if after is best and removals:
-            after = rebuild_sources(table, best, fixed, _HARDLY)
-        if after is best:
+        return after_lloyd
+    best = after_lloyd
+    for _ in range(_MAX_ROUNDS):
+        changed = apply_best_swap(table, best, fixed, _MIN_SAVING_OF_ROUND)
+        if changed is best and removals:
+            changed = rebuild_sources(table, best, fixed, _MIN_SAVING_OF_ROUND)
+        if changed is best:
             break
-        best = run_lloyd(table, after, fixed)
-    return best if _total(table, best) < (1.0 - threshold) * _total(table, near) else near
+        best = run_lloyd(table, changed, fixed)
+    max_cost = (1.0 - threshold) * _compute_cost(table, after_lloyd)
+    return best if _compute_cost(table, best) < max_cost else after_lloyd
 
 
-def move_first_source(table: Array, sources: IntArray, among: BoolArray, threshold: float) -> IntArray:
-    """Return the sources with the best one of some, (c,), in the place of the first, the others staying.
+def move_first_source(table: Array, sources: IntArray, is_allowed: BoolArray, threshold: float) -> IntArray:
+    """Replace the first source by the best allowed column, while the others do not change.
 
-    What this saves must be more than `threshold` of the sum; the same array is returned else. Unlike Lloyd's
-    iteration, it does not take the clusters for given.
+    Unlike Lloyd's iteration, this takes into account that targets change their nearest source.
+
+    Parameters
+    ----------
+    table : (m, c) array
+    sources : (k,) int array
+    is_allowed : (c,) bool array
+    threshold : float
+        Fraction of the cost that the move must save.
+
+    Returns
+    -------
+    (k,) int array
+        The same array, if no column saves enough.
     """
-    near = table[:, sources[1:]].min(axis=1, initial=np.inf)
-    sums = np.minimum(table, near[:, None]).sum(axis=0)
-    best = int(np.where(among, sums, np.inf).argmin())
-    if not (among[best] and sums[best] < sums[sources[0]] * (1.0 - threshold)):
+    other_distance = table[:, sources[1:]].min(axis=1, initial=np.inf)
+    costs = np.minimum(table, other_distance[:, None]).sum(axis=0)
+    best = int(np.where(is_allowed, costs, np.inf).argmin())
+    if not (is_allowed[best] and costs[best] < costs[sources[0]] * (1.0 - threshold)):
         return sources
     return np.concatenate([[best], sources[1:]])
 
 
 def rebuild_sources(table: Array, sources: IntArray, fixed: BoolArray, threshold: float) -> IntArray:
-    """Return the sources after some were taken away at once, and put back one by one where each helps most.
+    """Remove two or three sources at once, and replace them one by one where each helps most.
 
-    Of all pairs and triples the most promising few are tried to the end, with Lloyd's iteration. The same
-    array is returned where none lowers the sum by the threshold.
+    All pairs and triples are tried; the most promising few are completed with Lloyd's iteration.
+
+    Parameters
+    ----------
+    table : (m, c) array
+    sources : (k,) int array
+    fixed : (k,) bool array
+        Sources that do not change.
+    threshold : float
+        Fraction of the cost that must be saved.
+
+    Returns
+    -------
+    (k,) int array
+        The same array, if nothing saves enough.
     """
     free = np.flatnonzero(~fixed).tolist()
-    found = []
-    for away in (each for size in _REMOVED for each in combinations(free, size)):
-        order = np.append(np.delete(np.arange(len(sources)), away), away)
-        found.append(_put_back(table, sources, order, len(sources) - len(away)))
-    found.sort(key=lambda each: each[0])
-    least, chosen = _total(table, sources) * (1.0 - threshold), sources
-    for _, after in found[:_TRIED]:
-        after = run_lloyd(table, after, fixed)
-        total = _total(table, after)
-        if total < least:
-            least, chosen = total, after
-    return chosen
+    candidates = []
+    for size in _REMOVAL_SIZES:
+        for removed in combinations(free, size):
+            order = np.append(np.delete(np.arange(len(sources)), removed), removed)
+            candidates.append(_replace_sources(table, sources, order, len(sources) - size))
+    candidates.sort(key=lambda candidate: candidate[0])
+    best = sources
+    best_cost = _compute_cost(table, sources) * (1.0 - threshold)
+    for _, candidate in candidates[:_MAX_REBUILT]:
+        improved = run_lloyd(table, candidate, fixed)
+        cost = _compute_cost(table, improved)
+        if cost < best_cost:
+            best = improved
+            best_cost = cost
+    return best
+
+
+def _compute_cost(table: Array, sources: IntArray) -> float:
+    return float(table[:, sources].min(axis=1).sum())
 
 
 @kernel
-def _put_back(table: Array, sources: IntArray, order: IntArray, stay: int) -> tuple[float, IntArray]:
-    """Return the sum, and the sources, after all but the first `stay` in this order were put back."""
-    after, near = sources.copy(), np.full(len(table), np.inf)
-    taken = np.zeros(table.shape[1], dtype=np.bool_)
-    for number in range(len(order)):
-        k = order[number]
-        if number >= stay:
+def _find_nearest_sources(table: Array, sources: IntArray) -> _NearestSources:
+    """Return the nearest source of each target, and the distances of the nearest two."""
+    targets = len(table)
+    owner = np.zeros(targets, dtype=np.intp)
+    nearest = np.full(targets, np.inf)
+    second = np.full(targets, np.inf)
+    for t in range(targets):
+        for k in range(len(sources)):
+            distance = table[t, sources[k]]
+            if distance < nearest[t]:
+                second[t] = nearest[t]
+                nearest[t] = distance
+                owner[t] = k
+            elif distance < second[t]:
+                second[t] = distance
+    return _NearestSources(owner, nearest, second)
+
+
+@kernel
+def _apply_lloyd_step(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[float, IntArray]:
+    """Return the cost of the sources, and the best source for the targets of each."""
+    nearest = _find_nearest_sources(table, sources)
+    cost = 0.0
+    has_targets = np.zeros(len(sources), dtype=np.bool_)
+    sums = np.zeros((len(sources), table.shape[1]))
+    for t in range(len(table)):
+        k = nearest.owner[t]
+        cost += nearest.distance[t]
+        has_targets[k] = True
+        for column in range(table.shape[1]):
+            sums[k, column] += table[t, column]
+    # A source without targets does not change, and no two sources may become equal.
+    is_taken = np.zeros(table.shape[1], dtype=np.bool_)
+    for k in range(len(sources)):
+        is_taken[sources[k]] |= fixed[k] or not has_targets[k]
+    next_sources = sources.copy()
+    for k in range(len(sources)):
+        if has_targets[k] and not fixed[k]:
+            next_sources[k] = _find_smallest(sums[k], is_taken)
+            is_taken[next_sources[k]] = True
+    return cost, next_sources
+
+
+@kernel
+def _find_smallest(sums: Array, is_taken: BoolArray) -> int:
+    """Return the index of the smallest sum that is not taken."""
+    best = -1
+    smallest = np.inf
+    for column in range(len(sums)):
+        if not is_taken[column] and (best < 0 or sums[column] < smallest):
+            best = column
+            smallest = sums[column]
+    return best
+
+
+@kernel
+def _find_best_swap(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[float, float, IntArray]:
+    """Return the cost of the sources, the cost after the best swap, and the sources after it."""
+    nearest = _find_nearest_sources(table, sources)
+    # The cost after a swap is that with the new column in addition to all sources, and the increase of the
+    # targets of the removed source: they go to the new column, or to their second nearest source.
+    cost_with_column = np.zeros(table.shape[1])
+    increase = np.zeros((len(sources), table.shape[1]))
+    cost = 0.0
+    for t in range(len(table)):
+        k = nearest.owner[t]
+        own_distance = nearest.distance[t]
+        second_distance = nearest.second_distance[t]
+        cost += own_distance
+        for column in range(table.shape[1]):
+            distance = table[t, column]
+            distance_with_column = min(distance, own_distance)
+            cost_with_column[column] += distance_with_column
+            increase[k, column] += min(distance, second_distance) - distance_with_column
+    is_source = np.zeros(table.shape[1], dtype=np.bool_)
+    for k in range(len(sources)):
+        is_source[sources[k]] = True
+    best_cost = np.inf
+    best_k = -1
+    best_column = -1
+    for column in range(table.shape[1]):
+        for k in range(len(sources)):
+            swapped_cost = cost_with_column[column] + increase[k, column]
+            if swapped_cost < best_cost and not is_source[column] and not fixed[k]:
+                best_cost = swapped_cost
+                best_k = k
+                best_column = column
+    swapped = sources.copy()
+    if best_k >= 0:
+        swapped[best_k] = best_column
+    return cost, best_cost, swapped
+
+
+@kernel
+def _replace_sources(table: Array, sources: IntArray, order: IntArray, kept: int) -> tuple[float, IntArray]:
+    """Keep the first `kept` sources of an order, and replace the others one by one where each helps most.
+
+    Returns the cost, and the sources.
+    """
+    replaced = sources.copy()
+    distance = np.full(len(table), np.inf)
+    is_taken = np.zeros(table.shape[1], dtype=np.bool_)
+    for position in range(len(order)):
+        k = order[position]
+        if position >= kept:
             sums = np.zeros(table.shape[1])
             for t in range(len(table)):
-                for s in range(table.shape[1]):
-                    sums[s] += min(table[t, s], near[t])
-            after[k] = _least(sums, taken)
-        taken[after[k]] = True
+                for column in range(table.shape[1]):
+                    sums[column] += min(table[t, column], distance[t])
+            replaced[k] = _find_smallest(sums, is_taken)
+        is_taken[replaced[k]] = True
         for t in range(len(table)):
-            near[t] = min(near[t], table[t, after[k]])
-    return near.sum(), after
-
-
-def _total(table: Array, sources: IntArray) -> float:
-    return float(table[:, sources].min(axis=1).sum())
+            distance[t] = min(distance[t], table[t, replaced[k]])
+    return distance.sum(), replaced
