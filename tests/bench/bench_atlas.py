@@ -28,7 +28,6 @@ from robocov import (
     generate_map,
     load_map,
     make_controller,
-    settled_at,
 )
 from robocov.environment import WallObstacle
 from robocov.metrics import compute_path_lengths
