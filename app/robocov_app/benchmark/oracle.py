@@ -15,7 +15,7 @@ from scipy.optimize import linear_sum_assignment
 
 from robocov.arrays import Array, IntArray
 from robocov.controllers.base import Law
-from robocov.controllers.driving import last_returns
+from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.geodesic_lloyd import Plan
 from robocov.controllers.route_following import follow_routes
@@ -91,7 +91,7 @@ class Oracle(Law):
             routes = tuple(way(plan, at, goal) for at, goal in zip(inside, places, strict=True))
             legs = np.zeros(len(routes), dtype=np.intp)
             memory = replace(memory, stage=stage, routes=routes, legs=legs, planned=seen.time)
-        returns, drive = last_returns(seen, memory.returns), (self.k_prop, self.response_time)
+        returns, drive = update_returns(seen, memory.returns), (self.k_prop, self.response_time)
         forces, goals, legs = follow_routes(seen, memory.team, memory.routes, memory.legs, returns, *drive)
         return Decision(
             forces, goals, {"attraction": forces}, memory=replace(memory, legs=legs, returns=returns)

@@ -10,7 +10,7 @@ import scipy
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
 from robocov.controllers.base import Law
-from robocov.controllers.driving import approach, drive
+from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
@@ -108,8 +108,10 @@ class Adaptive(Law):
             goals = compute_sample_centroids(mine, places, memory.estimates, seen.positions)
             memory = replace(memory, goals=goals, planned=seen.time)
         assert memory.goals is not None
-        wanted = approach(memory.goals - seen.positions, self.k_prop, memory.team.max_speed)
-        forces = drive(wanted, seen, memory.team, self.response_time)
+        wanted = compute_approach_velocities(
+            memory.goals - seen.positions, self.k_prop, memory.team.max_speed
+        )
+        forces = compute_drive_forces(wanted, seen, memory.team, self.response_time)
         return Decision(forces, memory.goals, {"attraction": forces}, memory=memory)
 
     def _by_basis(self, seen: Observations, memory: AdaptiveMemory, mine: BoolArray) -> AdaptiveMemory:

@@ -12,9 +12,9 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import Law
-from robocov.controllers.driving import last_returns
+from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.controllers.localization import Estimates, localized, wary
+from robocov.controllers.localization import Estimates, assume_closer_neighbours, estimate_positions
 from robocov.controllers.route_following import follow_routes
 from robocov.controllers.shared_map import Circle, circles, surveyed
 from robocov.observation import Decision, Observations, Scanning, Scans
@@ -212,8 +212,8 @@ class Atlas(Law):
     def decide(self, seen: Observations, memory: AtlasMemory) -> Decision:
         estimates = memory.estimates
         if seen.reported_positions is not None:
-            seen, estimates = localized(
-                seen, estimates or Estimates.nothing(len(seen.positions)), memory.team
+            seen, estimates = estimate_positions(
+                seen, estimates or Estimates.build_initial(len(seen.positions)), memory.team
             )
         states, scans = list(memory.states), seen.scans
         if scans is not None:
@@ -229,9 +229,13 @@ class Atlas(Law):
                     routes[i], legs[i] = ways.find_route(seen.positions[i], goal), 0
             elif state.planned is None:
                 routes[i] = seen.positions[i : i + 1]
-        team, returns = memory.team, last_returns(seen, memory.returns)
+        team, returns = memory.team, update_returns(seen, memory.returns)
         drive = self.k_prop, self.response_time
-        near = seen if estimates is None or seen.reported_positions is None else wary(seen, estimates)
+        near = (
+            seen
+            if estimates is None or seen.reported_positions is None
+            else assume_closer_neighbours(seen, estimates)
+        )
         forces, goals, legs = follow_routes(near, team, routes, legs, returns, *drive)
         after = AtlasMemory(team, tuple(states), tuple(routes), legs, returns, estimates)
         return Decision(forces, goals, {"attraction": forces}, memory=after)

@@ -7,7 +7,13 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
-from robocov.controllers.driving import approach, in_rows, last_returns, nearest_allowed, with_nearest
+from robocov.controllers.driving import (
+    arrange_in_rows,
+    collect_obstacle_points,
+    compute_approach_velocities,
+    find_nearest_allowed,
+    update_returns,
+)
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations, Scanning
 from robocov.potential import compute_separations
@@ -73,7 +79,7 @@ class Barrier(Law):
         """Return the forces of the nearest accelerations to Lloyd's that are certified."""
         team = memory.team
         cells = cells_seen(seen, self.cells, memory.triangulation)
-        wanted = approach(cells.centroid - seen.positions, self.k_prop, team.max_speed)
+        wanted = compute_approach_velocities(cells.centroid - seen.positions, self.k_prop, team.max_speed)
         wanted = (wanted - seen.velocities) / self.response_time
         chosen, memory = self.certified(seen, memory, wanted)
         forces = chosen * team.mass[:, None] + seen.velocities * team.viscosity[:, None]
@@ -88,11 +94,11 @@ class Barrier(Law):
     ) -> tuple[Array, BarrierMemory]:
         """Return the certified accelerations nearest to the wanted ones, (n, 2) m/s², and the new memory."""
         team = memory.team
-        returns = last_returns(seen, memory.returns)
+        returns = update_returns(seen, memory.returns)
         robots, heard = self._robots(seen, memory)
-        obstacles = self._obstacles(seen, team, with_nearest(seen, returns))
+        obstacles = self._obstacles(seen, team, collect_obstacle_points(seen, returns))
         normals, levels = (np.concatenate(both, axis=1) for both in zip(robots, obstacles, strict=True))
-        chosen, feasible = nearest_allowed(wanted, normals, levels, team.max_acceleration)
+        chosen, feasible = find_nearest_allowed(wanted, normals, levels, team.max_acceleration)
         # to rest within the response time, or as hard as possible
         speed = np.hypot(*seen.velocities.T)
         brake = -np.minimum(1.0 / self.response_time, team.max_acceleration / np.maximum(speed, 1e-300))
@@ -118,7 +124,7 @@ class Barrier(Law):
         passing = np.maximum((closing * closing).sum(axis=1) - along**2, 0.0)
         level = self._level(gap, along, power) + passing / np.maximum(distance, self.safe_gap + 1e-3)
         level *= alpha[robot] / power
-        return (in_rows(robot, n, -normal, np.nan), in_rows(robot, n, level, np.inf)), heard
+        return (arrange_in_rows(robot, n, -normal, np.nan), arrange_in_rows(robot, n, level, np.inf)), heard
 
     def _obstacles(self, seen: Observations, team: Team, points: Array) -> tuple[Array, Array]:
         """Return the half planes that keep robots off (n, k, 2) obstacle points; nan where none."""
@@ -151,4 +157,4 @@ def _derived(heard: Heard, before: Heard | None, fastest: Array) -> Array:
     if before is not None and heard.time > before.time:
         _, now, then = np.intersect1d(heard.pair, before.pair, assume_unique=True, return_indices=True)
         velocities[now] = (heard.positions[now] - before.positions[then]) / (heard.time - before.time)
-    return approach(velocities, 1.0, fastest)
+    return compute_approach_velocities(velocities, 1.0, fastest)

@@ -11,7 +11,15 @@ import numpy as np
 from robocov.arrays import Array, IntArray, freeze
 from robocov.compiled import kernel
 from robocov.controllers.base import Law, Memory
-from robocov.controllers.driving import approach, avoid, drive, last_returns, summed, with_nearest
+from robocov.controllers.driving import (
+    Margins,
+    avoid_collisions,
+    collect_obstacle_points,
+    compute_approach_velocities,
+    compute_drive_forces,
+    sum_by_robot,
+    update_returns,
+)
 from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.observation import Decision, Observations, Scanning, compute_headings
 from robocov.observation.scanned_view import (
@@ -153,14 +161,16 @@ class Boosting(Law):
             follows = np.array([climb.mode is Mode.BOOSTED for climb in climbs])
             gradient = np.where(follows[:, None], boosted, gradient)
             step = compute_step_fractions(gradient, before, step)
-        wanted = approach(gradient, self.k_grad, team.max_speed) * step[:, None]
+        wanted = compute_approach_velocities(gradient, self.k_grad, team.max_speed) * step[:, None]
         for i, climb in enumerate(climbs):
             if climb.mode is Mode.BACK:
-                wanted[i] = approach((climb.trail[-1] - seen.positions[i])[None], 2.0, team.max_speed[i])[0]
-        returns, keep = last_returns(seen, memory.returns), team.radius + self.clearance
-        points, apart = with_nearest(seen, returns), keep + float(team.radius.max())
-        wanted = avoid(wanted, seen, team, points, keep, apart, 4.0, 0.5)
-        forces = drive(wanted, seen, team, self.response_time)
+                wanted[i] = compute_approach_velocities(
+                    (climb.trail[-1] - seen.positions[i])[None], 2.0, team.max_speed[i]
+                )[0]
+        returns, keep = update_returns(seen, memory.returns), team.radius + self.clearance
+        points, apart = collect_obstacle_points(seen, returns), keep + float(team.radius.max())
+        wanted = avoid_collisions(wanted, seen, team, points, Margins(keep, apart, 4.0, 0.5))
+        forces = compute_drive_forces(wanted, seen, team, self.response_time)
         memory = BoostingMemory(team, returns, None, view, gradient, step, climbs)
         return Decision(forces, terms={"attraction": forces}, memory=memory)
 
@@ -196,11 +206,11 @@ class Boosting(Law):
             swept *= view.distances[edges.robot, edges.ray] / _RINGS
             gradients.append(
                 (towards[..., None] * directions).sum(axis=1)
-                + summed(edges.robot, swept[:, None] * edges.across, n)
+                + sum_by_robot(edges.robot, swept[:, None] * edges.across, n)
             )
         if self.boost == "neighbours":
             push = self.kappa / np.maximum(distance, 1e-3) ** (self.gamma + 1.0)
-            gradients[1] = gradients[1] + summed(robot, push[:, None] * offset, n)
+            gradients[1] = gradients[1] + sum_by_robot(robot, push[:, None] * offset, n)
         return added, gradients[0], gradients[1]
 
 

@@ -14,7 +14,12 @@ from scipy.spatial import Delaunay
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.controllers.base import Law
-from robocov.controllers.driving import approach, avoid, drive
+from robocov.controllers.driving import (
+    Margins,
+    avoid_collisions,
+    compute_approach_velocities,
+    compute_drive_forces,
+)
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.environment import Environment
 from robocov.errors import ParameterError
@@ -106,10 +111,12 @@ class Diffeomorphism(Law):
         (x, y), (a, b, c, d) = (memory.centroids - images).T, slopes.reshape(-1, 4).T
         # one to one means a positive determinant
         back = np.column_stack([d * x - b * y, a * y - c * x]) / np.maximum(a * d - b * c, 1e-300)[:, None]
-        wanted = approach(back, self.k_prop, team.max_speed)
+        wanted = compute_approach_velocities(back, self.k_prop, team.max_speed)
         keep, points = team.radius + 0.5 * self.clearance, seen.obstacle_points[:, None]
-        wanted = avoid(wanted, seen, team, points, keep, keep + float(team.radius.max()), 4.0, 0.5)
-        forces = drive(wanted, seen, team, self.response_time)
+        wanted = avoid_collisions(
+            wanted, seen, team, points, Margins(keep, keep + float(team.radius.max()), 4.0, 0.5)
+        )
+        forces = compute_drive_forces(wanted, seen, team, self.response_time)
         return Decision(forces, memory.goals, {"attraction": forces}, memory=memory)
 
     def _chart(self, team: Team) -> Chart:

@@ -1,6 +1,11 @@
-"""From what a robot wants and its scans show to a safe velocity, and to the force that brings it about."""
+"""Safe velocities towards goals, and the forces that bring them about.
+
+A controller computes a desired velocity, `avoid_collisions` returns the nearest velocity that is safe by what
+the robot senses and hears, and `compute_drive_forces` the force that tracks it.
+"""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,101 +15,215 @@ from robocov.observation import Observations
 from robocov.team import Team
 
 
-def approach(offset: Array, k_prop: float, speed: Array) -> Array:
-    """Return velocities (n, 2) m/s: k_prop (1/s) times the (n, 2) m offsets of goals, (n,) m/s at most."""
-    distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
-    return np.asarray(offset * np.minimum(k_prop, speed / np.maximum(distance, 1e-300))[:, None])
+class Margins(NamedTuple):
+    """Distances that `avoid_collisions` keeps, and how fast robots may approach them."""
+
+    clearance: Array
+    """(n,) m, from the centre of each robot to obstacle points."""
+    separation: Array
+    """(n,) m, between the centres of robots."""
+    rate: float
+    """1/s, at which the rest of a distance may fall exponentially."""
+    braking: float
+    """Fraction of the maximum acceleration that is counted on for braking."""
 
 
-def drive(wanted: Array, seen: Observations, team: Team, response_time: float) -> Array:
-    """Return the forces (n, 2) N that track wanted velocities (n, 2) m/s with a time constant (s)."""
-    change = (wanted - seen.velocities) * (team.mass / response_time)[:, None]
+def compute_approach_velocities(offsets: Array, gain: float, max_speed: Array) -> Array:
+    """Compute velocities towards goals.
+
+    Parameters
+    ----------
+    offsets : (n, 2) array, m
+        From the robots to their goals.
+    gain : float, 1/s
+        Speed per metre of distance; infinite for full speed.
+    max_speed : (n,) array, m/s
+
+    Returns
+    -------
+    (n, 2) array, m/s
+
+    Examples
+    --------
+    >>> compute_approach_velocities(np.array([[3.0, 4.0], [0.1, 0.0]]), 2.0, np.array([1.0, 1.0]))
+    array([[0.6, 0.8],
+           [0.2, 0. ]])
+    """
+    distance = np.sqrt(offsets[:, 0] ** 2 + offsets[:, 1] ** 2)
+    factor = np.minimum(gain, max_speed / np.maximum(distance, 1e-300))
+    return np.asarray(offsets * factor[:, None])
+
+
+def compute_drive_forces(velocities: Array, seen: Observations, team: Team, response_time: float) -> Array:
+    """Compute the forces that track desired velocities.
+
+    Parameters
+    ----------
+    velocities : (n, 2) array, m/s
+    seen : Observations
+    team : Team
+    response_time : float, s
+        Time constant with which the velocities are reached.
+
+    Returns
+    -------
+    (n, 2) array, N
+    """
+    change = (velocities - seen.velocities) * (team.mass / response_time)[:, None]
     return np.asarray(change + seen.velocities * team.viscosity[:, None])
 
 
-def last_returns(seen: Observations, before: Array | None) -> Array | None:
-    """Return the points that the last scans met, (n, rays, 2) m, nan for none; between scans `before`."""
+def update_returns(seen: Observations, previous: Array | None) -> Array | None:
+    """Return the obstacle points that the last scan of each robot has met.
+
+    Parameters
+    ----------
+    seen : Observations
+    previous : (n, rays, 2) array or None, m
+        What this function returned before, which is returned again between two scans.
+
+    Returns
+    -------
+    (n, rays, 2) array or None, m
+        nan where a ray met nothing; None before the first scan.
+    """
     scans = seen.scans
     if scans is None:
-        return before
-    reach = np.where(scans.hit, scans.distances, np.nan)
-    return np.asarray(seen.positions[:, None] + reach[:, :, None] * scans.headings)
+        return previous
+    distances = np.where(scans.hit, scans.distances, np.nan)
+    return np.asarray(seen.positions[:, None] + distances[:, :, None] * scans.headings)
 
 
-def with_nearest(seen: Observations, returns: Array | None) -> Array:
-    """Return the closest obstacle point and those that the last scan met, (n, k, 2) m, nan where none."""
+def collect_obstacle_points(seen: Observations, returns: Array | None) -> Array:
+    """Return the closest obstacle point of each robot and those of its last scan, (n, k, 2) m, or nan."""
     nearest = seen.obstacle_points[:, None]
-    return nearest if returns is None else np.concatenate([nearest, returns], axis=1)
+    if returns is None:
+        return nearest
+    return np.concatenate([nearest, returns], axis=1)
 
 
-def avoid(
-    wanted: Array, seen: Observations, team: Team, points: Array,
-    clearance: Array, apart: Array, rate: float, braking: float,
-) -> Array:  # fmt: skip
-    """Return the velocities nearest to the wanted ones, (n, 2) m/s, that are slow towards points and robots.
+def avoid_collisions(
+    velocities: Array, seen: Observations, team: Team, obstacle_points: Array, margins: Margins
+) -> Array:
+    """Compute the safe velocities nearest to desired ones: slow towards obstacles and other robots.
 
-    Obstacle points, (n, k, 2) m, are kept a clearance, (n,) m, off, other robots `apart`, (n,) m, centre to
-    centre; `braking` is the part of the acceleration that is counted on. See `limit_approach_speed`.
+    Parameters
+    ----------
+    velocities : (n, 2) array, m/s
+    seen : Observations
+    team : Team
+    obstacle_points : (n, k, 2) array, m
+        nan for none, as `collect_obstacle_points` returns them.
+    margins : Margins
+
+    Returns
+    -------
+    (n, 2) array, m/s
+        See `limit_approach_speed`.
     """
-    # of two robots each brakes for its half of the way
-    slow, half = braking * team.max_acceleration, 0.5 * braking * team.max_acceleration
-    # whom a robot at full speed need not brake for is far
-    stopping = np.maximum(team.max_speed / max(rate, 1e-9), team.max_speed**2 / (2.0 * half))
-    others = neighbour_offsets(seen, float((apart + stopping).max()))
-    walls = seen.positions[:, None] - points
-    robots = np.arange(others.shape[1] + walls.shape[1]) < others.shape[1]
-    keep = np.where(robots, apart[:, None], clearance[:, None])
-    close = np.concatenate([others, walls], axis=1)
-    each = np.where(robots, half[:, None], slow[:, None])
-    return limit_approach_speed(wanted, close, keep, rate, each, team.max_speed)
+    wall_braking = margins.braking * team.max_acceleration
+    # Two robots that meet brake on half of the distance each.
+    robot_braking = 0.5 * margins.braking * team.max_acceleration
+    # A robot at full speed need not brake for anything farther away.
+    stopping_distance = np.maximum(
+        team.max_speed / max(margins.rate, 1e-9), team.max_speed**2 / (2.0 * robot_braking)
+    )
+    reach = float((margins.separation + stopping_distance).max())
+    robot_offsets = list_neighbour_offsets(seen, reach)
+    wall_offsets = seen.positions[:, None] - obstacle_points
+    robots = robot_offsets.shape[1]
+    is_robot = np.arange(robots + wall_offsets.shape[1]) < robots
+    return limit_approach_speed(
+        velocities,
+        offsets=np.concatenate([robot_offsets, wall_offsets], axis=1),
+        clearance=np.where(is_robot, margins.separation[:, None], margins.clearance[:, None]),
+        rate=margins.rate,
+        braking=np.where(is_robot, robot_braking[:, None], wall_braking[:, None]),
+        max_speed=team.max_speed,
+    )
 
 
 def limit_approach_speed(
-    wanted: Array, away: Array, clearance: Array, rate: float, braking: Array, speed: Array
+    velocities: Array, offsets: Array, clearance: Array, rate: float, braking: Array, max_speed: Array
 ) -> Array:
-    """Return the velocities nearest to the wanted ones, (n, 2) m/s, that are slow towards what is close.
+    """Compute the velocities nearest to desired ones that are slow towards close objects.
 
-    The distance to each thing (`away` from it is the robot, (n, k, 2) m, nan for none) falls to its clearance
-    (m) exponentially at most, with a rate (1/s), and no faster than a robot can brake (m/s²); inside it, the
-    velocity leads out. Where not all of that is possible, nothing is approached.
+    Parameters
+    ----------
+    velocities : (n, 2) array, m/s
+    offsets : (n, k, 2) array, m
+        From each object to the robot; nan for none.
+    clearance : (n, k) array, m
+        Distance to which the robot may come.
+    rate : float, 1/s
+        The rest of the distance falls exponentially at most with this rate,
+    braking : (n, k) array, m/s²
+        and no faster than the robot can brake with this acceleration.
+    max_speed : (n,) array, m/s
+
+    Returns
+    -------
+    (n, 2) array, m/s
+        Within the clearance they lead away from the object. If not all of that is possible, no object is
+        approached.
     """
-    distance = np.sqrt(away[..., 0] ** 2 + away[..., 1] ** 2)
-    normal = away / np.where(distance > 0.0, distance, np.nan)[..., None]
+    distance = np.sqrt(offsets[..., 0] ** 2 + offsets[..., 1] ** 2)
+    normals = offsets / np.where(distance > 0.0, distance, np.nan)[..., None]
     gap = np.nan_to_num(distance - clearance)
-    level = np.minimum(rate * gap, np.sqrt(2.0 * braking * np.maximum(gap, 0.0)))
-    # leading out is worth less than full speed, which would leave no room for anything else
-    level = np.maximum(level, -0.5 * speed[:, None])
-    slowed, feasible = nearest_allowed(wanted, -normal, level, speed)
-    if feasible.all():
+    limits = np.minimum(rate * gap, np.sqrt(2.0 * braking * np.maximum(gap, 0.0)))
+    # Leading away at full speed would leave no choice for anything else.
+    limits = np.maximum(limits, -0.5 * max_speed[:, None])
+    slowed, is_feasible = find_nearest_allowed(velocities, -normals, limits, max_speed)
+    if is_feasible.all():
         return slowed
-    stopped, _ = nearest_allowed(wanted, -normal, np.maximum(level, 0.0), speed)
-    return np.where(feasible[:, None], slowed, stopped)
+    stopped, _ = find_nearest_allowed(velocities, -normals, np.maximum(limits, 0.0), max_speed)
+    return np.where(is_feasible[:, None], slowed, stopped)
 
 
 @kernel
-def nearest_allowed(wanted: Array, normals: Array, offsets: Array, radius: Array) -> tuple[Array, BoolArray]:
-    """Return for each robot the point of a disc, cut by half planes, that is nearest to the wanted one.
+def find_nearest_allowed(
+    points: Array, normals: Array, offsets: Array, radius: Array
+) -> tuple[Array, BoolArray]:
+    """Find for each robot the point of a disc, cut by half planes, that is nearest to a desired one.
 
-    Minimise |u - wanted|² subject to normals[k] · u <= offsets[k] for all k and |u| <= radius. Constraints
-    are added one by one: where the optimum so far violates the next one, the new optimum lies on its line,
-    in the interval that those before leave (de Berg et al., *Computational Geometry*, section 4.3,
-    incremental linear programming, with this objective).
+    Parameters
+    ----------
+    points : (n, 2) array
+        Desired points p.
+    normals : (n, m, 2) array
+        Unit normals of the half planes; nan for no constraint.
+    offsets : (n, m) array
+    radius : (n,) array
 
-    Normals, (n, m, 2), are of length 1, or nan for no constraint; offsets are (n, m), radii (n,). Return the
-    best points, (n, 2), and whether there is any, (n,).
+    Returns
+    -------
+    nearest : (n, 2) array
+    is_feasible : (n,) bool array
+        Whether there is any allowed point.
+
+    Notes
+    -----
+    Minimise |u - p|² subject to normals[k] · u <= offsets[k] for all k and |u| <= radius. Constraints are
+    added one by one: if the optimum so far violates the next one, the new optimum lies on its line, in the
+    interval that those before leave (de Berg et al., *Computational Geometry*, section 4.3, incremental
+    linear programming, with this objective).
     """
-    best = np.empty(wanted.shape)
-    feasible = np.ones(len(wanted), dtype=np.bool_)
-    for i in range(len(wanted)):
+    nearest = np.empty(points.shape)
+    is_feasible = np.ones(len(points), dtype=np.bool_)
+    for i in range(len(points)):
         r = radius[i]
         slack = 1e-12 * max(r, 1.0)
-        x, y = wanted[i, 0], wanted[i, 1]
-        size = math.sqrt(x * x + y * y)
-        if size > r:
-            x, y = x * (r / size), y * (r / size)
+        x = points[i, 0]
+        y = points[i, 1]
+        length = math.sqrt(x * x + y * y)
+        if length > r:
+            x = x * (r / length)
+            y = y * (r / length)
         for k in range(offsets.shape[1]):
-            nx, ny, level = normals[i, k, 0], normals[i, k, 1], offsets[i, k]
-            # what the disc meets anyhow, and nan, is no constraint
+            nx = normals[i, k, 0]
+            ny = normals[i, k, 1]
+            level = offsets[i, k]
+            # Neither a half plane that contains the disc nor nan is a constraint.
             if not (level < r and nx * x + ny * y - level > slack):
                 continue
             high = math.sqrt(max(r * r - level * level, 0.0))
@@ -112,32 +231,56 @@ def nearest_allowed(wanted: Array, normals: Array, offsets: Array, radius: Array
             if level < -r:
                 low = math.inf
             for j in range(k):
-                # points of the line are level n + t (-ny, nx)
-                rate = normals[i, j, 1] * nx - normals[i, j, 0] * ny
-                room = offsets[i, j] - level * (normals[i, j, 0] * nx + normals[i, j, 1] * ny)
-                if rate >= 1e-12:
-                    high = min(high, room / rate)
-                elif rate <= -1e-12:
-                    low = max(low, room / rate)
-                elif room < -slack:
+                # Points of the line are level n + t (-ny, nx).
+                slope = normals[i, j, 1] * nx - normals[i, j, 0] * ny
+                rest = offsets[i, j] - level * (normals[i, j, 0] * nx + normals[i, j, 1] * ny)
+                if slope >= 1e-12:
+                    high = min(high, rest / slope)
+                elif slope <= -1e-12:
+                    low = max(low, rest / slope)
+                elif rest < -slack:
                     low = math.inf
             if low > high + slack:
-                feasible[i] = False
+                is_feasible[i] = False
                 break
-            t = min(max(wanted[i, 1] * nx - wanted[i, 0] * ny, min(low, high)), high)
-            x, y = level * nx - t * ny, level * ny + t * nx
-        best[i, 0], best[i, 1] = x, y
-    return best, feasible
+            t = min(max(points[i, 1] * nx - points[i, 0] * ny, min(low, high)), high)
+            x = level * nx - t * ny
+            y = level * ny + t * nx
+        nearest[i, 0] = x
+        nearest[i, 1] = y
+    return nearest, is_feasible
 
 
-def neighbour_offsets(seen: Observations, reach: float) -> Array:
-    """Return the offsets from each robot's neighbours within reach to itself, (n, k, 2) m; nan for none."""
+def list_neighbour_offsets(seen: Observations, reach: float) -> Array:
+    """Return the offsets from each robot's neighbours within reach to itself, (n, k, 2) m, or nan."""
     robot, _, offset, _ = seen.find_near_neighbours(reach)
-    return in_rows(robot, len(seen.positions), offset, np.nan)
+    return arrange_in_rows(robot, len(seen.positions), offset, np.nan)
 
 
-def in_rows(robot: IntArray, n: int, values: Array, fill: float) -> Array:
-    """Return (m, ...) values that belong to n robots, sorted by robot, as (n, k, ...), filled up."""
+def arrange_in_rows(robot: IntArray, n: int, values: Array, fill: float) -> Array:
+    """Arrange values of pairs in one row for each robot.
+
+    Parameters
+    ----------
+    robot : (m,) int array
+        Robot that each value belongs to, ascending.
+    n : int
+        Number of robots.
+    values : (m, ...) array
+    fill : float
+        Value at the ends of rows that are shorter than the longest one.
+
+    Returns
+    -------
+    (n, k, ...) array
+
+    Examples
+    --------
+    >>> arrange_in_rows(np.array([0, 2, 2]), 3, np.array([5.0, 6.0, 7.0]), 0.0)
+    array([[5., 0.],
+           [0., 0.],
+           [6., 7.]])
+    """
     count = np.bincount(robot, minlength=n)
     column = np.arange(len(robot)) - np.repeat(np.cumsum(count) - count, count)
     rows = np.full((n, int(count.max(initial=0)), *values.shape[1:]), fill)
@@ -145,7 +288,9 @@ def in_rows(robot: IntArray, n: int, values: Array, fill: float) -> Array:
     return rows
 
 
-def summed(robot: IntArray, vectors: Array, n: int) -> Array:
-    """Return the sums of (m, 2) vectors that belong to each of n robots, (n, 2)."""
-    sums = [np.bincount(robot, part, minlength=n) for part in vectors.T]
-    return np.column_stack(sums).astype(np.float64, copy=False)  # of nothing counts are whole
+def sum_by_robot(robot: IntArray, vectors: Array, n: int) -> Array:
+    """Sum (m, 2) vectors by the robot, (m,), that each belongs to, (n, 2)."""
+    x = np.bincount(robot, vectors[:, 0], minlength=n)
+    y = np.bincount(robot, vectors[:, 1], minlength=n)
+    # The counts of no vectors at all are integers.
+    return np.column_stack([x, y]).astype(np.float64, copy=False)

@@ -11,7 +11,7 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array
 from robocov.controllers.base import Law
-from robocov.controllers.driving import approach, drive
+from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
@@ -90,7 +90,9 @@ class GeodesicLloyd(Law):
         speed = np.minimum(self.k_prop * (distance + memory.beyond), team.max_speed)
         # the last metre before a way-point that is not the goal is not slower than the others
         speed = np.minimum(speed, distance / self.response_time)
-        forces = drive(approach(offset, np.inf, speed), seen, team, self.response_time)
+        forces = compute_drive_forces(
+            compute_approach_velocities(offset, np.inf, speed), seen, team, self.response_time
+        )
         return Decision(forces, memory.goals, {"attraction": forces}, memory=memory)
 
     def _plan(self, team: Team) -> Plan:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
-from robocov.controllers.driving import approach, drive
+from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.locational_cost.best_points import HEIGHT_HELP, TARGET_HELP, TARGETS, find_targets
 from robocov.observation import Decision, Observations
@@ -36,8 +36,8 @@ class Lloyd(Law):
     def decide(self, seen: Observations, memory: Memory) -> Decision:
         cells = cells_seen(seen, self.cells, memory.triangulation)
         goals = find_targets(cells, seen.density, self.target, self.height)
-        wanted = approach(goals - seen.positions, self.k_prop, memory.team.max_speed)
-        forces = drive(wanted, seen, memory.team, self.response_time)
+        wanted = compute_approach_velocities(goals - seen.positions, self.k_prop, memory.team.max_speed)
+        forces = compute_drive_forces(wanted, seen, memory.team, self.response_time)
         memory = replace(memory, triangulation=cells.triangulation)
         return Decision(forces, goals, {"attraction": forces}, cells, memory)
 
@@ -81,7 +81,7 @@ class RangeLimited(Law):
             uniform = seen.positions + offset
             _, centroid = seen.density.compute_mass_and_centroid(limited, seen.positions, area, uniform)
             offset = centroid - seen.positions
-        wanted = approach(offset, self.k_prop, memory.team.max_speed)
-        forces = drive(wanted, seen, memory.team, self.response_time)
+        wanted = compute_approach_velocities(offset, self.k_prop, memory.team.max_speed)
+        forces = compute_drive_forces(wanted, seen, memory.team, self.response_time)
         memory = replace(memory, triangulation=cells.triangulation)
         return Decision(forces, seen.positions + offset, {"attraction": forces}, cells, memory)

@@ -13,119 +13,220 @@ from robocov.compiled import kernel
 from robocov.observation import Observations
 from robocov.team import Team
 
-_MEMORY = 2.0  # s, over which fixes are averaged
-_OUTLIER = 6.0  # standard deviations by which a fix is off where the robot was carried away
-_SETTLED = 10  # fixes from which on their noise is known
-_LEAST = 1e-9  # m, of a standard deviation
-_MANOEUVRE = 0.5  # part of the acceleration that others are taken to change their velocity with
-_HORIZON = 1.5  # s, for which others are taken to go on as they did
-_DOUBT = 1.0  # standard deviations of a fix by which others may be nearer than estimated,
-_DRIFT = 1.0  # and metres for each second since they told where they are
+_AVERAGING_S = 2.0
+"""Time over which position fixes are averaged."""
+_OUTLIER_SIGMAS = 6.0
+"""A fix that is off by more standard deviations means that the robot was carried away."""
+_MIN_FIXES = 10
+"""Number of fixes from which on their noise is known."""
+_MIN_DISTANCE_M = 1e-9
+_MANOEUVRE_FRACTION = 0.5
+"""Fraction of the maximum acceleration with which others are assumed to change their velocity."""
+_MAX_EXTRAPOLATION_S = 1.5
+"""Time for which others are assumed to go on as they did."""
+_DOUBT_SIGMAS = 1.0
+"""Standard deviations of a fix by which others may be closer than estimated,"""
+_DOUBT_SPEED = 1.0
+"""and speed in m/s at which they may have come closer since their last message."""
+_MAX_DOUBT_FRACTION = 0.75
+"""Fraction of the estimated distance by which others may be closer at most."""
+
+
+class Tracks(NamedTuple):
+    """What each robot, by rows, knows of each other one, by columns, from its messages."""
+
+    sent: Array
+    """(n, n) s, when the newest message was sent, nan for none."""
+    counts: IntArray
+    """(n, n) Number of messages."""
+    positions: Array
+    """(n, n, 2) m, filtered position at that time."""
+    velocities: Array
+    """(n, n, 2) m/s, filtered velocity at that time."""
 
 
 class Estimates(NamedTuple):
-    """Filter states of n robots: of its own position, and of each other robot that it has heard of."""
+    """Filter states of n robots: of their own positions, and of each other robot that they hear."""
 
-    time: float  # s
-    own: Array  # (n, 2) m, the estimate of each robot,
-    velocities: Array  # (n, 2) m/s, and its velocity,
-    fixes: Array  # (n,), by how many fixes,
-    variance: Array  # (n,) m², of one of them in x or y
-    sent: Array  # (n, n) s, when the newest message was sent that row's robot has of column's, nan for none,
-    messages: IntArray  # (n, n), how many there were,
-    at: Array  # (n, n, 2) m, and the filtered position
-    going: Array  # (n, n, 2) m/s, and velocity then
+    time: float
+    """s"""
+    positions: Array
+    """(n, 2) m, own positions."""
+    velocities: Array
+    """(n, 2) m/s, own velocities."""
+    fixes: Array
+    """(n,) Number of position fixes that were averaged."""
+    variance: Array
+    """(n,) m², of one fix in x or y."""
+    tracks: Tracks
 
     @classmethod
-    def nothing(cls, n: int) -> Estimates:
-        """Return the state before the first observation."""
-        none, pairs = np.zeros((n, 2)), np.zeros((n, n, 2))
-        never, zero = np.full((n, n), np.nan), np.zeros((n, n), dtype=np.intp)
-        return cls(0.0, none, none, np.zeros(n), np.zeros(n), never, zero, pairs, pairs)
+    def build_initial(cls, n: int) -> Estimates:
+        """Build the state before the first observation."""
+        tracks = Tracks(
+            sent=np.full((n, n), np.nan),
+            counts=np.zeros((n, n), dtype=np.intp),
+            positions=np.zeros((n, n, 2)),
+            velocities=np.zeros((n, n, 2)),
+        )
+        return cls(
+            time=0.0,
+            positions=np.zeros((n, 2)),
+            velocities=np.zeros((n, 2)),
+            fixes=np.zeros(n),
+            variance=np.zeros(n),
+            tracks=tracks,
+        )
 
 
-def localized(seen: Observations, before: Estimates, team: Team) -> tuple[Observations, Estimates]:
-    """Return the observations with estimated positions, and the filter states after them.
+def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> tuple[Observations, Estimates]:
+    """Estimate where robots and their neighbours are.
 
-    A robot integrates its own velocity and averages what fixes differ from that over `_MEMORY` seconds.
+    Parameters
+    ----------
+    seen : Observations
+        With noisy positions, and reported ones of neighbours.
+    previous : Estimates
+        Filter states after the observations before.
+    team : Team
+
+    Returns
+    -------
+    seen : Observations
+        The same with estimated positions.
+    estimates : Estimates
+        The filter states afterwards.
+
+    Notes
+    -----
+    A robot integrates its own velocity and averages the residuals of its position fixes over two seconds.
     Others are tracked by their messages with the steady-state gains of Kalata (1984, *The tracking index*),
     larger ones for the first messages; the noise of a message is that of the robot's own fixes. They are
-    taken to go on as they did for at most `_HORIZON` seconds since their last message.
+    assumed to go on as they did for at most 1.5 seconds since their last message.
     """
-    dt = seen.time - before.time
-    predicted = before.own + 0.5 * dt * (before.velocities + seen.velocities)
-    off = ((seen.positions - predicted) ** 2).sum(axis=1)
-    gate = 2.0 * _OUTLIER**2 * before.variance + (team.max_speed * dt) ** 2
-    carried = (off > gate) & (before.fixes >= _SETTLED)
-    fixes = np.where(carried, 1.0, before.fixes + 1.0)
-    gain = np.maximum(1.0 / fixes, min(dt / _MEMORY, 1.0))
-    # the residual of a mean of k - 1 fixes is larger than one fix's error
-    square = 0.5 * off * (1.0 - 1.0 / np.maximum(fixes, 1.0))
-    rate = np.maximum(1.0 / np.maximum(fixes - 1.0, 1.0), gain)
-    variance = np.where(carried, before.variance, before.variance + rate * (square - before.variance))
-    own = predicted + gain[:, None] * (seen.positions - predicted)
-    points = seen.obstacle_points - seen.positions + own
     assert seen.reported_positions is not None and seen.report_ages is not None
+    positions, fixes, variance = _filter_own_positions(seen, previous, team)
     robot, other = seen.neighbours.list_pairs()
-    sigma, change = np.sqrt(variance), _MANOEUVRE * team.max_acceleration
-    when, known = seen.time - seen.report_ages, (before.sent, before.messages, before.at, before.going)
-    told = seen.reported_positions
-    tracks = _tracked(robot, other, told, when, sigma, change, team.max_speed, *known)
-    after = Estimates(seen.time, own, seen.velocities, fixes, variance, *tracks)
-    ages = np.clip(seen.time - after.sent[robot, other], 0.0, _HORIZON)
-    places = after.at[robot, other] + ages[:, None] * after.going[robot, other]
-    return replace(seen, positions=own, obstacle_points=points, reported_positions=places), after
+    tracks = _update_tracks(
+        robot,
+        other,
+        seen.reported_positions,
+        seen.time - seen.report_ages,
+        np.sqrt(variance),
+        _MANOEUVRE_FRACTION * team.max_acceleration,
+        team.max_speed,
+        previous.tracks,
+    )
+    estimates = Estimates(
+        time=seen.time,
+        positions=positions,
+        velocities=seen.velocities,
+        fixes=fixes,
+        variance=variance,
+        tracks=tracks,
+    )
+    ages = np.clip(seen.time - tracks.sent[robot, other], 0.0, _MAX_EXTRAPOLATION_S)
+    neighbours = tracks.positions[robot, other] + ages[:, None] * tracks.velocities[robot, other]
+    obstacle_points = seen.obstacle_points - seen.positions + positions
+    estimated = replace(
+        seen, positions=positions, obstacle_points=obstacle_points, reported_positions=neighbours
+    )
+    return estimated, estimates
 
 
-def wary(seen: Observations, estimates: Estimates) -> Observations:
-    """Return the observations with others as near as they may be, for keeping apart from them."""
+def _filter_own_positions(seen: Observations, previous: Estimates, team: Team) -> tuple[Array, Array, Array]:
+    """Return positions, (n, 2) m, the number of fixes and their variance after one more fix of each robot."""
+    dt = seen.time - previous.time
+    predicted = previous.positions + 0.5 * dt * (previous.velocities + seen.velocities)
+    residual = ((seen.positions - predicted) ** 2).sum(axis=1)
+    max_residual = 2.0 * _OUTLIER_SIGMAS**2 * previous.variance + (team.max_speed * dt) ** 2
+    was_carried = (residual > max_residual) & (previous.fixes >= _MIN_FIXES)
+    fixes = np.where(was_carried, 1.0, previous.fixes + 1.0)
+    gain = np.maximum(1.0 / fixes, min(dt / _AVERAGING_S, 1.0))
+    # The residual of a mean of k - 1 fixes is larger than the error of one fix.
+    square = 0.5 * residual * (1.0 - 1.0 / np.maximum(fixes, 1.0))
+    variance_gain = np.maximum(1.0 / np.maximum(fixes - 1.0, 1.0), gain)
+    variance = previous.variance + variance_gain * (square - previous.variance)
+    variance = np.where(was_carried, previous.variance, variance)
+    positions = predicted + gain[:, None] * (seen.positions - predicted)
+    return positions, fixes, variance
+
+
+def assume_closer_neighbours(seen: Observations, estimates: Estimates) -> Observations:
+    """Return the observations with neighbours as close as they may be, for keeping away from them.
+
+    Parameters
+    ----------
+    seen : Observations
+        As `estimate_positions` returns them.
+    estimates : Estimates
+        The same.
+    """
     assert seen.reported_positions is not None
     robot, other = seen.neighbours.list_pairs()
     offset = seen.reported_positions - seen.positions[robot]
     distance = np.sqrt((offset**2).sum(axis=1))
-    ages = np.clip(seen.time - estimates.sent[robot, other], 0.0, _HORIZON)
-    doubt = np.minimum(_DOUBT * np.sqrt(estimates.variance[robot]) + _DRIFT * ages, 0.75 * distance)
-    nearer = 1.0 - doubt / np.maximum(distance, _LEAST)
-    places = seen.positions[robot] + nearer[:, None] * offset
-    return replace(seen, reported_positions=places)
+    ages = np.clip(seen.time - estimates.tracks.sent[robot, other], 0.0, _MAX_EXTRAPOLATION_S)
+    doubt = _DOUBT_SIGMAS * np.sqrt(estimates.variance[robot]) + _DOUBT_SPEED * ages
+    doubt = np.minimum(doubt, _MAX_DOUBT_FRACTION * distance)
+    factor = 1.0 - doubt / np.maximum(distance, _MIN_DISTANCE_M)
+    return replace(seen, reported_positions=seen.positions[robot] + factor[:, None] * offset)
 
 
 @kernel
-def _tracked(
-    robot: IntArray, other: IntArray, told: Array, when: Array, sigma: Array, change: Array, speed: Array,
-    sent: Array, count: IntArray, at: Array, going: Array,
-) -> tuple[Array, IntArray, Array, Array]:  # fmt: skip
-    """Return the trackers of others after their messages: when, which, positions, velocities."""
-    sent, count, at, going = sent.copy(), count.copy(), at.copy(), going.copy()
-    heard = np.zeros(sent.shape, np.bool_)
+def _update_tracks(
+    robot: IntArray,
+    other: IntArray,
+    reported: Array,
+    sent: Array,
+    sigma: Array,
+    manoeuvre: Array,
+    max_speed: Array,
+    previous: Tracks,
+) -> Tracks:
+    """Return the tracks after messages, (m,), of others to robots: reported positions, and when sent.
+
+    Robots have (n,) noise sigma (m), maximum speeds (m/s) and accelerations of manoeuvres (m/s²).
+    """
+    tracks = Tracks(
+        previous.sent.copy(),
+        previous.counts.copy(),
+        previous.positions.copy(),
+        previous.velocities.copy(),
+    )
+    is_heard = np.zeros(tracks.sent.shape, np.bool_)
     for m in range(len(robot)):
-        i, j = robot[m], other[m]
-        heard[i, j] = True
-        # sums of steps miss a little
-        if count[i, j] and not when[m] > sent[i, j] + 1e-6:
+        i = robot[m]
+        j = other[m]
+        is_heard[i, j] = True
+        # Sums of steps are slightly off.
+        if tracks.counts[i, j] and not sent[m] > tracks.sent[i, j] + 1e-6:
             continue
-        if count[i, j] == 0:
-            going[i, j, 0] = going[i, j, 1] = 0.0
-            at[i, j, 0], at[i, j, 1] = told[m, 0], told[m, 1]
+        if tracks.counts[i, j] == 0:
+            for axis in range(2):
+                tracks.velocities[i, j, axis] = 0.0
+                tracks.positions[i, j, axis] = reported[m, axis]
         else:
-            since, k = when[m] - sent[i, j], count[i, j] + 1.0
-            index = change[i] * since * since / max(sigma[i], 1e-9)
-            root = (4.0 + index - math.sqrt(8.0 * index + index * index)) / 4.0
+            dt = sent[m] - tracks.sent[i, j]
+            k = tracks.counts[i, j] + 1.0
+            tracking_index = manoeuvre[i] * dt * dt / max(sigma[i], 1e-9)
+            discriminant = 8.0 * tracking_index + tracking_index * tracking_index
+            root = (4.0 + tracking_index - math.sqrt(discriminant)) / 4.0
             alpha = max(1.0 - root * root, 2.0 * (2.0 * k - 1.0) / (k * (k + 1.0)))
             beta = min(max(2.0 * (1.0 - root) ** 2, 6.0 / (k * (k + 1.0))), 1.0)
-            for c in range(2):
-                expected = at[i, j, c] + since * going[i, j, c]
-                off = told[m, c] - expected
-                at[i, j, c] = expected + alpha * off
-                going[i, j, c] += beta * off / since
-            fast = math.sqrt(going[i, j, 0] ** 2 + going[i, j, 1] ** 2)
-            if fast > speed[i]:
-                going[i, j, 0] *= speed[i] / fast
-                going[i, j, 1] *= speed[i] / fast
-        sent[i, j] = when[m]
-        count[i, j] += 1
-    for i in range(len(sent)):
-        for j in range(len(sent)):
-            if not heard[i, j]:
-                count[i, j] = 0
-    return sent, count, at, going
+            for axis in range(2):
+                expected = tracks.positions[i, j, axis] + dt * tracks.velocities[i, j, axis]
+                residual = reported[m, axis] - expected
+                tracks.positions[i, j, axis] = expected + alpha * residual
+                tracks.velocities[i, j, axis] += beta * residual / dt
+            speed = math.sqrt(tracks.velocities[i, j, 0] ** 2 + tracks.velocities[i, j, 1] ** 2)
+            if speed > max_speed[i]:
+                tracks.velocities[i, j, 0] *= max_speed[i] / speed
+                tracks.velocities[i, j, 1] *= max_speed[i] / speed
+        tracks.sent[i, j] = sent[m]
+        tracks.counts[i, j] += 1
+    for i in range(len(is_heard)):
+        for j in range(len(is_heard)):
+            if not is_heard[i, j]:
+                tracks.counts[i, j] = 0
+    return tracks

@@ -6,7 +6,14 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
-from robocov.controllers.driving import avoid, drive, last_returns, summed, with_nearest
+from robocov.controllers.driving import (
+    Margins,
+    avoid_collisions,
+    collect_obstacle_points,
+    compute_drive_forces,
+    sum_by_robot,
+    update_returns,
+)
 from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.locational_cost.best_points import HEIGHT_HELP, TARGET_HELP, TARGETS, find_targets
 from robocov.observation import Decision, Observations, Scanning
@@ -157,9 +164,9 @@ class Howard(Law):
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
         """Return the forces F - nu q', but for what the world's viscosity does already."""
-        returns = last_returns(seen, memory.returns)
+        returns = update_returns(seen, memory.returns)
         robot, _, offset, _ = _close_pairs(seen, 2.0 * seen.region.diameter)
-        robots = summed(robot, self.k_robots * _inverse_square(offset), len(seen.positions))
+        robots = sum_by_robot(robot, self.k_robots * _inverse_square(offset), len(seen.positions))
         if returns is None:
             offset = np.nan_to_num(seen.positions - seen.obstacle_points)
             obstacle = self.k_obs * _WALL * _inverse_square(offset)
@@ -222,7 +229,8 @@ class Poduri(Law):
         cover = self.k_cover / np.maximum(distance, CONTACT_DISTANCE) ** 2
         spare = reach - np.minimum(distance, _STRETCHED * reach)
         degree = np.where(critical, self.k_cover * (1.0 / self.eta - 1.0) ** 2 / spare**2, 0.0)
-        apart, held = summed(robot, way * cover[:, None], n), summed(robot, way * -degree[:, None], n)
+        apart = sum_by_robot(robot, way * cover[:, None], n)
+        held = sum_by_robot(robot, way * -degree[:, None], n)
         gains = PotentialGains(float(self.k_obs), float(self.rho_obs), k_att=0.0, max_attraction=np.inf)
         obstacle = _compute_potential_forces(seen, seen.positions, gains, includes_robots=False).obstacle
         terms = {"repulsion_robots": apart, "attraction": held, "repulsion_obstacle": obstacle}
@@ -308,18 +316,18 @@ class Dispersion(Law):
     response_time: float = response_time_gain()
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
-        team, returns = memory.team, last_returns(seen, memory.returns)
-        keep, points = np.full(len(team), self.clearance), with_nearest(seen, returns)
+        team, returns = memory.team, update_returns(seen, memory.returns)
+        keep, points = np.full(len(team), self.clearance), collect_obstacle_points(seen, returns)
         wanted, apart = self._dispersing(seen, team), keep + float(team.radius.max())
-        wanted = avoid(wanted, seen, team, points, keep, apart, self.k_avoid, 0.5)
-        forces = drive(wanted, seen, team, self.response_time)
+        wanted = avoid_collisions(wanted, seen, team, points, Margins(keep, apart, self.k_avoid, 0.5))
+        forces = compute_drive_forces(wanted, seen, team, self.response_time)
         return Decision(forces, terms={"attraction": forces}, memory=replace(memory, returns=returns))
 
     def _dispersing(self, seen: Observations, team: Team) -> Array:
         n = len(seen.positions)
         robot, _, offset, distance = _close_pairs(seen, self.reach)
         flight = offset * (self.k_disperse * (self.reach / np.maximum(distance, _TOGETHER) - 1.0))[:, None]
-        wanted = summed(robot, flight, n)
+        wanted = sum_by_robot(robot, flight, n)
         if self.explore_speed > 0.0:
             speed = np.hypot(*seen.velocities.T)
             alone = (np.bincount(robot, minlength=n) == 0) & (speed > _STILL)

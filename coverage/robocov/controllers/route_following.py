@@ -1,64 +1,142 @@
-"""Route following among walls and other robots: fast where there is room, braking before both."""
+"""Route following among walls and other robots: fast in open space, braking before both."""
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.controllers.driving import approach, avoid, drive, neighbour_offsets, with_nearest
+from robocov.controllers.driving import (
+    Margins,
+    avoid_collisions,
+    collect_obstacle_points,
+    compute_approach_velocities,
+    compute_drive_forces,
+    list_neighbour_offsets,
+)
 from robocov.observation import Observations
 from robocov.team import Team
 
-_TURN = 0.2  # metres from a way-point at which it counts as reached
-_BRAKING = 0.4  # part of the acceleration that is counted on: less than half, for the lag of the drive
-_FOR_TURNING = 0.7  # part of it that is spent on where to go; the rest is for not running into anything
-_MARGIN, _APART = 0.02, 0.04  # gaps that are left to walls and to other robots, m
-_EAGERNESS = 10.0  # speed in 1/s with which the distance to what is close may fall to its gap
-_CREEP = 0.15  # speed at which a robot moves along what it is closest to, m/s; the more room, the faster
-_ASIDE, _HEEDED = 0.3, 1.5  # largest speed, m/s, to pass on the left who is in the way, so many metres away
+_WAY_POINT_RADIUS_M = 0.2
+"""Distance from a way-point at which it counts as reached."""
+_BRAKING_FRACTION = 0.4
+"""Fraction of the maximum acceleration that is counted on: less than half, for the lag of the drive."""
+_STEERING_FRACTION = 0.7
+"""Fraction of the maximum acceleration that is spent on following the route; the rest avoids collisions."""
+_WALL_GAP_M = 0.02
+_ROBOT_GAP_M = 0.04
+_APPROACH_RATE = 10.0
+"""Rate in 1/s at which a distance may fall to its gap."""
+_MIN_SPEED_LIMIT = 0.15
+"""Speed in m/s at which a robot may always move, however close it is to a wall."""
+_MAX_EVASION_SPEED = 0.3
+"""Maximum speed in m/s to the left of a robot that is in the way."""
+_EVASION_RANGE_M = 1.5
+"""Distance from which robots pass each other on the left."""
+
+
+class RouteCommand(NamedTuple):
+    """How robots follow their routes in one step."""
+
+    forces: Array
+    """(n, 2) N"""
+    goals: Array
+    """(n, 2) m, ends of the routes."""
+    legs: IntArray
+    """(n,) Number of the way-point that each robot heads for now."""
 
 
 def follow_routes(
-    seen: Observations, team: Team, routes: Sequence[Array], legs: IntArray, returns: Array | None,
-    k_prop: float, response_time: float,
-) -> tuple[Array, Array, IntArray]:  # fmt: skip
-    """Return the forces, (n, 2) N, along the routes, kept off walls and other robots; goals, (n, 2) m; legs.
+    seen: Observations,
+    team: Team,
+    routes: Sequence[Array],
+    legs: IntArray,
+    returns: Array | None,
+    k_prop: float,
+    response_time: float,
+) -> RouteCommand:
+    """Compute the forces that lead robots along their routes, away from walls and other robots.
 
-    A route is its way-points, (w, 2) m, the last one the goal; a leg, (n,), is the number of the one that is
-    headed for. `returns` are the points of the last scans (`last_returns`).
+    Parameters
+    ----------
+    seen : Observations
+    team : Team
+    routes : sequence of (w, 2) arrays, m
+        Way-points of each robot; the last one is the goal.
+    legs : (n,) int array
+        Number of the way-point that each robot headed for.
+    returns : (n, rays, 2) array or None, m
+        Points of the last scans, as `driving.update_returns` returns them.
+    k_prop : float, 1/s
+        Speed per metre of distance to the goal.
+    response_time : float, s
+        Time constant with which velocities are reached.
+
+    Returns
+    -------
+    RouteCommand
     """
-    positions = seen.positions
-    aim = np.array([route[leg] for route, leg in zip(routes, legs, strict=True)])
-    last = np.array([len(route) - 1 for route in routes])
-    legs = legs + ((legs < last) & (np.hypot(*(aim - positions).T) < _TURN))
-    aim = np.array([route[leg] for route, leg in zip(routes, legs, strict=True)])
-    # what is behind a corner comes into sight late: in a narrow place nothing is far
-    braking = _BRAKING * team.max_acceleration
-    gap = np.maximum(np.hypot(*(positions - seen.obstacle_points).T) - team.radius, 0.0)
-    speed = np.fmin(team.max_speed, np.sqrt(2.0 * braking * gap) + _CREEP)
-    wanted = approach(aim - positions, math.inf, speed)
-    wanted = np.where((legs == last)[:, None], approach(aim - positions, k_prop, speed), wanted)
-    # who turns would else spend on that the acceleration that is needed for braking
-    change = _FOR_TURNING * team.max_acceleration * response_time
-    wanted = seen.velocities + approach(wanted - seen.velocities, 1.0, change)
-    # of the size of others a robot knows its own
-    apart = 2.0 * team.radius + _APART
-    wanted = wanted + _aside(wanted, neighbour_offsets(seen, _HEEDED), apart, braking)
-    keep, points = team.radius + _MARGIN, with_nearest(seen, returns)
-    wanted = avoid(wanted, seen, team, points, keep, apart, _EAGERNESS, _BRAKING)
-    goals = np.array([route[-1] for route in routes])
-    return drive(wanted, seen, team, response_time), goals, legs
+    last_legs = np.array([len(route) - 1 for route in routes])
+    targets = _select_way_points(routes, legs)
+    is_reached = np.hypot(*(targets - seen.positions).T) < _WAY_POINT_RADIUS_M
+    legs = legs + ((legs < last_legs) & is_reached)
+    offsets = _select_way_points(routes, legs) - seen.positions
+
+    speed_limit = _compute_speed_limits(seen, team)
+    to_way_point = compute_approach_velocities(offsets, math.inf, speed_limit)
+    to_goal = compute_approach_velocities(offsets, k_prop, speed_limit)
+    velocities = np.where((legs == last_legs)[:, None], to_goal, to_way_point)
+    # Turning must not use up the acceleration that is needed for braking.
+    max_change = _STEERING_FRACTION * team.max_acceleration * response_time
+    velocities = seen.velocities + compute_approach_velocities(velocities - seen.velocities, 1.0, max_change)
+    # A robot does not know how large others are: it assumes its own size.
+    separation = 2.0 * team.radius + _ROBOT_GAP_M
+    velocities = velocities + _compute_evasion(seen, team, velocities, separation)
+    margins = Margins(
+        clearance=team.radius + _WALL_GAP_M,
+        separation=separation,
+        rate=_APPROACH_RATE,
+        braking=_BRAKING_FRACTION,
+    )
+    obstacle_points = collect_obstacle_points(seen, returns)
+    velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
+    return RouteCommand(
+        forces=compute_drive_forces(velocities, seen, team, response_time),
+        goals=np.array([route[-1] for route in routes]),
+        legs=legs,
+    )
 
 
-def _aside(wanted: Array, others: Array, apart: Array, braking: Array) -> Array:
-    """Return velocities (n, 2) m/s to the left of whom each robot approaches the most too fast."""
-    if not others.shape[1]:
-        return np.zeros_like(wanted)
-    distance = np.hypot(*np.moveaxis(others, -1, 0))
-    away = others / np.maximum(distance, 1e-9)[..., None]
-    allowed = np.sqrt(0.5 * braking[:, None] * np.maximum(distance - apart[:, None], 0.0))
-    excess = np.nan_to_num(-(away * wanted[:, None]).sum(axis=2) - allowed, nan=-np.inf)
-    worst = np.arange(len(wanted)), excess.argmax(axis=1)
-    left = np.nan_to_num(away[worst])[:, ::-1] * [1.0, -1.0]
-    return np.asarray(left * np.clip(excess[worst], 0.0, _ASIDE)[:, None])
+def _select_way_points(routes: Sequence[Array], legs: IntArray) -> Array:
+    """Return the way-point that each robot heads for, (n, 2) m."""
+    return np.array([route[leg] for route, leg in zip(routes, legs, strict=True)])
+
+
+def _compute_speed_limits(seen: Observations, team: Team) -> Array:
+    """Return the speed, (n,) m/s, at which each robot can still stop before the nearest obstacle.
+
+    What is behind a corner comes into sight late: in a narrow passage nothing is far away.
+    """
+    gap = np.maximum(np.hypot(*(seen.positions - seen.obstacle_points).T) - team.radius, 0.0)
+    braking = _BRAKING_FRACTION * team.max_acceleration
+    # No obstacle in range, nan, is no limit.
+    return np.asarray(np.fmin(team.max_speed, np.sqrt(2.0 * braking * gap) + _MIN_SPEED_LIMIT))
+
+
+def _compute_evasion(seen: Observations, team: Team, velocities: Array, separation: Array) -> Array:
+    """Return velocities, (n, 2) m/s, to the left of the robot that each approaches the most too fast."""
+    offsets = list_neighbour_offsets(seen, _EVASION_RANGE_M)
+    if not offsets.shape[1]:
+        return np.zeros_like(velocities)
+    braking = _BRAKING_FRACTION * team.max_acceleration
+    distance = np.hypot(*np.moveaxis(offsets, -1, 0))
+    normals = offsets / np.maximum(distance, 1e-9)[..., None]
+    allowed_speed = np.sqrt(0.5 * braking[:, None] * np.maximum(distance - separation[:, None], 0.0))
+    excess = -(normals * velocities[:, None]).sum(axis=2) - allowed_speed
+    excess = np.nan_to_num(excess, nan=-np.inf)
+    rows = np.arange(len(velocities))
+    worst = excess.argmax(axis=1)
+    left = np.nan_to_num(normals[rows, worst])[:, ::-1] * [1.0, -1.0]
+    speed = np.clip(excess[rows, worst], 0.0, _MAX_EVASION_SPEED)
+    return np.asarray(left * speed[:, None])

@@ -15,7 +15,7 @@ import scipy
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import Information, Law
-from robocov.controllers.driving import last_returns
+from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.route_following import follow_routes
 from robocov.density import Density
@@ -178,7 +178,7 @@ class SharedMapLaw(Law):
             routes = tuple(plan.ways.find_route(at, place) for plan, at, place in each_own)
             legs, due = np.zeros_like(memory.legs), seen.time + self.period
             memory = replace(memory, plans=plans, routes=routes, legs=legs, due=due)
-        returns, drive = last_returns(seen, memory.returns), (self.k_prop, self.response_time)
+        returns, drive = update_returns(seen, memory.returns), (self.k_prop, self.response_time)
         forces, goals, legs = follow_routes(seen, team, memory.routes, memory.legs, returns, *drive)
         after = replace(memory, legs=legs, returns=returns)
         return Decision(forces, goals, {"attraction": forces}, memory=after)

@@ -12,7 +12,14 @@ import numpy as np
 from robocov.arrays import Array, ComplexArray, freeze
 from robocov.compiled import kernel
 from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
-from robocov.controllers.driving import approach, avoid, drive, last_returns, with_nearest
+from robocov.controllers.driving import (
+    Margins,
+    avoid_collisions,
+    collect_obstacle_points,
+    compute_approach_velocities,
+    compute_drive_forces,
+    update_returns,
+)
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations, Scanning, compute_headings
 from robocov.team import Team
@@ -120,8 +127,8 @@ class TangentBug(Law):
 
     def decide(self, seen: Observations, memory: TangentBugMemory) -> Decision:
         team, cells = memory.team, cells_seen(seen, self.cells, memory.triangulation)
-        goals, returns, met = cells.centroid, last_returns(seen, memory.returns), memory.met
-        points = with_nearest(seen, returns)
+        goals, returns, met = cells.centroid, update_returns(seen, memory.returns), memory.met
+        points = collect_obstacle_points(seen, returns)
         bugs = memory.bugs or tuple(Bug(Mode.GOAL, 1, position) for position in seen.positions)
         if not memory.bugs or seen.scans is not None or returns is None:
             met = tuple(_remembered(near, met[i : i + 1]) for i, near in enumerate(points))
@@ -134,11 +141,13 @@ class TangentBug(Law):
         # towards the next way-points, slowed before what is close
         distance = np.hypot(*offset.T)
         speed = np.where(passing, team.max_speed, np.minimum(self.k_prop * distance, team.max_speed))
-        wanted = approach(offset, math.inf, np.minimum(speed, distance / self.response_time))
+        wanted = compute_approach_velocities(
+            offset, math.inf, np.minimum(speed, distance / self.response_time)
+        )
         keep = team.radius + 0.5 * self.clearance
         apart = keep + float(team.radius.max())
-        wanted = avoid(wanted, seen, team, points, keep, apart, _EAGERNESS, 0.5)
-        forces = drive(wanted, seen, team, self.response_time)
+        wanted = avoid_collisions(wanted, seen, team, points, Margins(keep, apart, _EAGERNESS, 0.5))
+        forces = compute_drive_forces(wanted, seen, team, self.response_time)
         kept = [own if bug.aim is None else bug.aim for bug, own in zip(bugs, goals, strict=True)]
         memory = TangentBugMemory(team, returns, cells.triangulation, bugs, met)
         return Decision(forces, np.array(kept), {"attraction": forces}, cells, memory)

@@ -7,7 +7,15 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.controllers.base import Law, Memory
-from robocov.controllers.driving import approach, avoid, drive, last_returns, summed, with_nearest
+from robocov.controllers.driving import (
+    Margins,
+    avoid_collisions,
+    collect_obstacle_points,
+    compute_approach_velocities,
+    compute_drive_forces,
+    sum_by_robot,
+    update_returns,
+)
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations, Scanning, compute_headings
 from robocov.observation.scanned_view import (
@@ -77,12 +85,12 @@ class Visibility(Law):
         if gradient is None or step is None or seen.scans is not None:
             before, gradient = gradient, self.gradient(seen, view, reach)
             step = compute_step_fractions(gradient, before, step)
-        returns = last_returns(seen, memory.returns)
-        wanted = approach(gradient, self.k_area, team.max_speed) * step[:, None]
+        returns = update_returns(seen, memory.returns)
+        wanted = compute_approach_velocities(gradient, self.k_area, team.max_speed) * step[:, None]
         keep = team.radius + self.clearance
-        points, apart = with_nearest(seen, returns), keep + float(team.radius.max())
-        wanted = avoid(wanted, seen, team, points, keep, apart, 4.0, 0.5)
-        forces = drive(wanted, seen, team, self.response_time)
+        points, apart = collect_obstacle_points(seen, returns), keep + float(team.radius.max())
+        wanted = avoid_collisions(wanted, seen, team, points, Margins(keep, apart, 4.0, 0.5))
+        forces = compute_drive_forces(wanted, seen, team, self.response_time)
         memory = VisibilityMemory(team, returns, None, view, gradient, step)
         return Decision(forces, terms={"attraction": forces}, memory=memory)
 
@@ -103,7 +111,7 @@ class Visibility(Law):
         past = np.maximum(along[here] - edges.corner[:, None], 0.0)[:, :-1]
         swept = (weight[here][:, :-1] * past).sum(axis=1) / np.maximum(edges.corner, 1e-3)
         swept *= view.distances[here] / _RINGS
-        turning = summed(edges.robot, swept[:, None] * edges.across, n)
+        turning = sum_by_robot(edges.robot, swept[:, None] * edges.across, n)
         return np.asarray((arcs[..., None] * directions).sum(axis=1) + turning)
 
 

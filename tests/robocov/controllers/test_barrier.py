@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 
 from robocov.controllers import Barrier
 from robocov.controllers.barrier import BarrierMemory
-from robocov.controllers.driving import nearest_allowed
+from robocov.controllers.driving import find_nearest_allowed
 from robocov.environment import Environment
 from robocov.mapfile import load_map
 from robocov.observation import Decision, Observations, Scanning
@@ -55,7 +55,7 @@ def all_candidates(wanted: np.ndarray, normals: np.ndarray, offsets: np.ndarray,
 def test_the_programme_is_solved_exactly(seed: int, m: int) -> None:
     """Against the best of all candidates, which is slow and obvious."""
     wanted, normals, offsets, radius = half_planes(seed, 5, m)
-    best, feasible = nearest_allowed(wanted, normals, offsets, radius)
+    best, feasible = find_nearest_allowed(wanted, normals, offsets, radius)
     for i in range(5):
         real = np.isfinite(offsets[i]) & np.isfinite(normals[i, :, 0])
         candidates = all_candidates(wanted[i], normals[i], offsets[i], radius[i])
@@ -73,7 +73,7 @@ def test_against_a_general_solver() -> None:
     wanted, normals, offsets, radius = half_planes(7, 20, 6)
     nothing = np.isinf(offsets) | np.isnan(normals[..., 0])
     normals[nothing], offsets[nothing] = (1.0, 0.0), 9.0
-    best, feasible = nearest_allowed(wanted, normals, offsets, radius)
+    best, feasible = find_nearest_allowed(wanted, normals, offsets, radius)
     assert 5 < feasible.sum() < 20
     for i in np.flatnonzero(feasible):
         found = minimize(
@@ -90,10 +90,12 @@ def test_against_a_general_solver() -> None:
 
 
 def test_nobody_and_nothing() -> None:
-    best, feasible = nearest_allowed(np.zeros((0, 2)), np.zeros((0, 3, 2)), np.zeros((0, 3)), np.zeros(0))
+    best, feasible = find_nearest_allowed(
+        np.zeros((0, 2)), np.zeros((0, 3, 2)), np.zeros((0, 3)), np.zeros(0)
+    )
     assert best.shape == (0, 2)
     assert feasible.shape == (0,)
-    best, feasible = nearest_allowed(
+    best, feasible = find_nearest_allowed(
         np.array([[3.0, 4.0]]), np.zeros((1, 0, 2)), np.zeros((1, 0)), np.ones(1)
     )
     np.testing.assert_allclose(best, [[0.6, 0.8]])

@@ -6,7 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.controllers import Dispersion
-from robocov.controllers.driving import approach, drive, limit_approach_speed, neighbour_offsets
+from robocov.controllers.driving import (
+    compute_approach_velocities,
+    compute_drive_forces,
+    limit_approach_speed,
+    list_neighbour_offsets,
+)
 from robocov.environment import Environment
 from robocov.mapfile import load_map
 from robocov.metrics import find_settling_time
@@ -31,7 +36,7 @@ def test_approach_is_proportional_and_limited(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
     offset, limit = rng.normal(size=(n, 2)), rng.uniform(0.1, 2.0, n)
     offset[0] = 0.0
-    wanted = approach(offset, 2.0, limit)
+    wanted = compute_approach_velocities(offset, 2.0, limit)
     speed = np.hypot(*wanted.T)
     np.testing.assert_allclose(speed, np.minimum(2.0 * np.hypot(*offset.T), limit), atol=1e-12)
     assert ((wanted * offset).sum(axis=1) >= 0.0).all()
@@ -43,7 +48,7 @@ def test_drive_reaches_the_wanted_velocity_against_viscosity() -> None:
     still = Observations(
         seen.positions, np.array([[0.5, 0.0]]), seen.neighbours, seen.obstacle_points, seen.region
     )
-    np.testing.assert_allclose(drive(np.array([[0.5, 0.0]]), still, team, 0.1), [[1.5, 0.0]])
+    np.testing.assert_allclose(compute_drive_forces(np.array([[0.5, 0.0]]), still, team, 0.1), [[1.5, 0.0]])
 
 
 @given(seed=st.integers(0, 2**32))
@@ -76,7 +81,7 @@ def test_between_two_walls_that_are_too_close_it_goes_along() -> None:
 
 def test_neighbour_offsets_by_all_distances() -> None:
     positions = np.random.default_rng(0).uniform(20, 30, size=(40, 2))
-    away = neighbour_offsets(seen_from(positions), 1.5)
+    away = list_neighbour_offsets(seen_from(positions), 1.5)
     for i in range(40):
         offset = positions[i] - np.delete(positions, i, axis=0)
         near = offset[np.hypot(*offset.T) <= 1.5]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robocov.controllers import Howard
-from robocov.controllers.driving import last_returns, with_nearest
+from robocov.controllers.driving import collect_obstacle_points, update_returns
 from robocov.environment import Environment
 from robocov.observation import Observations, Scans, compute_headings
 from robocov.observation.neighbours import Neighbours
@@ -38,15 +38,15 @@ def wall_scan(distance: float, rays: int) -> Scans:
 def test_returns_are_kept_where_they_were_met() -> None:
     seen = seen_from(np.array([[1.0, 2.0]]))
     scans = Scans(np.array([[1.0, 3.0, 2.0, 3.0]]), np.array([[True, False, True, False]]))
-    points = last_returns(replace(seen, scans=scans), None)
+    points = update_returns(replace(seen, scans=scans), None)
     assert points is not None
     np.testing.assert_allclose(points[0, [0, 2]], [[2.0, 2.0], [-1.0, 2.0]], atol=1e-12)
     assert np.isnan(points[0, [1, 3]]).all()
     moved = seen_from(np.array([[1.5, 2.0]]))
-    assert last_returns(moved, points) is points
-    assert last_returns(moved, None) is None
-    assert with_nearest(moved, points).shape == (1, 5, 2)
-    assert with_nearest(moved, None).shape == (1, 1, 2)
+    assert update_returns(moved, points) is points
+    assert update_returns(moved, None) is None
+    assert collect_obstacle_points(moved, points).shape == (1, 5, 2)
+    assert collect_obstacle_points(moved, None).shape == (1, 1, 2)
 
 
 def test_robots_repel_by_the_inverse_square() -> None:

@@ -11,7 +11,7 @@ from robocov.arrays import Array
 from robocov.conditions import Conditions
 from robocov.conditions.perception import Perception
 from robocov.controllers import Atlas
-from robocov.controllers.localization import Estimates, localized, wary
+from robocov.controllers.localization import Estimates, assume_closer_neighbours, estimate_positions
 from robocov.environment import Environment
 from robocov.metrics import compute_clearances, count_contacts
 from robocov.observation import Observations
@@ -29,13 +29,13 @@ def driven(paths: Array, conditions: Conditions) -> tuple[Observations, Estimate
     n = paths.shape[1]
     team = Team.homogeneous(n)
     perception = Perception(conditions, team, DT)
-    inbox, estimates, errors = perception.create_inbox(), Estimates.nothing(n), []
+    inbox, estimates, errors = perception.create_inbox(), Estimates.build_initial(n), []
     speeds = np.gradient(paths, DT, axis=0)
     for k, (places, velocities) in enumerate(zip(paths, speeds, strict=True)):
         walls = places + [1.0, 0.0]
         truth = Observations(places, velocities, Neighbours(n), walls, Region(SQUARE), k * DT)
         seen, inbox = perception.perceive(truth, inbox, np.ones(n, dtype=bool))
-        known, estimates = localized(seen, estimates, team)
+        known, estimates = estimate_positions(seen, estimates, team)
         assert np.allclose(known.obstacle_points - known.positions, [1.0, 0.0])
         errors.append(np.hypot(*(known.positions - places).T))
     return known, estimates, errors
@@ -62,8 +62,8 @@ def test_nobody_is_taken_to_go_on_for_ever() -> None:
     known, estimates, _ = driven(paths[:45], Conditions(delay=2.0, message_rate=2.0, forget_after=9.0))
     robot, other = known.neighbours.list_pairs()
     assert known.reported_positions is not None
-    ahead = np.hypot(*(known.reported_positions - estimates.at[robot, other]).T)
-    assert np.allclose(ahead, 1.5 * np.hypot(*estimates.going[robot, other].T))
+    ahead = np.hypot(*(known.reported_positions - estimates.tracks.positions[robot, other]).T)
+    assert np.allclose(ahead, 1.5 * np.hypot(*estimates.tracks.velocities[robot, other].T))
 
 
 @given(st.integers(0, 30))
@@ -83,13 +83,13 @@ def test_who_is_carried_away_notices_it_at_once() -> None:
     paths[60:] += [3.0, 0.0]
     conditions = Conditions(position_noise=0.02)
     team = Team.homogeneous(2)
-    perception, estimates = Perception(conditions, team, DT), Estimates.nothing(2)
+    perception, estimates = Perception(conditions, team, DT), Estimates.build_initial(2)
     inbox = perception.create_inbox()
     for k in range(62):
         velocities = (paths[1] - paths[0]) / DT
         truth = Observations(paths[k], velocities, Neighbours(2), paths[k], Region(SQUARE), k * DT)
         seen, inbox = perception.perceive(truth, inbox, np.ones(2, dtype=bool))
-        known, estimates = localized(seen, estimates, team)
+        known, estimates = estimate_positions(seen, estimates, team)
     assert np.hypot(*(known.positions - paths[61]).T).max() < 0.1
 
 
@@ -100,13 +100,13 @@ def test_a_robot_knows_nothing_of_what_it_does_not_hear(seed: int) -> None:
     perception = Perception(Conditions(position_noise=0.1, loss=0.2), team, DT)
     found = []
     for far in (50.0, 70.0):
-        estimates, inbox = Estimates.nothing(4), perception.create_inbox()
+        estimates, inbox = Estimates.build_initial(4), perception.create_inbox()
         for k, places in enumerate(lines(4, 20, seed) * 0.05 + [[0, 0], [1, 0], [far, 0], [far, 1]]):
             near = Neighbours.from_ranges(places, team.communication_range)
             truth = Observations(places, places * 0.0, near, places, Region(SQUARE), k * DT)
             seen, inbox = perception.perceive(truth, inbox, np.ones(4, dtype=bool))
-            known, estimates = localized(seen, estimates, team)
-        close = wary(known, estimates)
+            known, estimates = estimate_positions(seen, estimates, team)
+        close = assume_closer_neighbours(known, estimates)
         assert close.reported_positions is not None
         rows = close.neighbours.list_pairs()[0] < 2
         found.append([known.positions[:2].tobytes(), close.reported_positions[rows].tobytes()])
@@ -116,12 +116,12 @@ def test_a_robot_knows_nothing_of_what_it_does_not_hear(seed: int) -> None:
 def test_others_may_be_nearer_by_the_noise_and_with_time() -> None:
     known, estimates, _ = driven(lines(3, 60), Conditions(position_noise=0.1, delay=0.5))
     robot, other = known.neighbours.list_pairs()
-    close = wary(known, estimates)
+    close = assume_closer_neighbours(known, estimates)
     assert known.reported_positions is not None and close.reported_positions is not None
     before, after = (
         np.hypot(*(each.reported_positions - each.positions[robot]).T) for each in (known, close)
     )
-    doubt = np.sqrt(estimates.variance)[robot] + 1.0 * (known.time - estimates.sent[robot, other])
+    doubt = np.sqrt(estimates.variance)[robot] + 1.0 * (known.time - estimates.tracks.sent[robot, other])
     assert np.allclose(before - after, np.minimum(doubt, 0.75 * before))
 
 
