@@ -16,7 +16,7 @@ from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.localization import Estimates, assume_closer_neighbours, estimate_positions
 from robocov.controllers.route_following import follow_routes
-from robocov.controllers.shared_map import Circle, circles, surveyed
+from robocov.controllers.shared_map import Circle, list_circles, update_maps
 from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.region import Region
 from robocov.planning.discovered_map import DiscoveredMap
@@ -451,8 +451,8 @@ class AtlasShared(Atlas):
     def _surveyed(
         self, maps: list[DiscoveredMap], seen: Observations, scans: Scans, radius: Array
     ) -> list[DiscoveredMap]:
-        around, visited = circles(seen.neighbours), dict[tuple[int, Circle, float], DiscoveredMap]()
-        told = surveyed(maps, seen, scans, around)
+        around, visited = list_circles(seen.neighbours), dict[tuple[int, Circle, float], DiscoveredMap]()
+        told = update_maps(maps, seen, scans, around)
         # those who share a map share the next one, too
         for known, circle, size in (each := list(zip(told, around, radius.tolist(), strict=True))):
             if (id(known), circle, size) not in visited:

@@ -9,17 +9,21 @@ from scipy import ndimage
 
 from robocov.arrays import Array
 from robocov.controllers.gains import gain
-from robocov.controllers.shared_map import Candidates, SharedMapLaw, Situation, assigned
+from robocov.controllers.shared_map import Candidates, Placement, SharedMapController, Situation, assign_goals
 from robocov.k_median import choose_greedily, improve_sources
 from robocov.planning.discovered_map import FREE, UNKNOWN
 
-_LOOKED, _THERE = 0.5, 0.3  # metres around a place from where somebody has looked, and to it when he does
-_STUCK = 0.05  # who gets on by less than so many metres between two plans is not going to get there
+_INSPECTED_RADIUS_M = 0.5
+"""Distance around an inspected target within which no other target is worth a visit."""
+_ARRIVAL_RADIUS_M = 0.3
+"""Distance from a target at which a robot inspects it."""
+_MIN_PROGRESS_M = 0.05
+"""A robot that moves less between two plans does not get to its target."""
 _BLOCK = np.ones((3, 3), dtype=bool)
 
 
 @dataclass(frozen=True)
-class FrontierMedian(SharedMapLaw):
+class FrontierMedian(SharedMapController):
     """The two phases of the obvious solution: explore all of the building, then solve the k-median problem.
 
     *Exploration.* Frontiers are the borders of what is known to be free with what is unknown (Yamauchi 1997,
@@ -52,66 +56,89 @@ class FrontierMedian(SharedMapLaw):
     shortest: float = gain(0.15, "m", "length of a frontier that is worth going to", high=100.0)
     threshold: float = gain(0.01, "1", "part of the cost that another placement must save", high=1.0)
 
-    def placed(self, now: Situation) -> tuple[Array, bool, Array]:
-        looked = self._looked(now)
-        targets = self._targets(now, looked)
+    def compute_placement(self, situation: Situation) -> Placement:
+        looked = self._list_inspected_targets(situation)
+        targets = self._find_targets(situation, looked)
         if len(targets):
-            return self._shares(now, targets), False, looked
-        return self._median(now), True, looked
+            goals = self._assign_targets(situation, targets)
+            return Placement(goals=goals, is_final=False, notes=looked)
+        return Placement(goals=self._compute_median(situation), is_final=True, notes=looked)
 
-    def _looked(self, now: Situation) -> Array:
-        """Return the targets that nobody has to go to any more, (m, 2) m."""
-        if now.former is None or now.former.final:
-            return np.empty((0, 2)) if now.former is None else now.former.notes
-        former = now.former
-        there = np.sqrt(((now.at - now.begin) ** 2).sum(axis=1)) < _THERE
-        before = np.sqrt(((now.at[:, None] - former.group.at) ** 2).sum(axis=2)).min(axis=1)
-        done = now.begin[there | (np.isfinite(now.begin[:, 0]) & (before < _STUCK))]
-        return np.unique(np.vstack([former.notes, done]), axis=0)
+    def _list_inspected_targets(self, situation: Situation) -> Array:
+        """Return the targets that no robot has to go to any more, (m, 2) m."""
+        former_plan = situation.former_plan
+        if former_plan is None:
+            return np.empty((0, 2))
+        notes = former_plan.placement.notes
+        if former_plan.placement.is_final:
+            return notes
+        goals = situation.former_goals
+        is_there = np.sqrt(((situation.positions - goals) ** 2).sum(axis=1)) < _ARRIVAL_RADIUS_M
+        moves = situation.positions[:, None] - former_plan.group.positions
+        progress = np.sqrt((moves**2).sum(axis=2)).min(axis=1)
+        is_stuck = np.isfinite(goals[:, 0]) & (progress < _MIN_PROGRESS_M)
+        return np.unique(np.vstack([notes, goals[is_there | is_stuck]]), axis=0)
 
-    def _targets(self, now: Situation, looked: Array) -> Array:
-        """Return places on the frontiers, (t, 2) m."""
-        raster, ways, window = now.known.raster, now.ways, now.ways.window
-        state = window.crop(now.known.state, np.uint8(FREE))
-        unknown = (state == UNKNOWN) & ~window.crop(raster.is_outside, True)
-        # between two rays that are just as far apart there is nothing to look for
-        inside = ndimage.binary_opening(unknown, _BLOCK) & ~ways.is_tight
-        frontier = (state == FREE) & ~ways.is_tight & ndimage.binary_dilation(inside)
-        part, _ = ndimage.label(frontier, _BLOCK)
-        row, column = np.nonzero(
-            frontier & (np.bincount(part.ravel()) * raster.cell_size >= self.shortest)[part]
-        )
+    def _find_targets(self, situation: Situation, looked: Array) -> Array:
+        """Return positions on the frontiers, (t, 2) m."""
+        raster = situation.known_map.raster
+        planner = situation.planner
+        window = planner.window
+        state = window.crop(situation.known_map.state, np.uint8(FREE))
+        is_unknown = (state == UNKNOWN) & ~planner.is_outside
+        # Between two rays that are just as far apart there is nothing to look for.
+        is_area = ndimage.binary_opening(is_unknown, _BLOCK) & ~planner.is_tight
+        is_frontier = (state == FREE) & ~planner.is_tight & ndimage.binary_dilation(is_area)
+        labels, _ = ndimage.label(is_frontier, _BLOCK)
+        is_long = np.bincount(labels.ravel()) * raster.cell_size >= self.shortest
+        row, column = np.nonzero(is_frontier & is_long[labels])
         block = row // window.stride * window.columns + column // window.stride
-        _, first = np.unique(part[row, column] * len(ways.nodes) + block, return_index=True)
+        # One target for each block of a frontier.
+        _, first = np.unique(labels[row, column] * len(planner.nodes) + block, return_index=True)
         targets = raster.compute_centers(row[first] + window.first_row, column[first] + window.first_column)
         square = ((targets[:, None] - looked) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
-        return np.asarray(targets[square > _LOOKED**2])
+        return np.asarray(targets[square > _INSPECTED_RADIUS_M**2])
 
-    def _shares(self, now: Situation, targets: Array) -> Array:
+    def _assign_targets(self, situation: Situation, targets: Array) -> Array:
         """Return where each robot is to look, (k, 2) m."""
-        ways, goals = now.ways, now.at.copy()
-        roomy = np.flatnonzero(ways.is_roomy)
-        nodes = roomy[((targets[:, None] - ways.nodes[roomy]) ** 2).sum(axis=2).argmin(axis=1)]
-        cost = np.array([ways.compute_distances_from(at[None])[nodes] for at in now.at])
-        utility, left = np.ones(len(targets)), np.ones(len(goals), dtype=bool)
+        planner = situation.planner
+        goals = situation.positions.copy()
+        roomy = np.flatnonzero(planner.is_roomy)
+        square = ((targets[:, None] - planner.nodes[roomy]) ** 2).sum(axis=2)
+        nodes = roomy[square.argmin(axis=1)]
+        path_lengths = np.array(
+            [planner.compute_distances_from(position[None])[nodes] for position in situation.positions]
+        )
+        utility = np.ones(len(targets))
+        is_waiting = np.ones(len(goals), dtype=bool)
         for _ in range(len(goals)):
-            worth = np.where(left[:, None] & (utility > 0.0), utility - self.beta * cost, -np.inf)
-            robot, target = np.unravel_index(worth.argmax(), worth.shape)
-            if worth[robot, target] == -np.inf:
+            is_possible = is_waiting[:, None] & (utility > 0.0)
+            value = np.where(is_possible, utility - self.beta * path_lengths, -np.inf)
+            robot, target = np.unravel_index(value.argmax(), value.shape)
+            if value[robot, target] == -np.inf:
                 break
-            goals[robot], left[robot] = targets[target], False
-            away = np.sqrt(((targets - targets[target]) ** 2).sum(axis=1))
-            in_view = (away < now.reach) & ways.find_clear_lines(targets[target], targets, ways.is_blocked)
-            utility -= np.where(in_view, 1.0 - away / now.reach, 0.0)
+            goals[robot] = targets[target]
+            is_waiting[robot] = False
+            distance = np.sqrt(((targets - targets[target]) ** 2).sum(axis=1))
+            is_clear = planner.find_clear_lines(targets[target], targets, planner.is_blocked)
+            is_in_view = (distance < situation.sensing_range) & is_clear
+            utility -= np.where(is_in_view, 1.0 - distance / situation.sensing_range, 0.0)
         return goals
 
-    def _median(self, now: Situation) -> Array:
-        """Return where each robot is to be at last, (k, 2) m."""
-        weights = now.weights(now.known.state == FREE)
-        among = Candidates.at_nodes(now, weights, now.ways.sources)
-        if len(among.places) < len(now.at):
-            return now.at
-        kept = now.former is not None and now.former.final and np.isfinite(now.begin).all()
-        begin = among.nearest(now.begin) if kept else choose_greedily(among.table, len(now.at))
-        chosen = improve_sources(among.table, begin, np.zeros(len(begin), dtype=bool), self.threshold * kept)
-        return assigned(now, among.refined(now, weights, chosen))
+    def _compute_median(self, situation: Situation) -> Array:
+        """Return the final goals of all robots, (k, 2) m."""
+        weights = situation.compute_weights(situation.known_map.state == FREE)
+        candidates = Candidates.build_at_nodes(situation, weights, situation.planner.sources)
+        count = len(situation.positions)
+        if len(candidates.positions) < count:
+            return situation.positions
+        former_plan = situation.former_plan
+        goals = situation.former_goals
+        if former_plan is not None and former_plan.placement.is_final and np.isfinite(goals).all():
+            first = candidates.find_nearest(goals)
+            min_saving = self.threshold
+        else:
+            first = choose_greedily(candidates.table, count)
+            min_saving = 0.0
+        chosen = improve_sources(candidates.table, first, np.zeros(count, dtype=bool), min_saving)
+        return assign_goals(situation, candidates.refine(situation, weights, chosen))

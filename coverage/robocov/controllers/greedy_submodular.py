@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.controllers.gains import gain
-from robocov.controllers.shared_map import Candidates, SharedMapLaw, Situation, assigned
+from robocov.controllers.shared_map import Candidates, Placement, SharedMapController, Situation, assign_goals
 from robocov.k_median import choose_greedily, run_lloyd
 
 
 @dataclass(frozen=True)
-class GreedySubmodular(SharedMapLaw):
+class GreedySubmodular(SharedMapController):
     """Each place in turn is where it helps the most, given the earlier ones; then all descend.
 
     Sun, Cassandras and Meng (Automatica 100, 2019) start the distributed gradient descent of Zhong and
@@ -38,14 +37,18 @@ class GreedySubmodular(SharedMapLaw):
 
     threshold: float = gain(0.01, "1", "part of the cost that a greedy plan made anew must save", high=1.0)
 
-    def placed(self, now: Situation) -> tuple[Array, bool, Array]:
-        weights, notes = now.weights(~now.known.is_blocked), np.empty((0, 2))
-        among = Candidates.at_nodes(now, weights, now.ways.sources)
-        if len(among.places) < len(now.at):
-            return now.at, False, notes
-        chosen = run_lloyd(among.table, choose_greedily(among.table, len(now.at)))
-        if np.isfinite(now.begin).all():
-            kept = run_lloyd(among.table, among.nearest(now.begin))
-            if not among.total(chosen) < (1.0 - self.threshold) * among.total(kept):
-                chosen = kept
-        return assigned(now, among.refined(now, weights, chosen)), True, notes
+    def compute_placement(self, situation: Situation) -> Placement:
+        notes = np.empty((0, 2))
+        weights = situation.compute_weights(~situation.known_map.is_blocked)
+        candidates = Candidates.build_at_nodes(situation, weights, situation.planner.sources)
+        count = len(situation.positions)
+        if len(candidates.positions) < count:
+            return Placement(goals=situation.positions, is_final=False, notes=notes)
+        chosen = run_lloyd(candidates.table, choose_greedily(candidates.table, count))
+        if np.isfinite(situation.former_goals).all():
+            former = run_lloyd(candidates.table, candidates.find_nearest(situation.former_goals))
+            max_cost = (1.0 - self.threshold) * candidates.compute_cost(former)
+            if not candidates.compute_cost(chosen) < max_cost:
+                chosen = former
+        goals = assign_goals(situation, candidates.refine(situation, weights, chosen))
+        return Placement(goals=goals, is_final=True, notes=notes)

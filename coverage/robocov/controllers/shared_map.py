@@ -1,4 +1,4 @@
-"""Shared base of laws that plan for their team on a map that all who hear each other share."""
+"""Base class of controllers that plan for their team on a map that robots share if they hear each other."""
 
 from __future__ import annotations
 
@@ -26,33 +26,51 @@ from robocov.observation.region import Region
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.raster import Raster
+from robocov.planning.team_placement import UNREACHABLE_M
 from robocov.planning.window import Window
 from robocov.team import Team
 
-FINEST_CELL, MOST_CELLS = 0.05, 1_000_000  # side of a cell of the maps, m, larger in very large regions
-
-_FAR = 1e9  # metres that stand for "there is no way"
-_MISSED, _IN_RANGE = 5.0, 0.8  # who is silent for so many seconds where it would be, to so much of the range
+MIN_CELL_SIZE_M = 0.05
+"""Side of the cells of maps; they are larger in very large regions."""
+MAX_MAP_CELLS = 1_000_000
+MAX_SILENCE_S = 5.0
+"""A robot that is silent for longer, at a position from where it would be heard, is missed."""
+CERTAIN_RANGE_FRACTION = 0.8
+"""Fraction of the communication range within which a robot would certainly be heard."""
 
 
 class Group(NamedTuple):
     """The k robots that one plans for: itself and those that it has heard."""
 
-    robots: IntArray  # their numbers, ascending
-    at: Array  # where they are, or are presumed to be, (k, 2) m
-    heard: Array  # when they were heard, s
+    robots: IntArray
+    """(k,) Their numbers, ascending."""
+    positions: Array
+    """(k, 2) m, where they are, or are presumed to be."""
+    heard_times: Array
+    """(k,) s, when they were heard."""
+
+
+class Placement(NamedTuple):
+    """What a controller decides for a group."""
+
+    goals: Array
+    """(k, 2) m"""
+    is_final: bool
+    """Whether it stays as long as map, density and robots stay the same."""
+    notes: Array
+    """(m, 2) m, points that the next plan gets to know."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
     """Plan of a robot for its group. Immutable."""
 
-    group: Group  # as it was then
-    places: Array  # where they are to go, (k, 2) m
-    final: bool  # whether it stays as long as map, φ and robots stay the same
-    notes: Array  # what the law has noted, (m, 2) m
-    known: DiscoveredMap  # the map that it was made on
-    ways: GridPlanner
+    group: Group
+    """The group when the plan was made."""
+    placement: Placement
+    known_map: DiscoveredMap
+    """The map that it was made on."""
+    planner: GridPlanner
     density: Density | None
 
     def __deepcopy__(self, memo: object) -> Plan:
@@ -62,87 +80,120 @@ class Plan:
 class Situation(NamedTuple):
     """Situation of a robot that plans for k robots, itself and those that it has heard."""
 
-    at: Array  # where they are, or are presumed to be, (k, 2) m
-    begin: Array  # where they were to go by the last plan, (k, 2) m; nan for who was not in it
-    former: Plan | None  # the last plan
-    known: DiscoveredMap
-    ways: GridPlanner
+    positions: Array
+    """(k, 2) m, where they are, or are presumed to be."""
+    former_goals: Array
+    """(k, 2) m, their goals in the last plan; nan for a robot that was not in it."""
+    former_plan: Plan | None
+    known_map: DiscoveredMap
+    planner: GridPlanner
     density: Density | None
-    reach: float  # the robot's sensing range, m
+    sensing_range: float
+    """m"""
 
-    def weights(self, cells: BoolArray) -> Array:
-        """Return the number of these cells that each node stands for, times φ, (m,); 0 where no way leads."""
-        weights = self.ways.sum_by_node(self.ways.window.crop(cells, False))
-        weights = weights * np.isfinite(self.ways.compute_distances_from(self.at))
+    def compute_weights(self, cells: BoolArray) -> Array:
+        """Compute the weights of the nodes, (m,), for cells of the map, (rows, columns).
+
+        A weight is the number of these cells that the node stands for, times the density; 0 if no path leads
+        there.
+        """
+        weights = self.planner.sum_by_node(self.planner.window.crop(cells, False))
+        weights = weights * np.isfinite(self.planner.compute_distances_from(self.positions))
         if self.density is not None and not self.density.is_uniform:
-            weights = weights * self.density.evaluate(self.ways.nodes)
+            weights = weights * self.density.evaluate(self.planner.nodes)
         return np.asarray(weights, dtype=np.float64)
 
 
 class Candidates(NamedTuple):
-    """Places that a plan chooses among, with what `robocov.k_median` wants."""
+    """Positions that a plan chooses among, with the table of `robocov.k_median`."""
 
-    places: Array  # (c, 2) m
-    table: Array  # (m, c) distances from what is to be covered, weighted
+    positions: Array
+    """(c, 2) m"""
+    table: Array
+    """(m, c) Weighted distances from what is to be covered."""
 
     @classmethod
-    def at_nodes(cls, now: Situation, weights: Array, nodes: IntArray) -> Candidates:
-        """Return those of some nodes that a way leads to, for the weights of all nodes."""
-        target, nodes = np.flatnonzero(weights > 0.0), nodes[weights[nodes] > 0.0]
-        away = np.minimum(now.ways.compute_distance_table(nodes)[:, target], _FAR)
-        return cls(now.ways.nodes[nodes], np.ascontiguousarray((away * weights[target]).T))
+    def build_at_nodes(cls, situation: Situation, weights: Array, nodes: IntArray) -> Candidates:
+        """Build those of some nodes that a path leads to, for the weights of all nodes."""
+        targets = np.flatnonzero(weights > 0.0)
+        nodes = nodes[weights[nodes] > 0.0]
+        distances = situation.planner.compute_distance_table(nodes)[:, targets]
+        table = (np.minimum(distances, UNREACHABLE_M) * weights[targets]).T
+        return cls(positions=situation.planner.nodes[nodes], table=np.ascontiguousarray(table))
 
-    def total(self, chosen: IntArray) -> float:
-        """Return the cost of some."""
+    def compute_cost(self, chosen: IntArray) -> float:
+        """Compute the coverage cost of some candidates."""
         return float(self.table[:, chosen].min(axis=1).sum())
 
-    def nearest(self, places: Array) -> IntArray:
-        """Return one for each of (k, 2) places, no two the same: those nearest on the whole."""
-        square = ((places[:, None] - self.places) ** 2).sum(axis=2)
-        return np.asarray(scipy.optimize.linear_sum_assignment(square)[1], dtype=np.intp)
+    def find_nearest(self, positions: Array) -> IntArray:
+        """Find one candidate for each of (k, 2) positions, no two the same, by least squares."""
+        square = ((positions[:, None] - self.positions) ** 2).sum(axis=2)
+        _, candidates = scipy.optimize.linear_sum_assignment(square)
+        return np.asarray(candidates, dtype=np.intp)
 
-    def refined(self, now: Situation, weights: Array, chosen: IntArray) -> Array:
-        """Return the places, (k, 2) m, to which Lloyd's iteration leads among the nodes near the chosen."""
-        ways, places = now.ways, self.places[chosen]
-        apart = ways.spacing * math.sqrt(np.count_nonzero(weights) / len(self.places))
-        square = ((ways.nodes[:, None] - places) ** 2).sum(axis=2).min(axis=1)
-        fine = Candidates.at_nodes(
-            now, weights, np.flatnonzero(ways.is_roomy & (square < (1.5 * apart) ** 2))
-        )
-        return fine.places[run_lloyd(fine.table, fine.nearest(places))]
+    def refine(self, situation: Situation, weights: Array, chosen: IntArray) -> Array:
+        """Compute the positions, (k, 2) m, to which Lloyd's iteration leads on nodes close to some."""
+        planner = situation.planner
+        positions = self.positions[chosen]
+        spacing = planner.spacing * math.sqrt(np.count_nonzero(weights) / len(self.positions))
+        square = ((planner.nodes[:, None] - positions) ** 2).sum(axis=2).min(axis=1)
+        is_close = planner.is_roomy & (square < (1.5 * spacing) ** 2)
+        fine = Candidates.build_at_nodes(situation, weights, np.flatnonzero(is_close))
+        return fine.positions[run_lloyd(fine.table, fine.find_nearest(positions))]
 
 
-def assigned(now: Situation, places: Array) -> Array:
-    """Return the places in the order of the robots, (k, 2) m: the squared ways to them are the least in sum.
+def assign_goals(situation: Situation, goals: Array) -> Array:
+    """Assign goals to robots such that the sum of the squared path lengths is minimal.
 
-    That stays so on the way, as far as ways are straight.
+    The assignment stays the same on the way, as far as paths are straight.
+
+    Parameters
+    ----------
+    situation : Situation
+    goals : (k, 2) array, m
+
+    Returns
+    -------
+    (k, 2) array, m
+        The goals in the order of the robots.
     """
-    nodes = [now.ways.find_nearest_node(place) for place in places]
-    away = np.array([now.ways.compute_distances_from(at[None])[nodes] for at in now.at])
-    return np.asarray(places[scipy.optimize.linear_sum_assignment(np.minimum(away, _FAR) ** 2)[1]])
+    planner = situation.planner
+    nodes = [planner.find_nearest_node(goal) for goal in goals]
+    distances = np.array(
+        [planner.compute_distances_from(position[None])[nodes] for position in situation.positions]
+    )
+    _, assignment = scipy.optimize.linear_sum_assignment(np.minimum(distances, UNREACHABLE_M) ** 2)
+    return np.asarray(goals[assignment])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedMapMemory:
     """Memory of the robots."""
 
-    team: Team  # a robot knows its own limits
-    maps: tuple[DiscoveredMap, ...]  # what each has discovered, or has been told
+    team: Team
+    """A robot knows its own limits."""
+    maps: tuple[DiscoveredMap, ...]
+    """What each robot has discovered, or has been told."""
     plans: tuple[Plan | None, ...]
-    routes: tuple[Array, ...]  # the way-points of each, (w, 2) m, the last one the goal
-    legs: IntArray  # (n,), the way-point that is headed for
-    due: float = -math.inf  # when they plan next, s
-    returns: Array | None = None  # (n, rays, 2) m, what the last scan of each met
+    routes: tuple[Array, ...]
+    """Way-points of each robot, (w, 2) m, the last one the goal."""
+    legs: IntArray
+    """(n,) Number of the way-point that each robot heads for."""
+    next_plan_time: float = -math.inf
+    """s"""
+    returns: Array | None = None
+    """(n, rays, 2) m, what the last scan of each robot has met."""
 
 
 @dataclass(frozen=True)
-class SharedMapLaw(Law):
-    """Base class of laws by which each robot plans for itself and all that it hears on the map they share.
+class SharedMapController(Law):
+    """Base class of controllers by which each robot plans for itself and all robots that it hears.
 
-    Robots scan and merge their maps with those of whom they hear (`DiscoveredMap`). Once in `period` seconds
-    all plan: who knows the same makes the same plan, and goes to its own place in it by the shortest way. Who
-    is not heard any more is presumed to be where it was to go, and forgotten when it is missed there; with
-    short ranges plans differ, and two robots may go to the same place until they hear each other.
+    Robots scan and merge their maps with those of the robots that they hear (`DiscoveredMap`). Once in
+    `period` seconds all plan: robots that know the same make the same plan, and each goes to its own goal in
+    it by the shortest route. A robot that is not heard any more is presumed to be at its goal, and forgotten
+    when it is missed there; with short ranges plans differ, and two robots may go to the same position until
+    they hear each other.
     """
 
     information: ClassVar[Information] = "shared map"
@@ -155,114 +206,198 @@ class SharedMapLaw(Law):
     response_time: float = response_time_gain()
 
     @abstractmethod
-    def placed(self, now: Situation) -> tuple[Array, bool, Array]:
-        """Return where the robots are to go, (k, 2) m, whether that is final, and notes for the next plan."""
+    def compute_placement(self, situation: Situation) -> Placement:
+        """Compute the goals of the robots of a group."""
 
     def begin(self, region: Region, team: Team) -> SharedMapMemory:
         """Return the memory of robots that have seen nothing yet."""
-        low_x, low_y, high_x, high_y = region.bounds
-        cell = max(FINEST_CELL, math.sqrt((high_x - low_x) * (high_y - low_y) / MOST_CELLS))
-        n, nothing = len(team), DiscoveredMap.build_unknown(Raster(region, cell))
-        return SharedMapMemory(team, (nothing,) * n, (None,) * n, (), np.zeros(n, dtype=np.intp))
+        n = len(team)
+        return SharedMapMemory(
+            team=team,
+            maps=(build_unknown_map(region),) * n,
+            plans=(None,) * n,
+            routes=(),
+            legs=np.zeros(n, dtype=np.intp),
+        )
 
     def decide(self, seen: Observations, memory: SharedMapMemory) -> Decision:
-        """Return the forces along the ways to the robots' own places in their plans."""
-        team, scans = memory.team, seen.scans
-        if scans is not None:
-            maps = surveyed(memory.maps, seen, scans, circles(seen.neighbours))
+        """Return the forces along the routes to the robots' own goals in their plans."""
+        if seen.scans is not None:
+            maps = update_maps(memory.maps, seen, seen.scans, list_circles(seen.neighbours))
             memory = replace(memory, maps=tuple(maps))
-        if seen.time >= memory.due - 1e-9:
-            plans = self._plans(seen, memory)
-            own = [plan.places[np.searchsorted(plan.group.robots, i)] for i, plan in enumerate(plans)]
-            each_own = zip(plans, seen.positions, own, strict=True)
-            routes = tuple(plan.ways.find_route(at, place) for plan, at, place in each_own)
-            legs, due = np.zeros_like(memory.legs), seen.time + self.period
-            memory = replace(memory, plans=plans, routes=routes, legs=legs, due=due)
-        returns, drive = update_returns(seen, memory.returns), (self.k_prop, self.response_time)
-        forces, goals, legs = follow_routes(seen, team, memory.routes, memory.legs, returns, *drive)
-        after = replace(memory, legs=legs, returns=returns)
-        return Decision(forces, goals, {"attraction": forces}, memory=after)
+        if seen.time >= memory.next_plan_time - 1e-9:
+            memory = self._plan_routes(seen, memory)
+        returns = update_returns(seen, memory.returns)
+        command = follow_routes(
+            seen, memory.team, memory.routes, memory.legs, returns, self.k_prop, self.response_time
+        )
+        return Decision(
+            command.forces,
+            command.goals,
+            {"attraction": command.forces},
+            memory=replace(memory, legs=command.legs, returns=returns),
+        )
 
-    def _plans(self, seen: Observations, memory: SharedMapMemory) -> tuple[Plan, ...]:
-        """Return the plan of each robot; those who know the same share one."""
+    def _plan_routes(self, seen: Observations, memory: SharedMapMemory) -> SharedMapMemory:
+        """Return the memory with new plans, and the routes of all robots to their goals."""
+        plans = self._make_plans(seen, memory)
+        routes = []
+        for robot, plan in enumerate(plans):
+            goal = plan.placement.goals[np.searchsorted(plan.group.robots, robot)]
+            routes.append(plan.planner.find_route(seen.positions[robot], goal))
+        return replace(
+            memory,
+            plans=plans,
+            routes=tuple(routes),
+            legs=np.zeros_like(memory.legs),
+            next_plan_time=seen.time + self.period,
+        )
+
+    def _make_plans(self, seen: Observations, memory: SharedMapMemory) -> tuple[Plan, ...]:
+        """Return the plan of each robot; robots that know the same share one."""
         plans: list[Plan] = []
-        made: dict[tuple[object, ...], Plan] = {}
-        team = memory.team
-        for i, former in enumerate(memory.plans):
-            known, group = memory.maps[i], _group(seen, team, former, i)
-            sizes = float(team.radius[i]), float(team.sensing_range[i])
-            key = (id(known), id(former), *sizes, *(each.tobytes() for each in group))
-            if key not in made:
-                made[key] = self._plan(seen, known, former, group, *sizes)
-            plans.append(made[key])
+        plans_by_knowledge: dict[tuple[object, ...], Plan] = {}
+        for robot, former_plan in enumerate(memory.plans):
+            known_map = memory.maps[robot]
+            group = _build_group(seen, memory.team, former_plan, robot)
+            radius = float(memory.team.radius[robot])
+            sensing_range = float(memory.team.sensing_range[robot])
+            arrays = tuple(column.tobytes() for column in group)
+            key = (id(known_map), id(former_plan), radius, sensing_range, *arrays)
+            if key not in plans_by_knowledge:
+                plans_by_knowledge[key] = self._make_plan(
+                    seen, known_map, former_plan, group, radius, sensing_range
+                )
+            plans.append(plans_by_knowledge[key])
         return tuple(plans)
 
-    def _plan(
-        self, seen: Observations, known: DiscoveredMap, former: Plan | None, group: Group,
-        radius: float, reach: float,
-    ) -> Plan:  # fmt: skip
-        """Return a plan of a robot with this radius and sensing range, m."""
-        begin = np.full(group.at.shape, np.nan)
-        if former is not None:
-            same = former.known is known and former.density is seen.density
-            if former.final and same and np.array_equal(group.robots, former.group.robots):
-                return replace(former, group=group)
-            _, here, there = np.intersect1d(group.robots, former.group.robots, return_indices=True)
-            begin[here] = former.places[there]
-        window = Window.build_around(known.raster, group.at[0], math.inf, int(self.nodes))
-        ways = GridPlanner(known, window, radius + self.clearance) if former is None else former.ways
-        ways = ways.update(known, window)
-        now = Situation(group.at, begin, former, known, ways, seen.density, reach)
-        return Plan(group, *self.placed(now), known, ways, seen.density)
+    def _make_plan(
+        self,
+        seen: Observations,
+        known_map: DiscoveredMap,
+        former_plan: Plan | None,
+        group: Group,
+        radius: float,
+        sensing_range: float,
+    ) -> Plan:
+        """Return the plan of a robot with this radius and sensing range, m."""
+        window = Window.build_around(known_map.raster, group.positions[0], math.inf, int(self.nodes))
+        former_goals = np.full(group.positions.shape, np.nan)
+        if former_plan is None:
+            planner = GridPlanner(known_map, window, radius + self.clearance)
+        else:
+            if _is_still_valid(former_plan, known_map, seen.density, group):
+                return replace(former_plan, group=group)
+            planner = former_plan.planner
+            _, here, there = np.intersect1d(group.robots, former_plan.group.robots, return_indices=True)
+            former_goals[here] = former_plan.placement.goals[there]
+        planner = planner.update(known_map, window)
+        situation = Situation(
+            positions=group.positions,
+            former_goals=former_goals,
+            former_plan=former_plan,
+            known_map=known_map,
+            planner=planner,
+            density=seen.density,
+            sensing_range=sensing_range,
+        )
+        return Plan(
+            group=group,
+            placement=self.compute_placement(situation),
+            known_map=known_map,
+            planner=planner,
+            density=seen.density,
+        )
+
+
+def build_unknown_map(region: Region) -> DiscoveredMap:
+    """Build the map of a robot that has not seen anything of a region yet."""
+    low_x, low_y, high_x, high_y = region.bounds
+    cell_size = max(MIN_CELL_SIZE_M, math.sqrt((high_x - low_x) * (high_y - low_y) / MAX_MAP_CELLS))
+    return DiscoveredMap.build_unknown(Raster(region, cell_size))
+
+
+def _is_still_valid(plan: Plan, known_map: DiscoveredMap, density: Density | None, group: Group) -> bool:
+    """Return whether a plan is final, and map, density and robots are those that it was made for."""
+    return (
+        plan.placement.is_final
+        and plan.known_map is known_map
+        and plan.density is density
+        and np.array_equal(group.robots, plan.group.robots)
+    )
 
 
 Circle: TypeAlias = tuple[int, ...]
 """A robot and those that it hears, ascending."""
 
 
-def circles(neighbours: Neighbours) -> list[Circle]:
+def list_circles(neighbours: Neighbours) -> list[Circle]:
     """Return the circle of each robot."""
     if neighbours.is_complete:
         return [tuple(range(neighbours.count))] * neighbours.count
-    return [tuple(sorted({i, *neighbours.list_neighbours(i).tolist()})) for i in range(neighbours.count)]
+    return [
+        tuple(sorted({robot, *neighbours.list_neighbours(robot).tolist()}))
+        for robot in range(neighbours.count)
+    ]
 
 
-def surveyed(
-    maps: Sequence[DiscoveredMap], seen: Observations, scans: Scans, around: Sequence[Circle]
+def update_maps(
+    maps: Sequence[DiscoveredMap], seen: Observations, scans: Scans, circles: Sequence[Circle]
 ) -> list[DiscoveredMap]:
-    """Return the maps after a scan of each robot, told to those in its circle.
+    """Add the scan of each robot to the maps of all robots in its circle.
 
-    Robots that all hear each other share one map, into which all scans go, and where the last one counts:
-    maps that are merged time and again would keep what one of them has mistaken.
+    Robots that all hear each other share one map, to which all scans are added, and where the last one
+    counts: maps that are merged again and again would keep mistakes of one of them.
+
+    Parameters
+    ----------
+    maps : sequence of DiscoveredMap
+        One of each robot.
+    seen : Observations
+    scans : Scans
+    circles : sequence of Circle
+        As `list_circles` returns them.
     """
-    every = list(zip(seen.positions, scans.distances, scans.hit, strict=True))
-    own = cache(lambda i: maps[i].add_scan(*every[i]))
-    together, sizes, later = dict[Circle, DiscoveredMap](), Counter(around), []
-    for i, circle in enumerate(around):
+
+    def add_scan(known_map: DiscoveredMap, robot: int) -> DiscoveredMap:
+        return known_map.add_scan(seen.positions[robot], scans.distances[robot], scans.hit[robot])
+
+    @cache
+    def build_own_map(robot: int) -> DiscoveredMap:
+        return add_scan(maps[robot], robot)
+
+    sizes = Counter(circles)
+    shared_maps: dict[Circle, DiscoveredMap] = {}
+    later = []
+    for robot, circle in enumerate(circles):
         if sizes[circle] < len(circle):
-            later.append(own(i).merge(own(k) for k in circle if k != i))
+            others = (build_own_map(other) for other in circle if other != robot)
+            later.append(build_own_map(robot).merge(others))
             continue
-        if circle not in together:
-            one = maps[i].merge(maps[k] for k in circle if maps[k] is not maps[i])
-            for k in circle:
-                one = one.add_scan(*every[k])
-            together[circle] = one
-        later.append(together[circle])
+        if circle not in shared_maps:
+            shared = maps[robot].merge(maps[other] for other in circle if maps[other] is not maps[robot])
+            for member in circle:
+                shared = add_scan(shared, member)
+            shared_maps[circle] = shared
+        later.append(shared_maps[circle])
     return later
 
 
-def _group(seen: Observations, team: Team, former: Plan | None, i: int) -> Group:
-    """Return for whom robot i plans."""
-    place = seen.positions[i : i + 1]
-    robots = np.append(seen.neighbours.list_neighbours(i), i)
-    at, heard = np.vstack([seen.get_neighbour_positions(i), place]), np.full(len(robots), seen.time)
-    if former is not None:
-        away = np.sqrt(((former.places - place) ** 2).sum(axis=1))
-        late = seen.time - former.group.heard > _MISSED
-        missed = late & (away < _IN_RANGE * team.communication_range[i])
-        silent = ~(np.isin(former.group.robots, robots) | missed)
-        robots = np.concatenate([robots, former.group.robots[silent]])
-        at = np.vstack([at, former.places[silent]])
-        heard = np.concatenate([heard, former.group.heard[silent]])
+def _build_group(seen: Observations, team: Team, former_plan: Plan | None, robot: int) -> Group:
+    """Return the robots that one robot plans for: itself, those that it hears, and those that it expects."""
+    position = seen.positions[robot : robot + 1]
+    robots = np.append(seen.neighbours.list_neighbours(robot), robot)
+    positions = np.vstack([seen.get_neighbour_positions(robot), position])
+    heard_times = np.full(len(robots), seen.time)
+    if former_plan is not None:
+        former = former_plan.group
+        goals = former_plan.placement.goals
+        distance = np.sqrt(((goals - position) ** 2).sum(axis=1))
+        is_silent = seen.time - former.heard_times > MAX_SILENCE_S
+        is_close = distance < CERTAIN_RANGE_FRACTION * team.communication_range[robot]
+        is_expected = ~(np.isin(former.robots, robots) | (is_silent & is_close))
+        robots = np.concatenate([robots, former.robots[is_expected]])
+        positions = np.vstack([positions, goals[is_expected]])
+        heard_times = np.concatenate([heard_times, former.heard_times[is_expected]])
     order = np.argsort(robots)
-    return Group(robots[order], at[order], heard[order])
+    return Group(robots=robots[order], positions=positions[order], heard_times=heard_times[order])

@@ -8,20 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from robocov.arrays import Array
 from robocov.controllers.gains import gain
-from robocov.controllers.shared_map import Candidates, SharedMapLaw, Situation, assigned
+from robocov.controllers.shared_map import Candidates, Placement, SharedMapController, Situation, assign_goals
 from robocov.k_median import apply_best_swap
+from robocov.planning.team_placement import UNREACHABLE_M
 from robocov.planning.voronoi_roadmap import VoronoiRoadmap
 from robocov.planning.window import Window
 
-MOST_CELLS, MOST_VERTICES = 150_000, 300  # that the map is thinned on, and of the graph, about
-_SPACING = 0.25  # metres between vertices, at least
-_FALL = 1e-6  # part of the cost that an exchange must save, once there is one worth it
+MAX_CELLS = 150_000
+"""Number of blocks of cells that the map is thinned on."""
+MAX_VERTICES = 300
+"""Approximate number of vertices of the graph."""
+_MIN_SPACING_M = 0.25
+"""Distance between vertices."""
+_MIN_FURTHER_SAVING = 1e-6
+"""Fraction of the cost that an exchange must save, once there is one that saves the threshold."""
 
 
 @dataclass(frozen=True)
-class VoronoiGraphCoverage(SharedMapLaw):
+class VoronoiGraphCoverage(SharedMapController):
     """Robots are placed on the roadmap of the building, by distances along it.
 
     The roadmap is the generalized Voronoi graph of Choset and Burdick (IJRR 19, 2000): the places halfway
@@ -46,35 +51,48 @@ class VoronoiGraphCoverage(SharedMapLaw):
 
     threshold: float = gain(0.01, "1", "part of the cost that a first exchange must save", high=1.0)
 
-    def placed(self, now: Situation) -> tuple[Array, bool, Array]:
-        among, notes = self._vertices(now), np.empty((0, 2))
-        if len(among.places) < len(now.at):
-            return now.at, False, notes
-        begin = np.where(np.isfinite(now.begin), now.begin, now.at)
-        chosen, fixed, worth = among.nearest(begin), np.zeros(len(begin), dtype=bool), self.threshold
-        while (after := apply_best_swap(among.table, chosen, fixed, worth)) is not chosen:
-            chosen, worth = after, _FALL
-        return assigned(now, among.places[chosen]), True, notes
+    def compute_placement(self, situation: Situation) -> Placement:
+        notes = np.empty((0, 2))
+        candidates = self._build_vertices(situation)
+        count = len(situation.positions)
+        if len(candidates.positions) < count:
+            return Placement(goals=situation.positions, is_final=False, notes=notes)
+        goals = situation.former_goals
+        chosen = candidates.find_nearest(np.where(np.isfinite(goals), goals, situation.positions))
+        is_fixed = np.zeros(count, dtype=bool)
+        min_saving = self.threshold
+        while True:
+            improved = apply_best_swap(candidates.table, chosen, is_fixed, min_saving)
+            if improved is chosen:
+                break
+            chosen = improved
+            min_saving = _MIN_FURTHER_SAVING
+        return Placement(
+            goals=assign_goals(situation, candidates.positions[chosen]), is_final=True, notes=notes
+        )
 
-    def _vertices(self, now: Situation) -> Candidates:
-        """Return the vertices of the graph where the robots are, with distances along it."""
-        known, raster, ways = now.known, now.known.raster, now.ways
-        window = Window.build_around(raster, now.at[0], math.inf, MOST_CELLS)
-        blocks = window.rows, window.stride, window.columns, window.stride
+    def _build_vertices(self, situation: Situation) -> Candidates:
+        """Build the vertices of the graph where the robots are, with distances along it."""
+        known_map = situation.known_map
+        raster = known_map.raster
+        planner = situation.planner
+        window = Window.build_around(raster, situation.positions[0], math.inf, MAX_CELLS)
         rows, columns = raster.shape
-        room = ~window.crop(ways.is_tight[:rows, :columns], True).reshape(blocks).any(axis=(1, 3))
-        free = window.crop(~known.is_blocked, False).reshape(blocks).sum(axis=(1, 3))
-        part, _ = ndimage.label(room, np.ones((3, 3)))
-        standing = np.array([ways.nodes[ways.find_own_node(place)] for place in now.at])
-        row, column = (each // window.stride for each in raster.find_cells(standing))
-        room &= np.isin(part, part[row, column]) & (part > 0)
-        side = raster.cell_size * window.stride
-        graph = VoronoiRoadmap.build(room, free > 0, _SPACING / side, MOST_VERTICES)
-        places = np.asarray(raster.origin) + (graph.vertices[:, ::-1] + 0.5) * side
-        mass = free.astype(np.float64)
-        if now.density is not None and not now.density.is_uniform:
-            mass *= now.density.evaluate(window.compute_nodes(raster)).reshape(mass.shape)
-        inside = graph.vertex_of_cell >= 0
-        weights = np.bincount(graph.vertex_of_cell[inside], mass[inside], minlength=len(places))
-        away = np.minimum(graph.distances * side, 1e9)
-        return Candidates(places, np.ascontiguousarray((away * weights).T))
+        is_tight = window.crop(planner.is_tight[:rows, :columns], True)
+        is_roomy = ~is_tight.reshape(window.block_shape).any(axis=(1, 3))
+        free_cells = window.crop(~known_map.is_blocked, False).reshape(window.block_shape).sum(axis=(1, 3))
+        labels, _ = ndimage.label(is_roomy, np.ones((3, 3)))
+        own_nodes = [planner.find_own_node(position) for position in situation.positions]
+        row, column = raster.find_cells(planner.nodes[own_nodes])
+        own_labels = labels[row // window.stride, column // window.stride]
+        is_roomy &= np.isin(labels, own_labels) & (labels > 0)
+        block_size = raster.cell_size * window.stride
+        roadmap = VoronoiRoadmap.build(is_roomy, free_cells > 0, _MIN_SPACING_M / block_size, MAX_VERTICES)
+        vertices = np.asarray(raster.origin) + (roadmap.vertices[:, ::-1] + 0.5) * block_size
+        mass = free_cells.astype(np.float64)
+        if situation.density is not None and not situation.density.is_uniform:
+            mass *= situation.density.evaluate(window.compute_nodes(raster)).reshape(mass.shape)
+        has_vertex = roadmap.vertex_of_cell >= 0
+        weights = np.bincount(roadmap.vertex_of_cell[has_vertex], mass[has_vertex], minlength=len(vertices))
+        distances = np.minimum(roadmap.distances * block_size, UNREACHABLE_M)
+        return Candidates(positions=vertices, table=np.ascontiguousarray((distances * weights).T))

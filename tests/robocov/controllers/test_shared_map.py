@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -8,8 +9,10 @@ import pytest
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Rapf, information_of, make_controller
 from robocov.controllers.frontier_median import FrontierMedian
-from robocov.controllers.shared_map import Circle, Situation, assigned, circles, surveyed
+from robocov.controllers.greedy_submodular import GreedySubmodular
+from robocov.controllers.shared_map import Circle, Situation, assign_goals, list_circles, update_maps
 from robocov.cost import CoverageCost
+from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
 from robocov.metrics import compute_clearances, count_contacts
@@ -109,7 +112,7 @@ def observed(
     neighbours: Neighbours, distances: np.ndarray, hit: bool
 ) -> tuple[Observations, Scans, list[Circle]]:
     n, at = len(distances), np.tile([2.02, 2.02], (len(distances), 1))
-    scans, around = Scans(distances, np.full(distances.shape, hit)), circles(neighbours)
+    scans, around = Scans(distances, np.full(distances.shape, hit)), list_circles(neighbours)
     return (
         Observations(at, np.zeros((n, 2)), neighbours, np.full((n, 2), np.nan), ROOMS.region),
         scans,
@@ -121,11 +124,11 @@ def test_maps_go_to_those_who_hear() -> None:
     states = np.random.default_rng(0).choice([UNKNOWN, FREE, WALL], size=(4, *RASTER.shape)).astype(np.uint8)
     maps, blind = [DiscoveredMap(RASTER, state) for state in states], np.zeros((4, 8))
     first = states[(states != UNKNOWN).argmax(axis=0), *np.indices(RASTER.shape)]
-    together = surveyed(maps, *observed(Neighbours(4), blind, False))
+    together = update_maps(maps, *observed(Neighbours(4), blind, False))
     assert np.array_equal(together[0].state, first) and len({id(known) for known in together}) == 1
     # each knows best what it has seen itself; else the first counts that has
     line = Neighbours.from_ranges(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [9.0, 0.0]]), np.full(4, 1.5))
-    told = surveyed(maps, *observed(line, blind, False))
+    told = update_maps(maps, *observed(line, blind, False))
     assert np.array_equal(told[0].state, np.where(states[0] != UNKNOWN, states[0], states[1]))
     assert np.array_equal(told[1].state == UNKNOWN, (states[:3] == UNKNOWN).all(axis=0))
     assert told[3] is maps[3]
@@ -140,7 +143,7 @@ def test_what_one_has_mistaken_is_corrected_by_whoever_sees_it() -> None:
     distances = np.array([[0.0], [1.0], [0.0], [0.0]])
     seen, scans, around = observed(pairs, distances, False)
     scans.hit[1] = True
-    told = surveyed([free, nothing, free, nothing], seen, scans, around)
+    told = update_maps([free, nothing, free, nothing], seen, scans, around)
     assert told[0] is told[1] and told[2] is told[3] and told[0] is not told[2]
     assert told[0].is_blocked[20, 30] and not told[2].is_blocked[20, 30]
     assert (told[0].state >= WALL).sum() == 1
@@ -149,31 +152,31 @@ def test_what_one_has_mistaken_is_corrected_by_whoever_sees_it() -> None:
 def test_the_sum_of_squared_ways_is_the_least() -> None:
     rng = np.random.default_rng(1)
     now = situation(np.full(RASTER.shape, FREE), rng.uniform(1, 7, (5, 2)).tolist())
-    nodes = rng.choice(np.flatnonzero(now.ways.is_roomy), 5, replace=False)
-    places = now.ways.nodes[nodes]
-    away = np.array([now.ways.compute_distances_from(at[None])[nodes] for at in now.at]) ** 2
+    nodes = rng.choice(np.flatnonzero(now.planner.is_roomy), 5, replace=False)
+    places = now.planner.nodes[nodes]
+    away = np.array([now.planner.compute_distances_from(at[None])[nodes] for at in now.positions]) ** 2
     best = min(permutations(range(5)), key=lambda order: away[range(5), order].sum())
-    assert np.array_equal(assigned(now, places), places[list(best)])
+    assert np.array_equal(assign_goals(now, places), places[list(best)])
 
 
 def test_robots_go_to_different_frontiers_and_to_none_on_a_whole_map() -> None:
     law = FrontierMedian()
     state = np.full(RASTER.shape, FREE)
     at = [[4.0, 3.0], [4.0, 5.0], [4.0, 4.0]]
-    _, final, _ = law.placed(situation(state, at))
+    _, final, _ = law.compute_placement(situation(state, at))
     assert final
     # specks are no frontier
     state[20:60:5, 10:70:4] = UNKNOWN
-    assert law.placed(situation(state, at))[1]
+    assert law.compute_placement(situation(state, at)).is_final
     state[:, :20] = state[:, 60:] = UNKNOWN
-    goals, final, _ = law.placed(situation(state, at))
+    goals, final, _ = law.compute_placement(situation(state, at))
     assert not final
     assert np.ptp(goals[:, 0]) > 3.0
     columns = np.sort(goals[:, 0])
     assert columns[0] == pytest.approx(2.05) and columns[-1] == pytest.approx(5.95)
     # behind a wall there is nothing to look for
     state[:, 20] = state[:, 59] = WALL
-    assert law.placed(situation(state, at))[1]
+    assert law.compute_placement(situation(state, at)).is_final
 
 
 def test_a_frontier_that_stays_is_left_alone() -> None:
@@ -183,8 +186,25 @@ def test_a_frontier_that_stays_is_left_alone() -> None:
     for _ in range(5):
         simulated.step()
     plan = simulated.memory.plans[0]
-    assert not plan.final
-    for at in (plan.places, plan.group.at):
-        now = Situation(at, plan.places, plan, plan.known, plan.ways, None, 3.0)
-        looked = law.placed(now)[2]
-        assert all((np.hypot(*(looked - place).T) < 1e-9).any() for place in plan.places)
+    assert not plan.placement.is_final
+    for at in (plan.placement.goals, plan.group.positions):
+        now = Situation(at, plan.placement.goals, plan, plan.known_map, plan.planner, None, 3.0)
+        looked = law.compute_placement(now).notes
+        assert all((np.hypot(*(looked - place).T) < 1e-9).any() for place in plan.placement.goals)
+
+
+def test_a_final_plan_is_made_again_for_another_density() -> None:
+    """A plan that stays while nothing changes depends on the density, too."""
+    controller = GreedySubmodular(nodes=100.0)
+    density = Gaussians((Gaussian((7.0, 7.0), 50.0, 0.5),), floor=0.01)
+    seen = Observations(
+        np.array([[1.0, 1.0]]), np.zeros((1, 2)), Neighbours(1), np.full((1, 2), np.nan), ROOMS.region
+    )
+    known_map = DiscoveredMap(RASTER, np.full(RASTER.shape, FREE, dtype=np.uint8))
+    memory = replace(controller.begin(ROOMS.region, Team.homogeneous(1)), maps=(known_map,))
+    first = controller.decide(seen, memory).memory
+    later = replace(seen, time=5.0)
+    same = controller.decide(later, first).memory
+    assert same.plans[0].placement is first.plans[0].placement
+    other = controller.decide(replace(later, density=density), first).memory
+    assert np.hypot(*(other.plans[0].placement.goals[0] - [7.0, 7.0])) < 1.0
