@@ -5,9 +5,9 @@ senses, and the convex region. A controller computes all rows at once for speed,
 may depend only on row i and on the known positions of the neighbours of robot i. Thus the types themselves
 say that control is distributed and that obstacles are unknown.
 
-- `observations`, `scans`, `region`: what robots know
+- `observations`, `scans`, `region`: all that robots know
 - `neighbours`: the communication graph
-- `decisions`, `cells`: what a controller decides, and on what cells
+- `decisions`, `cells`: the decision of a controller, and the cells that it uses
 - `snapshot`: observations and decision of one step
 - `scanned_view`: the free space in view of a scan
 - `close_pairs`, `bins`: pairs of points that are close to each other

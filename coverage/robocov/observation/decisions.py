@@ -1,4 +1,4 @@
-"""What a controller decides at a step, and the checks of what controllers return."""
+"""Decisions of a controller, and checks of the values that controllers return."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def check_decision(returned: Any, count: int, controller: str, time: float, sour
     Parameters
     ----------
     returned : object
-        What the controller's ``decide`` returned.
+        Value returned by the controller's ``decide``.
     count : int
         Number of robots.
     controller : str
@@ -129,7 +129,7 @@ def to_numbers(values: object) -> Array | None:
     """Convert real numbers to an array of floats; return None if that is not possible.
 
     An array of floats is returned as it is. Complex numbers, strings and objects are not real numbers,
-    whatever they could be converted to.
+    even if they can be converted to floats.
     """
     if isinstance(values, np.ndarray) and values.dtype == np.float64:
         return values

@@ -1,4 +1,4 @@
-"""What the robots know at a step: all that a controller may base its decision on."""
+"""Observations of the robots at a step, on which alone a controller bases its decision."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The free space in view of a range scan: how far it extends, and which corners hide more of it."""
+"""The free space in view of a range scan: its extent, and the corners that hide more of it."""
 
 import math
 from typing import NamedTuple
@@ -33,9 +33,10 @@ class View(NamedTuple):
 class Windows(NamedTuple):
     """Edges of views that begin at a corner and turn about it when the robot moves; sorted by robot.
 
-    Seen from a position p, a corner v at the distance ρ hides what is behind it. When p moves by d, the point
-    of the edge at the distance s from p moves by -(d · t) (s - ρ)/ρ, where t is the unit vector across the
-    edge, away from the obstacle. The view thus grows by t (s - ρ)/ρ per metre of the edge and of the motion.
+    Seen from a position p, a corner v at the distance ρ hides the space behind it. When p moves by d, the
+    point of the edge at the distance s from p moves by -(d · t) (s - ρ)/ρ, where t is the unit vector across
+    the edge, away from the obstacle. The view thus grows by t (s - ρ)/ρ per metre of the edge and of the
+    motion.
     """
 
     robot: IntArray
@@ -111,7 +112,7 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
 
 
 def _predict_depth(view: View, reach: Array, side: int) -> Array:
-    """Return the depth of each ray, (n, rays) m, if the wall of the two rays before it goes on straight."""
+    """Return the depth of each ray, (n, rays) m, on the straight line through the two points before it."""
     inverse = 1.0 / np.maximum(view.distances, _MIN_DISTANCE_M)
     factor = 2.0 * np.cos(2.0 * np.pi / view.distances.shape[1])
     predicted = factor * np.roll(inverse, side, axis=1) - np.roll(inverse, 2 * side, axis=1)

@@ -1,4 +1,4 @@
-"""Range scans: what a controller asks for, and what its robots get."""
+"""Range scans: the settings that a controller requests, and the scans of its robots."""
 
 from __future__ import annotations
 

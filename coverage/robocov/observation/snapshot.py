@@ -13,7 +13,7 @@ from robocov.observation.observations import Observations
 
 @dataclass(slots=True, eq=False)
 class Snapshot:
-    """The state of a simulation at one time, what was observed in it, and what was decided."""
+    """The state of a simulation at one time, with the observations and the decision."""
 
     seen: Observations
     decision: Decision

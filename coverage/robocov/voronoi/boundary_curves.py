@@ -114,7 +114,7 @@ def trace_boundaries(
 
 @kernel
 def _make_room(pieces: Array, used: int, room: int) -> Array:
-    """Return pieces, the first `used` of which are kept, with room for more."""
+    """Return an array with the used pieces and room for more."""
     if used + room <= len(pieces):
         return pieces
     larger = np.empty((2 * (used + room), pieces.shape[1]))

@@ -97,9 +97,11 @@ def partition(
     (array([2., 2.]), array([[0, 1]]))
     """
     points = to_generators(generators)
-    known = _convert_neighbours(neighbours, reported_positions, len(points))
-    is_complete = neighbours is None or neighbours.is_complete
-    mesh = _create_mesh(len(points), triangulation, is_complete=is_complete)
+    if neighbours is None:
+        neighbours = Neighbours(len(points))
+    check_neighbours(neighbours, reported_positions, len(points))
+    known = _convert_neighbours(neighbours, reported_positions)
+    mesh = _create_mesh(len(points), triangulation, is_complete=neighbours.is_complete)
     cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=_NO_EDGES)
     count = _compute_cells(points, region.sides, known, mesh, cells)
     if count < 0:
@@ -129,12 +131,18 @@ def to_generators(values: object) -> Array:
     return points
 
 
-def to_reported_positions(values: Array, neighbours: int) -> Array:
-    """Convert reported positions, one for each neighbour; raise InputError unless they are (m, 2)."""
-    positions = np.ascontiguousarray(values, dtype=np.float64)
-    if positions.shape != (neighbours, 2):
-        raise InputError(f"reported_positions: expected shape {(neighbours, 2)}, got {positions.shape}")
-    return positions
+def check_neighbours(neighbours: Neighbours, reported_positions: Array | None, robots: int) -> None:
+    """Raise InputError if neighbours or reported positions do not fit to the number of robots."""
+    if neighbours.count != robots:
+        raise InputError(f"neighbours: expected a graph of {robots} robots, got {neighbours.count}")
+    if reported_positions is None:
+        return
+    if neighbours.indices is None:
+        raise InputError("reported_positions: expected None without limited communication")
+    expected = (len(neighbours.indices), 2)
+    if np.shape(reported_positions) != expected:
+        got = np.shape(reported_positions)
+        raise InputError(f"reported_positions: expected shape {expected}, got {got}")
 
 
 def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
@@ -143,8 +151,8 @@ def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
     Parameters
     ----------
     cells : Cells
-        Cells that nobody uses yet, computed for a density of 1. They are changed in place, and their arrays
-        become read-only.
+        New cells that are not yet in use, computed for a density of 1. They are changed in place, and their
+        arrays become read-only.
     density : Density or None
         None: 1 everywhere.
 
@@ -165,19 +173,13 @@ def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
     return cells
 
 
-def _convert_neighbours(
-    neighbours: Neighbours | None, reported_positions: Array | None, robots: int
-) -> KnownNeighbours:
-    """Convert a communication graph, and positions in its order, for the kernels, which check no bounds."""
-    if neighbours is not None and neighbours.count != robots:
-        raise InputError(f"neighbours: expected a graph of {robots} robots, got {neighbours.count}")
-    if neighbours is None or neighbours.indptr is None or neighbours.indices is None:
-        if reported_positions is not None:
-            raise InputError("reported_positions: expected None without limited communication")
+def _convert_neighbours(neighbours: Neighbours, reported_positions: Array | None) -> KnownNeighbours:
+    """Convert a communication graph, and positions in its order, for the kernels."""
+    if neighbours.indptr is None or neighbours.indices is None:
         return KnownNeighbours(_NO_POSITIONS, NO_INDICES, NO_INDICES)
     if reported_positions is None:
         return KnownNeighbours(_NO_POSITIONS, neighbours.indptr, neighbours.indices)
-    positions = to_reported_positions(reported_positions, len(neighbours.indices))
+    positions = np.ascontiguousarray(reported_positions, dtype=np.float64)
     return KnownNeighbours(positions, neighbours.indptr, neighbours.indices)
 
 

@@ -19,7 +19,7 @@ Y = 1
 BEYOND = 2
 """Column of a vertex: the robot on the other side of the edge that begins there, or `REGION`."""
 _EXCESS = 3
-"""Column of a vertex: how far it lies beyond the present bisector, m²."""
+"""Column of a vertex: its excess over the present bisector, m²; positive beyond it."""
 
 DX = 0
 """Column of a neighbour: its offset from the generator in x, m."""
@@ -52,7 +52,7 @@ class CellPolygon(NamedTuple):
 
 
 class CellArrays(NamedTuple):
-    """What is computed of n cells."""
+    """Results for n cells."""
 
     mass: Array
     """(n,) m², the areas."""
@@ -190,7 +190,7 @@ def _cut(rings: Array, old: int, count: int, near: Array, turn: int) -> int:
 
 @kernel
 def _compute_excess(rings: Array, ring: int, count: int, near: Array, turn: int) -> int:
-    """Compute how far each vertex lies beyond a bisector; return the farthest one, or -1 if none does."""
+    """Compute the excess of each vertex over a bisector; return the vertex farthest beyond it, or -1."""
     dx = near[turn, DX]
     dy = near[turn, DY]
     level = 0.5 * near[turn, SQUARE]

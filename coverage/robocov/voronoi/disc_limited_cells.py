@@ -20,7 +20,7 @@ class _Arcs(NamedTuple):
     angle: Array
     """(e,) rad from +x, where the arc begins."""
     turn: Array
-    """(e,) rad, how far it turns to the left."""
+    """(e,) rad, the angle that it turns to the left."""
 
 
 class _CutEdges(NamedTuple):

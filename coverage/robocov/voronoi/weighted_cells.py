@@ -29,9 +29,9 @@ from robocov.voronoi.boundary_curves import trace_boundaries
 from robocov.voronoi.bounded_partition import (
     VoronoiPartition,
     apply_density,
+    check_neighbours,
     partition,
     to_generators,
-    to_reported_positions,
 )
 from robocov.voronoi.delaunay import Mesh
 
@@ -145,6 +145,7 @@ def partition_by_travel_time(
     speeds = _convert_speeds(speeds, len(points))
     if neighbours is None:
         neighbours = Neighbours(len(points))
+    check_neighbours(neighbours, reported_positions, len(points))
     if (speeds == speeds[:1]).all():
         return partition(
             points,
@@ -154,11 +155,16 @@ def partition_by_travel_time(
             reported_positions=reported_positions,
             density=density,
         )
+    cells = _compute_weighted_cells(points, speeds, region, neighbours, reported_positions)
+    return apply_density(cells, density)
+
+
+def _compute_weighted_cells(
+    points: Array, speeds: Array, region: Region, neighbours: Neighbours, reported_positions: Array | None
+) -> WeightedCells:
+    """Compute cells of robots whose speeds are not all equal, for a density of 1."""
     robot, other = neighbours.list_pairs()
-    if reported_positions is None:
-        other_positions = points[other]
-    else:
-        other_positions = to_reported_positions(reported_positions, len(other))
+    other_positions = points[other] if reported_positions is None else np.asarray(reported_positions)
     is_equal = speeds[robot] == speeds[other]
     equal_cells = partition(
         points,
@@ -182,7 +188,7 @@ def partition_by_travel_time(
     mass = np.where(moments[:, 0] < _MIN_AREA * region.area, 0.0, moments[:, 0])
     centroid = points + moments[:, 1:3] / np.where(mass > 0.0, mass, np.inf)[:, None]
     speeds.setflags(write=False)
-    cells = WeightedCells(
+    return WeightedCells(
         generators=points,
         mass=np.where(is_straight, equal_cells.mass, mass),
         centroid=np.where(is_straight[:, None], equal_cells.centroid, centroid),
@@ -190,7 +196,6 @@ def partition_by_travel_time(
         pieces=pieces,
         region=region,
     )
-    return apply_density(cells, density)
 
 
 def _convert_speeds(values: object, robots: int) -> Array:

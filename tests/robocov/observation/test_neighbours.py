@@ -44,7 +44,7 @@ def seen(positions: np.ndarray, neighbours: Neighbours) -> Observations:
     return Observations(positions, positions, neighbours, positions, SQUARE)
 
 
-def test_without_limits_everybody_hears_everybody() -> None:
+def test_infinite_ranges_give_the_complete_graph() -> None:
     positions = np.array([[0.0, 0.0], [1e5, 0.0], [0.0, 2.0]])
     neighbours = Neighbours.from_ranges(positions, np.full(3, np.inf))
     assert neighbours.is_complete
@@ -53,7 +53,7 @@ def test_without_limits_everybody_hears_everybody() -> None:
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(0, 2), (2, 0)]
 
 
-def test_close_pairs_of_neighbours_only() -> None:
+def test_near_neighbours_are_within_communication_range() -> None:
     positions = np.array([[0.0, 0.0], [1.0, 0.0], [1.5, 0.0]])
     neighbours = Neighbours.from_ranges(positions, np.array([0.5, 3.0, 3.0]))
     first, second, offset, distance = seen(positions, neighbours).find_near_neighbours(2.0)

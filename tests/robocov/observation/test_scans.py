@@ -28,7 +28,7 @@ class Looking:
         return Decision(np.zeros_like(seen.positions), memory=memory)
 
 
-def test_scans_come_when_they_are_asked_for(cluttered: Environment) -> None:
+def test_scans_arrive_with_the_requested_period(cluttered: Environment) -> None:
     simulation = Simulation(cluttered, Looking(), [[1.0, 2.0], [1.5, 2.0]], dt=0.02)
     for _ in range(11):
         simulation.step()
@@ -40,7 +40,7 @@ def test_scans_come_when_they_are_asked_for(cluttered: Environment) -> None:
         assert each.memory == (0.0, 0.1, 0.2, 0.3)
 
 
-def test_scans_of_a_team_are_those_of_each_robot(cluttered: Environment) -> None:
+def test_a_team_scan_equals_the_scans_of_single_robots(cluttered: Environment) -> None:
     sensor = RangeSensor(build_solid_pieces(cluttered))
     places = np.array([[1.0, 2.0], [1.5, 2.2], [0.6, 4.0]])
     ranges = np.array([0.7, 2.0, np.inf])
@@ -65,12 +65,12 @@ def test_scans_of_a_team_are_those_of_each_robot(cluttered: Environment) -> None
         ({"period": float("nan")}, "scanning.period: nan"),
     ],
 )
-def test_what_cannot_be_scanned_is_told(values: dict[str, object], message: str) -> None:
+def test_invalid_scan_settings_are_rejected(values: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         Scanning(**values)  # type: ignore[arg-type]
 
 
-def test_periods_are_whole_steps() -> None:
+def test_periods_are_rounded_to_whole_steps() -> None:
     assert Scanning(period=0.5).count_steps(1 / 60) == 30
     assert Scanning(period=0.0).count_steps(0.02) == 1
     np.testing.assert_allclose(compute_headings(4), [[1, 0], [0, 1], [-1, 0], [0, -1]], atol=1e-15)

@@ -25,7 +25,7 @@ def arcs(start: np.ndarray, end: np.ndarray, half_angle: float) -> np.ndarray:
 
 
 @given(seeds, st.floats(-8.0, 0.0), st.sampled_from([-1.0, 1.0]))
-def test_an_arc_adds_what_quadrature_along_it_adds(seed: int, log_size: float, sign: float) -> None:
+def test_moments_of_an_arc_agree_with_quadrature(seed: int, log_size: float, sign: float) -> None:
     rng = np.random.default_rng(seed)
     start, end = rng.normal(size=(2, 2))
     half = sign * np.pi / 2 * 10.0**log_size
@@ -46,7 +46,7 @@ def test_an_arc_adds_what_quadrature_along_it_adds(seed: int, log_size: float, s
 
 
 @pytest.mark.parametrize("pieces", [2, 3, 7, 40])
-def test_a_whole_circle(pieces: int) -> None:
+def test_moments_of_a_whole_circle(pieces: int) -> None:
     ((area, *first, polar),) = compute_moments(circle(2.0, pieces, centre=(5.0, 1.0)), 1)
     assert area == pytest.approx(4 * np.pi, rel=1e-14)
     np.testing.assert_allclose(first, 4 * np.pi * np.array([5.0, 1.0]), rtol=1e-13)
@@ -54,7 +54,7 @@ def test_a_whole_circle(pieces: int) -> None:
     assert polar == pytest.approx(8 * np.pi + 4 * np.pi * 26.0, rel=1e-13)
 
 
-def test_no_digit_is_lost_where_an_arc_is_almost_a_segment() -> None:
+def test_almost_straight_arcs_keep_all_digits() -> None:
     """The closed form of the area, r² (x - sin x cos x), has none left there."""
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     half = 1e-9
@@ -63,9 +63,7 @@ def test_no_digit_is_lost_where_an_arc_is_almost_a_segment() -> None:
 
 
 @given(st.floats(0.01, 50.0), st.integers(2, 9), st.floats(1e-4, 0.5))
-def test_chords_leave_their_arc_by_no_more_than_is_allowed(
-    radius: float, pieces: int, sagitta: float
-) -> None:
+def test_chords_deviate_by_at_most_the_allowed_distance(radius: float, pieces: int, sagitta: float) -> None:
     table = circle(radius, pieces)
     for line, row in zip(split_into_chords(table, sagitta), table, strict=True):
         np.testing.assert_array_equal(line[[0, -1]].ravel(), row[:4])
@@ -79,7 +77,7 @@ def test_segments_stay_segments() -> None:
     np.testing.assert_array_equal(line, [[0.0, 0.0], [1.0, 1.0]])
 
 
-def test_rings_are_found_from_pieces_in_any_order() -> None:
+def test_rings_are_linked_from_pieces_in_any_order() -> None:
     outer, hole = circle(3.0, 5), circle(1.0, 3, turns=-1, centre=(0.5, 0.5))
     order = np.random.default_rng(0).permutation(8)
     found = link_rings(np.concatenate([outer, hole])[order], 1e-5)

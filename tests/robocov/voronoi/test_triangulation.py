@@ -39,13 +39,13 @@ CORNERS = 40.0 * np.array([[np.cos(a), np.sin(a)] for a in 2 * np.pi / 3 * np.ar
 
 
 @kernel
-def mended(mesh: Mesh, points: Array) -> bool:
+def update(mesh: Mesh, points: Array) -> bool:
     return update_triangulation(mesh, points, np.empty(mesh.shape[1]), np.empty(mesh.shape[1], np.intp))
 
 
-def fitted(points: Array, warm: Mesh | None = None) -> Mesh:
+def triangulate(points: Array, warm: Mesh | None = None) -> Mesh:
     mesh = np.full((2, 8 * len(points) + 4), -1, np.int32) if warm is None else warm.copy()
-    assert mended(mesh, np.concatenate([points, CORNERS]))
+    assert update(mesh, np.concatenate([points, CORNERS]))
     return mesh
 
 
@@ -87,7 +87,7 @@ def assert_same_cells(warm: VoronoiPartition, cold: VoronoiPartition, region: Re
         assert warm.edges.start.tobytes() == cold.edges.start.tobytes()
 
 
-def test_robots_on_the_boundary_and_outside_have_whole_polygons() -> None:
+def test_robots_on_the_boundary_and_outside_have_complete_polygons() -> None:
     rng = np.random.default_rng(5)
     inner = scattered(SQUARE, 30, rng) * 0.8 + 0.6
     points = np.concatenate([inner, [[3.0, -0.05], [6.0, 2.5], [0.0, 1.0]]])
@@ -99,7 +99,7 @@ def test_robots_on_the_boundary_and_outside_have_whole_polygons() -> None:
 
 @pytest.mark.parametrize("name", REGIONS)
 @pytest.mark.parametrize("n", [16, 50, 200])
-def test_both_paths_agree(n: int, name: str) -> None:
+def test_triangulated_and_clipped_cells_agree(n: int, name: str) -> None:
     region = REGIONS[name]
     points = scattered(region, n, np.random.default_rng(n))
     quick, slow = partition(points, region), clipped(points, region)
@@ -116,7 +116,7 @@ def test_both_paths_agree(n: int, name: str) -> None:
 
 @pytest.mark.parametrize("name", REGIONS)
 @pytest.mark.parametrize("side", [4, 7, 12])
-def test_lattices_do_not_need_the_slow_path(side: int, name: str) -> None:
+def test_lattices_are_triangulated(side: int, name: str) -> None:
     """All cocircular by fours, hulls collinear, and in the square and the round rays that end in corners."""
     region = REGIONS[name]
     points = 0.75 * region.centroid + 0.25 * lattice(region, side * side, np.random.default_rng(side))
@@ -134,7 +134,7 @@ def test_lattices_do_not_need_the_slow_path(side: int, name: str) -> None:
 
 @settings(deadline=None, max_examples=60)
 @given(seeds, names, families, st.integers(16, 50), st.floats(-6.0, 0.0))
-def test_cells_do_not_depend_on_the_way_here(
+def test_cells_do_not_depend_on_the_previous_triangulation(
     seed: int, name: str, family: Family, n: int, exponent: float
 ) -> None:
     region, rng = REGIONS[name], np.random.default_rng(seed)
@@ -143,10 +143,10 @@ def test_cells_do_not_depend_on_the_way_here(
         cells = partition(points, region, triangulation=warm)
         assert_same_cells(cells, partition(points, region), region)
         warm = warm if cells.triangulation is None else cells.triangulation
-        points = moved(points, region, 10.0**exponent, rng)
+        points = move_points(points, region, 10.0**exponent, rng)
 
 
-def moved(points: Array, region: Region, step: float, rng: np.random.Generator) -> Array:
+def move_points(points: Array, region: Region, step: float, rng: np.random.Generator) -> Array:
     """Return the points after one of several ways to go, none far out of the region."""
     middle = points.mean(axis=0)
     line = rng.normal(size=2)
@@ -171,11 +171,11 @@ def moved(points: Array, region: Region, step: float, rng: np.random.Generator) 
 @pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(seeds, st.sampled_from(FAMILIES[:3]), st.integers(4, 25), st.floats(-4.0, 0.5))
-def test_what_is_mended_is_delaunay(seed: int, family: Family, n: int, exponent: float) -> None:
+def test_a_repaired_mesh_is_delaunay(seed: int, family: Family, n: int, exponent: float) -> None:
     rng = np.random.default_rng(seed)
     points, warm = family(SQUARE, n, rng), None
     for _ in range(4):
-        warm = fitted(points, warm)
+        warm = triangulate(points, warm)
         assert_delaunay(warm, points)
         points = np.clip(points + 10.0**exponent * rng.normal(size=points.shape), -9.0, 15.0)
 
@@ -183,31 +183,31 @@ def test_what_is_mended_is_delaunay(seed: int, family: Family, n: int, exponent:
 @pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(seeds, st.integers(16, 40))
-def test_a_triangulation_of_other_places_does_no_harm(seed: int, n: int) -> None:
+def test_a_triangulation_of_other_points_can_be_passed(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
     elsewhere = partition(scattered(PENTAGON, n, rng), PENTAGON).triangulation
     points = scattered(SQUARE, n, rng)
     assert_same_cells(partition(points, SQUARE, triangulation=elsewhere), partition(points, SQUARE), SQUARE)
     mirrored = points * [-1.0, 1.0]
-    assert_delaunay(fitted(mirrored, fitted(points)), mirrored)
+    assert_delaunay(triangulate(mirrored, triangulate(points)), mirrored)
 
 
 @pytest.mark.slow
-def test_slow_robots_need_no_second_triangulation() -> None:
+def test_the_mesh_of_slow_robots_is_repaired() -> None:
     """Flips alone keep it Delaunay: robots on the hull included, which may leave and enter it."""
     rng = np.random.default_rng(8)
     x, y = np.meshgrid(np.linspace(0.0, 6.0, 8), np.linspace(0.0, 6.0, 8))
     home = np.column_stack([x.ravel(), y.ravel()])
     points = home + rng.uniform(-0.1, 0.1, home.shape)
-    mesh = fitted(points)
+    mesh = triangulate(points)
     shapes, velocity = set(), rng.normal(size=points.shape)
     for _ in range(150):
         points = points + 0.004 * velocity
         velocity -= 0.1 * (points - home)
-        mesh = fitted(points, mesh)
+        mesh = triangulate(points, mesh)
         shapes.add(tuple(triangles(mesh)))
     assert_delaunay(mesh, points)
-    assert (mesh != fitted(points)).any()
+    assert (mesh != triangulate(points)).any()
     assert len(shapes) > 50
 
 
@@ -224,7 +224,7 @@ def test_a_team_on_a_circle_needs_no_clipping(name: str) -> None:
             assert cells.mass == pytest.approx(clipped(points, REGIONS[name]).mass, rel=1e-9)
 
 
-def test_without_triangulation_there_is_nothing_to_hand_on() -> None:
+def test_small_teams_have_no_triangulation() -> None:
     points = scattered(SQUARE, 20, np.random.default_rng(0))
     mesh = partition(points, SQUARE).triangulation
     assert mesh is not None
@@ -247,7 +247,7 @@ class Home:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", [Rapf(), Lloyd(), Individually(Home())], ids=lambda law: law.name)
-def test_thousands_of_steps_have_the_cells_of_the_first(controller: Controller) -> None:
+def test_repairs_stay_correct_for_thousands_of_steps(controller: Controller) -> None:
     room = Environment(
         "room",
         ((0, 0), (14, 0), (14, 9), (0, 9)),

@@ -52,7 +52,7 @@ def test_every_family_is_exact(seed: int, name: str, family: Family, n: int) -> 
     assert_exact(clipped(points, region), region)
 
 
-def test_one_robot_has_the_region() -> None:
+def test_one_robot_gets_the_whole_region() -> None:
     cells = partition(np.array([[1.0, 1.0]]), PENTAGON)
     assert cells.mass == pytest.approx([PENTAGON.area])
     assert cells.centroid == pytest.approx(PENTAGON.centroid[None])
@@ -60,7 +60,7 @@ def test_one_robot_has_the_region() -> None:
     assert cells.adjacency.shape == (0, 2)
 
 
-def test_no_robots_no_cells() -> None:
+def test_an_empty_team_has_no_cells() -> None:
     cells = partition(np.empty((0, 2)), SQUARE)
     assert cells.mass.shape == (0,)
     assert cells.centroid.shape == (0, 2)
@@ -68,7 +68,7 @@ def test_no_robots_no_cells() -> None:
     assert cells.adjacency.shape == (0, 2)
 
 
-def test_nine_robots_on_a_lattice_have_the_ninths_of_a_square() -> None:
+def test_nine_robots_on_a_lattice_get_a_ninth_of_the_square_each() -> None:
     x, y = np.meshgrid([1.0, 3.0, 5.0], [1.0, 3.0, 5.0])
     points = np.column_stack([x.ravel(), y.ravel()])
     across = [(0, 1), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 6), (4, 5), (4, 7), (5, 8), (6, 7), (7, 8)]
@@ -147,7 +147,7 @@ def test_parallel_axis(seed: int, n: int) -> None:
 
 @settings(deadline=None, max_examples=120)
 @given(seeds, st.integers(1, 40), st.floats(0.0, 6.3), st.booleans())
-def test_turned_and_mirrored(seed: int, n: int, angle: float, mirror: bool) -> None:
+def test_cells_turn_and_mirror_with_the_robots(seed: int, n: int, angle: float, mirror: bool) -> None:
     points = scattered(PENTAGON, n, np.random.default_rng(seed))
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     if mirror:
@@ -180,13 +180,13 @@ def test_coincident_robots_get_the_same_cell() -> None:
         assert twice.polygons[n].tolist() == twice.polygons[0].tolist()
 
 
-def test_all_at_one_place_have_the_region_each() -> None:
+def test_robots_at_one_position_get_the_region_each() -> None:
     cells = partition(np.full((7, 2), 1.5), PENTAGON)
     assert cells.mass == pytest.approx(np.full(7, PENTAGON.area))
     assert cells.adjacency.shape == (0, 2)
 
 
-def test_an_empty_cell_has_its_generator_for_centroid() -> None:
+def test_the_centroid_of_an_empty_cell_is_its_generator() -> None:
     cells = partition(np.array([[1.0, 1.0], [-9.0, 1.0], [5.0, 5.0]]), SQUARE)
     assert cells.mass[1] == 0.0
     assert cells.centroid[1].tolist() == [-9.0, 1.0]
@@ -197,7 +197,7 @@ def test_an_empty_cell_has_its_generator_for_centroid() -> None:
 
 @settings(deadline=None, max_examples=200)
 @given(seeds, st.integers(2, 90), st.floats(0.1, 5.0))
-def test_a_cell_depends_on_the_heard_alone_to_the_last_bit(seed: int, n: int, range_: float) -> None:
+def test_a_cell_depends_only_on_the_neighbours_to_the_last_bit(seed: int, n: int, range_: float) -> None:
     rng = np.random.default_rng(seed)
     points = scattered(SQUARE, n, rng)
     robot = int(rng.integers(n))
@@ -226,7 +226,7 @@ def test_a_cell_depends_on_the_heard_alone_to_the_last_bit(seed: int, n: int, ra
 
 @settings(deadline=None, max_examples=120)
 @given(seeds, st.integers(1, 12), st.floats(0.1, 6.0))
-def test_limited_cells_are_those_of_the_heard_alone(seed: int, n: int, range_: float) -> None:
+def test_limited_cells_equal_those_of_the_neighbours_alone(seed: int, n: int, range_: float) -> None:
     points = scattered(PENTAGON, n, np.random.default_rng(seed))
     neighbours = Neighbours.from_ranges(points, np.full(n, range_))
     cells = partition(points, PENTAGON, neighbours)
@@ -252,7 +252,7 @@ def test_adjacent_cells_share_a_piece_of_boundary() -> None:
 
 
 @pytest.mark.parametrize("n", [2, 6, 50])
-def test_the_same_input_gives_the_same_bits_and_nothing_changes_it(n: int) -> None:
+def test_equal_input_gives_equal_bits_and_read_only_cells(n: int) -> None:
     points = scattered(PENTAGON, n, np.random.default_rng(n))
     first = partition(points, PENTAGON)
     second = partition(points, Region(PENTAGON.vertices))
@@ -269,14 +269,14 @@ def test_the_same_input_gives_the_same_bits_and_nothing_changes_it(n: int) -> No
 
 @pytest.mark.parametrize("n", [1, 9])
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_points_that_are_not_finite_are_named(n: int, bad: float) -> None:
+def test_generators_that_are_not_finite_are_named(n: int, bad: float) -> None:
     points = scattered(SQUARE, n, np.random.default_rng(0))
     points[n // 2, 1] = bad
     with pytest.raises(InputError, match=rf"^generators\[{n // 2}\]: .*finite"):
         partition(points, SQUARE)
 
 
-def test_points_of_the_wrong_shape_are_named() -> None:
+def test_generators_of_the_wrong_shape_are_rejected() -> None:
     with pytest.raises(InputError, match=r"shape \(n, 2\), got shape \(3,\)"):
         partition(np.zeros(3), SQUARE)
 
@@ -291,3 +291,5 @@ def test_neighbours_that_do_not_fit_the_generators_are_rejected() -> None:
         partition(points, SQUARE, neighbours, reported_positions=points)
     with pytest.raises(InputError, match=r"reported_positions: expected shape \(4, 2\), got \(3, 2\)"):
         partition_by_travel_time(points, [1.0, 2.0, 3.0], SQUARE, neighbours, reported_positions=points)
+    with pytest.raises(InputError, match="neighbours: expected a graph of 2 robots, got 3"):
+        partition_by_travel_time(points[:2], [1.0, 2.0], SQUARE, neighbours)

@@ -38,7 +38,7 @@ SPEEDS = {
 }
 
 
-def buffered(
+def build_cell_of_discs(
     i: int, points: np.ndarray, speeds: np.ndarray, region: Region, heard: np.ndarray
 ) -> shapely.Geometry:
     """Return a cell by shapely's buffers: the region, cut by discs and half planes one after the other."""
@@ -77,7 +77,7 @@ def test_cells_tile_the_region(seed: int, name: str, family: str, speeds: str, n
 
 @settings(max_examples=12)
 @given(seeds, st.sampled_from(["square", "pentagon", "triangle", "corridor"]), st.floats(1.0, 9.0))
-def test_cells_are_those_of_buffers_that_shapely_cuts(seed: int, name: str, reach: float) -> None:
+def test_cells_agree_with_discs_cut_by_shapely(seed: int, name: str, reach: float) -> None:
     rng = np.random.default_rng(seed)
     region = REGIONS[name]
     points = scattered(region, int(rng.integers(2, 9)), rng)
@@ -86,7 +86,7 @@ def test_cells_are_those_of_buffers_that_shapely_cuts(seed: int, name: str, reac
     neighbours = Neighbours.from_ranges(points, np.full(n, reach))
     cells = partition_by_travel_time(points, speeds, region, neighbours)
     for i in range(n):
-        expected = buffered(i, points, speeds, region, neighbours.list_neighbours(i))
+        expected = build_cell_of_discs(i, points, speeds, region, neighbours.list_neighbours(i))
         assert cells.mass[i] == pytest.approx(expected.area, abs=1e-6 * region.area)
         if expected.area > 1e-3 * region.area:
             np.testing.assert_allclose(cells.centroid[i], expected.centroid.coords[0], atol=1e-4)
@@ -94,7 +94,7 @@ def test_cells_are_those_of_buffers_that_shapely_cuts(seed: int, name: str, reac
 
 @settings(max_examples=40)
 @given(seeds, st.integers(1, 30))
-def test_every_place_is_in_the_cell_of_whoever_is_there_first(seed: int, n: int) -> None:
+def test_each_point_is_in_the_cell_of_the_robot_that_arrives_first(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
     points = scattered(PENTAGON, n, rng)
     speeds = rng.choice([0.5, 1.0, 1.5], n)
@@ -128,7 +128,7 @@ def test_equal_speeds_give_the_ordinary_cells_to_the_last_bit(seed: int, name: s
 
 @settings(max_examples=40)
 @given(seeds, st.sampled_from(["square", "pentagon", "triangle"]), st.integers(2, 30))
-def test_speeds_that_hardly_differ_give_hardly_other_cells(seed: int, name: str, n: int) -> None:
+def test_nearly_equal_speeds_give_nearly_equal_cells(seed: int, name: str, n: int) -> None:
     """The circles have radii of 10^13 m here, and the ordinary cells come out of them to 1e-12."""
     rng = np.random.default_rng(seed)
     points = scattered(REGIONS[name], n, rng)
@@ -155,7 +155,7 @@ def test_a_fast_robot_encloses_a_slow_one_whose_cell_is_a_disc() -> None:
     assert shapely.Polygon(outlines[2]).area == pytest.approx(cells.mass[0], rel=0.01)
 
 
-def test_a_cell_in_two_pieces_and_a_centroid_that_is_not_in_it() -> None:
+def test_a_cell_may_have_two_components_and_a_centroid_outside() -> None:
     corridor = REGIONS["corridor"]
     cells = partition_by_travel_time(np.array([[20.0, 0.5], [19.0, 0.5]]), np.array([1.0, 4.0]), corridor)
     assert isinstance(cells, WeightedCells)
@@ -171,7 +171,7 @@ def test_a_cell_in_two_pieces_and_a_centroid_that_is_not_in_it() -> None:
     assert cells.centroid[1, 0] > 19.0
 
 
-def test_circles_that_are_parallel_lines_but_for_the_last_bits() -> None:
+def test_speeds_that_differ_by_rounding() -> None:
     """Whether and where they meet, 10^20 m away, is rounding; which is the nearer one is not."""
     points = PENTAGON.centroid + np.array([[0.0, 0.0], [2.0**-6, 0.0], [2.0**-5, 0.0]])
     speeds = 1.0 + 4.0 * np.finfo(float).eps * np.arange(3)
@@ -181,7 +181,7 @@ def test_circles_that_are_parallel_lines_but_for_the_last_bits() -> None:
     )
 
 
-def test_robots_in_one_place() -> None:
+def test_robots_at_one_position() -> None:
     points = np.array([[2.0, 3.0], [2.0, 3.0], [4.0, 3.0], [2.0, 3.0]])
     cells = partition_by_travel_time(points, np.array([1.0, 2.0, 2.0, 2.0]), SQUARE)
     assert cells.mass[0] == 0.0
@@ -192,7 +192,7 @@ def test_robots_in_one_place() -> None:
 
 @settings(max_examples=15)
 @given(seeds, st.integers(2, 20))
-def test_the_centroid_is_where_the_cost_of_the_cells_has_no_slope(seed: int, n: int) -> None:
+def test_the_cost_of_given_cells_is_minimal_at_the_centroid(seed: int, n: int) -> None:
     """H = sum of the integrals of (|q - p| / v)² over the cells: dH/dp = 2 M (p - C) / v²."""
     rng = np.random.default_rng(seed)
     points = scattered(SQUARE, n, rng)
@@ -213,7 +213,7 @@ def test_the_centroid_is_where_the_cost_of_the_cells_has_no_slope(seed: int, n: 
 
 @settings(max_examples=40)
 @given(seeds, st.integers(2, 25), st.floats(0.5, 6.0))
-def test_a_cell_depends_on_nothing_but_whom_its_robot_hears(seed: int, n: int, reach: float) -> None:
+def test_a_cell_depends_only_on_the_neighbours_of_its_robot(seed: int, n: int, reach: float) -> None:
     rng = np.random.default_rng(seed)
     points = scattered(SQUARE, n, rng)
     speeds = rng.choice([0.5, 1.0], n)
@@ -234,7 +234,7 @@ def test_a_cell_depends_on_nothing_but_whom_its_robot_hears(seed: int, n: int, r
     assert before.centroid[i].tobytes() == after.centroid[i].tobytes()
 
 
-def test_neighbours_may_be_believed_elsewhere() -> None:
+def test_reported_positions_replace_the_true_ones() -> None:
     points = np.array([[1.0, 1.0], [5.0, 1.0], [3.0, 5.0]])
     speeds = np.array([1.0, 2.0, 1.0])
     neighbours = Neighbours.from_ranges(points, np.full(3, 100.0))
