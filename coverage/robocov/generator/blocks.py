@@ -97,7 +97,7 @@ def city(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[
     found = [scale(block, part, part, origin="centroid") for block in found]
     if not all(map(_stout, found)):
         return None
-    return [PolygonObstacle(request.ring(shapely.get_coordinates(block)[:-1])) for block in found]
+    return [PolygonObstacle(request.build_ring(shapely.get_coordinates(block)[:-1])) for block in found]
 
 
 def town_cells(request: Request, rng: np.random.Generator) -> list[Cell] | None:

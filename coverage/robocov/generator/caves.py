@@ -89,7 +89,7 @@ def cave(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[
         radius = (low + high) / 2.0
         space = free(middle, radius)
         rings = space.exterior, *space.interiors
-        outline, *pillars = (request.ring(shapely.get_coordinates(ring)[:-1]) for ring in rings)
+        outline, *pillars = (request.build_ring(shapely.get_coordinates(ring)[:-1]) for ring in rings)
         space = Polygon(outline, pillars)
         if abs(blocked(space) - request.area) > _CLOSE * AREA_TOLERANCE:
             return None

@@ -98,7 +98,7 @@ def _grid(request: Request, shape: Cell, thickness: float) -> list[list[float]]:
     lines = []
     for length, count in zip((request.width, request.height), shape, strict=True):
         inner = np.arange(1, count, dtype=np.float64) * ((length + thickness) / count) - thickness / 2.0
-        lines.append([0.0, *request.rounded(inner).tolist(), float(length)])
+        lines.append([0.0, *request.round_points(inner).tolist(), float(length)])
     return lines
 
 

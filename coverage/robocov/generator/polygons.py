@@ -9,40 +9,64 @@ from robocov.arrays import Array
 from robocov.environment import DiscStart, Obstacle, PolygonObstacle
 from robocov.generator.request import Request
 
-MIX = {"convex": 0.6, "L": 0.2, "U": 0.2}
-"""Chances of the shapes. A U that would be too narrow for the gap becomes an L."""
+SHAPE_PROBABILITIES = {"convex": 0.6, "L": 0.2, "U": 0.2}
+"""A U that would be too narrow for the gap becomes an L."""
 
-_SPREAD = 0.5, 1.5  # least and largest area of an obstacle, as parts of the mean
-_DENSEST = 0.7  # part of the map that obstacles fill at most, with the gaps around them counted half
-_MOVES = 12  # obstacles that are moved so that others find a place, before that is given up
-_OUTLINES, _PLACES = 8, 128  # outlines that are tried for one obstacle, and places for each of them
-_REDRAWS = 8  # draws of a shape that is better than the first, or possible at all
-_ROUND = 0.52  # least area of a convex polygon, in circles of the same length; a regular triangle has 0.6
+_MIN_AREA_RATIO = 0.5
+_MAX_AREA_RATIO = 1.5
+"""Smallest and largest area of an obstacle, relative to the mean."""
+_MAX_FILLED_FRACTION = 0.7
+"""Fraction of the map that obstacles fill at most, counting half of the gaps around them."""
+_MAX_MOVES = 12
+"""Obstacles that are moved so that others find room, before the layout is given up."""
+_MAX_OUTLINES = 8
+"""Outlines that are tried for one obstacle."""
+_POSITIONS_PER_OUTLINE = 128
+_MAX_REDRAWS = 8
+"""Times that a shape is drawn again until it is good."""
+_MIN_ROUNDNESS = 0.52
+"""Smallest area of a convex polygon, relative to the circle of the same perimeter (regular triangle: 0.6)."""
+_TOLERANCE_M = 1e-9
 
 
-def scattered(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
-    """Return obstacles that keep `gap` from each other and from the boundary; None if they found no place."""
-    areas = np.sort(rng.uniform(*_SPREAD, request.obstacles))[::-1]  # the largest is placed first
+def scatter_polygons(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
+    """Scatter obstacles that keep the gap from each other and from the boundary.
+
+    Parameters
+    ----------
+    request : Request
+    corner : DiscStart
+        Disc that stays free.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    list of Obstacle or None
+        None if the obstacles find no room.
+    """
+    areas = rng.uniform(_MIN_AREA_RATIO, _MAX_AREA_RATIO, request.obstacles)
+    areas = np.sort(areas)[::-1]  # The largest is placed first.
     areas *= request.blocked / areas.sum()
-    # a disc takes the least
-    filled = float((np.pi * (np.sqrt(areas / np.pi) + request.gap / 2.0) ** 2).sum())
-    if filled > _DENSEST * (request.width - request.gap) * (request.height - request.gap):
+    if _are_too_large(areas, request):
         return None
-    clear = shapely.Point(corner.center).buffer(corner.radius)
-    shapely.prepare(clear)
-    shapes = rng.choice(list(MIX), size=request.obstacles, p=list(MIX.values()))
+    kept_free = shapely.Point(corner.center).buffer(corner.radius)
+    shapely.prepare(kept_free)
+    names = list(SHAPE_PROBABILITIES)
+    shapes = rng.choice(names, size=request.obstacles, p=list(SHAPE_PROBABILITIES.values()))
     waiting = list(zip(shapes.tolist(), areas.tolist(), strict=True))[::-1]
     placed: list[tuple[str, float]] = []
     outlines: list[shapely.Polygon] = []
-    moves = _MOVES
+    moves = 0
     while waiting:
-        found = _placed(request, *waiting[-1], np.array(outlines, dtype=object), clear, rng)
-        if found is not None:
-            outlines.append(found)
+        shape, area = waiting[-1]
+        others = np.array(outlines, dtype=object)
+        outline = _place_shape(request, shape, area, others, kept_free, rng)
+        if outline is not None:
+            outlines.append(outline)
             placed.append(waiting.pop())
-        elif moves and placed:
-            # another one makes room, and looks for a new place after it
-            moves -= 1
+        elif moves < _MAX_MOVES and placed:
+            # Another obstacle makes room, and is placed again after this one.
+            moves += 1
             other = int(rng.integers(len(placed)))
             waiting.insert(-1, placed.pop(other))
             outlines.pop(other)
@@ -51,74 +75,142 @@ def scattered(request: Request, corner: DiscStart, rng: np.random.Generator) -> 
     return [PolygonObstacle(tuple(outline.exterior.coords[:-1])) for outline in outlines]
 
 
-def _placed(
-    request: Request, shape: str, area: float, others: Array, clear: shapely.Polygon, rng: np.random.Generator
+def _are_too_large(areas: Array, request: Request) -> bool:
+    """Return whether obstacles fill too much of the map, even as discs, which need the least room."""
+    radii = np.sqrt(areas / np.pi) + request.gap / 2.0
+    filled_area = float((np.pi * radii**2).sum())
+    max_filled_area = _MAX_FILLED_FRACTION * (request.width - request.gap) * (request.height - request.gap)
+    return filled_area > max_filled_area
+
+
+def _place_shape(
+    request: Request,
+    shape: str,
+    area: float,
+    others: Array,
+    kept_free: shapely.Polygon,
+    rng: np.random.Generator,
 ) -> shapely.Polygon | None:
-    """Return an outline of a shape at the first of many places that is good, None for none."""
-    size, gap = request.size, request.gap
+    """Return an outline of a shape at the first of many random positions that is free; None if none is."""
+    gap = request.gap
+    size = request.size
     tree = shapely.STRtree(others)
-    for _ in range(_OUTLINES):
-        # corners are rounded later: no opening may become narrower than the gap by that
-        outline = u_shape(rng, area, gap + 3.0 * request.step) if shape == "U" else None
-        if outline is None:
-            outline = convex(rng, area) if shape == "convex" else l_shape(rng, area)
-        room = size - 2.0 * gap - np.ptp(outline, axis=0)
-        if (room < 0.0).any():
+    for _ in range(_MAX_OUTLINES):
+        outline = _draw_shape(request, shape, area, rng)
+        free_size = size - 2.0 * gap - np.ptp(outline, axis=0)
+        if (free_size < 0.0).any():
             continue
-        middle = size / 2.0 + (rng.random((_PLACES, 2)) - 0.5) * room
-        candidates = shapely.polygons(request.rounded(middle[:, None] + outline))
-        first, last = np.split(shapely.bounds(candidates), 2, axis=1)
-        good = shapely.disjoint(candidates, clear) & shapely.is_valid(candidates)
-        good &= ((first >= gap - 1e-9) & (last <= size - gap + 1e-9)).all(axis=1)
-        one, other = tree.query(shapely.box(*(first - gap).T, *(last + gap).T))
-        good[one[shapely.distance(candidates[one], others[other]) < gap]] = False
-        if good.any():
-            return candidates[int(good.argmax())]
+        offsets = rng.random((_POSITIONS_PER_OUTLINE, 2)) - 0.5
+        middles = size / 2.0 + offsets * free_size
+        candidates = shapely.polygons(request.round_points(middles[:, None] + outline))
+        low, high = np.split(shapely.bounds(candidates), 2, axis=1)
+        is_good = shapely.disjoint(candidates, kept_free) & shapely.is_valid(candidates)
+        is_good &= ((low >= gap - _TOLERANCE_M) & (high <= size - gap + _TOLERANCE_M)).all(axis=1)
+        search_boxes = shapely.box(low[:, 0] - gap, low[:, 1] - gap, high[:, 0] + gap, high[:, 1] + gap)
+        candidate, other = tree.query(search_boxes)
+        is_too_close = shapely.distance(candidates[candidate], others[other]) < gap
+        is_good[candidate[is_too_close]] = False
+        if is_good.any():
+            return candidates[int(is_good.argmax())]
     return None
 
 
-def convex(rng: np.random.Generator, area: float) -> Array:
-    """Return a convex polygon of 3 to 7 vertices on an ellipse, no needle, (k, 2) m."""
-    for _ in range(_REDRAWS):
+def _draw_shape(request: Request, shape: str, area: float, rng: np.random.Generator) -> Array:
+    """Return a random outline of a shape, (k, 2) m."""
+    if shape == "convex":
+        return draw_convex_polygon(rng, area)
+    if shape == "U":
+        # Corners are rounded later, which must not make the opening narrower than the gap.
+        outline = draw_u_shape(rng, area, request.gap + 3.0 * request.step)
+        if outline is not None:
+            return outline
+    return draw_l_shape(rng, area)
+
+
+def draw_convex_polygon(rng: np.random.Generator, area: float) -> Array:
+    """Draw a convex polygon of 3 to 7 vertices on an ellipse that is not too thin.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    area : float, m²
+
+    Returns
+    -------
+    (k, 2) array, m
+    """
+    for _ in range(_MAX_REDRAWS):
         count = int(rng.choice([3, 4, 5, 6, 7], p=[0.1, 0.25, 0.3, 0.2, 0.15]))
-        between = 0.4 + rng.random(count)
-        angle = np.cumsum(between) * (2.0 * np.pi / between.sum())
+        angle_steps = 0.4 + rng.random(count)
+        angles = np.cumsum(angle_steps) * (2.0 * np.pi / angle_steps.sum())
         stretch = rng.uniform(1.0, 1.7)
-        outline = np.column_stack([stretch * np.cos(angle), np.sin(angle)])
+        outline = np.column_stack([stretch * np.cos(angles), np.sin(angles)])
         polygon = shapely.Polygon(outline)
-        if 4.0 * math.pi * polygon.area >= _ROUND * polygon.length**2:
+        if 4.0 * math.pi * polygon.area >= _MIN_ROUNDNESS * polygon.length**2:
             break
-    return _fitted(outline, area, rng)
+    return _scale_and_rotate(outline, area, rng)
 
 
-def l_shape(rng: np.random.Generator, area: float) -> Array:
-    """Return an L of two arms, 0.3 to 0.5 of its sides thick, (6, 2) m."""
-    long = rng.uniform(1.0, 1.5)
-    thick, top = rng.uniform(0.3, 0.5, 2)
-    right = long * thick
-    outline = [(0.0, 0.0), (long, 0.0), (long, top), (right, top), (right, 1.0), (0.0, 1.0)]
-    return _fitted(np.array(outline), area, rng)
+def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
+    """Draw an L of two arms whose thickness is 0.3 to 0.5 of its sides.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    area : float, m²
+
+    Returns
+    -------
+    (6, 2) array, m
+    """
+    width = rng.uniform(1.0, 1.5)
+    relative_thickness, top = rng.uniform(0.3, 0.5, 2)
+    right = width * relative_thickness
+    outline = [(0.0, 0.0), (width, 0.0), (width, top), (right, top), (right, 1.0), (0.0, 1.0)]
+    return _scale_and_rotate(np.array(outline), area, rng)
 
 
-def u_shape(rng: np.random.Generator, area: float, opening: float) -> Array | None:
-    """Return a U that is open by at least `opening` (m), (8, 2) m; None if that is too much for its area."""
-    for _ in range(_REDRAWS):
-        wide = rng.uniform(1.0, 1.6)
+def draw_u_shape(rng: np.random.Generator, area: float, opening: float) -> Array | None:
+    """Draw a U with an opening of some width; its arms may differ in length.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    area : float, m²
+    opening : float, m
+        Smallest width of the opening.
+
+    Returns
+    -------
+    (8, 2) array, m, or None
+        None if the opening is too wide for the area.
+    """
+    for _ in range(_MAX_REDRAWS):
+        width = rng.uniform(1.0, 1.6)
         left, right = rng.uniform(0.2, 0.3, 2)
         base = rng.uniform(0.22, 0.35)
-        # arms may differ in length
-        other = rng.uniform(0.7, 1.0)
-        arms = (0.0, 0.0), (wide, 0.0), (wide, other), (wide - right, other)
-        outline = np.array([*arms, (wide - right, base), (left, base), (left, 1.0), (0.0, 1.0)])
+        right_height = rng.uniform(0.7, 1.0)
+        outline = np.array(
+            [
+                (0.0, 0.0),
+                (width, 0.0),
+                (width, right_height),
+                (width - right, right_height),
+                (width - right, base),
+                (left, base),
+                (left, 1.0),
+                (0.0, 1.0),
+            ]
+        )
         scale = math.sqrt(area / shapely.Polygon(outline).area)
-        if (wide - left - right) * scale >= opening:
-            return _fitted(outline, area, rng)
+        if (width - left - right) * scale >= opening:
+            return _scale_and_rotate(outline, area, rng)
     return None
 
 
-def _fitted(outline: Array, area: float, rng: np.random.Generator) -> Array:
-    """Return an outline scaled to its area, turned by some angle, its box around the origin."""
+def _scale_and_rotate(outline: Array, area: float, rng: np.random.Generator) -> Array:
+    """Return an outline with some area and a random direction, its bounding box around the origin."""
     angle = rng.uniform(0.0, 2.0 * np.pi)
-    turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
-    outline = outline @ turn * math.sqrt(area / shapely.Polygon(outline).area)
+    rotation = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    outline = outline @ rotation * math.sqrt(area / shapely.Polygon(outline).area)
     return np.asarray(outline - (outline.min(axis=0) + outline.max(axis=0)) / 2.0)

@@ -10,19 +10,37 @@ from robocov.environment import MIN_START_GAP_RADII, Ring
 from robocov.errors import require_number
 from robocov.team import DEFAULT_RADIUS
 
-LEAST_GAP = 0.21  # m; robots of the usual size pass it
-assert LEAST_GAP > 2.0 * DEFAULT_RADIUS * (1.0 + MIN_START_GAP_RADII)
-
+MIN_GAP_M = 0.21
+"""Robots of the default size fit through."""
+assert MIN_GAP_M > 2.0 * DEFAULT_RADIUS * (1.0 + MIN_START_GAP_RADII)
 AREA_TOLERANCE = 0.005
-"""Blocked area of a generated map, as a part of its area, differs by at most so much from what was asked."""
-
-MOST_OBSTACLES = 100_000
-SIDES = 1.0, 1000.0  # m
+"""Largest difference between the blocked fraction of a map's area and the requested one."""
+MAX_OBSTACLES = 100_000
+MIN_SIDE_M = 1.0
+MAX_SIDE_M = 1000.0
+_MIN_AREA = 0.01
+_MAX_AREA = 0.9
+_MIN_GAPS_PER_SIDE = 3.0
+_MIN_CENTIMETRE_GAP_M = 0.5
+"""Coordinates are rounded to centimetres from this gap on, to millimetres below."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """Request for a map, see `robocov.generator.generate_map`."""
+    """Parameters of a map, see `robocov.generator.generate_map`.
+
+    Attributes
+    ----------
+    obstacles : int
+    area : float
+        Blocked fraction of the map's area.
+    gap, width, height : float, m
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is out of range.
+    """
 
     obstacles: int
     area: float
@@ -31,11 +49,11 @@ class Request:
     height: float
 
     def __post_init__(self) -> None:
-        require_number("obstacles", self.obstacles, 1, MOST_OBSTACLES, whole=True)
-        require_number("area", self.area, 0.01, 0.9)
-        require_number("width", self.width, *SIDES)
-        require_number("height", self.height, *SIDES)
-        require_number("gap", self.gap, LEAST_GAP, min(self.width, self.height) / 3.0)
+        require_number("obstacles", self.obstacles, 1, MAX_OBSTACLES, whole=True)
+        require_number("area", self.area, _MIN_AREA, _MAX_AREA)
+        require_number("width", self.width, MIN_SIDE_M, MAX_SIDE_M)
+        require_number("height", self.height, MIN_SIDE_M, MAX_SIDE_M)
+        require_number("gap", self.gap, MIN_GAP_M, min(self.width, self.height) / _MIN_GAPS_PER_SIDE)
 
     @property
     def size(self) -> Array:
@@ -44,32 +62,61 @@ class Request:
 
     @property
     def blocked(self) -> float:
-        """The area to be blocked, m²."""
+        """Area to be blocked, m²."""
         return self.area * self.width * self.height
 
     @property
     def unit(self) -> float:
-        """The side of a square of which there is one for each obstacle, m."""
+        """Side of a square whose area is that of the map per obstacle, m."""
         return math.sqrt(self.width * self.height / self.obstacles)
 
     @property
     def digits(self) -> int:
-        """Digits after the point of all coordinates: centimetres, millimetres where gaps are narrow."""
-        return 2 if self.gap >= 0.5 else 3
+        """Decimal places of all coordinates: centimetres, or millimetres if gaps are narrow."""
+        return 2 if self.gap >= _MIN_CENTIMETRE_GAP_M else 3
 
     @property
     def step(self) -> float:
         """Rounding step of coordinates, m."""
         return 10.0**-self.digits
 
-    def rounded(self, points: Array) -> Array:
-        """Return coordinates rounded."""
+    def round_points(self, points: Array) -> Array:
+        """Round coordinates.
+
+        Parameters
+        ----------
+        points : array, m
+
+        Returns
+        -------
+        array, m
+            Without negative zeros.
+        """
         return np.round(points, self.digits) + 0.0
 
-    def ring(self, points: Array) -> Ring:
-        """Return (k, 2) coordinates, rounded, as an outline."""
-        return tuple((x, y) for x, y in self.rounded(points).tolist())
+    def build_ring(self, points: Array) -> Ring:
+        """Round coordinates to an outline.
 
-    def floor(self, value: float) -> float:
-        """Return a length rounded down."""
-        return round(math.floor(value / self.step + 1e-9) * self.step, self.digits)
+        Parameters
+        ----------
+        points : (k, 2) array, m
+
+        Returns
+        -------
+        (k, 2) tuple, m
+        """
+        return tuple((x, y) for x, y in self.round_points(points).tolist())
+
+    def round_down(self, length: float) -> float:
+        """Round a length down.
+
+        Parameters
+        ----------
+        length : float, m
+
+        Returns
+        -------
+        float, m
+        """
+        # The tolerance keeps lengths that are multiples of the step apart from rounding errors.
+        return round(math.floor(length / self.step + 1e-9) * self.step, self.digits)

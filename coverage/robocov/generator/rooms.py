@@ -98,7 +98,7 @@ def building(request: Request, corner: DiscStart, rng: np.random.Generator) -> l
     part = rng.uniform(least, most + (of_small - most) * small)
     half = min(part * request.area / _LENGTH, _THICKEST) * request.unit / 2.0
     # so that the faces of walls have rounded coordinates
-    thickness = 2.0 * max(request.floor(half), request.step)
+    thickness = 2.0 * max(request.round_down(half), request.step)
     plan = floor_plan(request, thickness, rng)
     if plan is None:
         return None
@@ -179,7 +179,7 @@ def _add_doors(request: Request, plan: FloorPlan, corridor: int | None, rng: np.
         one, other, side = plan.rooms[i], plan.rooms[j], 1 - wall.across
         # the end is before the begin where the wall does not lie between the two
         low, high = max(wall.begin, one[side], other[side]), min(wall.end, one[side + 2], other[side + 2])
-        wide = request.floor(min(float(widths[k]), high - low - 2.0 * stub))
+        wide = request.round_down(min(float(widths[k]), high - low - 2.0 * stub))
         if wide < request.gap + request.step or (joined.connected(i, j) and loop[k] > _LOOPS):
             continue
         begin = round(low + stub + (high - low - 2.0 * stub - wide) * float(place[k]), request.digits)
@@ -240,7 +240,7 @@ def _piece(
     size = np.array([long, deep] if rng.random() < 0.5 else [deep, long])
     if kind == "round table":
         size = np.full(2, 2.0 * math.sqrt(area / math.pi))
-    size = np.maximum(request.rounded(size), 4.0 * request.step)
+    size = np.maximum(request.round_points(size), 4.0 * request.step)
     space = np.array(room.sides) - size
     if (space < 0.0).any():
         return None
@@ -249,13 +249,13 @@ def _piece(
         # with its back to the wall
         side = int(size[0] > size[1])
         off[:, side] = space[side] * rng.integers(0, 2, _TRIES)
-    low = request.rounded(off + room[:2])
+    low = request.round_points(off + room[:2])
     free = np.column_stack([low - room[:2], np.array(room[2:]) - low - size])
     # what is round would touch a wall in a point
     against = (free < request.step / 2.0) & (kind != "round table")
     low = low[(against | (free >= request.gap)).all(axis=1)]
-    high, middle = request.rounded(low + size), request.rounded(low + size / 2.0)
-    radius = request.floor(size[0] / 2.0 - request.step / 2.0) if kind == "round table" else 0.0
+    high, middle = request.round_points(low + size), request.round_points(low + size / 2.0)
+    radius = request.round_down(size[0] / 2.0 - request.step / 2.0) if kind == "round table" else 0.0
     shapes = shapely.points(middle) if radius else shapely.box(*low.T, *high.T)
     good = shapely.distance(shapes, clear) > radius
     if others:

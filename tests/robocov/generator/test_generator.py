@@ -243,9 +243,9 @@ def test_rooms_have_walls_doors_and_furniture():
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ({"seed": -1}, "seed: -1, but a whole number of at least 0 was wanted"),
-        ({"seed": 1.5}, "seed: 1.5, but"),
-        ({"seed": True}, "seed: True, but"),
+        ({"seed": -1}, "seed: expected a whole number of at least 0, got -1"),
+        ({"seed": 1.5}, "seed: expected a whole number of at least 0, got 1.5"),
+        ({"seed": True}, "seed: expected a whole number of at least 0, got True"),
         ({"kind": "polygon"}, "unknown kind of map 'polygon': did you mean 'polygons'?"),
         ({"kind": ["rooms"]}, "unknown kind of map"),
         ({"obstacles": 0}, "obstacles: 0, but a whole number from 1 to 100000 was wanted"),
@@ -284,7 +284,8 @@ def test_what_is_impossible_is_given_up(words):
     with pytest.raises(ParameterError) as caught:
         generate_map(0, **words)
     assert str(caught.value).startswith(
-        f"area: {words['area']:g}, but no layout of {words['obstacles']} {GENERATORS[words['kind']].counted} "
+        f"area: no layout of {words['obstacles']} {GENERATORS[words['kind']].counted} was found "
+        f"that blocks {words['area']:g} of "
     )
 
 

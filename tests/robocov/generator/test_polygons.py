@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.generator.polygons import convex, l_shape, u_shape
+from robocov.generator.polygons import draw_convex_polygon, draw_l_shape, draw_u_shape
 
 SEEDS = st.integers(0, 2**32)
 AREAS = st.floats(0.05, 20.0)
@@ -22,7 +22,7 @@ def shape_of(outline, area):
 
 @given(SEEDS, AREAS)
 def test_convex_polygons_are_convex_and_no_needles(seed, area):
-    outline = convex(np.random.default_rng(seed), area)
+    outline = draw_convex_polygon(np.random.default_rng(seed), area)
     shape = shape_of(outline, area)
     assert 3 <= len(outline) <= 7
     assert shape.convex_hull.area == pytest.approx(area)
@@ -31,7 +31,7 @@ def test_convex_polygons_are_convex_and_no_needles(seed, area):
 
 @given(SEEDS, AREAS)
 def test_an_l_has_right_angles_and_one_that_juts_in(seed, area):
-    outline = l_shape(np.random.default_rng(seed), area)
+    outline = draw_l_shape(np.random.default_rng(seed), area)
     shape_of(outline, area)
     before, after = outline - np.roll(outline, 1, axis=0), np.roll(outline, -1, axis=0) - outline
     sine = (
@@ -42,7 +42,7 @@ def test_an_l_has_right_angles_and_one_that_juts_in(seed, area):
 
 @given(SEEDS, AREAS, st.floats(0.1, 2.0))
 def test_a_u_is_open_as_wide_as_was_asked(seed, area, opening):
-    outline = u_shape(np.random.default_rng(seed), area, opening)
+    outline = draw_u_shape(np.random.default_rng(seed), area, opening)
     if outline is None:
         # there are wide ones of this area
         assert opening > 0.5 * np.sqrt(area)

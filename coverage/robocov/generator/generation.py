@@ -1,0 +1,314 @@
+"""Generation of random maps: obstacles of some kind, checked against the request, and starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from numbers import Integral
+from typing import Any, TypeAlias
+
+import numpy as np
+import shapely
+
+from robocov.environment import (
+    DiscStart,
+    Environment,
+    Obstacle,
+    UniformStart,
+    find_narrowest_gap,
+)
+from robocov.errors import (
+    MapError,
+    ParameterError,
+    describe_unknown_name,
+    is_number,
+    quote,
+    require_number,
+)
+from robocov.generator.blocks import city
+from robocov.generator.caves import cave
+from robocov.generator.mazes import maze
+from robocov.generator.polygons import scatter_polygons
+from robocov.generator.request import AREA_TOLERANCE, MAX_SIDE_M, MIN_SIDE_M, Request
+from robocov.generator.rooms import building
+from robocov.mapfile.check import check_rules
+
+Layout: TypeAlias = Callable[[Request, DiscStart, np.random.Generator], list[Obstacle] | None]
+"""Returns obstacles that keep the disc of the start in the corner free; None if an attempt fails."""
+
+_MAX_ATTEMPTS = 40
+"""Layouts that are tried before the parameters count as impossible."""
+_MIN_TEAM_DISC_M = 0.6
+"""Radius of a start in which some robots of the default size fit."""
+_DISC_UNITS = 0.25
+"""Radius of the discs, in sides of a square per obstacle."""
+_MAX_DISC_SIDES = 0.1
+"""Largest radius of the discs, in shorter sides of the map."""
+_MIN_DISC_FRACTION = 0.4
+"""Smallest fraction of that radius that remains if walls are near."""
+_DISC_SHRINKAGE = 0.9
+_DISC_MARGIN_SIDES = 0.02
+"""Margin between the disc in the corner and the boundary, in shorter sides of the map."""
+_MAX_CENTRE_OFFSET_SIDES = 0.3
+"""Largest offset of the other disc from the middle along x and y, in shorter sides of the map."""
+_CENTRE_CANDIDATES = 41
+"""Points along x and along y that are compared as centres of that disc."""
+_CENTRE_DISC_FRACTION = 0.8
+"""Largest radius of that disc, as a fraction of the one in the corner."""
+_CENTRE_OFFSET_WEIGHT = 0.2
+"""Clearance, m, that outweighs one metre of distance from the middle."""
+_SCORE_DIGITS = 9
+"""Scores are rounded so that rounding errors do not decide between equal ones."""
+_GAP_TOLERANCE_M = 1e-6
+
+
+@dataclass(frozen=True)
+class MapKind:
+    """A kind of generated maps.
+
+    Attributes
+    ----------
+    layout : callable
+        Builds the obstacles.
+    description : str
+    counted : str
+        What the number of obstacles counts, in the plural.
+    obstacles : int
+        Default number of them.
+    area : float
+        Default blocked fraction of the area.
+    is_approximate : bool
+        Whether maps have about the requested number, rather than exactly.
+    """
+
+    layout: Layout
+    description: str
+    counted: str
+    obstacles: int
+    area: float
+    is_approximate: bool = False
+
+
+GENERATORS: dict[str, MapKind] = {
+    "polygons": MapKind(
+        layout=scatter_polygons,
+        description="scattered obstacles: convex polygons, L and U shapes",
+        counted="obstacles",
+        obstacles=6,
+        area=0.2,
+    ),
+    "blocks": MapKind(
+        layout=city,
+        description="a town: blocks between streets",
+        counted="blocks",
+        obstacles=12,
+        area=0.4,
+    ),
+    "rooms": MapKind(
+        layout=building,
+        description="a building: rooms with doors, and some furniture",
+        counted="rooms",
+        obstacles=6,
+        area=0.12,
+    ),
+    "mazes": MapKind(
+        layout=maze,
+        description="a maze: corridors, some dead ends, some ways round",
+        counted="cells",
+        obstacles=36,
+        area=0.12,
+        is_approximate=True,
+    ),
+    "caves": MapKind(
+        layout=cave,
+        description="a cave: chambers and tunnels with smooth walls, and pillars",
+        counted="chambers",
+        obstacles=12,
+        area=0.4,
+        is_approximate=True,
+    ),
+}
+"""The kinds of maps by name."""
+
+
+def generate_map(
+    seed: int,
+    *,
+    kind: str = "polygons",
+    obstacles: int | None = None,
+    area: float | None = None,
+    gap: float = 0.6,
+    side: float = 10.0,
+    width: float | None = None,
+    height: float | None = None,
+) -> Environment:
+    """Generate a random map; the same seed and parameters give the same map.
+
+    Its free space is connected and has no passage narrower than `gap`. The blocked fraction of its area
+    differs from `area` by at most `AREA_TOLERANCE`. Its starts are ``corner``, a disc in one of the corners,
+    ``centre``, a disc near the middle, and ``uniform``. Its `extra` contains the parameters.
+
+    Parameters
+    ----------
+    seed : int
+    kind : str
+        One of `GENERATORS`.
+    obstacles : int or None
+        Number of obstacles, blocks or rooms; approximate number of cells of a maze or chambers of a cave. By
+        default, what suits the kind.
+    area : float or None
+        Blocked fraction of the map's area. By default, what suits the kind.
+    gap : float, m
+        Smallest width of a passage.
+    side : float, m
+        Side of a square map.
+    width, height : float or None, m
+        Sides of a rectangular map; `side` by default.
+
+    Returns
+    -------
+    Environment
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is out of range, or no layout is found that fulfils all of them.
+
+    Examples
+    --------
+    >>> generate_map(3, kind="polygons", obstacles=4)
+    <Environment polygons 3, 10 x 10 m, 4 obstacles>
+    """
+    if not is_number(seed, Integral) or seed < 0:
+        raise ParameterError(f"seed: expected a whole number of at least 0, got {quote(seed)}")
+    if not isinstance(kind, str) or kind not in GENERATORS:
+        raise ParameterError(describe_unknown_name("kind of map", str(kind), GENERATORS))
+    map_kind = GENERATORS[kind]
+    side = require_number("side", side, MIN_SIDE_M, MAX_SIDE_M)
+    request = Request(
+        obstacles=map_kind.obstacles if obstacles is None else obstacles,
+        area=map_kind.area if area is None else area,
+        gap=gap,
+        width=side if width is None else width,
+        height=side if height is None else height,
+    )
+    for attempt in range(_MAX_ATTEMPTS):
+        rng = np.random.default_rng([int(seed), attempt])
+        corner = _choose_corner_disc(request, rng)
+        layout = map_kind.layout(request, corner, rng)
+        if layout is None:
+            continue
+        environment = _build_environment(int(seed), kind, request, layout, corner)
+        if environment is not None:
+            return environment
+    raise ParameterError(
+        f"area: no layout of {request.obstacles} {map_kind.counted} was found that blocks {request.area:g} "
+        f"of {request.width:g} x {request.height:g} m with gaps of {request.gap:g} m. "
+        "Try another area, a narrower gap or another number"
+    )
+
+
+def _choose_corner_disc(request: Request, rng: np.random.Generator) -> DiscStart:
+    """Return a disc in one of the corners."""
+    is_right, is_top = rng.integers(0, 2, 2).tolist()
+    side = min(request.width, request.height)
+    radius = max(_DISC_UNITS * request.unit, _MIN_TEAM_DISC_M)
+    radius = request.round_down(min(_MAX_DISC_SIDES * side, radius))
+    offset = radius + _DISC_MARGIN_SIDES * side
+    x = request.width - offset if is_right else offset
+    y = request.height - offset if is_top else offset
+    return DiscStart((round(x, request.digits), round(y, request.digits)), radius)
+
+
+def _build_environment(
+    seed: int, kind: str, request: Request, layout: list[Obstacle], corner: DiscStart
+) -> Environment | None:
+    """Return the map with its starts; None if it is not valid, or does not fulfil the request."""
+    width = float(request.width)
+    height = float(request.height)
+    about = "about " if GENERATORS[kind].is_approximate else ""
+    starts: dict[str, Any] = {}
+    environment = Environment(
+        name=f"{kind} {seed}",
+        boundary=((0.0, 0.0), (width, 0.0), (width, height), (0.0, height)),
+        obstacles=tuple(layout),
+        starts=starts,
+        description=(
+            f"Generated with seed {seed}: {about}{request.obstacles} {GENERATORS[kind].counted}, "
+            f"{request.area:.3g} of the area blocked, every passage at least {request.gap:g} m wide."
+        ),
+        extra={
+            "generator": {
+                "kind": kind,
+                "seed": seed,
+                "obstacles": int(request.obstacles),
+                "area": float(request.area),
+                "gap_m": float(request.gap),
+                "width_m": width,
+                "height_m": height,
+            }
+        },
+    )
+    try:
+        if not _fulfils_request(environment, request):
+            return None
+        corner_disc = _shrink_corner_disc(environment, request, corner)
+        centre_disc = _choose_centre_disc(environment, request, corner)
+        if corner_disc is None or centre_disc is None:
+            return None
+        # The starts are added only now, because they depend on the free space, which is computed once.
+        starts["corner"] = corner_disc
+        starts["centre"] = centre_disc
+        starts["uniform"] = UniformStart()
+        check_rules(environment, environment.name)
+    except (MapError, shapely.GEOSException):
+        return None
+    return environment
+
+
+def _shrink_corner_disc(environment: Environment, request: Request, corner: DiscStart) -> DiscStart | None:
+    """Return the disc, smaller and nearer to its corner if walls are near; None if it gets too small."""
+    center = np.array(corner.center)
+    outwards = np.sign(center - request.size / 2.0)
+    radius = corner.radius
+    while radius >= _MIN_DISC_FRACTION * corner.radius:
+        x, y = request.round_points(center + outwards * (corner.radius - radius)).tolist()
+        if environment.free.contains(shapely.Point(x, y).buffer(radius)):
+            return DiscStart((x, y), radius)
+        radius = request.round_down(_DISC_SHRINKAGE * radius)
+    return None
+
+
+def _choose_centre_disc(environment: Environment, request: Request, corner: DiscStart) -> DiscStart | None:
+    """Return a disc near the middle with as much clearance as possible; None if nothing is free there."""
+    max_offset = _MAX_CENTRE_OFFSET_SIDES * float(request.size.min())
+    steps = np.linspace(-max_offset, max_offset, _CENTRE_CANDIDATES)
+    offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    points = request.round_points(offsets + request.size / 2.0)
+    is_free = shapely.contains_xy(environment.free, points[:, 0], points[:, 1])
+    if not is_free.any():
+        return None
+    points = points[is_free]
+    offsets = offsets[is_free]
+    clearances = shapely.distance(environment.free.boundary, shapely.points(points))
+    max_radius = _CENTRE_DISC_FRACTION * corner.radius
+    distances = np.hypot(offsets[:, 0], offsets[:, 1])
+    scores = np.minimum(clearances, max_radius) - _CENTRE_OFFSET_WEIGHT * distances
+    best = int(np.round(scores, _SCORE_DIGITS).argmax())
+    radius = max(float(clearances[best]), _MIN_DISC_FRACTION * max_radius)
+    center = (float(points[best, 0]), float(points[best, 1]))
+    return DiscStart(center, request.round_down(min(radius, max_radius)))
+
+
+def _fulfils_request(environment: Environment, request: Request) -> bool:
+    """Return whether a map has the blocked area and the gaps that were requested, and is connected."""
+    free = environment.free
+    blocked_fraction = 1.0 - environment.free_area / environment.area
+    if abs(blocked_fraction - request.area) > AREA_TOLERANCE or len(free.geoms) != 1:
+        return False
+    narrowest = find_narrowest_gap(free)
+    if narrowest is not None and narrowest.width < request.gap - _GAP_TOLERANCE_M:
+        return False
+    # The points where a disc as wide as the gap may be must be connected.
+    disc_area = free.buffer(-request.gap / 2.0 + _GAP_TOLERANCE_M, quad_segs=16)
+    return isinstance(disc_area, shapely.Polygon)
