@@ -30,7 +30,7 @@ from robocov import (
     make_controller,
 )
 from robocov.environment import WallObstacle
-from robocov.metrics import compute_path_lengths
+from robocov.metrics import compute_path_lengths, find_settling_time
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.running import reference
 

@@ -124,7 +124,7 @@ import sys
 import robocov as rc
 room = rc.load_map("rooms")
 simulation = rc.Simulation(room, rc.Rapf(), room.start().sample(2))
-record = simulation.run(0.2).thinned(10.0)
+record = simulation.run(0.2).thin(10.0)
 print(room, record, simulation, rc.CoverageCost(room, 16)(record.positions[-1]))
 heavy = {"matplotlib", "pandas", "pyarrow", "pygame", "jinja2", "robocov_app"} & set(sys.modules)
 assert not heavy, heavy

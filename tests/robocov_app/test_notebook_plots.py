@@ -36,7 +36,7 @@ RUN = run_of(ROOMS, 5)
 COST = CoverageCost(ROOMS, 32)
 # made-up runs go through walls: their ends and a few moments that are free will do
 RESULT = COST(RUN.positions[-1])
-HISTORY = compute_cost_history(RUN.thinned(0.0), COST, 1.0)
+HISTORY = compute_cost_history(RUN.thin(0.0), COST, 1.0)
 THINGS = [ROOMS, RUN, RESULT, HISTORY]
 IDS = ["environment", "record", "result", "history"]
 

@@ -37,7 +37,7 @@ class Arguments(PlotOptions):
 def command(options: Arguments) -> None:
     from robocov.files.result_folder import extended
     from robocov.metrics.run_metrics import COLUMNS, compute_run_metrics, find_time_near_final
-    from robocov.record import nearest_moments
+    from robocov.record import select_nearest_moments
     from robocov_app.figures.runs import Measured
     from robocov_app.runs.saved import load_saved
 
@@ -47,7 +47,7 @@ def command(options: Arguments) -> None:
     with extended(folder) as result:
         for saved in runs:
             record, history = saved.record, saved.history
-            total = len(nearest_moments(record.time, options.rate))
+            total = len(select_nearest_moments(record.time, options.rate))
             with progress(f"measuring {record.label}", total, quiet=options.json) as update:
                 metrics = compute_run_metrics(record, options.rate, counting(update))
             target = result.new / saved.folder.relative_to(folder)

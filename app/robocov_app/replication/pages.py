@@ -15,7 +15,7 @@ from robocov import __version__
 from robocov.files.result_folder import for_results
 from robocov.files.writing import replace_file
 from robocov.metrics import SETTLED_DISTANCE_M, SETTLED_WINDOW_S
-from robocov.record import Record, versions
+from robocov.record import Record, list_versions
 from robocov.text import escape_controls
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.statistics import RESAMPLES
@@ -130,7 +130,7 @@ def paper_page(
         ],
         "replay": Markup(replay_part(replays, panes, _REPLAY_BUDGET)),
         "replay_script": Markup(script(f"{replay_js()}startReplays();")),
-        "versions": versions(),
+        "versions": list_versions(),
         "all_bundled": len(plan.bundled) == len(NON_CONVEX),
     }
     if results is not None:

@@ -371,7 +371,7 @@ def worst_runs(study: Study, outcomes: Outcomes, contender: Contender, count: in
         scenario = Scenario(task.map, task.start, task.seed)
         own = task.controller == contender.controller and dict(task.gains) == contender.all_gains
         if own and scenario in wanted.values():
-            records[scenario] = worker.simulated(task, environments[task.map]).thinned(10.0)
+            records[scenario] = worker.simulated(task, environments[task.map]).thin(10.0)
     return [(scenario, records[scenario]) for scenario in wanted.values()]
 
 

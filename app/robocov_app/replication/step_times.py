@@ -14,7 +14,7 @@ import numpy as np
 from robocov.controllers import gain_values, make_controller
 from robocov.files.writing import replace_file
 from robocov.mapfile import load_map
-from robocov.record import versions
+from robocov.record import list_versions
 from robocov_app.figures.statistics import Interval, bootstrap
 from robocov_app.replication.plan import TEAM, Plan
 from robocov_app.runs.spec import RunSpec
@@ -70,7 +70,7 @@ def step_times(
         names = list(dict.fromkeys((YARDSTICK, *controllers)))
         gains = {name: dict(gain_values(make_controller(name))) for name in names}
         blocks = plan.beyond.warm_up, plan.beyond.blocks
-        content = [robots, plan.dt, dict(TEAM), *blocks, gains, versions()["robocov"]]
+        content = [robots, plan.dt, dict(TEAM), *blocks, gains, list_versions()["robocov"]]
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
         entry = kept.get(str(robots))
         if entry is None or entry["digest"] != digest:

@@ -119,7 +119,7 @@ def embedded_run(run: ReplayRun, on: int, style: CurveStyle, rate: float, *, goa
         "mark": MARKS[style.mark],
         "map": on,
         "radius": radius[0] if len(set(radius)) == 1 else radius,
-        **({"speeds": record.team.max_speed.tolist()} if record.by_time else {}),
+        **({"speeds": record.team.max_speed.tolist()} if record.has_travel_time_cells else {}),
         "numbers": list(roster_of(record).numbers),
         **({"begin": begin} if begin and record.environment.has_moving_obstacles else {}),
         **({"lives": life} if any(each != (0.0, None) for each in life) else {}),

@@ -22,7 +22,7 @@ from robocov.mapfile import from_json
 from robocov.metrics import compute_cost_history, summarise
 from robocov.metrics.run_metrics import compute_final_metrics
 from robocov.planning.discovered_map import DiscoveredMap
-from robocov.record import Record, versions
+from robocov.record import Record, list_versions
 from robocov.simulation import Simulation
 from robocov_app.runs.run import cost_table
 from robocov_app.runs.spec import RunSpec
@@ -53,7 +53,7 @@ _RESULTS = 3  # goes up when the same inputs give other results: since robots in
 @cache
 def made_with() -> dict[str, str]:
     """Return the versions that results of this process depend on."""
-    found = dict(versions())
+    found = dict(list_versions())
     del found["python"]
     return found | {"robocov": f"{found['robocov']} (results {_RESULTS})"}
 
@@ -89,7 +89,7 @@ def perform(task: Task) -> Outcome:
             content = record.to_json(summary, lattice=task.lattice)
             content |= {"cost_hz": task.cost_hz, "record_hz": task.record_hz}
             content["controller"] |= source_json(task.source)
-            kept, arrays = record.thinned(task.record_hz), io.BytesIO()
+            kept, arrays = record.thin(task.record_hz), io.BytesIO()
             np.savez_compressed(arrays, **{name: getattr(kept, name) for name in kept.arrays})
             files = {"run.json": json_text(content).encode(), "record.npz": arrays.getvalue()}
             files["cost.csv"] = csv_text(*cost_table(history)).encode()

@@ -11,7 +11,7 @@ from robocov.arrays import Array
 from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.drawing import Drawable
 from robocov.errors import format_count, require_type
-from robocov.record import Record, nearest_moments
+from robocov.record import Record, select_nearest_moments
 
 DEFAULT_RATE_HZ = 10.0
 """Samples of the coverage cost per simulated second."""
@@ -120,7 +120,7 @@ def select_sampled_moments(record: Record, rate: float) -> list[int]:
     """
     if record.environment.has_moving_obstacles:
         rate = min(rate, MAX_RATE_WITH_MOVING_OBSTACLES_HZ)
-    return [int(moment) for moment in nearest_moments(record.time, rate)]
+    return [int(moment) for moment in select_nearest_moments(record.time, rate)]
 
 
 def compute_mean_over_run(time: Array, values: Array) -> float:

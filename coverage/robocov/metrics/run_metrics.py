@@ -14,7 +14,7 @@ from robocov.metrics.clearance import compute_clearances, measure_robot_gaps
 from robocov.metrics.connectivity import measure_connectivity
 from robocov.metrics.cost_history import CostHistory
 from robocov.metrics.visible_area import compute_covered_areas
-from robocov.record import Record, nearest_moments
+from robocov.record import Record, select_nearest_moments
 
 DEFAULT_RATE_HZ = 2.0
 """Moments per simulated second at which areas and graphs are measured."""
@@ -130,7 +130,7 @@ def compute_run_metrics(
     """
     if not 0.0 <= rate < np.inf:
         raise ParameterError(f"rate: expected a finite number of at least 0 Hz, got {quote(rate)}")
-    moments = nearest_moments(record.time, rate)
+    moments = select_nearest_moments(record.time, rate)
     areas = []
     graphs = []
     for moment in moments.tolist():

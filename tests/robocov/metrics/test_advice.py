@@ -76,7 +76,7 @@ def test_short_and_thinned_records_are_not_judged() -> None:
     record = rooms_at(0.25)
     assert len(find_trembling(record)) > 0
     assert len(find_trembling(record.until(3.0))) == 0
-    assert len(find_trembling(record.thinned(1.0))) == 0
+    assert len(find_trembling(record.thin(1.0))) == 0
 
 
 def test_contacts_with_one_wall_are_no_zigzag() -> None:

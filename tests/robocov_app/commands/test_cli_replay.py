@@ -227,10 +227,10 @@ def arrays(folder: Path, **changes) -> None:
             lambda run: edited(run / "run.json", session=[1]),
             "{run}/run.json: session: [1], but an object was wanted",
         ),
-        (lambda run: arrays(run, time=np.zeros(61)), "{run}/record.npz: time: ascending numbers were wanted"),
+        (lambda run: arrays(run, time=np.zeros(61)), "{run}/record.npz: time: expected ascending numbers"),
         (
             lambda run: arrays(run, velocities=np.full((61, 3, 2), np.nan)),
-            "{run}/record.npz: velocities: nan, but finite numbers up to 1e+300 were wanted",
+            "{run}/record.npz: velocities: expected finite numbers up to 1e+300, got nan",
         ),
         (
             lambda run: arrays(
@@ -241,7 +241,7 @@ def arrays(folder: Path, **changes) -> None:
                     for name in "positions velocities forces goals obstacle_points".split()
                 },
             ),
-            "{run}/record.npz: time has shape (0,) of float64",
+            "{run}/record.npz: time: expected shape (T,) of float64, got (0,)",
         ),
         (
             lambda run: (run / "cost.csv").write_text("t,J\n"),

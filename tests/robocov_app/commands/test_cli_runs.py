@@ -169,7 +169,7 @@ def test_a_controller_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[
             "k: list = []",
             "mine.py cannot be run: ValueError: mutable default <class 'list'> for field k is not",
         ),
-        ("k: float = float('inf')", "mine.py:Mine': k: inf, but a finite number was wanted"),
+        ("k: float = float('inf')", "mine.py:Mine': k: expected a finite number, got inf"),
         (
             "label = property(lambda self: 1 / 0)",
             "your own: ZeroDivisionError: division by zero (mine.py, line 7)",

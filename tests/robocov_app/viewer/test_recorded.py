@@ -224,7 +224,7 @@ def test_a_record_with_moments_missing_goes_on_at_the_old_pace(record: Record) -
 
 def test_a_thinned_record_goes_on_at_its_own_pace(record: Record) -> None:
     rate = 1.0 / (4 * record.dt)
-    session = replayed(record.thinned(rate))
+    session = replayed(record.thin(rate))
     assert session.scenario.dt == record.dt
     assert session.history.steps[:3] == [0, 4, 8]
     session.look_at(12 * record.dt)
@@ -233,13 +233,13 @@ def test_a_thinned_record_goes_on_at_its_own_pace(record: Record) -> None:
     stepped(session, STEPS - 12)
     np.testing.assert_array_equal(state_of(session)[0], record.positions[-1])
     # as one that was thinned before and is thinned again
-    again = replayed(record.thinned(rate).thinned(rate / 3))
+    again = replayed(record.thin(rate).thin(rate / 3))
     assert again.history.steps[:3] == [0, 12, 24] and again.scenario.dt == record.dt
 
 
 def test_moments_at_uneven_times_are_refused(record: Record) -> None:
     with pytest.raises(InputError, match=r"record.npz: time: moments .* s apart were wanted"):
-        replayed(record.thinned(1.0 / (7 * record.dt)))
+        replayed(record.thin(1.0 / (7 * record.dt)))
 
 
 @pytest.mark.parametrize(

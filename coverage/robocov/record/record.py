@@ -1,0 +1,416 @@
+"""The record of a run: its arrays, saved in a folder and loaded from it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.conditions import Conditions, JoinedRobot
+from robocov.controllers import short_name
+from robocov.controllers.gains import Value
+from robocov.drawing import Drawable
+from robocov.environment import Environment
+from robocov.errors import InputError, OutputError, ParameterError, describe_error, format_count, quote
+from robocov.files.result_folder import settle
+from robocov.files.strictjson import read_document
+from robocov.files.writing import replace_file
+from robocov.mapfile import from_json, to_json
+from robocov.observation import Decision, Observations, Snapshot
+from robocov.observation.neighbours import Neighbours
+from robocov.optional_imports import import_optional
+from robocov.record.package_versions import list_versions
+from robocov.record.record_arrays import ARRAYS, COLUMNS, STEERING, read_record_arrays
+from robocov.record.run_document import JoinEvent, RunDocument
+from robocov.record.sampling import TIME_ROUNDING_S, select_nearest_moments
+from robocov.team import Team
+from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
+
+FORMAT = "robocov-run"
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Record(Drawable):
+    """A run: the state, forces and goals of all robots at each of its T moments.
+
+    Attributes
+    ----------
+    controller, label : str
+        Its name, as `make_controller` takes it, and its label in figures.
+    gains : mapping of str to float, str or None
+    start : str or None
+        Name of the start from which the initial positions were sampled.
+    seed : int or None
+        Seed with which they were sampled.
+    dt : float, s
+        Control period; also the step between moments, unless the record was thinned.
+    time : (T,) s
+    positions, velocities : (T, n, 2) m, m/s
+    forces : (T, n, 2) N
+        The controller's force, before any limit and without viscosity.
+    goals : (T, n, 2) m
+        nan where a robot has none.
+    obstacle_points : (T, n, 2) m
+        The nearest obstacle point that each robot sensed; nan if there was none.
+    steering : (T, n, 2) rad, rad/s
+        Heading, from +x, and turning rate of unicycles; None in a team of points.
+    session : dict
+        Where the run comes from, if it is part of a session in the window.
+    conditions : Conditions or None
+        None: ideal ones.
+    joined : tuple of JoinedRobot
+        The robots that joined during the run, and their positions then.
+    """
+
+    _drawn_as = "record"
+
+    environment: Environment
+    team: Team
+    controller: str
+    label: str
+    gains: Mapping[str, Value]
+    start: str | None
+    seed: int | None
+    dt: float
+    time: Array
+    positions: Array
+    velocities: Array
+    forces: Array
+    goals: Array
+    obstacle_points: Array
+    session: Mapping[str, Any] = field(default_factory=dict)
+    conditions: Conditions | None = None
+    steering: Array | None = None
+    joined: tuple[JoinedRobot, ...] = ()
+
+    @cached_property
+    def working(self) -> BoolArray:
+        """Mask of robots present and not failed, (T, n) bool; read-only."""
+        if self.conditions is None:
+            return self._build_full_mask()
+        mask = self.conditions.find_working(self.time, len(self.team))
+        mask.setflags(write=False)
+        return mask
+
+    @cached_property
+    def present(self) -> BoolArray:
+        """Mask of robots present, failed ones included, (T, n) bool; read-only."""
+        if self.conditions is None:
+            return self._build_full_mask()
+        mask = self.conditions.find_present(self.time, len(self.team))
+        mask.setflags(write=False)
+        return mask
+
+    def _build_full_mask(self) -> BoolArray:
+        mask = np.ones(self.positions.shape[:2], dtype=bool)
+        mask.setflags(write=False)
+        return mask
+
+    @cached_property
+    def travelled(self) -> BoolArray:
+        """Mask of the displacements that belong to a path, (T - 1, n) bool; read-only.
+
+        A robot that has not joined yet, or that the user put to another position, does not travel between
+        the two moments.
+        """
+        mask = self.present[:-1].copy()
+        numbers = self.session.get("robots") or range(1, len(self.team) + 1)
+        row_of_number = {number: row for row, number in enumerate(numbers)}
+        for placement in self.session.get("placed", ()):
+            moment = int(np.searchsorted(self.time, placement["time_s"] - TIME_ROUNDING_S))
+            rows = [row_of_number[number] for number in placement["robots"] if number in row_of_number]
+            if 0 < moment < len(self.time):
+                mask[moment - 1, rows] = False
+        mask.setflags(write=False)
+        return mask
+
+    @property
+    def arrays(self) -> tuple[str, ...]:
+        """Names of the arrays of this record."""
+        return ARRAYS if self.steering is None else (*ARRAYS, STEERING)
+
+    @property
+    def has_travel_time_cells(self) -> bool:
+        """Whether the controller divided the region by travel time, and that differs from by distance."""
+        return self.gains.get("cells") == "time" and self.team.has_mixed_speeds
+
+    def __len__(self) -> int:
+        """Return the number of moments."""
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        robots = format_count(len(self.team), "robot")
+        return f"<Record {self.controller} on {self.environment.name}, {robots}, {self.time[-1]:.1f} s>"
+
+    def cells(self, k: int = -1) -> VoronoiPartition | WeightedCells:
+        """Compute the cells of the working robots at a moment.
+
+        Parameters
+        ----------
+        k : int
+            Number of the moment; by default the last one.
+
+        Returns
+        -------
+        VoronoiPartition or WeightedCells
+            Weighted ones if `has_travel_time_cells`. Communication is taken to be unlimited.
+        """
+        working = slice(None) if self.conditions is None else self.working[k]
+        positions = self.positions[k][working]
+        region = self.environment.region
+        density = self.environment.density
+        if self.has_travel_time_cells:
+            speeds = self.team.max_speed[working]
+            return partition_by_travel_time(positions, speeds, region, density=density)
+        return partition(positions, region, density=density)
+
+    def snapshot(self, k: int) -> Snapshot:
+        """Return a moment as far as it was recorded: without force terms.
+
+        Parameters
+        ----------
+        k : int
+            Number of the moment.
+        """
+        working = None if self.conditions is None else self.working[k]
+        neighbours = Neighbours.from_ranges(self.positions[k], self.team.communication_range)
+        observations = Observations(
+            positions=self.positions[k],
+            velocities=self.velocities[k],
+            neighbours=neighbours if working is None else neighbours.keep_working(working),
+            obstacle_points=self.obstacle_points[k],
+            region=self.environment.region,
+            time=float(self.time[k]),
+            max_speeds=self.team.max_speed,
+            density=self.environment.density,
+            steering=None if self.steering is None else self.steering[k],
+        )
+        decision = Decision(
+            forces=self.forces[k],
+            goals=None if np.isnan(self.goals[k]).all() else self.goals[k],
+            cells=self.cells(k) if self.has_travel_time_cells else None,
+        )
+        return Snapshot(observations, decision, working=working)
+
+    def at(self, time: float) -> Snapshot:
+        """Return the moment nearest to a time.
+
+        Parameters
+        ----------
+        time : float, s
+
+        Raises
+        ------
+        ParameterError
+            If it is outside of the run by more than a control period.
+        """
+        first = float(self.time[0])
+        last = float(self.time[-1])
+        if not first - self.dt <= time <= last + self.dt:
+            raise ParameterError(f"time: expected a number from {first:g} to {last:g} s, got {quote(time)}")
+        return self.snapshot(int(np.abs(self.time - time).argmin()))
+
+    def until(self, time: float) -> Record:
+        """Return the part of the run up to a time, inclusive.
+
+        Parameters
+        ----------
+        time : float, s
+
+        Raises
+        ------
+        ParameterError
+            If it is before the start of the run.
+        """
+        if not time >= self.time[0] - TIME_ROUNDING_S:
+            raise ParameterError(f"time: expected a number of at least {self.time[0]:g} s, got {quote(time)}")
+        moments = int(np.searchsorted(self.time, time + TIME_ROUNDING_S, side="right"))
+        return self._select_moments(slice(moments))
+
+    def thin(self, rate: float) -> Record:
+        """Return the record with fewer moments.
+
+        Parameters
+        ----------
+        rate : float, Hz
+            Moments per simulated second, see `select_nearest_moments`; 0 keeps the first and the last one.
+
+        Raises
+        ------
+        ParameterError
+            If the rate is negative or not finite.
+        """
+        if not 0.0 <= rate < np.inf:
+            raise ParameterError(f"rate: expected a finite number of at least 0 Hz, got {quote(rate)}")
+        return self._select_moments(select_nearest_moments(self.time, rate))
+
+    def _select_moments(self, moments: slice | IntArray) -> Record:
+        """Return the record of some of the moments; its arrays are copies."""
+        arrays = {name: getattr(self, name)[moments].copy() for name in self.arrays}
+        return replace(self, **arrays)
+
+    def to_pandas(self) -> Any:
+        """Return the run as a tidy data frame, one row for each moment and robot, by time, then robot.
+
+        It needs ``robocov[pandas]``.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the columns time_s, robot (from 0; figures number robots from 1), x_m, y_m, vx_m_s, vy_m_s,
+            fx_N, fy_N, goal_x_m, goal_y_m, obstacle_x_m and obstacle_y_m; for unicycles also heading_rad and
+            turning_rate_rad_s.
+        """
+        pandas = import_optional("pandas", "pandas")
+        moments, robots = self.positions.shape[:2]
+        columns: dict[str, Array | IntArray] = {
+            "time_s": np.repeat(self.time, robots),
+            "robot": np.tile(np.arange(robots), moments),
+        }
+        for array in self.arrays:
+            if array == "time":
+                continue
+            values = getattr(self, array)
+            for component, column in enumerate(COLUMNS[array]):
+                columns[column] = values[:, :, component].ravel()
+        return pandas.DataFrame(columns)
+
+    def to_json(
+        self, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
+    ) -> dict[str, Any]:
+        """Return the content of ``run.json``.
+
+        Parameters
+        ----------
+        summary : mapping or None
+            The summary of the run, see `metrics.summarise`.
+        lattice : int or None
+            Lattice on which its cost was computed.
+        """
+        document: dict[str, Any] = {
+            "format": FORMAT,
+            "version": FORMAT_VERSION,
+            "map": to_json(self.environment),
+            "controller": {"name": self.controller, "gains": dict(self.gains)},
+            "team": self.team.to_dict(),
+            "start": self.start,
+            "starts_m": self.positions[0].tolist(),
+            "seed": self.seed,
+            "dt_s": self.dt,
+            "duration_s": float(self.time[-1]),
+            "lattice": lattice,
+        }
+        if self.conditions is not None:
+            document["conditions"] = self.conditions.to_dict()
+        if self.joined:
+            document["events"] = [_to_event(joined) for joined in self.joined]
+        if self.session:
+            document["session"] = dict(self.session)
+        document["versions"] = dict(list_versions())
+        document["summary"] = dict(summary or {})
+        return document
+
+    def save(
+        self, folder: Path | str, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
+    ) -> None:
+        """Write ``record.npz`` and ``run.json`` to a folder, each completely or not at all.
+
+        Parameters
+        ----------
+        folder : Path or str
+        summary, lattice
+            As those of `to_json`.
+
+        Raises
+        ------
+        OutputError
+            If the folder or a file cannot be written.
+        """
+        folder = Path(folder)
+        settle(folder)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{folder}: cannot be made: {describe_error(error)}") from error
+        arrays = {name: getattr(self, name) for name in self.arrays}
+        with replace_file(folder / "record.npz") as temporary, temporary.open("wb") as file:
+            # Compression would save 10 % of the size and take 20 times as long.
+            np.savez(file, **arrays)
+        text = json.dumps(self.to_json(summary, lattice=lattice), indent=1, allow_nan=False)
+        with replace_file(folder / "run.json") as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, folder: Path | str) -> Record:
+        """Load a record that `save` wrote.
+
+        The controller is named, but not loaded: no code from the folder is executed.
+
+        Parameters
+        ----------
+        folder : Path or str
+
+        Raises
+        ------
+        InputError
+            If it is not the folder of a run, or a file in it cannot be used.
+        """
+        folder = Path(folder)
+        settle(folder)
+        for file in ("run.json", "record.npz"):
+            if not (folder / file).is_file():
+                raise InputError(f"{folder}: not the folder of a run (there is no {file})")
+        path = folder / "run.json"
+        document = read_document(path, RunDocument, FORMAT, FORMAT_VERSION)
+        environment = from_json(document.map, f"{path}: map")
+        conditions = None
+        try:
+            team = Team.from_dict(document.team)
+            if document.conditions is not None:
+                conditions = Conditions.from_dict(document.conditions.model_dump())
+                conditions.check_team(len(team))
+        except ParameterError as error:
+            raise InputError(f"{path}: {error}") from error
+        arrays: dict[str, Any] = dict(read_record_arrays(folder / "record.npz", team))
+        return cls(
+            environment=environment,
+            team=team,
+            controller=document.controller.name,
+            label=short_name(document.controller.name),
+            gains=document.controller.gains,
+            start=document.start,
+            seed=document.seed,
+            dt=document.dt_s,
+            session=document.session.model_dump(exclude_unset=True),
+            conditions=conditions,
+            joined=tuple(_from_event(event) for event in document.events),
+            **arrays,
+        )
+
+
+def _to_event(joined: JoinedRobot) -> dict[str, Any]:
+    """Return a robot that joined as an event of ``run.json``."""
+    return {
+        "kind": "join",
+        "robot": joined.robot,
+        "time_s": joined.time,
+        "place_m": list(joined.place),
+        "requested_m": list(joined.requested),
+    }
+
+
+def _from_event(event: JoinEvent) -> JoinedRobot:
+    """Return the robot that joined by an event of ``run.json``."""
+    return JoinedRobot(
+        robot=event.robot,
+        time=event.time_s,
+        place=(event.place_m[0], event.place_m[1]),
+        requested=(event.requested_m[0], event.requested_m[1]),
+    )

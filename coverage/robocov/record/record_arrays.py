@@ -1,0 +1,86 @@
+"""The arrays of a record, and their file ``record.npz``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import InputError
+from robocov.files.array_files import read_arrays
+from robocov.team import Team
+
+ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points")
+"""Names of the arrays of every record."""
+STEERING = "steering"
+"""Name of the array that only records of unicycles have in addition."""
+COLUMNS = {
+    "positions": ("x_m", "y_m"),
+    "velocities": ("vx_m_s", "vy_m_s"),
+    "forces": ("fx_N", "fy_N"),
+    "goals": ("goal_x_m", "goal_y_m"),
+    "obstacle_points": ("obstacle_x_m", "obstacle_y_m"),
+    STEERING: ("heading_rad", "turning_rate_rad_s"),
+}
+"""Names of the columns of data frames, by array."""
+_MAX_VALUES = {"time": 1e9, "positions": 1e7, "velocities": 1e300, "forces": 1e300, STEERING: 1e9}
+"""Largest numbers in the arrays that are finite throughout, s, m, m/s, N, rad and rad/s."""
+
+
+def list_array_names(team: Team) -> tuple[str, ...]:
+    """Return the names of the arrays of a record of a team."""
+    return (*ARRAYS, STEERING) if team.is_unicycle.any() else ARRAYS
+
+
+def read_record_arrays(path: Path, team: Team) -> dict[str, Array]:
+    """Read the arrays of a record.
+
+    Parameters
+    ----------
+    path : Path
+        A file ``record.npz``.
+    team : Team
+        The robots of the record.
+
+    Returns
+    -------
+    dict of str to array
+
+    Raises
+    ------
+    InputError
+        If an array is missing, or has another shape or type, or contains numbers that are out of range.
+    """
+    with path.open("rb") as file:
+        saved = read_arrays(file, str(path))
+    names = list_array_names(team)
+    for name in names:
+        if name not in saved:
+            raise InputError(f"{path}: there is no array {name}")
+        _check_shape(path, name, saved[name], saved["time"].shape, robots=len(team))
+    for name, maximum in _MAX_VALUES.items():
+        if name in names:
+            _check_range(path, name, saved[name], maximum)
+    if (np.diff(saved["time"]) <= 0.0).any():
+        raise InputError(f"{path}: time: expected ascending numbers")
+    return {name: saved[name] for name in names}
+
+
+def _check_shape(path: Path, name: str, array: Array, moments: tuple[int, ...], robots: int) -> None:
+    is_time = name == "time"
+    shape = moments if is_time else (*moments, robots, 2)
+    has_moments = len(moments) == 1 and moments != (0,)
+    if array.dtype != np.float64 or array.shape != shape or not has_moments:
+        expected = "(T,)" if is_time else str(shape)
+        raise InputError(
+            f"{path}: {name}: expected shape {expected} of float64, got {array.shape} of {array.dtype}"
+        )
+
+
+def _check_range(path: Path, name: str, array: Array, maximum: float) -> None:
+    is_good = np.abs(array) <= maximum
+    if not is_good.all():
+        raise InputError(
+            f"{path}: {name}: expected finite numbers up to {maximum:g}, got {array[~is_good][0]:g}"
+        )

@@ -1,0 +1,111 @@
+"""Collects the steps of a simulation into a record."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import KW_ONLY, dataclass
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.conditions import Conditions, JoinedRobot
+from robocov.controllers import Controller, gain_values
+from robocov.controllers.gains import Value
+from robocov.environment import Environment
+from robocov.errors import ParameterError, quote, to_one_line
+from robocov.observation import Snapshot
+from robocov.record.record import Record
+from robocov.record.record_arrays import STEERING, list_array_names
+from robocov.team import Team
+
+
+@dataclass(eq=False)
+class Recorder:
+    """Collects snapshots of a simulation into a `Record`.
+
+    Raises
+    ------
+    ParameterError
+        If a gain of the controller cannot be recorded.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rooms = rc.load_map("rooms")
+    >>> simulation = rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(6, seed=0))
+    >>> recorder = Recorder(rooms, simulation.team, simulation.controller, simulation.dt)
+    >>> for snapshot in simulation.snapshots(duration=1.0):
+    ...     recorder.add(snapshot)
+    >>> recorder.record()
+    <Record rapf on Rooms, 6 robots, 1.0 s>
+    """
+
+    environment: Environment
+    team: Team
+    controller: Controller
+    dt: float
+    _: KW_ONLY
+    name: str | None = None
+    """Name under which the controller was found, as ``mine.py:MyController``; by default its own."""
+    start: str | None = None
+    """Name of the start from which the positions were sampled."""
+    seed: int | None = None
+    """Seed with which they were sampled."""
+    conditions: Conditions | None = None
+
+    def __post_init__(self) -> None:
+        if self.name is None:
+            self.name = self.controller.name
+        self._gains = gain_values(getattr(self.controller, "law", self.controller))
+        for gain, value in self._gains.items():
+            if not _is_recordable(value):
+                raise ParameterError(
+                    f"controller {self.name!r}: {gain}: expected a finite number, got {quote(value)}"
+                )
+        self._times: list[float] = []
+        self._rows: dict[str, list[Array]] = {
+            name: [] for name in list_array_names(self.team) if name != "time"
+        }
+
+    def add(self, snapshot: Snapshot) -> None:
+        """Append a step; its arrays are copied."""
+        goals = snapshot.decision.goals
+        if goals is None:
+            goals = np.full_like(snapshot.seen.positions, np.nan)
+        self._times.append(snapshot.seen.time)
+        self._rows["positions"].append(snapshot.positions.copy())
+        self._rows["velocities"].append(snapshot.seen.velocities.copy())
+        self._rows["forces"].append(snapshot.decision.forces.copy())
+        self._rows["goals"].append(goals.copy())
+        self._rows["obstacle_points"].append(snapshot.seen.obstacle_points.copy())
+        if snapshot.steering is not None:
+            self._rows[STEERING].append(snapshot.steering.copy())
+
+    def record(self, joined: tuple[JoinedRobot, ...] = ()) -> Record:
+        """Return the record of the steps so far; `joined` are the robots that joined in them."""
+        arrays = {name: np.array(rows) for name, rows in self._rows.items()}
+        return Record(
+            environment=self.environment,
+            team=self.team,
+            controller=str(self.name),
+            label=to_one_line(self.controller.label),
+            gains=self._gains,
+            start=self.start,
+            seed=self.seed,
+            dt=self.dt,
+            time=np.array(self._times),
+            positions=arrays["positions"],
+            velocities=arrays["velocities"],
+            forces=arrays["forces"],
+            goals=arrays["goals"],
+            obstacle_points=arrays["obstacle_points"],
+            conditions=self.conditions,
+            steering=arrays.get(STEERING),
+            joined=joined,
+        )
+
+
+def _is_recordable(value: Value) -> bool:
+    if value is None or isinstance(value, str):
+        return True
+    return isinstance(value, int | float) and abs(value) <= sys.float_info.max

@@ -1,0 +1,112 @@
+"""The model of ``run.json``, by which it is checked when it is read."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import Field, create_model
+
+from robocov.conditions import LIMITS
+from robocov.files.strictjson import Document, wanted
+from robocov.team import MAX_ROBOTS
+
+Seconds: TypeAlias = Annotated[float, Field(gt=0, le=1e6), wanted("a number above 0 (s)")]
+Time: TypeAlias = Annotated[float, Field(ge=0, le=1e9), wanted("a number from 0 (s)")]
+Number: TypeAlias = Annotated[int, Field(ge=1, le=MAX_ROBOTS), wanted("the number of a robot, from 1,")]
+Key: TypeAlias = Annotated[str, Field(pattern=r"^[1-9]\d{0,8}$"), wanted("the number of a robot")]
+Point: TypeAlias = Annotated[list[float], Field(min_length=2, max_length=2), wanted("a point [x, y]")]
+Seed: TypeAlias = Annotated[int, Field(ge=0), wanted("a whole number from 0")]
+
+
+class _Failure(Document):
+    robot: Number
+    time_s: Time
+
+
+class _Join(_Failure):
+    place_m: Point | None
+
+
+def _build_number_field(low: float, high: float, *, allow_null: bool) -> Any:
+    """Return the field of a model for a number in a range, or null."""
+    null = " or null" if allow_null else ""
+    description = wanted(f"a number from {low:g} to {high:g}{null}")
+    number: Any = Annotated[float, Field(ge=low, le=high)]
+    return Annotated[number | None if allow_null else number, description], ...
+
+
+def _build_conditions_model() -> Any:
+    """Return the model of conditions, whose numbers have the ranges of `LIMITS`."""
+    fields: dict[str, Any] = {
+        "failures": (list[_Failure], ...),
+        "joins": (list[_Join], ...),
+        "seed": (Seed, ...),
+    }
+    for name, (low, high, _, key) in LIMITS.items():
+        fields[key] = _build_number_field(low, high, allow_null=name == "message_rate")
+    return create_model("_Conditions", __base__=Document, **fields)
+
+
+_Conditions: Any = _build_conditions_model()
+
+
+class _Controller(Document):
+    name: Annotated[str, Field(min_length=1), wanted("a name")]
+    gains: dict[str, Annotated[float | str | bool | None, wanted("a number, a word or null")]]
+
+
+class _Touch(Document):
+    """A time during which the user moved robots."""
+
+    from_s: Time
+    to_s: Time
+    robots: list[Number]
+
+
+class _Placement(Document):
+    """Robots that the user put to other positions at a time."""
+
+    time_s: Time
+    robots: list[Number]
+
+
+class JoinEvent(Document):
+    """A robot that joined, its position then, and the requested one."""
+
+    kind: Literal["join"]
+    robot: Number
+    time_s: Time
+    place_m: Point
+    requested_m: Point
+
+
+class _Session(Document):
+    """Where a run comes from that is part of a session in the window."""
+
+    began_at_s: Time = 0.0
+    start_velocities_m_per_s: list[Point] = Field([])
+    robots: list[Number] = Field([])
+    failed: dict[Key, Point] = Field({})
+    touched: list[_Touch] = Field([])
+    placed: list[_Placement] = Field([])
+    control_dt_s: Seconds = 1.0
+    repeatable: bool = True
+
+
+class RunDocument(Document):
+    """The content of ``run.json``: everything that is needed to repeat a run, and its summary."""
+
+    map: dict[str, Any]
+    controller: _Controller
+    team: dict[str, Any]
+    start: Annotated[str | None, wanted("the name of a start, or null,")]
+    starts_m: list[Point] = Field([])
+    seed: Annotated[Seed | None, wanted("a whole number from 0, or null,")]
+    dt_s: Seconds
+    duration_s: Time = 0.0
+    lattice: Annotated[int | None, Field(ge=2, le=2048), wanted("a whole number from 2 to 2048")] = None
+    conditions: _Conditions | None = None
+    events: list[JoinEvent] = Field([])
+    session: _Session = _Session()
+    versions: dict[str, str] = Field({})
+    summary: dict[str, Any] = Field({})

@@ -1,0 +1,45 @@
+"""Selection of moments of a record at a rate."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robocov.arrays import Array, IntArray
+
+TIME_ROUNDING_S = 5e-7
+"""Difference between times that is taken for rounding: times are sums of control periods."""
+_TIE_DECIMALS = 6
+"""Decimals of a period within which two times are equally near; further ones are rounding errors."""
+
+
+def select_nearest_moments(time: Array, rate: float) -> IntArray:
+    """Return the row numbers of the times nearest to multiples of 1/rate, and of the first and last time.
+
+    Parameters
+    ----------
+    time : (T,) array, s
+        Ascending.
+    rate : float, Hz
+        0 selects the first and the last time only.
+
+    Returns
+    -------
+    (K,) int array
+        Ascending. The earlier one of two times that are equally near.
+
+    Examples
+    --------
+    >>> select_nearest_moments(np.array([0.0, 0.4, 0.8, 1.2, 1.6, 2.0]), rate=1.0)
+    array([0, 2, 5])
+    """
+    last = len(time) - 1
+    min_step = float(np.diff(time).min(initial=np.inf))
+    if min_step * rate >= 1.0:
+        return np.arange(last + 1)
+    periods = (time - time[0]) * rate
+    nearest_multiple = np.rint(periods)
+    deviation = np.round(np.abs(periods - nearest_multiple), _TIE_DECIMALS)
+    order = np.lexsort([deviation, nearest_multiple])
+    is_first_of_multiple = np.diff(nearest_multiple[order], prepend=-1.0)
+    nearest = order[np.flatnonzero(is_first_of_multiple)]
+    return np.union1d(nearest, [0, last])
