@@ -73,4 +73,6 @@ def test_invalid_scan_settings_are_rejected(values: dict[str, object], message: 
 def test_periods_are_rounded_to_whole_steps() -> None:
     assert Scanning(period=0.5).count_steps(1 / 60) == 30
     assert Scanning(period=0.0).count_steps(0.02) == 1
+    # The nearest number of control periods, not the next lower one.
+    assert Scanning(period=0.29).count_steps(0.1) == 3
     np.testing.assert_allclose(compute_headings(4), [[1, 0], [0, 1], [-1, 0], [0, -1]], atol=1e-15)

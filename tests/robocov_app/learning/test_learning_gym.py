@@ -187,3 +187,14 @@ def test_many_are_asked_for_actions_of_the_right_shape() -> None:
     several.reset(seed=0)
     with pytest.raises(ParameterError, match="action of robot_3"):
         several.step(np.pad(np.zeros((2, 2, 2)), ((0, 0), (0, 1), (0, 0)), constant_values=np.nan))
+
+
+def test_environments_of_one_simulation_show_their_own_robots() -> None:
+    together = CoverageVectorEnv(2, render_mode="rgb_array", **SMALL)
+    alone = CoverageEnv(render_mode="rgb_array", **SMALL)
+    together.reset(seed=4)
+    alone.reset(seed=5)
+    second = together.envs[1]
+    assert second.episode.shared is not None
+    assert second.episode.observe().positions.tobytes() == alone.episode.observe().positions.tobytes()
+    assert second.render().tobytes() == alone.render().tobytes()
