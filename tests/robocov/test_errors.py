@@ -100,7 +100,7 @@ STILL = rc.Simulation(ROOMS, rc.Rapf(), ONE).run(0.0)
         (lambda: rc.Rapf(krep=1), "rapf: unknown gain 'krep': did you mean 'k_rep'?"),
         (lambda: rc.Team.homogeneous("a"), "robots: expected a whole number of at least 1, got 'a'"),
         (lambda: rc.Team.homogeneous(2, mass="a"), "team.mass: 'a', but a number was wanted"),
-        (lambda: rc.load_map(3), "map: 3, but a path, or the name of a bundled map, was wanted"),
+        (lambda: rc.load_map(3), "map: expected a path, or the name of a bundled map, got 3"),
         (lambda: rc.Simulation(ROOMS, rc.Rapf, ONE), "controller: expected a controller"),
         (lambda: rc.make_controller(3), "controller: 3, but a name, as in 'rapf' or 'mine.py:MyController'"),
         (lambda: rc.compute_cost_history("run", rc.CoverageCost(ROOMS, 4)), "record: 'run', but a Record, "),

@@ -57,7 +57,7 @@ def command(options: Arguments) -> int:
 
 
 def _open_editor(options: Arguments) -> int:
-    from robocov.mapfile import list_bundled_maps, map_file
+    from robocov.mapfile import find_map_file, list_bundled_maps
     from robocov_app.editor.ui.launch import editor_window
     from robocov_app.web import show
 
@@ -65,7 +65,7 @@ def _open_editor(options: Arguments) -> int:
     look |= {"headless": options.screenshot is not None, "served": options.serve}
     path = None if options.map is None else Path(options.map)
     if options.map in list_bundled_maps() or (path is not None and not path.suffix):
-        path = map_file(str(options.map))
+        path = find_map_file(str(options.map))
     elif path is not None and path.suffix.lower() != ".json" and not path.is_file():
         raise MapError(f"{options.map}: there is no such file")
     with editor_window(path, options.folder, background=options.background, **look) as window:

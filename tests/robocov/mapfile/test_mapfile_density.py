@@ -14,7 +14,7 @@ from PIL import Image
 from robocov.density import MAX_RASTER_SIZE, Gaussians, Raster, Uniform, WeightedPolygons
 from robocov.environment import Environment
 from robocov.errors import MapError
-from robocov.mapfile import MOST_BYTES, dump_map, from_json, load_map, parse_map, save_map, to_json
+from robocov.mapfile import MAX_PICTURE_BYTES, dump_map, from_json, load_map, parse_map, save_map, to_json
 
 RING = ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0))
 PLAIN = to_json(Environment("plain", RING))
@@ -237,7 +237,7 @@ def test_pictures_that_cannot_be_used(tmp_path):
     (tmp_path / "bomb.pgm").write_bytes(b"P5 100000 100000 255\n")
     assert "100000 x 100000 pixels" in refused("bomb.pgm") or "PNG or PGM" in refused("bomb.pgm")
     with (tmp_path / "heavy.png").open("wb") as file:
-        file.truncate(MOST_BYTES + 1)
+        file.truncate(MAX_PICTURE_BYTES + 1)
     assert "larger than 8 MB" in refused("heavy.png")
     grey(tmp_path / "black.png", [[0, 0]])
     assert "density.picture: all places count 0" in refused("black.png")

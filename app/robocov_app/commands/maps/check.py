@@ -11,7 +11,7 @@ import tyro
 from rich.console import Console
 
 from robocov.errors import InputError, MapError, format_path
-from robocov.mapfile import load_map, map_file
+from robocov.mapfile import find_map_file, load_map
 from robocov.mapfile.check import MapReport, check_map
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.output import console, echo, tell
@@ -64,7 +64,7 @@ def watch(options: Arguments) -> None:
     names, output = {}, console()
     for name in options.files:
         try:
-            names[map_file(name)] = name
+            names[find_map_file(name)] = name
         except MapError:
             names[Path(name)] = name
     outcomes: dict[str, MapReport | InputError] = {}

@@ -18,7 +18,7 @@ from robocov.errors import (
     to_one_line,
 )
 from robocov.files.strictjson import check_header, located, parse, require_json
-from robocov.mapfile import density_of
+from robocov.mapfile import parse_density
 from robocov.mapfile.models import FORMAT, VERSION, MapModel
 from robocov_app.editor.model.background import taken_apart
 from robocov_app.editor.model.sketch import KINDS, Item, Sketch
@@ -67,7 +67,7 @@ def sketch_of(document: Any, where: str = "map", folder: Path | None = None) -> 
         background=background,
         extra=others,
         schema=None if schema is None else reader.text(schema, ("$schema",)),
-        density=None if density is None else density_of(density, boundary or _UNBOUNDED, where, folder),
+        density=None if density is None else parse_density(density, boundary or _UNBOUNDED, where, folder),
     )
 
 

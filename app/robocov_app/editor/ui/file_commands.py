@@ -10,7 +10,7 @@ from typing import TypeAlias
 from PIL import Image, UnidentifiedImageError
 
 from robocov.errors import MapError
-from robocov.mapfile import list_bundled_maps, map_file
+from robocov.mapfile import find_map_file, list_bundled_maps
 from robocov.text import remove_controls
 from robocov_app.editor.edits.properties import underlaid
 from robocov_app.editor.model import require
@@ -95,7 +95,7 @@ class FileCommands:
         names += [Option(name, "comes with robocov; opens as a copy") for name in list_bundled_maps()]
 
         def chosen(option: Option) -> None:
-            self.editor.carry_out(lambda: self.open(map_file(option.text)))
+            self.editor.carry_out(lambda: self.open(find_map_file(option.text)))
 
         self.editor.dialogs.ask(list_choice("Open a recent or bundled map", lambda: names, chosen))
 

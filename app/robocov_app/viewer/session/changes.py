@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field, WrapValidator
 from robocov.density import Density
 from robocov.environment import Environment, Obstacle, Point
 from robocov.errors import MapError, ParameterError, RobocovError
-from robocov.mapfile import density_of, to_json
+from robocov.mapfile import parse_density, to_json
 from robocov.mapfile.models import DensityModel, ObstacleModel, plain
 from robocov.world.free_positions import find_free_position
 from robocov_app.viewer.session.map_edits import painted, with_replaced
@@ -33,7 +33,7 @@ def _density_of(model: Any, context: Any) -> Density | None:
     if model is None:
         return None
     boundary = context.environment(0).boundary
-    return density_of(model.model_dump(exclude_none=True, warnings=False), boundary, context.where)
+    return parse_density(model.model_dump(exclude_none=True, warnings=False), boundary, context.where)
 
 
 def _density_json(density: Density | None, context: object = None) -> object:

@@ -1,0 +1,228 @@
+"""Read maps from files, texts and JSON documents, and find the bundled ones."""
+
+import json
+from contextlib import suppress
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robocov.density import Density, Raster
+from robocov.environment import Environment, Ring
+from robocov.errors import (
+    InputError,
+    MapError,
+    Mistake,
+    ParameterError,
+    describe_unknown_name,
+    quote,
+    quote_json,
+    to_one_line,
+)
+from robocov.files.strictjson import located, parse, read_bytes, require_json
+from robocov.mapfile.check import check_rules
+from robocov.mapfile.density_pictures import read_gray_levels, read_picture_file
+from robocov.mapfile.models import HEAD, LIGHTEST, NOTHING, DensityModel, RasterModel, validate
+
+_GRAY_DIGITS = 6
+"""Decimal places of the weights of gray levels, so that a map that is saved again stays short."""
+
+
+def load_map(source: str | Path) -> Environment:
+    """Load a map.
+
+    Parameters
+    ----------
+    source : str or Path
+        Path of a map file, or, as a str without suffix and separator, the name of a bundled map.
+
+    Returns
+    -------
+    Environment
+
+    Raises
+    ------
+    MapError
+        If the map cannot be read; the message has line, column and JSON path of the first mistake.
+
+    Examples
+    --------
+    >>> load_map("rooms").name
+    'Rooms'
+    """
+    path = find_map_file(source)
+    return parse_map(read_bytes(path), str(path), path.parent)
+
+
+def find_map_file(source: str | Path) -> Path:
+    """Find the file of a map, as `load_map` does.
+
+    Parameters
+    ----------
+    source : str or Path
+        See `load_map`.
+
+    Returns
+    -------
+    Path
+        It may not exist.
+
+    Raises
+    ------
+    MapError
+        If there is no bundled map of this name.
+    """
+    if not isinstance(source, str | PathLike):
+        raise ParameterError(f"map: expected a path, or the name of a bundled map, got {quote(source)}")
+    if not isinstance(source, str) or any(character in source for character in "./\\\0"):
+        return Path(source)
+    bundled_maps = list_bundled_maps()
+    if source in bundled_maps:
+        return bundled_maps[source]
+    with suppress(OSError):  # The name may be longer than any file's.
+        if Path(source).is_file():
+            return Path(source)
+    raise MapError(describe_unknown_name("map", source, bundled_maps))
+
+
+def list_bundled_maps() -> dict[str, Path]:
+    """List the bundled maps.
+
+    Returns
+    -------
+    dict of str to Path
+        Files by name, sorted: those in the installed package, otherwise those in the checkout.
+    """
+    here = Path(__file__).resolve()
+    in_package = sorted((here.parents[1] / "maps").glob("*.json"))
+    in_checkout = sorted((here.parents[3] / "maps").glob("*.json"))
+    return {file.stem: file for file in in_package or in_checkout}
+
+
+def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Environment:
+    """Parse the text of a map file.
+
+    Parameters
+    ----------
+    text : str or bytes
+    where : str
+        Name of the file in messages.
+    folder : Path or None
+        Folder of pictures that the map names.
+
+    Returns
+    -------
+    Environment
+
+    Raises
+    ------
+    MapError
+        As `load_map`.
+    """
+    document = parse(text, where)
+    try:
+        return _build_environment(document, to_one_line(where), folder)
+    except MapError as error:
+        raise located(error, text, where) from None
+
+
+def from_json(document: dict[str, Any], where: str = "map", folder: Path | None = None) -> Environment:
+    """Build the map that a JSON document describes.
+
+    Parameters
+    ----------
+    document : dict
+    where : str
+        Name of the document in messages.
+    folder : Path or None
+        Folder of pictures that the map names.
+
+    Returns
+    -------
+    Environment
+
+    Raises
+    ------
+    MapError
+        If the document is no valid map.
+    """
+    where = to_one_line(where)
+    require_json(document, where)
+    return _build_environment(document, where, folder)
+
+
+def parse_density(value: object, boundary: Ring, where: str = "map", folder: Path | None = None) -> Density:
+    """Build the density that a JSON value describes.
+
+    Parameters
+    ----------
+    value : object
+        Value of the key ``density`` of a map.
+    boundary : (k, 2) sequence, m
+        Boundary of the map.
+    where : str
+        Name of the map in messages.
+    folder : Path or None
+        Folder of the picture that the density may name.
+
+    Returns
+    -------
+    Density
+
+    Raises
+    ------
+    MapError
+        If the value is no valid density.
+    """
+    rest = {"name": "map", "boundary": [[0, 0], [1, 0], [1, 1]]}
+    model = validate({**HEAD, **rest, "density": value}, where)
+    density: Density = _build_density(model.density, boundary, folder, where)
+    return density
+
+
+def _build_environment(document: object, where: str, folder: Path | None) -> Environment:
+    model = validate(document, where)
+    boundary: Any = model.boundary
+    density = None
+    if model.density is not None:
+        density = _build_density(model.density, boundary, folder, where)
+    environment = Environment(
+        name=model.name,
+        boundary=boundary,
+        obstacles=tuple(obstacle.built() for obstacle in model.obstacles),
+        starts={name: start.built() for name, start in model.starts.items()},
+        description=model.description,
+        extra=json.loads(json.dumps(model.extra)),
+        schema=model.schema_,
+        density=density,
+    )
+    check_rules(environment, where)
+    return environment
+
+
+def _build_density(model: DensityModel, boundary: Ring, folder: Path | None, where: str) -> Any:
+    """Return the density that a model describes; a raster without an extent covers the boundary's box.
+
+    `folder` is that of the map and its picture; None if the map did not come from a file.
+    """
+    if not isinstance(model, RasterModel):
+        return model.built()
+    if model.rows is not None:
+        values = np.array(model.rows, dtype=float)
+        values[values < LIGHTEST] = 0.0
+    else:
+        black = model.black or 0.0
+        white = 1.0 if model.white is None else model.white
+        path = ("density", "picture")
+        try:
+            gray_levels = read_gray_levels(read_picture_file(str(model.picture), folder))
+        except InputError as error:
+            mistake = Mistake.at_path(path, f"{quote_json(model.picture)}: {error}")
+            raise MapError.from_mistakes(where, [mistake]) from None
+        values = np.round(black + (white - black) * gray_levels, _GRAY_DIGITS)
+        if not values.max() > 0.0:
+            raise MapError.from_mistakes(where, [Mistake.at_path(path, NOTHING)])
+    x, y = zip(*boundary, strict=True)
+    x_min, y_min, x_max, y_max = model.extent or (min(x), min(y), max(x), max(y))
+    return Raster(values[::-1], (x_min, y_min, x_max, y_max), model.interpolation)
