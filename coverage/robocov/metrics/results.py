@@ -58,7 +58,7 @@ class Results:
     ----------
     folder : Path
     columns : tuple of str
-        What was varied (``map``, ``controller``, ``robots``, ``start``, ``seed``, gains and others), figures
+        Parameters that vary (``map``, ``controller``, ``robots``, ``start``, ``seed``, gains, ...), figures
         by names that end in their units, the name of the run's folder (``run``), and its ``error``.
 
     Examples

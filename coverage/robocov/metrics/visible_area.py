@@ -146,7 +146,7 @@ def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterato
 
 
 def _find_sectors(walls: Walls, index: AngularWallIndex, entries: int, position: Array) -> _Sectors:
-    """Return the sectors of the view from a position; the index has so many entries of walls that face it."""
+    """Return the sectors of the view from a position; the first `entries` of the index are in use."""
     facing_walls = np.unique(index.entry_wall[:entries])
     ends = walls.ends[facing_walls].reshape(-1, 2) - position
     start = np.unique(np.arctan2(ends[:, 1], ends[:, 0]))

@@ -4,7 +4,7 @@
 - `batch`: many runs of equal teams, advanced together
 - `team_state`: the state from which a run starts or continues
 - `controller_caller`: calls of controllers, checked, with faults in one line
-- `sensing`: from the world and the sensor to what robots observe
+- `sensing`: observations of robots with exact sensors
 - `checks`: checks of control periods and joining robots
 """
 

@@ -32,7 +32,7 @@ triangulation, with which one call for each run is as fast."""
 
 
 class _BatchDecision(NamedTuple):
-    """What the robots of all runs decide in a step."""
+    """The decision for the robots of all runs in a step."""
 
     forces: Array
     """(runs * n, 2) N"""
@@ -131,7 +131,7 @@ class SimulationBatch:
         self._start_step()
 
     def _start_step(self) -> None:
-        """Forget what was observed and decided in the last step."""
+        """Discard observations and decision of the last step."""
         self._graphs: list[Neighbours] | None = None
         self._observations: Observations | None = None
         self._decision: _BatchDecision | None = None
@@ -204,7 +204,7 @@ class SimulationBatch:
         self._start_step()
 
     def observe(self) -> Observations:
-        """Return what the robots of all runs know now.
+        """Return the present observations of the robots of all runs.
 
         Row ``r * n + i`` belongs to robot i of run r. Robots hear only those of their own run.
         """
@@ -222,7 +222,7 @@ class SimulationBatch:
         return self._observations
 
     def observe_run(self, run: int) -> Observations:
-        """Return what the robots of one run know now, as `Simulation.observe` does."""
+        """Return the present observations of the robots of one run, as `Simulation.observe` does."""
         observations = self.observe()
         rows = self._rows[run]
         scans = observations.scans
@@ -344,7 +344,7 @@ class SimulationBatch:
         return replace(joint_record, team=self.team, seed=seed, **arrays)
 
     def __getstate__(self) -> dict[str, Any]:
-        # What the robots know and decide in this step is computed again.
+        # Observations and decision of this step are computed again.
         return {**vars(self), "_graphs": None, "_observations": None, "_decision": None}
 
 

@@ -1,4 +1,4 @@
-"""Checks of what a simulation is built from."""
+"""Checks of the arguments of simulations."""
 
 from __future__ import annotations
 

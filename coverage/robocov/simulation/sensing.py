@@ -1,4 +1,4 @@
-"""From the world and the range sensor to what robots observe."""
+"""Observations of robots with exact sensors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def build_observations(
     time: float,
     scanning: Scanning | None,
 ) -> Observations:
-    """Build what robots with exact sensors observe.
+    """Build the observations of robots with exact sensors.
 
     Parameters
     ----------

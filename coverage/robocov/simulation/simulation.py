@@ -41,7 +41,7 @@ MAX_START_OVERLAP_M = 1e-6
 
 
 class _Knowledge(NamedTuple):
-    """What the robots know in a step."""
+    """Observations and messages of a step."""
 
     observations: Observations
     inbox: Inbox | None
@@ -67,7 +67,7 @@ class Simulation:
     Attributes
     ----------
     memory : object
-        Memory of the robots: what the controller returned in its last decision.
+        Memory of the robots, which the controller returned with its last decision.
     inbox : Inbox or None
         Messages that the robots have received; None if robots know the positions of others at once.
     joined : tuple of JoinedRobot
@@ -123,7 +123,7 @@ class Simulation:
         self._steps = state.steps
         if not state.is_computed:
             check_joins(environment, self.conditions)
-            self._check_robots_fit(state)
+            _check_robots_fit(environment, self.team, state, self.conditions, self.time)
         self._caller = ControllerCaller(controller, environment.static, self.time)
         self._world = self._build_world(state)
         self.sensor = RangeSensor(build_solid_pieces(environment), build_movers(environment))
@@ -139,16 +139,6 @@ class Simulation:
             self._complete_graph = Neighbours(len(self.team))
         self.memory: Any = self._caller.begin(environment.region, self.team, self.time)
         self._start_step()
-
-    def _check_robots_fit(self, state: TeamState) -> None:
-        max_overlap = MAX_START_OVERLAP_M
-        if state.velocities is not None:
-            # A robot that moves may lean on something, and then overlaps with it a little.
-            max_overlap = 2.0 * MAX_PENETRATION
-        working = None
-        if self.conditions is not None:
-            working = self.conditions.find_working(self.time, len(state))
-        require_free_starts(self.environment.at(self.time), state.positions, self.team, max_overlap, working)
 
     def _build_world(self, state: TeamState) -> World | ChangingWorld:
         if self.conditions is not None and self.conditions.has_team_changes:
@@ -171,7 +161,7 @@ class Simulation:
         )
 
     def _start_step(self) -> None:
-        """Forget what was observed and decided in the last step, and move the sensor's obstacles."""
+        """Discard observations and decision of the last step, and move the sensor's obstacles."""
         self._knowledge: _Knowledge | None = None
         self._snapshot: Snapshot | None = None
         if self._obstacles_change:
@@ -248,11 +238,11 @@ class Simulation:
         self.memory = next_memory
         self.inbox = next_inbox
         self._steps += 1
-        self.joined += self._list_joined(positions_before)
+        self.joined += self._find_new_robots(positions_before)
         self._start_step()
 
     def observe(self) -> Observations:
-        """Return what each robot knows now; the controller is not called."""
+        """Return the present observations of the robots; the controller is not called."""
         return self._get_knowledge().observations
 
     def observe_and_decide(self) -> Snapshot:
@@ -263,7 +253,7 @@ class Simulation:
         Returns
         -------
         Snapshot
-            The present state, what the robots observe, and what the controller decides.
+            The present state, the observations of the robots and the decision of the controller.
 
         Raises
         ------
@@ -288,7 +278,7 @@ class Simulation:
         return self._snapshot
 
     def _get_knowledge(self) -> _Knowledge:
-        """Return what the robots know in this step; it is found out once."""
+        """Return observations and messages of this step, which are computed once."""
         if self._knowledge is None:
             observations = self._sense()
             inbox = None
@@ -298,7 +288,7 @@ class Simulation:
         return self._knowledge
 
     def _sense(self) -> Observations:
-        """Return what robots with ideal sensors and communication observe."""
+        """Return the observations of robots with ideal sensors and communication."""
         neighbours = self._complete_graph
         if neighbours is None:
             neighbours = Neighbours.from_ranges(self.positions, self.team.communication_range)
@@ -313,8 +303,8 @@ class Simulation:
             scanning=scanning if is_scan_due(scanning, self._steps, self.dt) else None,
         )
 
-    def _list_joined(self, positions_before: Array) -> tuple[JoinedRobot, ...]:
-        """Return the robots that joined in the last step.
+    def _find_new_robots(self, positions_before: Array) -> tuple[JoinedRobot, ...]:
+        """Return the robots that joined at the end of the last step.
 
         The position of a robot before it joins is the one at which it should.
         """
@@ -408,7 +398,7 @@ class Simulation:
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
-        # What the robots know and decide in this step is computed again.
+        # Observations and decision of this step are computed again.
         return {**vars(self), "_knowledge": None, "_snapshot": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -497,3 +487,15 @@ class Simulation:
             if controller is None:
                 twin.memory = deepcopy(self.memory)
         return twin
+
+
+def _check_robots_fit(
+    environment: Environment, team: Team, state: TeamState, conditions: Conditions | None, time: float
+) -> None:
+    """Check that no working robot is in a wall or in another robot."""
+    max_overlap = MAX_START_OVERLAP_M
+    if state.velocities is not None:
+        # A robot that moves may lean on something, and then overlaps with it a little.
+        max_overlap = 2.0 * MAX_PENETRATION
+    working = None if conditions is None else conditions.find_working(time, len(state))
+    require_free_starts(environment.at(time), state.positions, team, max_overlap, working)
