@@ -59,25 +59,29 @@ def compute_clipped_cells(points: Array, sides: Array, neighbours: KnownNeighbou
 @kernel
 def _add_listed_neighbours(workspace: Workspace, points: Array, neighbours: KnownNeighbours, i: int) -> int:
     """Add the neighbours of robot i at their known positions; return their number."""
+    near = workspace.neighbours
+    indices = neighbours.indices
+    positions = neighbours.positions
     count = 0
     for k in range(neighbours.indptr[i], neighbours.indptr[i + 1]):
-        j = neighbours.indices[k]
-        if len(neighbours.positions):
-            dx = neighbours.positions[k, 0] - points[i, 0]
-            dy = neighbours.positions[k, 1] - points[i, 1]
+        j = indices[k]
+        if len(positions):
+            dx = positions[k, 0] - points[i, 0]
+            dy = positions[k, 1] - points[i, 1]
         else:
             dx = points[j, 0] - points[i, 0]
             dy = points[j, 1] - points[i, 1]
-        count = add_neighbour(workspace, count, dx, dy, j)
+        count = add_neighbour(near, count, dx, dy, j)
     return count
 
 
 @kernel
 def _add_all_robots(workspace: Workspace, points: Array, i: int) -> int:
     """Add all robots as neighbours of robot i; return their number."""
+    near = workspace.neighbours
     count = 0
     for j in range(len(points)):
         dx = points[j, 0] - points[i, 0]
         dy = points[j, 1] - points[i, 1]
-        count = add_neighbour(workspace, count, dx, dy, j)
+        count = add_neighbour(near, count, dx, dy, j)
     return count

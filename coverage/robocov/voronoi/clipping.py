@@ -29,6 +29,7 @@ SQUARE = 2
 """Column of a neighbour: its squared distance, m²."""
 ROBOT = 3
 """Column of a neighbour: its number."""
+_NEIGHBOUR_COLUMNS = 4
 
 _SORTED_NEIGHBOURS = 6
 """Number of neighbours that cut a cell in order of distance; it is then so small that few others count."""
@@ -69,12 +70,11 @@ def create_workspace(robots: int, sides: int) -> Workspace:
 
 
 @kernel
-def add_neighbour(workspace: Workspace, count: int, dx: float, dy: float, robot: int) -> int:
-    """Add a neighbour that may bound a cell; return the new number of neighbours.
+def add_neighbour(neighbours: Array, count: int, dx: float, dy: float, robot: int) -> int:
+    """Add a neighbour that may bound a cell to those of a workspace; return their new number.
 
     Neighbours at the same position are left out: two robots at one position do not cut each other's cells.
     """
-    neighbours = workspace.neighbours
     neighbours[count, DX] = dx
     neighbours[count, DY] = dy
     neighbours[count, SQUARE] = dx * dx + dy * dy
@@ -141,7 +141,7 @@ def _move_nearest(near: Array, turn: int, count: int) -> None:
     for k in range(turn + 1, count):
         if near[k, SQUARE] < near[best, SQUARE]:
             best = k
-    for column in range(near.shape[1]):
+    for column in range(_NEIGHBOUR_COLUMNS):
         near[turn, column], near[best, column] = near[best, column], near[turn, column]
 
 

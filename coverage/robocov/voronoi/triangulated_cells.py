@@ -166,6 +166,7 @@ def _walk_around(
 ) -> _Fan:
     """Write neighbours and Voronoi vertices of robot i, counter-clockwise from half-edge `begin` on."""
     mesh = triangulation.mesh
+    cotangents = triangulation.cotangents
     near = workspace.neighbours
     rings = workspace.rings
     n = len(points)
@@ -186,8 +187,8 @@ def _walk_around(
             dx = points[j, 0] - points[i, 0]
             dy = points[j, 1] - points[i, 1]
             # The vertex lies on the bisector, to its left by half the distance times the cotangent.
-            x = 0.5 * (dx - triangulation.cotangents[h] * dy)
-            y = 0.5 * (dy + triangulation.cotangents[h] * dx)
+            x = 0.5 * (dx - cotangents[h] * dy)
+            y = 0.5 * (dy + cotangents[h] * dx)
             max_square = max(max_square, x * x + y * y)
             near[count, DX] = dx
             near[count, DY] = dy
