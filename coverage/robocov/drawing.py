@@ -61,7 +61,7 @@ class Drawable:
 
         Raises ParameterError on axes or options that cannot be used.
         """
-        return getattr(drawing_backend(backend), f"plot_{self._drawn_as}")(self, axes, **options)
+        return getattr(load_drawing_backend(backend), f"plot_{self._drawn_as}")(self, axes, **options)
 
     def _repr_html_(self) -> Any:
         return self._displayed("html")
@@ -71,7 +71,7 @@ class Drawable:
 
     def _displayed(self, form: str) -> Any:
         try:
-            draw = getattr(drawing_backend(), f"{self._drawn_as}_{form}", None)
+            draw = getattr(load_drawing_backend(), f"{self._drawn_as}_{form}", None)
         except RobocovError:
             return None  # notebooks show the text instead
         return None if draw is None else draw(self)
@@ -94,10 +94,10 @@ def show(map: Any, **options: Any) -> Any:  # noqa: A002 - as everywhere else
     Needs ``robocov[web]``; without it, a replay of one minute is returned. Raises RobocovError for whatever
     the window cannot begin with.
     """
-    return drawing_backend().show(map, **options)
+    return load_drawing_backend().show(map, **options)
 
 
-def drawing_backend(name: str | None = None) -> DrawingBackend:
+def load_drawing_backend(name: str | None = None) -> DrawingBackend:
     """Return the backend called `name`.
 
     Raises ParameterError for an unknown name, RobocovError when there is none at all or it cannot be loaded.

@@ -13,7 +13,7 @@ import pytest
 from robocov import drawing
 from robocov.controllers import Rapf
 from robocov.cost import CoverageCost
-from robocov.drawing import drawing_backend
+from robocov.drawing import load_drawing_backend
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError
 from robocov.metrics import compute_cost_history
@@ -62,11 +62,11 @@ def record(empty: Environment) -> Record:
 
 
 def test_the_application_is_installed_as_the_backend() -> None:
-    assert drawing_backend().__name__ == "robocov_app.notebook"  # type: ignore[attr-defined]
-    assert drawing_backend("matplotlib") is drawing_backend()
+    assert load_drawing_backend().__name__ == "robocov_app.notebook"  # type: ignore[attr-defined]
+    assert load_drawing_backend("matplotlib") is load_drawing_backend()
     wanted = list(drawing.DrawingBackend.__annotations__)
     assert len(wanted) == 9
-    assert all(callable(getattr(drawing_backend(), name)) for name in wanted)
+    assert all(callable(getattr(load_drawing_backend(), name)) for name in wanted)
 
 
 def test_another_backend_is_asked_for_by_name(
@@ -92,7 +92,7 @@ def test_without_matplotlib_the_first_by_name_draws(
     monkeypatch: pytest.MonkeyPatch, sketches: Sketches, record: Record, empty: Environment
 ) -> None:
     offering(monkeypatch, zeichnungen="nowhere", sketches="sketches")
-    assert drawing_backend() is sketches
+    assert load_drawing_backend() is sketches
     assert record._repr_html_() == "record_html of sketches"
     assert record._repr_png_() == "record_png of sketches"
     assert empty._repr_html_() == "environment_html of sketches"
