@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from robocov.controllers import information_of
-from robocov.controllers.atlas import Teammates
+from robocov.controllers.teammates import Teammates
 from robocov.controllers.user_modules import provided
 from robocov.cost import CoverageCost
 from robocov.environment import Environment

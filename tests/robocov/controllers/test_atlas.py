@@ -10,13 +10,16 @@ import pytest
 
 from robocov.conditions import Conditions, Failure
 from robocov.controllers import Atlas, AtlasShared, Rapf, atlas, information_of, make_controller
-from robocov.controllers.atlas import MAX_PLANNING_GROUP, AtlasMemory, Teammates
+from robocov.controllers.atlas import MAX_PLANNING_GROUP, AtlasMemory, PlannerState
+from robocov.controllers.teammates import Teammates
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
 from robocov.mapfile import load_map
 from robocov.metrics import compute_clearances, count_contacts
-from robocov.planning.discovered_map import UNKNOWN
+from robocov.observation import Observations
+from robocov.observation.neighbours import Neighbours
+from robocov.planning.discovered_map import FREE, UNKNOWN, WALL, DiscoveredMap
 from robocov.simulation import Simulation
 from robocov.team import Team
 
@@ -67,7 +70,7 @@ def test_it_comes_to_rest(finished: Simulation) -> None:
 @pytest.mark.slow
 def test_who_rests_notices_that_all_others_have_come_to_rest(finished: Simulation) -> None:
     """Only then it may relocate: it plans once more then, though nothing that it sees has changed."""
-    assert all(state.idle and state.quiet for state in finished.memory.states)
+    assert all(state.is_idle and state.was_quiet for state in finished.memory.states)
 
 
 @pytest.mark.slow
@@ -163,12 +166,12 @@ def test_a_robot_alone_and_a_crowd() -> None:
 def test_it_plans_now_and_then() -> None:
     """Not all robots at the same moment, and less often where nodes are far apart."""
     some = simulation()
-    due = [state.due for state in some.memory.states]
+    due = [state.next_plan_time for state in some.memory.states]
     assert len(set(due)) == 4
     assert max(due) < 0.5
     while some.time < 0.5:
         some.step()
-    due = [state.due for state in some.memory.states]
+    due = [state.next_plan_time for state in some.memory.states]
     assert len(set(due)) == 4
     assert min(due) > 1.0
     assert max(due) < 2.5
@@ -185,11 +188,11 @@ def test_what_must_be_saved_begins_anew_when_the_team_changes() -> None:
     some = Simulation(ROOMS, Atlas(), CORNER, dt=0.05, conditions=Conditions(failures=((4, 2.0),)))
     while some.time < 1.9:
         some.step()
-    before = [state.since for state in some.memory.states[:3]]
+    before = [state.start_time for state in some.memory.states[:3]]
     assert max(before) < 1.0
     while some.time < 5.0:
         some.step()
-    assert all(2.0 <= state.since < 4.5 for state in some.memory.states[:3])
+    assert all(2.0 <= state.start_time < 4.5 for state in some.memory.states[:3])
 
 
 @pytest.mark.slow
@@ -205,17 +208,17 @@ def test_what_relocations_and_goals_must_save_doubles_with_the_way(monkeypatch: 
     some = Simulation(ROOMS, Atlas(settling=0.1), CORNER[:2], Team.homogeneous(2), dt=0.05)
     while some.time < 8.0:
         some.step()
-    walked = max(state.walked for state in some.memory.states)
+    walked = max(state.path_length for state in some.memory.states)
     rest = np.array([each for _, each in asked])
     assert walked > 3.0 and min(rest) == 0.002
     assert max(rest) == pytest.approx(0.002 * 2.0 ** (walked / (0.1 * ROOMS.region.diameter)), rel=0.1)
     # who stands still stays as ready to move as it was
     while some.time < 60.0:
         some.step()
-    rested = [state.walked for state in some.memory.states]
+    rested = [state.path_length for state in some.memory.states]
     while some.time < 90.0:
         some.step()
-    assert [state.walked for state in some.memory.states] == rested
+    assert [state.path_length for state in some.memory.states] == rested
 
 
 @pytest.mark.slow
@@ -247,7 +250,9 @@ def test_robots_that_meet_pass_on_the_left() -> None:
     sideways = np.zeros(2)
     for _ in range(120):
         memory = some.memory
-        states = tuple(replace(state, due=math.inf, planned=state.known) for state in memory.states)
+        states = tuple(
+            replace(state, next_plan_time=math.inf, planned_map=state.known_map) for state in memory.states
+        )
         legs = np.zeros(2, dtype=np.intp)
         some = some.with_memory(replace(memory, states=states, routes=tuple(goals), legs=legs))
         some.step()
@@ -263,15 +268,17 @@ def test_who_stays_is_noticed() -> None:
     at = np.array([[0.0, 0.0], [1.0, 0.0]])
     known = Teammates(np.array([1, 4]), at, np.array([1.0, 1.0]), np.ones(2), np.array([0.0, 0.5]), at)
     seen = np.array([[0.05, 0.0], [3.0, 3.0], [1.2, 0.0]])
-    later = known.updated(np.array([1, 2, 4]), seen, np.array([0.05, 4.0]), 2.0, np.zeros(2, dtype=bool))
-    assert later.since.tolist() == [0.0, 2.0, 2.0] and later.heard.tolist() == [2.0] * 3
-    np.testing.assert_array_equal(later.at, seen)
+    later = known.add_observation(
+        np.array([1, 2, 4]), seen, np.array([0.05, 4.0]), 2.0, np.zeros(2, dtype=bool)
+    )
+    assert later.rest_times.tolist() == [0.0, 2.0, 2.0] and later.heard_times.tolist() == [2.0] * 3
+    np.testing.assert_array_equal(later.positions, seen)
     # creeping away is noticed as well
-    np.testing.assert_array_equal(later.places, [[0.0, 0.0], [3.0, 3.0], [1.2, 0.0]])
-    np.testing.assert_allclose(later.away, np.hypot(*(seen - [0.05, 4.0]).T))
+    np.testing.assert_array_equal(later.rest_positions, [[0.0, 0.0], [3.0, 3.0], [1.2, 0.0]])
+    np.testing.assert_allclose(later.heard_distances, np.hypot(*(seen - [0.05, 4.0]).T))
     nobody, nowhere = np.empty(0, dtype=np.intp), np.empty((0, 2))
-    silent = later.updated(nobody, nowhere, np.zeros(2), 3.0, np.array([False, True, False]))
-    assert silent.robots.tolist() == [1, 4] and silent.heard.tolist() == [2.0] * 2
+    silent = later.add_observation(nobody, nowhere, np.zeros(2), 3.0, np.array([False, True, False]))
+    assert silent.robots.tolist() == [1, 4] and silent.heard_times.tolist() == [2.0] * 2
 
 
 def test_the_latest_report_of_a_robot_counts() -> None:
@@ -283,11 +290,11 @@ def test_the_latest_report_of_a_robot_counts() -> None:
     mine = known((2, 0.2, 5.0), (3, 0.3, 1.0), (6, 0.6, 4.0))
     # itself, older, later, then missed before, missed since, and just as old news
     report = known((0, 9.0, 9.0), (2, 9.0, 4.0), (3, 0.33, 2.0), (4, 0.4, 3.0), (5, 9.0, 3.0), (6, 9.0, 4.0))
-    told = mine.joined([report], 0, {4: 2.5, 5: 3.5})
-    assert (told.robots.tolist(), told.at[:, 0].tolist()) == ([2, 3, 4, 6], [0.2, 0.33, 0.4, 0.6])
-    assert told.heard.tolist() == [5.0, 2.0, 3.0, 4.0]
+    told = mine.add_reports([report], 0, {4: 2.5, 5: 3.5})
+    assert (told.robots.tolist(), told.positions[:, 0].tolist()) == ([2, 3, 4, 6], [0.2, 0.33, 0.4, 0.6])
+    assert told.heard_times.tolist() == [5.0, 2.0, 3.0, 4.0]
     # who was never near cannot be missed for its silence
-    assert told.away.tolist() == [1.0, math.inf, math.inf, 1.0]
+    assert told.heard_distances.tolist() == [1.0, math.inf, math.inf, 1.0]
 
 
 @pytest.mark.parametrize(("kind", "whom"), [(Atlas, [1]), (AtlasShared, [1, 2])])
@@ -298,7 +305,7 @@ def test_a_robot_in_the_middle_tells_where_the_others_are(kind: type[Atlas], who
     while some.time < 2.5:
         some.step()
     state = some.memory.states[0]
-    assert state.others.robots.tolist() == whom and state.met == {*whom}
+    assert state.teammates.robots.tolist() == whom and state.met == {*whom}
 
 
 @pytest.mark.slow
@@ -312,11 +319,11 @@ def test_who_is_out_of_range_is_presumed_at_its_place_and_who_falls_silent_in_ra
         while each.time < 40.0:
             each.step()
     np.testing.assert_allclose(np.sort(both.positions, axis=0), [[5.0, 1.5], [15.0, 1.5]], atol=0.5)
-    others = [state.others for state in both.memory.states]
+    others = [state.teammates for state in both.memory.states]
     assert [each.robots.tolist() for each in others] == [[1], [0]]
-    assert max(each.heard[0] for each in others) < 10.0, "out of range since then"
-    np.testing.assert_allclose(others[0].at[0], both.positions[1], atol=0.7)
-    assert len(alone.memory.states[0].others.robots) == 0
+    assert max(each.heard_times[0] for each in others) < 10.0, "out of range since then"
+    np.testing.assert_allclose(others[0].positions[0], both.positions[1], atol=0.7)
+    assert len(alone.memory.states[0].teammates.robots) == 0
     np.testing.assert_allclose(alone.positions[0], [10.0, 1.5], atol=0.5)
 
 
@@ -328,17 +335,17 @@ def test_who_is_not_where_it_was_presumed_to_be_is_forgotten() -> None:
     some = Simulation(hall, Atlas(), [[9.8, 1.5], [10.2, 1.5]], team, dt=0.05)
     while some.time < 20.0:
         some.step()
-    since = some.memory.states[0].since
+    since = some.memory.states[0].start_time
     dies = Conditions(failures=(Failure(2, 20.0),))
     near = some.positions.copy()
     near[0, 0] += 0.8 * (near[1, 0] - near[0, 0])
     some = some.with_changes(positions=near, conditions=dies).with_memory(some.memory)
     some.step()
-    assert some.memory.states[0].others.robots.tolist() == [1], "it may be late"
+    assert some.memory.states[0].teammates.robots.tolist() == [1], "it may be late"
     while some.time < 50.0:
         some.step()
     state = some.memory.states[0]
-    assert len(state.others.robots) == 0 and state.since == since
+    assert len(state.teammates.robots) == 0 and state.start_time == since
     np.testing.assert_allclose(some.positions[0], [10.0, 1.5], atol=0.7)
 
 
@@ -403,8 +410,12 @@ def test_robots_that_share_a_map_plan_once(monkeypatch: pytest.MonkeyPatch) -> N
         simulated.step()
     assert len(plan_times) == len(set(plan_times)) == 3
     states = simulated.memory.states
-    assert len({id(state.known) for state in states}) == len({id(state.team_ways) for state in states}) == 1
-    plans = [state.places[np.argsort(state.places[:, 0])] for state in states]
+    assert (
+        len({id(state.known_map) for state in states})
+        == len({id(state.team_planner) for state in states})
+        == 1
+    )
+    plans = [state.planned_goals[np.argsort(state.planned_robots)] for state in states]
     assert all(np.array_equal(plan, plans[0]) for plan in plans)
 
 
@@ -418,3 +429,69 @@ def test_a_jam_at_a_door_dissolves() -> None:
     while crowd.time < 80.0:
         crowd.step()
     assert 16 <= (crowd.positions[:, 0] > 3.1).sum() <= 21
+
+
+def test_a_robot_is_missed_only_after_a_while() -> None:
+    """Robot 2 is presumed near robot 1 but is far away: for some seconds its messages may just be late."""
+    team = Team.homogeneous(2, communication_range=5.0)
+    positions = np.array([[1.0, 1.0], [7.0, 7.0]])
+    observations = Observations(
+        positions,
+        np.zeros((2, 2)),
+        Neighbours.from_ranges(positions, team.communication_range),
+        np.full((2, 2), np.nan),
+        ROOMS.region,
+    )
+    presumed = np.array([[2.0, 1.0]])
+    zero = np.zeros(1)
+    teammates = Teammates(np.array([1]), presumed, zero, np.full(1, math.inf), zero, presumed)
+    state = replace(Atlas().begin(ROOMS.region, team).states[0], teammates=teammates)
+    for time, expected in ((1.0, [1]), (4.9, [1]), (5.1, [])):
+        later = Atlas()._update_teammates(replace(observations, time=time), team, state, 0, [])
+        assert later.teammates.robots.tolist() == expected
+
+
+def build_idle_state() -> PlannerState:
+    state = Atlas().begin(ROOMS.region, Team.homogeneous(1)).states[0]
+    return replace(
+        state,
+        planned_map=state.known_map,
+        group=np.array([0, 1]),
+        positions=np.array([[1.0, 1.0], [2.0, 1.0]]),
+        was_quiet=True,
+        is_idle=True,
+    )
+
+
+def test_a_plan_is_skipped_only_if_nothing_has_changed() -> None:
+    state = build_idle_state()
+    group = np.array([0, 1])
+    positions = state.positions
+    assert positions is not None
+
+    def is_skipped(state: PlannerState, group: np.ndarray, positions: np.ndarray, is_quiet: bool) -> bool:
+        return atlas._is_unchanged(state, group, positions, is_quiet, max_move=0.1)
+
+    assert is_skipped(state, group, positions + 0.09, True)
+    assert not is_skipped(state, group, positions + [[0.0, 0.0], [0.11, 0.0]], True)
+    assert not is_skipped(state, np.array([0, 2]), positions, True)
+    assert not is_skipped(state, group, positions, False)
+    assert not is_skipped(replace(state, is_idle=False), group, positions, True)
+    other_map = DiscoveredMap(state.known_map.raster, np.ones_like(state.known_map.state))
+    assert not is_skipped(replace(state, known_map=other_map), group, positions, True)
+    assert not is_skipped(replace(state, positions=None), group, positions, True)
+
+
+def test_a_robot_starts_again_when_walls_change() -> None:
+    state = build_idle_state()
+    raster = state.known_map.raster
+    free = np.full(raster.shape, FREE, dtype=np.uint8)
+    walls = free.copy()
+    walls[50, 20:40] = WALL
+    before = replace(state, known_map=DiscoveredMap(raster, walls), planned_map=DiscoveredMap(raster, walls))
+    assert not atlas._has_changed(before, before, 0.1)
+    after = replace(before, known_map=DiscoveredMap(raster, free))
+    assert atlas._has_changed(before, after, 0.1)
+    # Small changes are the side of another robot that has come into view, or is gone.
+    assert not atlas._has_changed(before, after, 0.3)
+    assert atlas._has_changed(before, replace(before, met=frozenset({1})), 0.1)

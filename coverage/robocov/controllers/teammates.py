@@ -1,0 +1,100 @@
+"""What one robot knows of the others: where they are, when they were heard, and how long they have rested."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+
+REST_RADIUS_M = 0.1
+"""A robot that stays within this distance is at rest."""
+
+
+class Teammates(NamedTuple):
+    """Knowledge of a robot about (k,) others."""
+
+    robots: IntArray
+    """(k,) Their numbers, ascending."""
+    positions: Array
+    """(k, 2) m, where they are, or are presumed to be."""
+    heard_times: Array
+    """(k,) s, when they were last heard."""
+    heard_distances: Array
+    """(k,) m, how far away they were then."""
+    rest_times: Array
+    """(k,) s, since when they have been within `REST_RADIUS_M` of `rest_positions`."""
+    rest_positions: Array
+    """(k, 2) m"""
+
+    @classmethod
+    def build_empty(cls) -> Teammates:
+        """Build the knowledge of a robot that has not heard any other one."""
+        return cls(
+            robots=np.empty(0, dtype=np.intp),
+            positions=np.empty((0, 2)),
+            heard_times=np.empty(0),
+            heard_distances=np.empty(0),
+            rest_times=np.empty(0),
+            rest_positions=np.empty((0, 2)),
+        )
+
+    def add_observation(
+        self, robots: IntArray, positions: Array, own_position: Array, time: float, is_gone: BoolArray
+    ) -> Teammates:
+        """Add where some robots are heard to be now.
+
+        Parameters
+        ----------
+        robots : (m,) int array
+        positions : (m, 2) array, m
+        own_position : (2,) array, m
+        time : float, s
+        is_gone : (k,) bool array
+            Robots known before that are left out unless they are heard.
+        """
+        now = np.full(len(robots), time)
+        distances = np.sqrt(((positions - own_position) ** 2).sum(axis=1))
+        heard = Teammates(robots, positions, now, distances, now, positions)
+        is_kept = ~(np.isin(self.robots, robots) | is_gone)
+        columns = [np.concatenate([new, old[is_kept]]) for new, old in zip(heard, self, strict=True)]
+        order = np.argsort(columns[0])
+        later = Teammates(*(column[order] for column in columns))
+        _, here, there = np.intersect1d(later.robots, self.robots, assume_unique=True, return_indices=True)
+        distances = np.sqrt(((later.positions[here] - self.rest_positions[there]) ** 2).sum(axis=1))
+        is_at_rest = distances < REST_RADIUS_M
+        here = here[is_at_rest]
+        there = there[is_at_rest]
+        later.rest_positions[here] = self.rest_positions[there]
+        later.rest_times[here] = self.rest_times[there]
+        return later
+
+    def add_reports(self, reports: Sequence[Teammates], robot: int, gone: Mapping[int, float]) -> Teammates:
+        """Add what a robot is told of others that were heard later than it has heard them itself.
+
+        Parameters
+        ----------
+        reports : sequence of Teammates
+            Of several reports as late the first one counts.
+        robot : int
+            The robot itself, of which reports tell nothing new.
+        gone : mapping of int to float, s
+            When it took a robot for failed, or missed it: only later reports count.
+        """
+        sources: list[Sequence[Array | IntArray]] = [self]
+        for report in reports:
+            min_times = [
+                math.inf if other == robot else gone.get(other, -1.0) for other in report.robots.tolist()
+            ]
+            is_new = report.heard_times > np.array(min_times)
+            # A robot that was never near cannot be missed for its silence.
+            report = report._replace(heard_distances=np.full(len(is_new), math.inf))
+            sources.append([column[is_new] for column in report])
+        columns = [np.concatenate(parts) for parts in zip(*sources, strict=True)]
+        order = np.lexsort((-columns[2], columns[0]))  # by robot, the latest first; stable
+        _, first = np.unique(columns[0][order], return_index=True)
+        order = order[first]
+        return Teammates(*(column[order] for column in columns))
