@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -140,3 +142,17 @@ def test_a_density_draws_the_centroid_of_what_is_in_range() -> None:
     weight = bell.evaluate(places)
     assert goals is not None
     np.testing.assert_allclose(goals[0], (places * weight[:, None]).sum(axis=0) / weight.sum(), atol=3e-3)
+
+
+def test_each_cell_is_limited_by_the_robots_own_communication_range() -> None:
+    """The range of one robot does not limit the cells of the others."""
+    positions = np.array([[3.0, 4.0], [8.0, 4.0]])
+    team = replace(Team.homogeneous(2), communication_range=np.array([1.0, 8.0]))
+    controller = RangeLimited(interaction_range=None)
+    decision = controller.decide(seen_from(positions), controller.begin(REGION, team))
+    assert decision.goals is not None
+    cells = partition(positions, REGION)
+    for robot, radius in enumerate((0.5, 4.0)):
+        disc = shapely.Point(positions[robot]).buffer(radius, quad_segs=1024)
+        limited_cell = shapely.Polygon(cells.polygons[robot]).intersection(disc)
+        np.testing.assert_allclose(decision.goals[robot], limited_cell.centroid.coords[0], atol=1e-4)
