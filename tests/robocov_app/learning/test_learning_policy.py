@@ -247,7 +247,7 @@ def test_what_is_no_policy(empty: Environment) -> None:
         ParameterError, match=r"controller 'policy': ZeroDivisionError: .*test_learning_policy.py"
     ):
         run(PolicyController(lambda observation: (1 / 0, 2.0)))
-    with pytest.raises(ParameterError, match="but finite newtons were wanted"):
+    with pytest.raises(ParameterError, match="expected two finite numbers in newtons"):
         run(PolicyController(lambda observation: (np.nan, 0.0)))
     with pytest.raises(ParameterError, match="action: unknown kind of action 'steer'"):
         PolicyController(action="steer")
