@@ -31,6 +31,9 @@ progress._tell = lambda kernel: None
 # what is started in the background of a script ignores Ctrl-C, and hands that on to all that it starts
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+# what is started by nohup ignores SIGHUP, and hands that on as well
+if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # examples differ in cost by orders of magnitude, and machines are shared: time says nothing here
 QUIET = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}

@@ -15,8 +15,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from robocov_app.commands import COMMANDS
+
+if TYPE_CHECKING:
+    from robocov.errors import RobocovError
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 TRACEBACK = "ROBOCOV_TRACEBACK"  # environment variable; where it is set, errors come with their traceback
@@ -109,9 +113,17 @@ def _run_command(name: str, rest: list[str]) -> int:
     return int(status or OK)
 
 
+def _find_users_fault(error: BaseException) -> "RobocovError | None":
+    """Return what is wrong in a user's own code, if the error comes from there."""
+    if "robocov.controllers" not in sys.modules:
+        return None  # Without it, which takes long to import, no code of users has run.
+    from robocov.controllers.user_modules import users_fault
+
+    return users_fault(error)
+
+
 def _explain(error: BaseException, name: str) -> int:
     """Say in one line why a command has failed, and return its exit status."""
-    from robocov.controllers.user_modules import users_fault
     from robocov.errors import ControllerEndedError, ParameterError, RobocovError
     from robocov_app.terminal.interruption import was_interrupted
     from robocov_app.terminal.output import echo
@@ -125,7 +137,7 @@ def _explain(error: BaseException, name: str) -> int:
         return _complain(by_option(module.Arguments, str(error)))
     if isinstance(error, RobocovError):
         return _complain(str(error))
-    fault = users_fault(error)
+    fault = _find_users_fault(error)
     if isinstance(error, KeyboardInterrupt) and (was_interrupted() or fault is None):
         echo("robocov: stopped", to_stderr=True)
         return INTERRUPTED

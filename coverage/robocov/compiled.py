@@ -160,7 +160,9 @@ def _build_dispatcher(function: Callable[..., Any], *, is_cached: bool) -> Any:
     try:
         if is_cached:
             numba.config.CACHE_DIR = str(cache_folder())
-        return numba.njit(function, cache=is_cached, error_model="numpy")
+            with suppress(RuntimeError):  # for functions that are in no file, such as those of an example
+                return numba.njit(function, cache=True, error_model="numpy")
+        return numba.njit(function, error_model="numpy")
     finally:
         numba.config.CACHE_DIR = previous
 

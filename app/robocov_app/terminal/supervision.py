@@ -22,7 +22,9 @@ from contextlib import suppress
 from pathlib import Path
 from types import FrameType
 
-_DESCRIPTOR = "ROBOCOV_SUPERVISED"  # environment variable with the descriptor of the pipe
+_DESCRIPTOR = (
+    "_ROBOCOV_SUPERVISOR"  # environment variable, for this module alone, with the descriptor of the pipe
+)
 _CONTROLLER = re.compile(r"[^\s,\"'\[\]]+\.py:[^\W\d]\w*")
 _MAX_STUDY_BYTES = 1_000_000
 _FORWARDED = ("SIGINT", "SIGTERM", "SIGHUP")

@@ -666,7 +666,7 @@ class Ui:
             is_old = self.open_list.options != list(options)  # what there is to choose has changed meanwhile
             if picked is not None or is_old:
                 self.open_list = None
-            if picked not in options:
+            if picked is not None and picked not in options:
                 picked = None
         opened = self._clicks("menu", key, rect, now, now, tip, "") or self._key(key) == "down"
         if opened and picked is None:

@@ -79,6 +79,6 @@ def serve_each(command: Callable[[Any], int], options: Any) -> int:
     sessions = Sessions(command, options, options.max_sessions, max_idle_s)
     try:
         asyncio.run(sessions.serve(lambda line: echo(line, flush=True)))
-    except asyncio.CancelledError:  # by SIGTERM
+    except asyncio.CancelledError:  # by SIGINT or SIGTERM
         raise KeyboardInterrupt from None
     return 0

@@ -162,7 +162,9 @@ class Sessions:
         task = asyncio.current_task()
         assert task is not None
         with suppress(NotImplementedError, ValueError):  # not on Windows, and only in the main thread
-            loop.add_signal_handler(signal.SIGTERM, task.cancel)
+            # Raised as a KeyboardInterrupt, Ctrl-C could end whatever task is running, instead of this one.
+            for number in (signal.SIGINT, signal.SIGTERM):
+                loop.add_signal_handler(number, task.cancel)
         try:
             self._spare = await self._open(self._folders.create())  # reports at once what is wrong
             tell(f"open {link_to(host, port, self.token)}")

@@ -181,6 +181,10 @@ class Wild:
         (np.zeros((3, 2)), r"returned forces of shape \(3, 2\) at .*, expected \(2, 2\)"),
         ("east", r"returned forces 'east' at 0.000 s .*, expected numbers of shape"),
         (None, r"returned forces None at .*, expected numbers of shape"),
+        (
+            np.full((2, 2), 1.0 + 2.0j),
+            r"returned forces .*1.*2.*j.* at 0.000 s .*, expected numbers of shape",
+        ),
         (np.array([[0.0, 0.0], [np.nan, 1.0]]), r"returned the force \[nan, 1.0\] for robot 2 at 0.000 s"),
     ],
 )

@@ -105,7 +105,7 @@ def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str
     [
         (
             "--kind mases",
-            "--kind: 'mases', but one of 'polygons', 'blocks', 'rooms', 'mazes', 'caves' was wanted",
+            "--kind: expected polygons, blocks, rooms, mazes or caves, got 'mases'",
         ),
         ("--seed -1", "--seed: expected a whole number of at least 0, got -1"),
         ("--seed x", "--seed: 'x', but a whole number was wanted"),
@@ -124,7 +124,7 @@ def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str
         ("--study full", "--out: a folder for the maps was wanted with --count and --study"),
         ("--study full --gap 0.7 --out maps", "--gap: 0.7, but --study says what its maps are like"),
         ("--study full --count 3 --out maps", "--count: 3, but --study says what its maps are like"),
-        ("--study half", "--study: 'half', but one of 'full', 'quick' was wanted"),
+        ("--study half", "--study: expected full or quick, got 'half'"),
         ("--plot sheet.gif", "sheet.gif: suffix '.gif', but .png, .svg or .pdf was wanted"),
         ("--plot none/sheet.png", "none/sheet.png: cannot be written: there is no folder none"),
         ("--out .", "--out: '.', but the name of a file was wanted"),

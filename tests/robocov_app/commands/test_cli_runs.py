@@ -253,6 +253,7 @@ def test_a_gain_of_no_use_is_refused(value: str, message: str, capsys: pytest.Ca
             "controller 'Mine': force(own) returned [nan, 0] for robot 1 at 0.000 s",
         ),
         ("return 'east'", "controller 'Mine': force(own) returned 'east' for robot 1"),
+        ("return [1j, 0]", "controller 'Mine': force(own) returned [1j, 0] for robot 1"),
     ],
 )
 def test_a_controller_that_fails_is_named_with_its_line(
