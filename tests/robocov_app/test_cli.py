@@ -143,7 +143,7 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ("run rooms --robots many", "--robots: 'many', but a whole number was wanted"),
         ("run rooms --start coridor", "did you mean 'corridor'?"),
         ("run rooms --max-speed -1", "--max-speed: expected a number from"),
-        ("run rooms --fail 9@1", "--fail: robot 9, but one of 1 to 6 was wanted"),
+        ("run rooms --fail 9@1", "--fail: expected a robot from 1 to 6, got robot 9"),
         ("run rooms --message-rate -1", "--message-rate: -1.0"),
         ("run rooms --dt 0", "dt: expected a number from 0.0001 to 1 s, got 0.0"),
         ("run rooms --dt nan", "dt: expected a number from 0.0001 to 1 s, got nan"),

@@ -136,7 +136,7 @@ class ConditionOptions:
         """Return the conditions for a team, None where they are ideal; raises ParameterError."""
         if self == ConditionOptions():
             return None
-        from robocov.conditions import LIMITS, Conditions, Failure, Join, parse_event
+        from robocov.conditions import PARAMETERS, Conditions, Failure, Join, parse_event
 
         events: dict[str, Any] = {}
         for option, kind, texts in (("fail", Failure, self.fail), ("join", Join, self.join)):
@@ -144,7 +144,7 @@ class ConditionOptions:
                 events[option] = tuple(parse_event(kind, text) for text in texts)
             except ParameterError as error:
                 raise ParameterError(f"--{option}: {error}") from None
-        limits = {name: getattr(self, name) for name in LIMITS}
+        limits = {name: getattr(self, name) for name in PARAMETERS}
         conditions = Conditions(**limits, failures=events["fail"], joins=events["join"], seed=seed)
         conditions.check_team(robots)
         return None if conditions.is_ideal else conditions

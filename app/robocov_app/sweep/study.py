@@ -16,7 +16,7 @@ from typing import Any, Literal, TypeAlias, TypeVar, cast, get_args
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.conditions import LIMITS, Conditions, Failure, Join, parse_event
+from robocov.conditions import PARAMETERS, Conditions, Failure, Join, parse_event
 from robocov.conditions import UNITS as CONDITION_UNITS
 from robocov.controllers import controller_kind, gain_values, gains_of
 from robocov.controllers.gains import Gain, Option, Value, with_gains
@@ -230,7 +230,7 @@ def once(values: Sequence[object], path: Place) -> None:
 
 TeamValue: TypeAlias = float | str | None  # of what is varied of team and conditions
 EVENTS = {"fail": Failure, "join": Join}  # conditions that are texts: ``3@20 5@40`` are two in one run
-CONDITIONS = (*LIMITS, *EVENTS)  # the conditions that a study may sweep
+CONDITIONS = (*PARAMETERS, *EVENTS)  # the conditions that a study may sweep
 WORDS = (*EVENTS, "kinematics")
 GROUPS = "groups"  # robots that differ, as JSON: the groups of a team file
 UNITS = {**TEAM_UNITS, **CONDITION_UNITS, **dict.fromkeys((*WORDS, GROUPS), "")}
@@ -276,7 +276,7 @@ def condition_axes(given: Mapping[str, Any]) -> dict[str, list[TeamValue]]:
 
 def conditions_of(parameters: Mapping[str, TeamValue], seed: int, robots: int) -> Conditions | None:
     """Return the conditions among what a study varies; None where they are ideal."""
-    values: dict[str, Any] = {name: parameters[name] for name in LIMITS if name in parameters}
+    values: dict[str, Any] = {name: parameters[name] for name in PARAMETERS if name in parameters}
     fail, join = (str(parameters.get(name, "")).split() for name in EVENTS)
     values["failures"] = tuple(parse_event(Failure, word) for word in fail)
     values["joins"] = tuple(parse_event(Join, word) for word in join)
@@ -563,7 +563,7 @@ def _value_of(name: str, value: object, path: Place) -> TeamValue:
             raise ParameterError(f"{format_path(path)}: {error}") from None
     if value in _UNLIMITED.get(name, ()):
         return None
-    if name in LIMITS:
+    if name in PARAMETERS:
         given: dict[str, Any] = {"forget_after": 1e6, name: value}
         return getattr(placed(path, lambda: Conditions(**given)), name)  # type: ignore[no-any-return]
     if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > _HUGE:

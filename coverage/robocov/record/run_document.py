@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field, create_model
 
-from robocov.conditions import LIMITS
+from robocov.conditions import PARAMETERS
 from robocov.files.strictjson import Document, wanted
 from robocov.team import MAX_ROBOTS
 
@@ -36,14 +36,16 @@ def _build_number_field(low: float, high: float, *, allow_null: bool) -> Any:
 
 
 def _build_conditions_model() -> Any:
-    """Return the model of conditions, whose numbers have the ranges of `LIMITS`."""
+    """Return the model of conditions, whose numbers have the ranges of `PARAMETERS`."""
     fields: dict[str, Any] = {
         "failures": (list[_Failure], ...),
         "joins": (list[_Join], ...),
         "seed": (Seed, ...),
     }
-    for name, (low, high, _, key) in LIMITS.items():
-        fields[key] = _build_number_field(low, high, allow_null=name == "message_rate")
+    for parameter in PARAMETERS.values():
+        fields[parameter.json_key] = _build_number_field(
+            parameter.minimum, parameter.maximum, allow_null=parameter.may_be_null
+        )
     return create_model("_Conditions", __base__=Document, **fields)
 
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.conditions import Conditions, JoinedRobot
-from robocov.conditions.perception import Inbox, Perception, ignore_idle_robots
+from robocov.conditions.communication import Inbox
+from robocov.conditions.perception import Perception, ignore_idle_robots
 from robocov.controllers.base import Controller, IndividualController
 from robocov.drawing import show
 from robocov.environment import Environment, require_environment

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.conditions import LOSS, Conditions
-from robocov.conditions.perception import Inbox, Perception
-from robocov.conditions.random_streams import Draws
+from robocov.conditions.communication import Inbox, Radio
+from robocov.conditions.random_streams import RandomStream
 from robocov.controllers import CONTROLLERS, Controller, atlas, informed
 from robocov.environment import Environment
 from robocov.errors import InputError
@@ -26,9 +26,8 @@ OPEN = Environment("open", ((0, 0), (10, 0), (10, 10), (0, 10)))
 SQUARE = Region(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]))
 
 
-def radio_of(conditions: Conditions, ranges: np.ndarray, dt: float = DT) -> Perception:
-    team = replace(Team.homogeneous(len(ranges)), communication_range=ranges)
-    return Perception(conditions, team, dt)
+def build_radio(conditions: Conditions, ranges: np.ndarray, dt: float = DT) -> Radio:
+    return Radio(conditions, ranges, dt)
 
 
 def walks(n: int, steps: int, seed: int) -> np.ndarray:
@@ -42,7 +41,7 @@ def told_one_by_one(
     conditions: Conditions, ranges: np.ndarray, places: np.ndarray, working: np.ndarray
 ) -> list[dict[tuple[int, int], tuple[int, np.ndarray]]]:
     """Return what each robot knows of each other at every step, by looking through all messages each time."""
-    chance = Draws(conditions.seed, LOSS)
+    chance = RandomStream(conditions.seed, LOSS)
     messages, known, sent = [], [], 0
     for step, now in enumerate(places):
         rate = conditions.message_rate
@@ -53,7 +52,7 @@ def told_one_by_one(
                     far = np.hypot(*(now[i] - now[j])) > min(ranges[i], ranges[j])
                     if i == j or far or not (working[step, i] and working[step, j]):
                         continue
-                    if chance.uniform(step, np.array([i]), np.array([j]))[0] >= conditions.loss:
+                    if chance.draw_uniform(step, np.array([i]), np.array([j]))[0] >= conditions.loss:
                         messages.append((step * DT + conditions.delay, step, i, j, now[j].copy()))
         found: dict[tuple[int, int], tuple[int, np.ndarray]] = {}
         for arrives, when, i, j, place in messages:
@@ -87,7 +86,7 @@ def test_what_is_heard_equals_what_was_told_one_by_one(
     ranges[0] *= 0.7
     working = np.ones((25, n), dtype=bool)
     working[12:, 1] = False
-    radio, inbox = radio_of(conditions, ranges, DT), Inbox.create_empty(n)
+    radio, inbox = build_radio(conditions, ranges, DT), Inbox.create_empty(n)
     expected = told_one_by_one(conditions, ranges, places, working)
     for step, now in enumerate(places):
         inbox = radio.exchange_messages(inbox, step, now, now, working[step])
@@ -103,7 +102,7 @@ def test_what_is_heard_equals_what_was_told_one_by_one(
 @pytest.mark.parametrize(("delay", "dt", "steps"), [(0.14, 0.02, 7), (0.7, DT, 7), (0.71, DT, 8)])
 def test_a_delay_of_whole_steps_is_that_many_and_silence_as_well(delay: float, dt: float, steps: int) -> None:
     """Also where 0.14 / 0.02 is more than 7, and 3 x 0.1 more than 0.3."""
-    radio = radio_of(Conditions(delay=delay, forget_after=round(3 * dt, 2)), np.ones(2), dt)
+    radio = build_radio(Conditions(delay=delay, forget_after=round(3 * dt, 2)), np.ones(2), dt)
     inbox, working, heard = Inbox.create_empty(2), np.ones(2, dtype=bool), []
     for step in range(16):
         places = np.array([[0.0, 0.0], [9.0 * step, 0.0]])  # out of range after the first message
@@ -114,14 +113,14 @@ def test_a_delay_of_whole_steps_is_that_many_and_silence_as_well(delay: float, d
 
 def test_an_inbox_is_replaced_and_never_changed() -> None:
     """So that a copy of a run can hold the same one."""
-    radio = radio_of(Conditions(delay=0.2, loss=0.2), np.full(3, np.inf), DT)
+    radio = build_radio(Conditions(delay=0.2, loss=0.2), np.full(3, np.inf), DT)
     inbox, working = Inbox.create_empty(3), np.ones(3, dtype=bool)
     for step, now in enumerate(walks(3, 12, 4)):
         before = [
             inbox.sent.tobytes(),
             inbox.arrived.tobytes(),
             inbox.places.tobytes(),
-            len(inbox.on_the_way),
+            len(inbox.in_flight),
         ]
         once = radio.exchange_messages(inbox, step, now, now, working)
         again = radio.exchange_messages(inbox, step, now, now, working)
@@ -130,14 +129,14 @@ def test_an_inbox_is_replaced_and_never_changed() -> None:
             inbox.sent.tobytes(),
             inbox.arrived.tobytes(),
             inbox.places.tobytes(),
-            len(inbox.on_the_way),
+            len(inbox.in_flight),
         ] == before
         inbox = once
 
 
 def test_loss_is_as_often_as_it_says() -> None:
     n, steps = 40, 30
-    radio = radio_of(Conditions(loss=0.3, forget_after=0.01, seed=1), np.full(n, np.inf), DT)
+    radio = build_radio(Conditions(loss=0.3, forget_after=0.01, seed=1), np.full(n, np.inf), DT)
     inbox, working, got = Inbox.create_empty(n), np.ones(n, dtype=bool), 0
     for step, now in enumerate(walks(n, steps, 1)):
         inbox = radio.exchange_messages(inbox, step, now, now, working)
@@ -298,7 +297,7 @@ def test_reported_positions_without_neighbours_are_rejected() -> None:
 
 
 def test_an_inbox_follows_robots_that_come_and_go() -> None:
-    radio, inbox = radio_of(Conditions(delay=0.2), np.full(3, np.inf), DT), Inbox.create_empty(3)
+    radio, inbox = build_radio(Conditions(delay=0.2), np.full(3, np.inf), DT), Inbox.create_empty(3)
     working = np.ones(3, dtype=bool)
     for step, now in enumerate(walks(3, 6, 2)):
         inbox = radio.exchange_messages(inbox, step, now, now, working)
@@ -307,6 +306,6 @@ def test_an_inbox_follows_robots_that_come_and_go() -> None:
     assert (other.places[0, 2] == inbox.places[2, 0]).all()
     assert (other.sent[1] == -1).all()
     assert (other.sent[:, 1] == -1).all()
-    assert len(other.on_the_way) == len(inbox.on_the_way) == 2
-    assert not other.on_the_way[0].reaches[:, 1].any()
-    assert other.on_the_way[0].reaches[0, 2]
+    assert len(other.in_flight) == len(inbox.in_flight) == 2
+    assert not other.in_flight[0].is_received[:, 1].any()
+    assert other.in_flight[0].is_received[0, 2]

@@ -37,15 +37,33 @@ def test_without_anything_they_are_ideal() -> None:
         ({"delay": math.nan}, "conditions.delay: nan, but"),
         ({"message_rate": 0}, r"conditions.message_rate: 0, but .* Hz or null was wanted"),
         ({"position_noise": "much"}, "conditions.position_noise: 'much', but"),
-        ({"message_rate": 0.1}, "conditions.forget_after: 3 s, but at least the 10 s between two messages"),
-        ({"failures": ((0, 1.0),)}, r"conditions.failures\[0\]: robot 0, but a whole number from 1"),
-        ({"failures": ((1, 1), (1, 2))}, r"conditions.failures\[1\]: robot 1 is given twice"),
-        ({"failures": ((1, math.inf),)}, r"conditions.failures\[0\]: time inf, but a number from 0"),
-        ({"failures": (3,)}, r"conditions.failures\[0\]: 3, but a robot and a time were wanted"),
-        ({"joins": ((1, 2, (1, 2, 3)),)}, r"conditions.joins\[0\]: place \(1, 2, 3\), but \[x, y\]"),
-        ({"joins": ((1, 2, (1, math.nan)),)}, r"conditions.joins\[0\]: place \(1, nan\)"),
-        ({"joins": ((2, 5),), "failures": ((2, 5),)}, "robot 2 joins at 5 s, but it has failed at 5 s"),
-        ({"seed": -1}, "conditions.seed: -1, but a whole number from 0"),
+        (
+            {"message_rate": 0.1},
+            "conditions.forget_after: expected at least the 10 s between two messages, got 3 s",
+        ),
+        (
+            {"failures": ((0, 1.0),)},
+            r"conditions.failures\[0\]: expected the number of a robot, from 1, got 0",
+        ),
+        (
+            {"failures": ((1, 1), (1, 2))},
+            r"conditions.failures\[1\]: expected one event per robot, got robot 1 twice",
+        ),
+        (
+            {"failures": ((1, math.inf),)},
+            r"conditions.failures\[0\]: expected a time from 0 to 1e\+06 s, got inf",
+        ),
+        ({"failures": (3,)}, r"conditions.failures\[0\]: expected a robot and a time, got 3"),
+        (
+            {"joins": ((1, 2, (1, 2, 3)),)},
+            r"conditions.joins\[0\]: expected a place \[x, y\] in metres, got \(1, 2, 3\)",
+        ),
+        ({"joins": ((1, 2, (1, math.nan)),)}, r"conditions.joins\[0\]: expected a place .* got \(1, nan\)"),
+        (
+            {"joins": ((2, 5),), "failures": ((2, 5),)},
+            "expected robot 2 to join before it fails at 5 s, got 5 s",
+        ),
+        ({"seed": -1}, "conditions.seed: expected a whole number from 0, got -1"),
     ],
 )
 def test_what_cannot_be_is_named(given_: dict[str, object], message: str) -> None:
@@ -57,10 +75,10 @@ def test_what_cannot_be_is_named(given_: dict[str, object], message: str) -> Non
 def test_a_team_must_have_the_robots_and_one_from_the_start() -> None:
     Conditions(failures=((3, 1),)).check_team(3)
     with pytest.raises(
-        ParameterError, match=r"conditions.failures\[0\]: robot 3, but one of 1 to 2 was wanted"
+        ParameterError, match=r"conditions.failures\[0\]: expected a robot from 1 to 2, got robot 3"
     ):
         Conditions(failures=((3, 1),)).check_team(2)
-    with pytest.raises(ParameterError, match="at least one from the start"):
+    with pytest.raises(ParameterError, match="expected at least one robot from the start"):
         Conditions(joins=((1, 1), (2, 2))).check_team(2)
     Conditions(joins=((1, 0), (2, 2))).check_team(2)
 
@@ -146,10 +164,10 @@ def test_failures_and_joins_can_be_typed() -> None:
     assert parse_event(Join, "5@30") == (5, 30.0, None)
     assert parse_event(Join, "5@1.5:2.5,-1") == (5, 1.5, (2.5, -1.0))
     for text in ("3", "3@", "@20", "a@20", "3@x", "3@20s", "-1@2", "3@inf", "3@1@2"):
-        with pytest.raises(ParameterError, match="but ROBOT@SECONDS, as in 3@20, was wanted"):
+        with pytest.raises(ParameterError, match="expected ROBOT@SECONDS, as in 3@20, got"):
             parse_event(Failure, text)
     for text in ("3@2:", "3@2:1", "3@2:1,", "3@2:1,2,3", "3@2:a,b", "3@2:nan,1"):
-        with pytest.raises(ParameterError, match="ROBOT@SECONDS or ROBOT@SECONDS:X,Y was wanted"):
+        with pytest.raises(ParameterError, match="expected ROBOT@SECONDS or ROBOT@SECONDS:X,Y, got"):
             parse_event(Join, text)
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.conditions.random_streams import Draws, philox
+from robocov.conditions.random_streams import RandomStream, compute_philox
 
 
 @pytest.mark.parametrize(
@@ -20,37 +20,39 @@ def test_philox_gives_the_known_answers(counter: str, key: str, answer: str) -> 
     """The known-answer vectors that come with Random123, the reference implementation."""
     words = np.array([int(word, 16) for word in counter.split()], dtype=np.uint64)
     first, second = (int(word, 16) for word in key.split())
-    assert [f"{int(word):08x}" for word in philox(words, (first, second))] == answer.split()
+    assert [f"{int(word):08x}" for word in compute_philox(words, (first, second))] == answer.split()
 
 
 @given(st.integers(0, 2**63), st.integers(0, 2**40), st.lists(st.integers(0, 2**20), min_size=1, max_size=9))
 def test_a_number_depends_on_what_it_is_for_alone(seed: int, step: int, who: list[int]) -> None:
-    draws, rows = Draws(seed, 1), np.array(who)
-    together = draws.uniform(step, rows, 5)
+    draws, rows = RandomStream(seed, 1), np.array(who)
+    together = draws.draw_uniform(step, rows, 5)
     assert ((together > 0.0) & (together < 1.0)).all()
     for k, one in enumerate(who):
-        assert draws.uniform(step, np.array([one]), 5)[0] == together[k]
-        assert (Draws(seed, 1).normal(step, np.array([one]))[0] == draws.normal(step, rows)[k]).all()
+        assert draws.draw_uniform(step, np.array([one]), 5)[0] == together[k]
+        assert (
+            RandomStream(seed, 1).draw_normal(step, np.array([one]))[0] == draws.draw_normal(step, rows)[k]
+        ).all()
 
 
 def test_seeds_streams_steps_and_pairs_differ() -> None:
     rows = np.arange(50)
     found = [
-        Draws(seed, stream).uniform(step, rows, other)
+        RandomStream(seed, stream).draw_uniform(step, rows, other)
         for seed, stream, step, other in [(0, 0, 0, 0), (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0)]
     ]
-    found += [Draws(0, 0).uniform(0, rows, 1), Draws(0, 0).uniform(2**32, rows)]
+    found += [RandomStream(0, 0).draw_uniform(0, rows, 1), RandomStream(0, 0).draw_uniform(2**32, rows)]
     assert len({value for row in found for value in row.tolist()}) == 50 * len(found)
 
 
 def test_moments_and_independence() -> None:
     """Bounds are five standard errors wide; the draws are the same each time."""
     count = 100_000
-    draws = Draws(3, 0)
-    even = draws.uniform(0, np.arange(count))
+    draws = RandomStream(3, 0)
+    even = draws.draw_uniform(0, np.arange(count))
     assert abs(even.mean() - 0.5) < 5 / np.sqrt(12 * count)
     assert abs(np.corrcoef(even[:-1], even[1:])[0, 1]) < 5 / np.sqrt(count)
-    bell = draws.normal(9, np.arange(count))
+    bell = draws.draw_normal(9, np.arange(count))
     assert np.abs(bell.mean(axis=0)).max() < 5 / np.sqrt(count)
     assert np.abs(bell.var(axis=0) - 1.0).max() < 5 * np.sqrt(2 / count)
     assert abs(np.corrcoef(bell.T)[0, 1]) < 5 / np.sqrt(count)

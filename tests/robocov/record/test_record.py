@@ -222,7 +222,7 @@ CONDITIONS = Conditions(loss=0.1, failures=((1, 0.5),), joins=((2, 0.5, (1.0, 1.
         ),
         (
             edited("conditions", to={**CONDITIONS, "failures": [{"robot": 9, "time_s": 1}]}),
-            "run.json: conditions.failures[0]: robot 9, but one of 1 to 4 was wanted",
+            "run.json: conditions.failures[0]: expected a robot from 1 to 4, got robot 9",
         ),
         (
             edited("conditions", to={**CONDITIONS, "joins": [{"robot": 1, "time_s": 0.0, "place_m": [1]}]}),

@@ -28,9 +28,9 @@ def test_what_is_said_becomes_conditions() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (ConditionOptions(fail=("3",)), "--fail: '3', but ROBOT@SECONDS"),
-        (ConditionOptions(join=("3@x",)), "--join: '3@x', but ROBOT@SECONDS"),
-        (ConditionOptions(fail=("9@1",)), "robot 9, but one of 1 to 6 was wanted"),
+        (ConditionOptions(fail=("3",)), "--fail: expected ROBOT@SECONDS, as in 3@20, got '3'"),
+        (ConditionOptions(join=("3@x",)), "--join: expected ROBOT@SECONDS or ROBOT@SECONDS:X,Y, got '3@x'"),
+        (ConditionOptions(fail=("9@1",)), "expected a robot from 1 to 6, got robot 9"),
         (ConditionOptions(loss=2.0), "conditions.loss: 2.0, but a number from 0 to 1"),
     ],
 )
@@ -59,7 +59,7 @@ def test_a_run_under_conditions_can_be_repeated_from_its_folder(
 
 def test_one_line_says_what_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:
     said = complaint(capsys, "run", "rooms", "--fail", "3@x")
-    assert said == "--fail: '3@x', but ROBOT@SECONDS, as in 3@20, was wanted"
+    assert said == "--fail: expected ROBOT@SECONDS, as in 3@20, got '3@x'"
 
 
 @pytest.mark.slow

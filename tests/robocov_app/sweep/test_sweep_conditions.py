@@ -54,7 +54,7 @@ def test_a_run_is_under_its_conditions() -> None:
         ({"loss": []}, "conditions.loss: none, but at least one"),
         ({"loss": [0.1, 0.1]}, r"conditions.loss\[1\]"),
         ({"fail": 3}, "conditions.fail: 3, but a text"),
-        ({"fail": ["3@1", "3"]}, r"conditions.fail\[1\]: '3', but ROBOT@SECONDS"),
+        ({"fail": ["3@1", "3"]}, r"conditions.fail\[1\]: expected ROBOT@SECONDS, as in 3@20, got '3'"),
         ({"delay": "null"}, "conditions.delay: 'null', but a number"),
     ],
 )
@@ -64,7 +64,7 @@ def test_what_cannot_be_is_named(given: dict[str, object], message: str) -> None
 
 
 def test_robots_that_are_not_there_cannot_fail() -> None:
-    with pytest.raises(ParameterError, match="robot 3, but one of 1 to 2 was wanted"):
+    with pytest.raises(ParameterError, match="expected a robot from 1 to 2, got robot 3"):
         small_study(conditions={"fail": "3@0.1"})
 
 

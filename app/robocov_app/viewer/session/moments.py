@@ -12,7 +12,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.conditions import Conditions
-from robocov.conditions.perception import Inbox
+from robocov.conditions.communication import Inbox
 from robocov.environment import CircleObstacle, Environment, Point
 from robocov.observation import Decision
 from robocov.team import Team

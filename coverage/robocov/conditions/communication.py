@@ -1,0 +1,218 @@
+"""Messages between robots, with loss, latency and a limited rate.
+
+A message contains the position that its sender believes to have. It is sent to all robots with which the
+sender is in communication range. For each of them it is lost or not, independently, and it arrives after the
+latency. A robot knows the newest message of each other robot that has arrived, until none has arrived for so
+long that the other one is assumed to be gone.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.conditions.conditions import LOSS, TIME_TOLERANCE_S, Conditions
+from robocov.conditions.random_streams import RandomStream
+from robocov.observation.neighbours import Neighbours
+
+NEVER = -1
+"""The step at which something has not happened."""
+
+
+class Broadcast(NamedTuple):
+    """Messages of all robots from one step.
+
+    Attributes
+    ----------
+    arrives, sent : int
+        Steps since time zero.
+    places : (n, 2) array, m
+        Reported positions of the senders.
+    is_received : (n, n) bool array
+        Whether the row's robot receives the message of the column's robot.
+    """
+
+    arrives: int
+    sent: int
+    places: Array
+    is_received: BoolArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Inbox:
+    """Messages received and messages in flight. Immutable; replaced in each step.
+
+    Attributes
+    ----------
+    sent, arrived : (n, n) int array
+        Steps at which the newest message that the row's robot has from the column's robot was sent, and
+        arrived; `NEVER` if there is none.
+    places : (n, n, 2) array, m
+        Positions in these messages.
+    in_flight : tuple of Broadcast
+        In the order in which they arrive.
+    """
+
+    sent: IntArray
+    arrived: IntArray
+    places: Array
+    in_flight: tuple[Broadcast, ...] = ()
+
+    @classmethod
+    def create_empty(cls, count: int) -> Inbox:
+        """Create the inbox of robots that have not received any message.
+
+        Parameters
+        ----------
+        count : int
+            Number of robots n.
+
+        Returns
+        -------
+        Inbox
+        """
+        never = np.full((count, count), NEVER, dtype=np.intp)
+        return cls(sent=never, arrived=never.copy(), places=np.zeros((count, count, 2)))
+
+    def select_robots(self, rows: IntArray) -> Inbox:
+        """Return the inbox of a team that consists of robots of this one and of new robots.
+
+        Parameters
+        ----------
+        rows : (m,) int array
+            Robot of this team that each robot of the new team was; -1 for a new robot.
+
+        Returns
+        -------
+        Inbox
+        """
+        is_new = np.asarray(rows) < 0
+        is_new_pair = is_new[:, None] | is_new
+        old_rows = np.maximum(rows, 0)
+        old_pairs = np.ix_(old_rows, old_rows)
+        in_flight = tuple(
+            broadcast._replace(
+                places=broadcast.places[old_rows], is_received=broadcast.is_received[old_pairs] & ~is_new_pair
+            )
+            for broadcast in self.in_flight
+        )
+        return Inbox(
+            sent=np.where(is_new_pair, NEVER, self.sent[old_pairs]),
+            arrived=np.where(is_new_pair, NEVER, self.arrived[old_pairs]),
+            places=self.places[old_pairs],
+            in_flight=in_flight,
+        )
+
+
+class Radio:
+    """Sends and delivers the messages of a team.
+
+    Parameters
+    ----------
+    conditions : Conditions
+    ranges : (n,) array, m
+        Communication ranges of the robots.
+    dt : float, s
+        Control period.
+    """
+
+    def __init__(self, conditions: Conditions, ranges: Array, dt: float) -> None:
+        self._conditions = conditions
+        self._ranges = ranges
+        self._dt = dt
+        self._latency_steps = math.ceil(conditions.delay / dt - TIME_TOLERANCE_S)
+        self._loss_stream = RandomStream(conditions.seed, LOSS)
+
+    def exchange_messages(
+        self, inbox: Inbox, step: int, reported: Array, positions: Array, working: BoolArray
+    ) -> Inbox:
+        """Send and deliver the messages of one step.
+
+        Parameters
+        ----------
+        inbox : Inbox
+            Messages before the step.
+        step : int
+            Number of the step since time zero.
+        reported : (n, 2) array, m
+            Positions that the robots believe to have.
+        positions : (n, 2) array, m
+            True positions, which decide who is in range.
+        working : (n,) bool array
+
+        Returns
+        -------
+        Inbox
+        """
+        in_flight = inbox.in_flight
+        if self._is_sending(step):
+            broadcast = Broadcast(
+                arrives=step + self._latency_steps,
+                sent=step,
+                places=np.array(reported),
+                is_received=self._find_receivers(step, positions, working),
+            )
+            in_flight = (*in_flight, broadcast)
+        due = [broadcast for broadcast in in_flight if broadcast.arrives <= step]
+        if len(due) == 0:
+            return replace(inbox, in_flight=in_flight)
+        sent = inbox.sent.copy()
+        arrived = inbox.arrived.copy()
+        places = inbox.places.copy()
+        for broadcast in due:
+            sent[broadcast.is_received] = broadcast.sent
+            arrived[broadcast.is_received] = broadcast.arrives
+            receiver, sender = np.nonzero(broadcast.is_received)
+            places[receiver, sender] = broadcast.places[sender]
+        return Inbox(sent, arrived, places, in_flight[len(due) :])
+
+    def read_reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbours, Array, Array]:
+        """Read the newest message that each working robot has from each other one and has not forgotten.
+
+        Parameters
+        ----------
+        inbox : Inbox
+        step : int
+            Number of the step since time zero.
+        working : (n,) bool array
+
+        Returns
+        -------
+        neighbours : Neighbours
+            Robots of which each robot knows.
+        places : (m, 2) array, m
+            Positions in the messages, in the order of ``neighbours.indices``.
+        ages : (m,) array, s
+            Times since they were sent.
+        """
+        silence = (step - inbox.arrived) * self._dt
+        is_recent = silence <= self._conditions.forget_after + TIME_TOLERANCE_S
+        robot, neighbour = np.nonzero((inbox.arrived >= 0) & is_recent & working[:, None])
+        neighbours = Neighbours.from_pairs(len(working), robot, neighbour, self._ranges)
+        ages = (step - inbox.sent[robot, neighbour]) * self._dt
+        return neighbours, inbox.places[robot, neighbour], np.asarray(ages)
+
+    def _is_sending(self, step: int) -> bool:
+        """Return whether messages are sent in a step: at time zero, and whenever a period has passed."""
+        rate = self._conditions.message_rate
+        if rate is None:
+            return True
+        messages_per_step = self._dt * rate
+        count = math.floor(step * messages_per_step + TIME_TOLERANCE_S)
+        previous_count = math.floor((step - 1) * messages_per_step + TIME_TOLERANCE_S)
+        return count > previous_count
+
+    def _find_receivers(self, step: int, positions: Array, working: BoolArray) -> BoolArray:
+        """Return which robots receive the messages of which ones, (receiver, sender) bool."""
+        links = Neighbours.from_ranges(positions, self._ranges).keep_working(working)
+        receiver, sender = links.list_pairs()
+        is_received = np.zeros((len(positions), len(positions)), dtype=bool)
+        is_received[receiver, sender] = True
+        if self._conditions.loss:
+            uniform = self._loss_stream.draw_uniform(step, receiver, sender)
+            is_received[receiver, sender] = uniform >= self._conditions.loss
+        return is_received

@@ -1,0 +1,297 @@
+"""The conditions of a run: what goes wrong, or changes, while it lasts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from numbers import Integral
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray
+from robocov.conditions.events import MAX_TIME_S, Failure, Join, build_events
+from robocov.conditions.random_streams import RandomStream
+from robocov.errors import ParameterError, is_number, quote, require_number
+
+LOSS, POSITION, SENSING, SCANNING, FAILING = range(5)
+"""Numbers of the independent random streams of a run."""
+TIME_TOLERANCE_S = 1e-9
+"""Difference of times that count as equal, because sums of steps have rounding errors."""
+
+
+class ConditionParameter(NamedTuple):
+    """Range of a condition that is a number, and its name in files.
+
+    Attributes
+    ----------
+    minimum, maximum : float
+    unit : str
+    json_key : str
+        Name in ``run.json``, with the unit.
+    may_be_null : bool
+    """
+
+    minimum: float
+    maximum: float
+    unit: str
+    json_key: str
+    may_be_null: bool = False
+
+
+PARAMETERS: dict[str, ConditionParameter] = {
+    "loss": ConditionParameter(0.0, 1.0, "", "loss"),
+    "delay": ConditionParameter(0.0, 1e3, "s", "delay_s"),
+    "message_rate": ConditionParameter(1e-3, 1e4, "Hz", "message_rate_hz", may_be_null=True),
+    "forget_after": ConditionParameter(1e-3, MAX_TIME_S, "s", "forget_after_s"),
+    "position_noise": ConditionParameter(0.0, 1e3, "m", "position_noise_m"),
+    "sensing_noise": ConditionParameter(0.0, 1e3, "m", "sensing_noise_m"),
+    "failure_rate": ConditionParameter(0.0, 1e3, "1/s", "failure_rate_per_s"),
+}
+"""The conditions that are numbers."""
+UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
+"""Units of the conditions that are numbers."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """All that goes wrong or changes during a run, with the seed of its random numbers.
+
+    Communication is ideal, as without conditions, unless there is loss, delay, a message rate or localization
+    noise. With ideal communication, a robot that fails is forgotten at once, otherwise after `forget_after`.
+
+    Attributes
+    ----------
+    loss : float
+        Probability with which a message does not reach a receiver.
+    delay : float, s
+        Latency of messages.
+    message_rate : float or None, Hz
+        Rate at which robots broadcast their positions to those in range. None: in every control step.
+    forget_after : float, s
+        Time without messages after which a robot is no longer assumed to be at its last reported position.
+    position_noise : float, m
+        Standard deviation of the localization noise in x and in y, white over the control steps. A robot acts
+        on the noisy position and broadcasts it; the physics continues from the true one.
+    sensing_noise : float, m
+        Standard deviation of the noise of the range sensor.
+    failure_rate : float, 1/s
+        Failures per second of each working robot: lifetimes are exponentially distributed.
+    failures : tuple of Failure
+        At most one per robot; also accepted as ``(robot, time)``.
+    joins : tuple of Join
+        At most one per robot; also accepted as ``(robot, time)`` or ``(robot, time, place)``.
+    seed : int
+
+    Raises
+    ------
+    ParameterError
+        If a value is out of range. The message names it.
+
+    Examples
+    --------
+    >>> conditions = Conditions(failures=((2, 10.0),))
+    >>> conditions.find_working(12.0, 3)
+    array([ True, False,  True])
+    """
+
+    loss: float = 0.0
+    delay: float = 0.0
+    message_rate: float | None = None
+    forget_after: float = 3.0
+    position_noise: float = 0.0
+    sensing_noise: float = 0.0
+    failure_rate: float = 0.0
+    failures: tuple[Failure, ...] = ()
+    joins: tuple[Join, ...] = ()
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, parameter in PARAMETERS.items():
+            value = getattr(self, name)
+            if value is None and parameter.may_be_null:
+                continue
+            number = require_number(
+                f"conditions.{name}",
+                value,
+                parameter.minimum,
+                parameter.maximum,
+                f"{parameter.unit} or null" if parameter.may_be_null else parameter.unit,
+            )
+            object.__setattr__(self, name, number)
+        object.__setattr__(self, "failures", build_events("failures", Failure, self.failures))
+        object.__setattr__(self, "joins", build_events("joins", Join, self.joins))
+        if not is_number(self.seed, Integral) or self.seed < 0:
+            raise ParameterError(f"conditions.seed: expected a whole number from 0, got {quote(self.seed)}")
+        self._check_forget_after()
+        self._check_order_of_events()
+
+    def _check_forget_after(self) -> None:
+        """Raise an error if robots would be forgotten between two of their messages."""
+        if self.message_rate is not None and self.forget_after * self.message_rate < 1.0:
+            period = 1.0 / self.message_rate
+            raise ParameterError(
+                f"conditions.forget_after: expected at least the {period:g} s between two messages, "
+                f"got {self.forget_after:g} s"
+            )
+
+    def _check_order_of_events(self) -> None:
+        """Raise an error if a robot joins after it has failed."""
+        failure_times = {failure.robot: failure.time for failure in self.failures}
+        for k, join in enumerate(self.joins):
+            failure_time = failure_times.get(join.robot, math.inf)
+            if failure_time <= join.time:
+                raise ParameterError(
+                    f"conditions.joins[{k}]: expected robot {join.robot} to join before it fails at "
+                    f"{failure_time:g} s, got {join.time:g} s"
+                )
+
+    @property
+    def is_ideal(self) -> bool:
+        """Whether everything is as without conditions."""
+        return not (self.uses_messages or self.sensing_noise or self.has_team_changes)
+
+    @property
+    def uses_messages(self) -> bool:
+        """Whether robots know of each other only by messages."""
+        has_rate = self.message_rate is not None
+        return bool(self.loss or self.delay or has_rate or self.position_noise)
+
+    @property
+    def has_team_changes(self) -> bool:
+        """Whether robots may fail or join."""
+        return bool(self.failure_rate or self.failures or self.joins)
+
+    def drop_team_changes(self) -> Conditions | None:
+        """Return the conditions without failures and joins; None if the others are ideal."""
+        remaining = replace(self, failure_rate=0.0, failures=(), joins=())
+        return None if remaining.is_ideal else remaining
+
+    def check_team(self, count: int) -> None:
+        """Check that the events are possible for a team.
+
+        Parameters
+        ----------
+        count : int
+            Number of robots.
+
+        Raises
+        ------
+        ParameterError
+            If a robot that fails or joins is not in the team, or no robot is present from the start.
+        """
+        robots_by_event = {
+            "failures": [failure.robot for failure in self.failures],
+            "joins": [join.robot for join in self.joins],
+        }
+        for name, robots in robots_by_event.items():
+            for k, robot in enumerate(robots):
+                if robot > count:
+                    raise ParameterError(
+                        f"conditions.{name}[{k}]: expected a robot from 1 to {count}, got robot {robot}"
+                    )
+        if len(self.joins) == count and min(join.time for join in self.joins) > 0.0:
+            raise ParameterError(
+                "conditions.joins: expected at least one robot from the start, got all robots joining later"
+            )
+
+    def compute_working_periods(self, count: int) -> tuple[Array, Array]:
+        """Compute from when and until when each robot works.
+
+        Parameters
+        ----------
+        count : int
+            Number of robots n.
+
+        Returns
+        -------
+        starts, stops : (n,) arrays, s
+            -inf for robots that are present from the start, inf for those that do not fail.
+        """
+        starts = np.full(count, -np.inf)
+        stops = np.full(count, np.inf)
+        for join in self.joins:
+            starts[join.robot - 1] = join.time
+        if self.failure_rate:
+            uniform = RandomStream(self.seed, FAILING).draw_uniform(0, np.arange(count))
+            stops = np.maximum(starts, 0.0) - np.log(uniform) / self.failure_rate
+        for failure in self.failures:
+            stops[failure.robot - 1] = min(stops[failure.robot - 1], failure.time)
+        return starts, stops
+
+    def find_working(self, time: float | Array, count: int) -> BoolArray:
+        """Find the robots that are present and have not failed.
+
+        Parameters
+        ----------
+        time : float or (...) array, s
+        count : int
+            Number of robots n.
+
+        Returns
+        -------
+        (..., n) bool array
+        """
+        return self.find_present(time, count) & ~self.find_failed(time, count)
+
+    def find_failed(self, time: float | Array, count: int) -> BoolArray:
+        """Find the robots that have failed; see `find_working`."""
+        _, stops = self.compute_working_periods(count)
+        return np.asarray(stops <= np.asarray(time)[..., None] + TIME_TOLERANCE_S)
+
+    def find_present(self, time: float | Array, count: int) -> BoolArray:
+        """Find the robots that are present, working or failed; see `find_working`."""
+        starts, _ = self.compute_working_periods(count)
+        return np.asarray(starts <= np.asarray(time)[..., None] + TIME_TOLERANCE_S)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the conditions as plain JSON, with units in the names of the keys."""
+        plain: dict[str, Any] = {
+            parameter.json_key: getattr(self, name) for name, parameter in PARAMETERS.items()
+        }
+        plain["failures"] = [{"robot": failure.robot, "time_s": failure.time} for failure in self.failures]
+        plain["joins"] = [
+            {
+                "robot": join.robot,
+                "time_s": join.time,
+                "place_m": None if join.place is None else list(join.place),
+            }
+            for join in self.joins
+        ]
+        plain["seed"] = int(self.seed)
+        return plain
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, Any]) -> Conditions:
+        """Build the conditions that `to_dict` returned.
+
+        Parameters
+        ----------
+        plain : mapping
+
+        Returns
+        -------
+        Conditions
+
+        Raises
+        ------
+        ParameterError
+            If a key is missing, or a value cannot be used.
+        """
+        try:
+            numbers = {name: plain[parameter.json_key] for name, parameter in PARAMETERS.items()}
+            failures = [(failure["robot"], failure["time_s"]) for failure in plain["failures"]]
+            joins = [(join["robot"], join["time_s"], join["place_m"]) for join in plain["joins"]]
+            arguments: dict[str, Any] = {**numbers, "failures": failures, "joins": joins}
+            return cls(**arguments, seed=plain["seed"])
+        except (KeyError, TypeError) as error:
+            raise ParameterError(f"conditions: cannot be read ({error!r})") from error
+
+    def __repr__(self) -> str:
+        arguments = []
+        for parameter in fields(self):
+            value = getattr(self, parameter.name)
+            if repr(value) != repr(parameter.default):
+                arguments.append(f"{parameter.name}={value!r}")
+        return f"Conditions({', '.join(arguments)})"

@@ -1,0 +1,171 @@
+"""Failures and joins of robots."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from contextlib import suppress
+from numbers import Integral
+from typing import Any, NamedTuple, TypeVar
+
+from robocov.errors import ParameterError, is_number, quote
+
+MAX_TIME_S = 1e6
+"""Latest time of an event."""
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d{1,3})?"
+_EVENT = re.compile(rf"(\d{{1,9}})@({_NUMBER})(?::({_NUMBER}),({_NUMBER}))?", re.ASCII)
+
+
+class Failure(NamedTuple):
+    """A robot that fails: from then on it is an obstacle that does not communicate.
+
+    Attributes
+    ----------
+    robot : int
+        From 1.
+    time : float, s
+    """
+
+    robot: int
+    time: float
+
+    def __str__(self) -> str:
+        return f"{self.robot}@{self.time:g}"
+
+
+class Join(NamedTuple):
+    """A robot that joins the team.
+
+    Attributes
+    ----------
+    robot : int
+        From 1.
+    time : float, s
+    place : (x, y) or None, m
+        Position, or the nearest one where the robot fits at that time. By default that at which it would
+        have started.
+    """
+
+    robot: int
+    time: float
+    place: tuple[float, float] | None = None
+
+    def __str__(self) -> str:
+        if self.place is None:
+            return f"{self.robot}@{self.time:g}"
+        x, y = self.place
+        return f"{self.robot}@{self.time:g}:{x:g},{y:g}"
+
+
+class JoinedRobot(NamedTuple):
+    """A robot that has joined the team during a run.
+
+    Attributes
+    ----------
+    robot : int
+        From 1.
+    time : float, s
+    place, requested : (x, y), m
+        Position at which it joined, and the one that was requested.
+    """
+
+    robot: int
+    time: float
+    place: tuple[float, float]
+    requested: tuple[float, float]
+
+    @property
+    def offset(self) -> float:
+        """Distance from the requested position, m: above 0 if a wall or another robot was too near."""
+        return math.dist(self.place, self.requested)
+
+
+Event = TypeVar("Event", bound=Failure | Join)
+
+
+def parse_event(kind: type[Event], text: str) -> Event:
+    """Parse a failure or a join.
+
+    Parameters
+    ----------
+    kind : Failure or Join
+    text : str
+        ``3@20`` for robot 3 after 20 s; a join may have a position, as in ``5@30:2.5,1``.
+
+    Returns
+    -------
+    Failure or Join
+
+    Raises
+    ------
+    ParameterError
+        If the text has another form.
+
+    Examples
+    --------
+    >>> parse_event(Failure, "3@20")
+    Failure(robot=3, time=20.0)
+    """
+    match = _EVENT.fullmatch(text)
+    if match is None or (kind is Failure and match[3] is not None):
+        form = "ROBOT@SECONDS, as in 3@20" if kind is Failure else "ROBOT@SECONDS or ROBOT@SECONDS:X,Y"
+        raise ParameterError(f"expected {form}, got {quote(text)}")
+    robot = int(match[1])
+    time = float(match[2])
+    places = [] if match[3] is None else [(float(match[3]), float(match[4]))]
+    return kind(robot, time, *places)
+
+
+def build_events(name: str, kind: type[Event], values: Iterable[Any]) -> tuple[Event, ...]:
+    """Build failures or joins from tuples, in the order of the robots.
+
+    Parameters
+    ----------
+    name : str
+        "failures" or "joins", for messages.
+    kind : Failure or Join
+    values : iterable of (robot, time) or (robot, time, place)
+
+    Returns
+    -------
+    tuple of Failure or Join
+
+    Raises
+    ------
+    ParameterError
+        If a value is out of range, or a robot has more than one event.
+    """
+    events: dict[int, Event] = {}
+    for k, value in enumerate(values):
+        event = _build_event(f"conditions.{name}[{k}]", kind, value)
+        if event.robot in events:
+            raise ParameterError(
+                f"conditions.{name}[{k}]: expected one event per robot, got robot {event.robot} twice"
+            )
+        events[event.robot] = event
+    return tuple(events[robot] for robot in sorted(events))
+
+
+def _build_event(path: str, kind: type[Event], value: Any) -> Event:
+    """Build a failure or a join from a tuple."""
+    try:
+        robot, time, *rest = value
+        kind(robot, time, *rest)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{path}: expected a robot and a time, got {quote(value)}") from None
+    if not is_number(robot, Integral) or robot < 1:
+        raise ParameterError(f"{path}: expected the number of a robot, from 1, got {quote(robot)}")
+    if not is_number(time) or not 0.0 <= time <= MAX_TIME_S:
+        raise ParameterError(f"{path}: expected a time from 0 to {MAX_TIME_S:g} s, got {quote(time)}")
+    places = [None if place is None else _build_place(path, place) for place in rest]
+    return kind(int(robot), float(time), *places)
+
+
+def _build_place(path: str, value: Any) -> tuple[float, float]:
+    with suppress(TypeError, ValueError):
+        x, y = value
+        if all(is_number(coordinate) and math.isfinite(coordinate) for coordinate in (x, y)):
+            return float(x), float(y)
+    raise ParameterError(f"{path}: expected a place [x, y] in metres, got {quote(value)}")

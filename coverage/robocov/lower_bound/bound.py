@@ -1,0 +1,393 @@
+"""The lower bound of the coverage cost: a search for prices, and a proof; see `lower_bound`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from scipy.optimize import Bounds, minimize
+
+from robocov.arrays import Array, BoolArray, IntArray, freeze
+from robocov.cost import CoverageCost
+from robocov.environment import GRID_M, Environment
+from robocov.errors import ParameterError, require_number
+from robocov.geodesic.angular_index import AngularWallIndex
+from robocov.geodesic.geodesics import SOURCE_BINS
+from robocov.lower_bound.price_table import PriceTable, add_paid_shares
+from robocov.lower_bound.worth_bounds import (
+    SiteDistances,
+    TriangleScratch,
+    bound_worths,
+    halve_triangles,
+)
+from robocov.team import DEFAULT_RADIUS
+
+MIN_PRECISION = 1e-5
+"""The smallest precision that may be requested."""
+
+_ROUGH_SMOOTHINGS = (0.02, 0.007)
+"""Fractions of the cost over which the maximal worth is smoothed in the first searches for prices."""
+
+_SMOOTHING = 0.0025
+"""The same before the first proof; it is halved before each next one."""
+
+_SLACK = 0.3
+"""Tolerance of a proof, as a fraction of the smoothing."""
+
+_MAX_ITERATIONS = 100
+"""Maximum number of iterations of each search for prices."""
+
+_MIN_PLACES = 500
+"""About the minimum number of positions in the table."""
+
+_PLACES_PER_ROBOT = 60
+"""About the minimum number of these for each robot."""
+
+_SERVING_ROBOTS = 4
+"""No price is above the distance from so many robots of the placement."""
+
+_PLACES_PER_BLOCK = 256
+"""Number of positions whose distances are computed at the same time."""
+
+_MAX_TRIANGLES = 1_000_000
+"""A proof ends after this number of triangles with the bound it has by then."""
+
+_EROSION = 0.98
+"""Fraction of the radius by which the room is narrowed.
+
+Before GEOS moves walls, it simplifies them by up to 1 % of the distance.
+"""
+
+_ROUNDING = 1e-10
+"""Allowance for each robot and site, as a fraction of the map's size: far more than all rounding errors."""
+
+_PROGRESS_BEFORE_SEARCH = 0.2
+"""Progress when the search for prices starts."""
+
+
+@dataclass(frozen=True, eq=False)
+class LowerBound:
+    """A certified lower bound of the coverage cost (22) of a team, and the cost of one placement.
+
+    Attributes
+    ----------
+    mean_distance : float, m
+        As of `CoverageResult`: no placement has a lower one.
+    value : float, m³
+        The same for the cost (22).
+    placement_mean_distance : float, m
+        Mean distance of the given placement.
+    prices : (m,) array, m
+        Prices of the sites that prove the bound; nan in components of the free space without a robot.
+    """
+
+    mean_distance: float
+    value: float
+    placement_mean_distance: float
+    prices: Array
+
+    @property
+    def gap(self) -> float:
+        """Largest possible excess of the placement over the best one, as a fraction of its own cost."""
+        if self.placement_mean_distance == 0.0:
+            return 0.0
+        return 1.0 - self.mean_distance / self.placement_mean_distance
+
+
+def compute_lower_bound(
+    environment: Environment,
+    positions: Array,
+    *,
+    radius: float = DEFAULT_RADIUS,
+    lattice: int = 64,
+    precision: float = 0.001,
+    progress: Callable[[float], None] | None = None,
+) -> LowerBound:
+    """Compute a lower bound of the coverage cost of every placement of a team.
+
+    The bound holds for as many robots as there are positions, anywhere in the free space where a disc of the
+    radius fits. (A point may be where walls touch, in two rooms at once.) If the free space has several
+    components, it holds for all placements in those that contain the positions, and is of the cost of these.
+    It is not required that robots fit next to each other.
+
+    Parameters
+    ----------
+    environment : Environment
+    positions : (n, 2) array, m
+        A placement of low cost, as `find_optimum` returns it, which makes the interval small.
+    radius : float, m
+        Radius of the robots, at least 1 µm.
+    lattice : int
+        Number of cells along a side of the lattice, see `CoverageCost`.
+    precision : float
+        The search ends if the interval is not wider than this fraction of the cost, or the bound is about
+        that much below the best that the dual can give.
+    progress : callable, optional
+        Called now and then with the fraction that is done. It may raise an exception to stop.
+
+    Returns
+    -------
+    LowerBound
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is out of range, or no such robot fits where the positions are.
+    InputError
+        If a position is outside the free space; the message names it.
+
+    Notes
+    -----
+    All rounding errors are covered by 1e-10 of the map's size for each robot and site.
+
+    Examples
+    --------
+    >>> square = Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2)))
+    >>> bound = compute_lower_bound(square, [[1, 1]], lattice=16)
+    >>> bound.gap < 0.001
+    True
+    """
+    require_number("radius", radius, GRID_M, math.inf, "m")
+    require_number("precision", precision, MIN_PRECISION, 1.0)
+    report = progress or (lambda fraction: None)
+    cost = CoverageCost(
+        environment, lattice, progress=lambda part: report(_PROGRESS_BEFORE_SEARCH / 2.0 * part)
+    )
+    dual = _Dual(cost, np.asarray(positions, dtype=float), radius)
+    prices = dual.first_prices
+    for smoothing in _ROUGH_SMOOTHINGS:
+        prices = dual.improve_prices(prices, smoothing, partial(report, _PROGRESS_BEFORE_SEARCH))
+    best_bound = -math.inf
+    smoothing = _SMOOTHING
+    rounds = max(1, math.ceil(math.log2(8.0 * smoothing / precision)))
+    for k in range(rounds):
+        fraction = _PROGRESS_BEFORE_SEARCH + (1.0 - _PROGRESS_BEFORE_SEARCH) * k / rounds
+        beat = partial(report, fraction)
+        prices = dual.improve_prices(prices, smoothing, beat)
+        proof = dual.prove(prices, _SLACK * smoothing, beat)
+        if proof.bound > best_bound:
+            best_bound = proof.bound
+            best_prices = prices
+        if best_bound >= (1.0 - precision) * dual.placement_cost:
+            break
+        dual.add_places(proof.worthy_places)
+        smoothing /= 2.0
+    report(1.0)
+    mean_distance = max(best_bound, 0.0) / dual.total_weight
+    all_prices = np.full(len(cost.points), np.nan)
+    all_prices[dual.sites] = best_prices
+    mass = float(environment.free_masses[dual.is_covered].sum())
+    return LowerBound(
+        mean_distance=mean_distance,
+        value=mean_distance * mass,
+        placement_mean_distance=dual.placement_cost / dual.total_weight,
+        prices=freeze(all_prices),
+    )
+
+
+class _Proof(NamedTuple):
+    """What a branch and bound has proved."""
+
+    bound: float
+    """Lower bound of the cost, as a weighted sum over the sites, m."""
+    worthy_places: Array
+    """(p, 2) grid steps, positions that are worth more than all of the table."""
+
+
+class _Dual:
+    """The dual problem of one map and team. Costs are weighted sums over the sites, not means.
+
+    Attributes
+    ----------
+    is_covered : (c,) bool array
+        Whether each component of the free space contains robots.
+    sites : (m,) int array
+        The sites in these components.
+    total_weight : float
+        Sum of their weights.
+    placement_cost : float, m
+        Cost of the given placement.
+    first_prices : (m,) array, m
+        Where the search starts.
+    """
+
+    def __init__(self, cost: CoverageCost, positions: Array, radius: float) -> None:
+        geodesics = cost.geodesics
+        self._geodesics = geodesics
+        self._unit = geodesics.grid.unit
+        self._robots = len(positions)
+        result = cost(positions)
+        robots, is_inside = geodesics.snap_to_free_space(positions)
+        self.is_covered: BoolArray = np.asarray(is_inside.any(axis=0))
+        self.sites: IntArray = np.flatnonzero(result.owner >= 0)
+        weights = np.ones(len(cost.points)) if cost.weights is None else cost.weights
+        self._weights = weights[self.sites]
+        self.total_weight = float(self._weights.sum())
+        if not self.total_weight > 0.0:
+            raise ParameterError(
+                f"lattice: expected sites with a weight where the robots are, got none with {cost.lattice} "
+                "cells along a side"
+            )
+        self.placement_cost = float(self._weights @ result.distances[self.sites])
+
+        points = cost.points[self.sites]
+        sites, _ = geodesics.snap_to_free_space(points)
+        from_corners = geodesics.compute_grid_distances(geodesics.walls.corners, sites)
+        self._known = SiteDistances(
+            walls=geodesics.walls,
+            sites=sites,
+            weights=self._weights,
+            from_corners=np.ascontiguousarray(from_corners.T),
+        )
+        room = self._build_room(cost.environment, radius)
+        self._triangles = self._triangulate(room)
+        self._max_prices, self.first_prices = self._compute_first_prices(robots)
+
+        # The table starts with one site in each square of some cells, and the robots.
+        places = max(_MIN_PLACES, _PLACES_PER_ROBOT * len(robots))
+        side = max(1, int(math.sqrt(len(sites) / places)))
+        self._place_spacing = side * cost.spacing / self._unit
+        inside = sites[shapely.intersects_xy(room, points[:, 0], points[:, 1])]
+        self._table = PriceTable.build_empty()
+        self.add_places(np.concatenate([robots, self._thin_out(inside)]))
+
+    def _build_room(self, environment: Environment, radius: float) -> shapely.Geometry:
+        """Return where the centres of robots can be, m; it may be a little too large, but never too small."""
+        components = np.array(environment.free.geoms)[self.is_covered]
+        # The arcs around corners become chords, which makes the room larger.
+        room = shapely.union_all(shapely.buffer(components, -_EROSION * radius, quad_segs=2))
+        if room.is_empty:
+            raise ParameterError(f"radius: expected one that fits where the positions are, got {radius:g} m")
+        return room
+
+    def _triangulate(self, room: shapely.Geometry) -> Array:
+        """Return triangles that cover the room, (t, 3, 2) grid steps."""
+        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(room))
+        assert math.isclose(shapely.area(triangles).sum(), room.area, rel_tol=1e-9)
+        rings = shapely.get_coordinates(triangles).reshape(-1, 4, 2)
+        return self._geodesics.grid.snap(rings[:, :3])
+
+    def _compute_first_prices(self, robots: Array) -> tuple[Array, Array]:
+        """Return the maximal prices and the first ones, (m,) m, for a placement at (n, 2) grid steps."""
+        sites = self._known.sites
+        distances = self._geodesics.compute_grid_distances(robots, sites) * self._unit
+        no_robots = np.full((_SERVING_ROBOTS, len(sites)), np.inf)
+        distances = np.sort(np.concatenate([distances, no_robots]), axis=0)
+        nearest = distances[0]
+        second = distances[1]
+        # A price is between the distances of the nearest robot and of the next one. Without another robot it
+        # is beyond all sites.
+        beyond = nearest + nearest.max()
+        first_prices = np.where(np.isinf(second), beyond, (nearest + second) / 2.0)
+        return distances[_SERVING_ROBOTS - 1], first_prices
+
+    def _thin_out(self, places: Array) -> Array:
+        """Return the first of (p, 2) positions in each square of a grid."""
+        squares = np.floor(places * 2.0 / self._place_spacing)
+        _, first = np.unique(squares, axis=0, return_index=True)
+        return places[np.sort(first)]
+
+    def add_places(self, places: Array) -> None:
+        """Add positions, (p, 2) grid steps, to the table."""
+        for first in range(0, len(places), _PLACES_PER_BLOCK):
+            block = places[first : first + _PLACES_PER_BLOCK]
+            distances = self._geodesics.compute_grid_distances(block, self._known.sites) * self._unit
+            self._table = self._table.append(distances, self._max_prices)
+
+    def improve_prices(self, prices: Array, smoothing: float, beat: Callable[[], None]) -> Array:
+        """Search prices, (m,) m, for which the dual on the table is higher.
+
+        In place of the maximal worth, the search uses ``s log sum exp(worth / s)``; `smoothing` is s as a
+        fraction of the cost of one robot.
+        """
+        weights = self._weights
+        scale = max(self.placement_cost, 1e-9 * self.total_weight * self._geodesics.size)
+        smooth = smoothing * scale / self._robots
+
+        def compute_negative_dual(prices: Array) -> tuple[float, Array]:
+            beat()
+            worths = self._table.compute_worths(prices, weights)
+            max_worth = worths.max()
+            shares = np.exp((worths - max_worth) / smooth)
+            smooth_max = max_worth + smooth * math.log(shares.sum())
+            paid = np.zeros(len(prices))
+            add_paid_shares(self._table, prices, shares * (self._robots / shares.sum()), paid)
+            dual = float(weights @ prices) - self._robots * smooth_max
+            return -dual / scale, weights * (paid - 1.0) / scale
+
+        solution = minimize(
+            compute_negative_dual,
+            prices,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=Bounds(0.0, self._max_prices),
+            options={"maxiter": _MAX_ITERATIONS},
+        )
+        return np.asarray(solution.x)
+
+    def bound_worths(self, prices: Array, triangles: Array) -> tuple[Array, Array, Array]:
+        """Bound what the points of triangles are worth.
+
+        Parameters
+        ----------
+        prices : (m,) array, m
+        triangles : (t, 3, 2) array, grid steps
+
+        Returns
+        -------
+        centres : (t, 2) array, grid steps
+            A point in each triangle.
+        worths : (t,) array, m
+            What it is worth.
+        bounds : (t,) array, m
+            What any point of the triangle can be worth.
+        """
+        middles = self._geodesics.grid.to_metres(triangles.mean(axis=1))
+        centres, _ = self._geodesics.snap_to_free_space(middles)
+        scratch = TriangleScratch.allocate(len(self._geodesics.corners))
+        worths = np.empty((2, len(triangles)))
+        steps = prices / self._unit
+
+        def fill(index: AngularWallIndex, _numbers: IntArray, _lengths: Array) -> int:
+            return int(bound_worths(self._known, index, steps, triangles, centres, scratch, worths))
+
+        self._geodesics.run_with_index(1, SOURCE_BINS, fill)
+        worths *= self._unit
+        return centres, worths[0], worths[1]
+
+    def prove(self, prices: Array, tolerance: float, beat: Callable[[], None]) -> _Proof:
+        """Prove a lower bound of the cost.
+
+        The bound is lower than what it could be with these prices by at most a fraction, `tolerance`, of the
+        cost.
+        """
+        slack = tolerance * self.placement_cost / self._robots
+        table_worth = self._table.compute_worths(prices, self._weights).max()
+        max_worth = 0.0
+        best_worth = 0.0
+        count = 0
+        triangles = self._triangles
+        leaves = []
+        worthy = [np.empty((0, 3))]
+        while len(triangles):
+            beat()
+            centres, worths, bounds = self.bound_worths(prices, triangles)
+            best_worth = max(best_worth, float(worths.max()))
+            count += len(triangles)
+            worthy.append(np.column_stack([worths, centres])[worths > table_worth])
+            is_leaf = (bounds <= best_worth + slack) | (count >= _MAX_TRIANGLES)
+            max_worth = max(max_worth, float(bounds[is_leaf].max(initial=0.0)))
+            leaves.append(triangles[is_leaf])
+            triangles = halve_triangles(triangles[~is_leaf])
+        # The next proof starts with these triangles.
+        self._triangles = np.concatenate(leaves)
+        rounding = _ROUNDING * self._geodesics.size * self.total_weight * self._robots
+        bound = float(self._weights @ prices) - self._robots * max_worth - rounding
+        candidates = np.concatenate(worthy)
+        by_worth = np.argsort(-candidates[:, 0], kind="stable")
+        return _Proof(bound, self._thin_out(candidates[by_worth, 1:]))

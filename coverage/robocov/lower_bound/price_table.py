@@ -1,0 +1,90 @@
+"""A table of distances from some positions, on which prices for the sites are searched."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocov.arrays import Array, IntArray
+from robocov.compiled import kernel
+
+_MIN_SHARE = 1e-9
+"""Positions with smaller shares of a robot are left out."""
+
+
+class PriceTable(NamedTuple):
+    """Distances from p positions to the sites that may pay for a robot there."""
+
+    first_entry: IntArray
+    """(p + 1,) The entries of position k are those from ``first_entry[k]`` up to ``first_entry[k + 1]``."""
+    site: NDArray[np.int32]
+    """(e,)"""
+    distance: NDArray[np.float32]
+    """(e,) m"""
+
+    @classmethod
+    def build_empty(cls) -> PriceTable:
+        """Build a table without positions."""
+        return cls(np.zeros(1, np.int64), np.empty(0, np.int32), np.empty(0, np.float32))
+
+    def append(self, distances: Array, max_distance: Array) -> PriceTable:
+        """Append positions.
+
+        Parameters
+        ----------
+        distances : (p, m) array, m
+            Distances from the new positions to all sites.
+        max_distance : (m,) array, m
+            Entries are made only for smaller distances.
+
+        Returns
+        -------
+        PriceTable
+        """
+        position, site = np.nonzero((distances < max_distance) & np.isfinite(distances))
+        count = np.bincount(position, minlength=len(distances))
+        return PriceTable(
+            first_entry=np.append(self.first_entry, self.first_entry[-1] + np.cumsum(count)),
+            site=np.append(self.site, site.astype(np.int32)),
+            distance=np.append(self.distance, distances[position, site].astype(np.float32)),
+        )
+
+    def compute_worths(self, prices: Array, weights: Array) -> Array:
+        """Compute what the positions are worth, (p,), at prices, (m,) m, of sites with weights, (m,)."""
+        worths = np.empty(len(self.first_entry) - 1)
+        _compute_worths(self, prices, weights, worths)
+        return worths
+
+
+@kernel
+def _compute_worths(table: PriceTable, prices: Array, weights: Array, worths: Array) -> None:
+    """Write what the positions of the table are worth."""
+    for position in range(len(worths)):
+        worth = 0.0
+        for entry in range(table.first_entry[position], table.first_entry[position + 1]):
+            site = table.site[entry]
+            worth += weights[site] * max(prices[site] - table.distance[entry], 0.0)
+        worths[position] = worth
+
+
+@kernel
+def add_paid_shares(table: PriceTable, prices: Array, shares: Array, paid: Array) -> None:
+    """Add up the shares of robots, at the positions of the table, that each site pays for.
+
+    Parameters
+    ----------
+    table : PriceTable
+    prices : (m,) array, m
+    shares : (p,) array
+        Share of a robot at each position.
+    paid : (m,) array
+        Result, added to what it contains.
+    """
+    for position in range(len(shares)):
+        if shares[position] > _MIN_SHARE:
+            for entry in range(table.first_entry[position], table.first_entry[position + 1]):
+                site = table.site[entry]
+                if prices[site] > table.distance[entry]:
+                    paid[site] += shares[position]

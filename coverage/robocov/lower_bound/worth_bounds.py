@@ -1,0 +1,170 @@
+"""Bounds of what any position in a triangle is worth, by tangents of the distances; see `lower_bound`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.arrays import Array, IntArray
+from robocov.compiled import kernel
+from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_visible
+from robocov.geodesic.corner_graph import find_visible_corners
+from robocov.geodesic.walls import Walls
+
+
+class SiteDistances(NamedTuple):
+    """What is known of the sites, in grid steps."""
+
+    walls: Walls
+    sites: Array
+    """(m, 2) Positions."""
+    weights: Array
+    """(m,)"""
+    from_corners: Array
+    """(m, k) Distances of the sites from the corners."""
+
+
+class TriangleScratch(NamedTuple):
+    """Scratch space for one triangle, in grid steps."""
+
+    corners: IntArray
+    """(k,) Corners that the centre sees."""
+    corner_distances: Array
+    """(k,) Distances of these from the centre."""
+    vertices: Array
+    """(3, 2) Vertices, relative to the centre."""
+    min_distances: Array
+    """(3,) A lower bound of the distance of a site from each vertex."""
+    max_worths: Array
+    """(3,) An upper bound of what each vertex is worth."""
+
+    @classmethod
+    def allocate(cls, corners: int) -> TriangleScratch:
+        """Allocate space for a number of corners."""
+        return cls(
+            corners=np.empty(corners, np.int64),
+            corner_distances=np.empty(corners),
+            vertices=np.empty((3, 2)),
+            min_distances=np.empty(3),
+            max_worths=np.empty(3),
+        )
+
+
+@kernel
+def bound_worths(
+    known: SiteDistances,
+    index: AngularWallIndex,
+    prices: Array,
+    triangles: Array,
+    centres: Array,
+    scratch: TriangleScratch,
+    worths: Array,
+) -> int:
+    """Compute what the centres of triangles are worth, and upper bounds for all their points.
+
+    Parameters
+    ----------
+    known : SiteDistances
+    index : AngularWallIndex
+        Scratch space for one source.
+    prices : (m,) array, grid steps
+    triangles : (t, 3, 2) array, grid steps
+    centres : (t, 2) array, grid steps
+        A point in each triangle.
+    scratch : TriangleScratch
+    worths : (2, t) array, grid steps
+        Result: what the centres are worth, and the bounds.
+
+    Returns
+    -------
+    int
+        -1 if there are too few entries in the index.
+    """
+    corners = known.walls.corners
+    min_distances = scratch.min_distances
+    for t in range(len(triangles)):
+        x = centres[t, 0]
+        y = centres[t, 1]
+        if add_walls(known.walls, index, 0, x, y, np.inf, 0) < 0:
+            return -1
+        radius = _set_triangle(scratch, triangles[t], x, y)
+        count = find_visible_corners(known.walls, index, 0, 0, scratch.corners)
+        for k in range(count):
+            corner = scratch.corners[k]
+            scratch.corner_distances[k] = np.hypot(x - corners[corner, 0], y - corners[corner, 1])
+        worth = 0.0
+        for site in range(len(prices)):
+            price = prices[site]
+            dx = x - known.sites[site, 0]
+            dy = y - known.sites[site, 1]
+            straight = np.sqrt(dx * dx + dy * dy)
+            if straight - radius >= price:
+                continue
+            for vertex in range(3):
+                min_distances[vertex] = price
+            distance = np.inf
+            if is_visible(known.walls, index, 0, known.sites[site, 0], known.sites[site, 1]):
+                distance = straight
+                _lower_to_tangent(scratch, straight, dx, dy, straight)
+            for k in range(count):
+                corner = scratch.corners[k]
+                length = scratch.corner_distances[k] + known.from_corners[site, corner]
+                distance = min(distance, length)
+                if length - radius < max(min_distances[0], min_distances[1], min_distances[2]):
+                    corner_dx = x - corners[corner, 0]
+                    corner_dy = y - corners[corner, 1]
+                    _lower_to_tangent(scratch, length, corner_dx, corner_dy, scratch.corner_distances[k])
+            worth += known.weights[site] * max(price - distance, 0.0)
+            for vertex in range(3):
+                scratch.max_worths[vertex] += known.weights[site] * (price - min_distances[vertex])
+        worths[0, t] = worth
+        worths[1, t] = max(scratch.max_worths[0], scratch.max_worths[1], scratch.max_worths[2])
+    return 0
+
+
+@kernel
+def _set_triangle(scratch: TriangleScratch, triangle: Array, x: float, y: float) -> float:
+    """Take a triangle with the centre (x, y); return the largest distance of a vertex from there."""
+    radius = 0.0
+    for vertex in range(3):
+        scratch.vertices[vertex, 0] = triangle[vertex, 0] - x
+        scratch.vertices[vertex, 1] = triangle[vertex, 1] - y
+        radius = max(radius, np.hypot(scratch.vertices[vertex, 0], scratch.vertices[vertex, 1]))
+        scratch.max_worths[vertex] = 0.0
+    return radius
+
+
+@kernel
+def _lower_to_tangent(scratch: TriangleScratch, length: float, dx: float, dy: float, first: float) -> None:
+    """Lower the bounds of the distances to those of a path whose first segment leads along -(dx, dy).
+
+    `length` is that of the whole path from the centre, `first` that of its first segment.
+    """
+    for vertex in range(3):
+        rise = dx * scratch.vertices[vertex, 0] + dy * scratch.vertices[vertex, 1]
+        tangent = length + rise / max(first, 1.0)
+        scratch.min_distances[vertex] = min(scratch.min_distances[vertex], tangent)
+
+
+def halve_triangles(triangles: Array) -> Array:
+    """Cut triangles through the middle of their longest edge.
+
+    Parameters
+    ----------
+    triangles : (t, 3, 2) array
+
+    Returns
+    -------
+    (2 t, 3, 2) array
+    """
+    edges = triangles - np.roll(triangles, -1, axis=1)
+    longest = (edges * edges).sum(axis=2).argmax(axis=1)
+    rows = np.arange(len(triangles))
+    start = triangles[rows, longest]
+    end = triangles[rows, (longest + 1) % 3]
+    apex = triangles[rows, (longest + 2) % 3]
+    middle = (start + end) / 2.0
+    first_halves = np.stack([start, middle, apex], axis=1)
+    second_halves = np.stack([middle, end, apex], axis=1)
+    return np.concatenate([first_halves, second_halves])
