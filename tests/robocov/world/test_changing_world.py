@@ -168,7 +168,7 @@ def test_starts_that_are_not_taken_yet_may_overlap() -> None:
         Simulation(HALL, Rapf(), places)
     record = Simulation(HALL, Rapf(), places, conditions=Conditions(joins=((2, 1.0),))).run(2.0)
     assert record.working[-1].all()
-    with pytest.raises(ParameterError, match="robot 4, but one of 1 to 3 was wanted"):
+    with pytest.raises(ParameterError, match="expected a robot from 1 to 3, got robot 4"):
         Simulation(HALL, Rapf(), places, conditions=Conditions(joins=((4, 1.0),)))
 
 

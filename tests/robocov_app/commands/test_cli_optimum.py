@@ -144,7 +144,7 @@ def test_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (("--run", "nowhere"), "nowhere: not the folder of a run"),
         (("--run", "x", "--robots", "3"), "--robots: 3, but with --run it is that of the run"),
         (("--run", "x", "--radius", "0.2"), "--radius: 0.2, but with --run"),
-        (("rooms", "--positions", "."), ".: is a folder, but a file was wanted"),
+        (("rooms", "--positions", "."), ".: expected a file, got a folder"),
     ],
 )
 def test_mistakes_are_named(words: tuple[str, ...], part: str, capsys: pytest.CaptureFixture[str]) -> None:

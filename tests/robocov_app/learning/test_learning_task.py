@@ -43,7 +43,7 @@ def test_the_team_goes_before_the_number() -> None:
         ({"observation": None}, "observation: None, but a ObservationLayout was wanted"),
         (
             {"conditions": Conditions(failures=((7, 3.0),))},
-            r"conditions\.failures\[0\]: robot 7, but one of 1 to 6",
+            r"conditions\.failures\[0\]: expected a robot from 1 to 6, got robot 7",
         ),
     ],
 )

@@ -25,7 +25,7 @@ def scene(selected: int | None = 0):
     known = DiscoveredMap(raster, state)
     plain = explained(ONE)
     memory = Atlas().begin(SQUARE.region, Team.homogeneous(len(plain.team)))
-    memory = replace(memory, states=(replace(memory.states[0], known=known), *memory.states[1:]))
+    memory = replace(memory, states=(replace(memory.states[0], known_map=known), *memory.states[1:]))
     snapshot = replace(plain.snapshot, decision=replace(plain.snapshot.decision, memory=memory))
     return known, replace(plain, snapshot=snapshot, sensed=Sensed(), selected=selected)
 

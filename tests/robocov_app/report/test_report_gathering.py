@@ -142,7 +142,10 @@ def broken(folder: Path, name: str, text: str) -> Path:
             lambda copy: broken(copy, "study.json", '{"runs": 3}'),
             "study.json: the study cannot be read: KeyError",
         ),
-        (lambda copy: broken(copy, "results.csv", "PAR"), "results.csv: line 1: the header of a table"),
+        (
+            lambda copy: broken(copy, "results.csv", "PAR"),
+            "results.csv: line 1: expected the header of a table",
+        ),
     ],
 )
 def test_what_cannot_be_read_is_named(folder, tmp_path, spoil, message) -> None:

@@ -13,7 +13,7 @@ from robocov.environment import CircleObstacle, Environment
 from robocov.errors import MapError, ParameterError, StartError
 from robocov.team import Team
 from robocov_app.viewer.session import changes as module
-from robocov_app.viewer.session.changes import Join, nearest_free
+from robocov_app.viewer.session.changes import Join, find_free_position
 from robocov_app.viewer.session.scenario import TeamSpec
 
 RADIUS = 0.1
@@ -41,7 +41,7 @@ def failed_at(session, number, pane=0) -> tuple[float, float]:
 @given(places, st.lists(places, max_size=12), st.sampled_from([0.05, 0.1, 0.3]))
 def test_the_nearest_place_where_a_robot_fits(point, others, radius):
     others = np.array(others).reshape(-1, 2)
-    place = nearest_free(HALL, radius, others, point)
+    place = find_free_position(HALL, radius, others, point)
     room = HALL.free.buffer(-radius)
     if len(others):
         room = room.difference(shapely.union_all(shapely.buffer(shapely.points(others), 2 * radius)))
@@ -54,16 +54,16 @@ def test_the_nearest_place_where_a_robot_fits(point, others, radius):
 
 
 def test_where_it_fits_it_stays():
-    assert nearest_free(HALL, RADIUS, np.empty((0, 2)), (3.0, 2.0)) == (3.0, 2.0)
-    assert nearest_free(HALL, RADIUS, np.array([[3.0, 2.2]]), (3.0, 2.0)) == (3.0, 2.0)
+    assert find_free_position(HALL, RADIUS, np.empty((0, 2)), (3.0, 2.0)) == (3.0, 2.0)
+    assert find_free_position(HALL, RADIUS, np.array([[3.0, 2.2]]), (3.0, 2.0)) == (3.0, 2.0)
 
 
 def test_a_room_that_is_full():
     cell = Environment("cell", ((0, 0), (0.45, 0), (0.45, 0.45), (0, 0.45)))
-    assert nearest_free(cell, RADIUS, np.array([[0.15, 0.15]]), (0.15, 0.15))
+    assert find_free_position(cell, RADIUS, np.array([[0.15, 0.15]]), (0.15, 0.15))
     for radius, others in ((RADIUS, np.array([[0.225, 0.225]])), (0.3, np.empty((0, 2)))):
         with pytest.raises(StartError, match="no room for a robot there"):
-            nearest_free(cell, radius, others, (0.25, 0.25))
+            find_free_position(cell, radius, others, (0.25, 0.25))
 
 
 # placing
