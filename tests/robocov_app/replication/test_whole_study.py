@@ -294,7 +294,7 @@ def finished_runs(out: Path) -> int:
 
 
 def wait_for_runs(out: Path, count: int, process: subprocess.Popen[str]) -> None:
-    end = time.monotonic() + 60.0
+    end = time.monotonic() + 300.0  # a hang limit: two busy cores are enough in a fifth of it
     while finished_runs(out) < count:
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < end
@@ -309,7 +309,7 @@ class TestStopping:
         process = begun("--out", str(out), "--workers", "2")
         wait_for_runs(out, 12, process)
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does
-        said, told = process.communicate(timeout=60)
+        said, told = process.communicate(timeout=300)
         assert process.returncode == 130
         first = told.splitlines()[0]
         assert first.startswith("paper (quick): 114 runs, about ")
@@ -321,10 +321,10 @@ class TestStopping:
         process = begun("--out", str(out), "--workers", "2")
         wait_for_runs(out, kept + 12, process)
         process.kill()
-        process.communicate(timeout=60)
+        process.communicate(timeout=300)
 
         process = begun("--out", str(out), "--workers", "1", "--json")
-        said, told = process.communicate(timeout=120)
+        said, told = process.communicate(timeout=500)
         assert process.returncode == 0, told
         answer = json.loads(said)
         assert (answer["runs"], answer["failed"], answer["interrupted"]) == (114, 0, False)

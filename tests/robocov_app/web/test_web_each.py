@@ -24,7 +24,7 @@ from websockets.sync.client import connect
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("web")]
 
-PATIENCE_S = 40.0
+PATIENCE_S = 120.0
 
 
 class Visitor:
