@@ -17,7 +17,13 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.cost.corner_views import CornerViews
 from robocov.cost.lattice import SLOTS, TILES_PER_GROUP, Tiles
-from robocov.geodesic.angular_index import AngularWallIndex, add_walls, is_box_hidden, is_visible
+from robocov.geodesic.angular_index import (
+    AngularWallIndex,
+    add_walls,
+    is_box_hidden,
+    is_surely_visible,
+    is_visible,
+)
 from robocov.geodesic.box_tree import LEAF_SIZE, compute_squared_box_distance
 from robocov.geodesic.corner_graph import CornerGraph, CornerPaths, CornerQueue, relax_paths
 from robocov.geodesic.walls import Walls, can_bend_at_corner
@@ -261,7 +267,10 @@ def _find_hidden_sites(cost_map: CostMap, search: Search, tile: int, is_covered:
         elif tiles.site[tile, slot] >= 0:
             x = tiles.x[tile, slot]
             y = tiles.y[tile, slot]
-            if not is_visible(cost_map.walls, search.wall_index, search.nearest_robot[tile, slot], x, y):
+            robot = search.nearest_robot[tile, slot]
+            if is_surely_visible(search.wall_index, robot, x, y):
+                continue
+            if not is_visible(cost_map.walls, search.wall_index, robot, x, y):
                 search.site_length[tile, slot] = np.inf
                 mask |= 1 << slot
     search.hidden[tile] = mask
@@ -285,7 +294,9 @@ def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None
         paths.length[corner] = np.inf
         paths.source[corner] = len(robots)
         search.queue.is_waiting[corner] = False
-        nearest = _find_nearest_candidate(search, robots, count, walls.corners[corner])
+        nearest = _find_nearest_candidate(
+            robots, search.group_robots, count, walls.corners[corner, 0], walls.corners[corner, 1]
+        )
         waiting = _take_straight_path(walls, search, corner, nearest, waiting)
     relax_paths(cost_map.graph, paths, search.queue, waiting)
     # Only robots that are closer than the length of these paths can shorten them.
@@ -305,14 +316,14 @@ def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None
 
 
 @kernel
-def _find_nearest_candidate(search: Search, robots: Array, count: int, point: Array) -> int:
-    """Return which of the first `count` of `group_robots` is nearest to a point in a straight line."""
+def _find_nearest_candidate(robots: Array, candidates: IntArray, count: int, x: float, y: float) -> int:
+    """Return which of the first `count` candidates is nearest to a point in a straight line."""
     best2 = np.inf
     nearest = -1
     for k in range(count):
-        i = search.group_robots[k]
-        dx = point[0] - robots[i, 0]
-        dy = point[1] - robots[i, 1]
+        i = candidates[k]
+        dx = x - robots[i, 0]
+        dy = y - robots[i, 1]
         if dx * dx + dy * dy < best2:
             best2 = dx * dx + dy * dy
             nearest = i
@@ -328,9 +339,8 @@ def _take_straight_path(walls: Walls, search: Search, corner: int, robot: int, w
     x = search.wall_index.positions[robot, 0]
     y = search.wall_index.positions[robot, 1]
     length = np.sqrt((corner_x - x) * (corner_x - x) + (corner_y - y) * (corner_y - y))
-    is_tie = length == paths.length[corner]
     if (
-        (length < paths.length[corner] or (is_tie and robot < paths.source[corner]))
+        _is_better(length, robot, paths.length[corner], paths.source[corner])
         and can_bend_at_corner(walls.corners, walls.corner_walls, corner, x, y)
         and is_visible(walls, search.wall_index, robot, corner_x, corner_y)
     ):
@@ -412,18 +422,16 @@ def _take_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
                 dx = tiles.x[tile, slot] - corners[corner, 0]
                 dy = tiles.y[tile, slot] - corners[corner, 1]
                 length = to_corner + np.sqrt(dx * dx + dy * dy)
-                if _is_shorter(search, tile, slot, length, robot):
+                if _is_better(length, robot, search.site_length[tile, slot], search.site_robot[tile, slot]):
                     search.site_length[tile, slot] = length
                     search.site_robot[tile, slot] = robot
                     search.site_corner[tile, slot] = corner
 
 
 @kernel
-def _is_shorter(search: Search, tile: int, slot: int, length: float, robot: int) -> bool:
-    """Return whether a path is shorter than the known one to a site, or as long from a lower robot."""
-    known = search.site_length[tile, slot]
-    is_tie: bool = length == known
-    return length < known or (is_tie and robot < search.site_robot[tile, slot])
+def _is_better(length: float, robot: int, known_length: float, known_robot: int) -> bool:
+    """Return whether a path is shorter than the known one, or as long from a robot of a lower number."""
+    return length < known_length or (length == known_length and robot < known_robot)
 
 
 @kernel
@@ -453,7 +461,7 @@ def _take_straight_paths(cost_map: CostMap, search: Search, tile: int, robot: in
             dy = y - index.positions[robot, 1]
             length = np.sqrt(dx * dx + dy * dy)
             if (
-                _is_shorter(search, tile, slot, length, robot)
+                _is_better(length, robot, search.site_length[tile, slot], search.site_robot[tile, slot])
                 and robot != search.nearest_robot[tile, slot]
                 and is_visible(cost_map.walls, index, robot, x, y)
             ):

@@ -275,19 +275,37 @@ def _find_chain_end(
 
 
 @kernel
+def find_bin(bins: int, dx: float, dy: float) -> int:
+    """Return the angular bin of a direction."""
+    return min(int(compute_pseudo_angle(dx, dy) * (bins * 0.25)), bins - 1)
+
+
+@kernel
 def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: float) -> bool:
     """Return whether a source sees a point at any distance; from a vertex only into its free space."""
     dx = x - index.positions[source, 0]
     dy = y - index.positions[source, 1]
     distance2 = dx * dx + dy * dy
-    bins = index.clear2.shape[1]
-    k = min(int(compute_pseudo_angle(dx, dy) * (bins * 0.25)), bins - 1)
+    k = find_bin(index.clear2.shape[1], dx, dy)
     # These two comparisons decide most cases.
     if distance2 <= index.clear2[source, k]:
         return True
     if distance2 > index.horizon2[source, k]:
         return False
     return _is_visible_past_walls(walls, index, source, k, dx, dy)
+
+
+@kernel
+def is_surely_visible(index: AngularWallIndex, source: int, x: float, y: float) -> bool:
+    """Return whether a point is so close to a source that nothing can hide it.
+
+    Loops that test many points call this before `is_visible`, which is too large for the compiler to inline.
+    """
+    dx = x - index.positions[source, 0]
+    dy = y - index.positions[source, 1]
+    k = find_bin(index.clear2.shape[1], dx, dy)
+    is_clear: bool = dx * dx + dy * dy <= index.clear2[source, k]
+    return is_clear
 
 
 @kernel
