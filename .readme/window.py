@@ -12,7 +12,7 @@ import imageio_ffmpeg
 import pygame
 from PIL import Image
 
-from robocov.mapfile import load_map, map_file
+from robocov.mapfile import load_map, find_map_file
 from robocov_app.editor.edits.create import rectangle_drawn
 from robocov_app.editor.ui.launch import editor_window
 from robocov_app.viewer.film import pixels
@@ -53,7 +53,7 @@ def picture(theme: str, name: str) -> None:
 
 def editor(theme: str, name: str) -> None:
     """Draw a show-case into a museum, and drag it until it is in line with the others."""
-    path = map_file("museum")
+    path = find_map_file("museum")
     with editor_window(path, HERE, theme=theme, size=SIZE, headless=True) as window:
         editor = window.editor
         editor.change(rectangle_drawn(editor.sketch, (15.6, 7.0), (17.9, 7.6)))
