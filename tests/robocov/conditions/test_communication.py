@@ -245,7 +245,7 @@ def test_what_was_heard_matters(kind: type) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PLANNING)
 def test_those_that_plan_go_by_what_they_heard_too(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(atlas, "_LISTENED", 0.0)
+    monkeypatch.setattr(atlas, "_LISTENING_S", 0.0)
     kind, team = CONTROLLERS[name], Team.homogeneous(4)
     places = np.random.default_rng(5).uniform(1, 9, size=(4, 2))
     neighbours = Neighbours.from_ranges(places, np.full(4, 20.0))
