@@ -169,7 +169,7 @@ def test_a_reference_is_searched_for_once_and_then_known(run, tmp_path, monkeypa
     (above,) = re.findall(r"average, ([\d.]+) % above the best placement known", page.read_text())
     assert float(above) > 0.0
     before = page.read_bytes()
-    monkeypatch.setattr("robocov_app.report.results.optimum", None)  # nothing is searched for again
+    monkeypatch.setattr("robocov_app.report.results.find_optimum", None)  # nothing is searched for again
     assert main(["report", str(run)]) == 0 and page.read_bytes() == before
     monkeypatch.setenv("ROBOCOV_CACHE", "")
     assert main(["report", str(run)]) == 0 and "above the best" not in page.read_text()
