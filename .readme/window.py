@@ -12,7 +12,7 @@ import imageio_ffmpeg
 import pygame
 from PIL import Image
 
-from robocov.mapfile import load_map, find_map_file
+from robocov.mapfile import find_map_file, load_map
 from robocov_app.editor.edits.create import rectangle_drawn
 from robocov_app.editor.ui.launch import editor_window
 from robocov_app.viewer.film import pixels
