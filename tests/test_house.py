@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import importlib
+import pickle
 import subprocess
 import sys
 import tomllib
@@ -82,20 +84,40 @@ def test_the_version_is_said_once_in_each_place() -> None:
     assert f"## {robocov.__version__}" in (ROOT / "CHANGELOG.md").read_text()
 
 
-def test_public_names_are_what_the_package_says() -> None:
+def test_every_public_name_loads_from_the_module_that_the_stub_says() -> None:
     import robocov
 
-    assert sorted(robocov._HOME) == sorted(robocov.__all__)
-    for name in robocov.__all__:
-        assert getattr(robocov, name) is not None
+    stub = ast.parse((ROOT / "coverage/robocov/__init__.pyi").read_text())
+    imports = [node for node in ast.walk(stub) if isinstance(node, ast.ImportFrom)]
+    stub_names = [alias.asname for node in imports for alias in node.names]
+    assert sorted(map(str, stub_names)) == robocov.__all__
+    for node in imports:
+        module = importlib.import_module(f"robocov.{node.module}")
+        for alias in node.names:
+            if alias.name != "CONTROLLERS":  # at the top it includes those of installed packages
+                assert getattr(robocov, alias.name) is getattr(module, alias.name)
+
+
+def test_public_names_can_be_listed_and_star_imported_and_misspelled() -> None:
+    import robocov
+
+    assert {*robocov.__all__, "__version__"} <= {*dir(robocov)}
+    namespace: dict[str, object] = {}
+    exec("from robocov import *", namespace)
+    assert {*robocov.__all__} <= {*namespace}
     modules = {path.stem for path in (ROOT / "coverage/robocov").iterdir()}
     assert not modules & set(robocov.__all__), "once imported, a module would hide the name"
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+    with pytest.raises(AttributeError, match="module 'robocov' has no attribute 'nothing'"):
         robocov.nothing
-    tree = ast.parse((ROOT / "coverage/robocov/__init__.py").read_text())
-    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
-    declared = {alias.name for node in imports for alias in node.names}
-    assert set(robocov.__all__) <= declared, "a name that type checkers do not see"
+
+
+def test_public_classes_can_be_pickled_by_reference() -> None:
+    import robocov
+
+    for name in robocov.__all__:
+        value = getattr(robocov, name)
+        if isinstance(value, type):
+            assert pickle.loads(pickle.dumps(value)) is value
 
 
 def loaded_by(statement: str) -> set[str]:

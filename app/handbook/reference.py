@@ -155,7 +155,7 @@ def names() -> str:
         elif callable(value):
             text += f".. autofunction:: robocov.{name}\n"
         else:  # what it is stands beside it in its own module
-            text += f".. autodata:: robocov.{rc._HOME[name]}.{name}\n   :no-value:\n"
+            text += f".. autodata:: {rc._modules[name]}.{name}\n   :no-value:\n"
     return text
 
 
