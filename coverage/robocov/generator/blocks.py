@@ -1,4 +1,8 @@
-"""Maps of the kind `blocks`: a town, cut by streets into blocks."""
+"""Maps of the kind `blocks`: a town, divided by streets into blocks.
+
+The map is divided into convex cells by one cut after another. Each cut is the middle line of a street, and
+the block of a cell is what the streets along its edges leave of it.
+"""
 
 import math
 from typing import NamedTuple, TypeAlias
@@ -11,22 +15,45 @@ from shapely.affinity import scale
 from robocov.environment import DiscStart, Obstacle, PolygonObstacle
 from robocov.generator.request import Request
 
-_TILTS = 0.0, 0.05, 0.1  # streets of a town bend by about so much (standard deviation, radians)
-_WIDEST = 1.2  # what the first street is wider than it must be at most, in gaps
-_LEAST = 0.4  # what the last streets, and those along the boundary, get of what the first is wider
-_CHAMFERED, _NOTCHED = 0.25, 0.2  # parts of the blocks with a corner cut off, and a yard cut out of one
-_UNEVEN = 0.25  # a cut is off the even one by at most so much of one block's share
-_THIN = 0.3  # least thickness of a block, as a part of the side of a square of its area
-_HALVINGS = 16
+_TILTS_RAD = (0.0, 0.05, 0.1)
+"""Standard deviations of the directions of streets, one of which is drawn for each town."""
+_MAX_TILT_DEVIATIONS = 1.5
+"""Largest tilt of a street, in standard deviations."""
+_MAX_WIDENING_GAPS = 1.2
+"""Largest widening of the first street beyond its smallest width, in gaps."""
+_MIN_WIDENING_SHARE = 0.4
+"""Widening of the last streets, and of those along the boundary, relative to that of the first."""
+_CHAMFER_PROBABILITY = 0.25
+_YARD_PROBABILITY = 0.2
+_MAX_CORNERS = 12
+"""The corner to be cut is drawn from so many, and counted round the block as often as necessary."""
+_MAX_UNEVENNESS = 0.25
+"""Largest offset of a cut from the even division, in the share of one block."""
+_MIN_THICKNESS = 0.3
+"""Smallest thickness of a block, relative to the side of a square of its area."""
+_MIN_THICK_FRACTION = 0.97
+"""Smallest fraction of a block that must be at least that thick; acute corners never are."""
+_WIDENING_STEPS = 16
+"""Steps of the bisection for the width of the streets."""
 
 
 class Edge(NamedTuple):
-    """An edge of a cell, from (x, y) m; blocks keep `setback` off it, and `more` of what is to spare."""
+    """An edge of a cell, from a corner to the next.
+
+    Attributes
+    ----------
+    x, y : float, m
+        The first corner.
+    setback : float, m
+        Smallest distance of the block from the edge.
+    widening_share : float
+        Increase of that distance, relative to the widening of the first street.
+    """
 
     x: float
     y: float
     setback: float = 0.0
-    more: float = 0.0
+    widening_share: float = 0.0
 
 
 Cell: TypeAlias = list[Edge]
@@ -34,149 +61,273 @@ Cell: TypeAlias = list[Edge]
 
 Point: TypeAlias = tuple[float, float]
 
-Trim: TypeAlias = tuple[int, float, float, bool]
-"""Cut of a block's corner: its number, parts of the edges before and after it, and whether it is a yard."""
 
+class Trim(NamedTuple):
+    """A cut at a corner of a block.
 
-def cut(cell: Cell, origin: Point, normal: Point, setback: float = 0.0, more: float = 0.0) -> Cell:
-    """Return the part of a cell that a normal points away from; the cut is its new edge."""
-    side = [(edge.x - origin[0]) * normal[0] + (edge.y - origin[1]) * normal[1] for edge in cell]
-    part = []
-    for here, there, edge, after in zip(side, side[1:] + side[:1], cell, cell[1:] + cell[:1], strict=True):
-        if here <= 0.0:
-            part.append(edge)
-        if (here <= 0.0) != (there <= 0.0):
-            along = here / (here - there)
-            x, y = edge.x + (after.x - edge.x) * along, edge.y + (after.y - edge.y) * along
-            # where the outline leaves, the cut begins
-            part.append(Edge(x, y, setback, more) if here <= 0.0 else Edge(x, y, edge.setback, edge.more))
-    return part
-
-
-def without_streets(cell: Cell, wider: float) -> Cell:
-    """Return what is left of a cell beside streets that are so much wider than they must be, in metres."""
-    block = cell
-    for edge, after in zip(cell, cell[1:] + cell[:1], strict=True):
-        length = math.hypot(after.x - edge.x, after.y - edge.y)
-        normal = (after.y - edge.y) / length, (edge.x - after.x) / length
-        off = edge.setback + wider * edge.more
-        block = cut(block, (edge.x - normal[0] * off, edge.y - normal[1] * off), normal)
-    return block
-
-
-def city(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
-    """Return blocks between streets, the first that are cut the widest; None if they block too little.
-
-    Streets are as wide as the blocked area allows, up to a limit; then blocks become smaller all around.
+    Attributes
+    ----------
+    corner : int
+        Index of the corner, modulo the number of corners.
+    before, after : float
+        Fractions of the edges before and after the corner that are cut off.
+    is_yard : bool
+        Whether a parallelogram is cut out, rather than a triangle cut off.
     """
-    cells = town_cells(request, rng)
+
+    corner: int
+    before: float
+    after: float
+    is_yard: bool
+
+
+def build_town(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
+    """Build blocks between streets; streets that separate more blocks are wider.
+
+    The streets are as wide as the blocked area allows, up to a limit. Then all blocks are scaled down.
+
+    Parameters
+    ----------
+    request : Request
+    corner : DiscStart
+        Disc that stays free.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    list of Obstacle or None
+        None if the blocks would be too small or too thin.
+    """
+    cells = divide_into_cells(request, rng)
     if cells is None:
         return None
-    narrow, wide = 0.0, _WIDEST * request.gap
-    # not so wide that blocks become too thin
-    while not all(_stout(_block(cell, wide, corner, None)) for cell in cells):
-        if wide == 0.0:
-            return None
-        wide = wide / 2.0 if wide > request.step else 0.0
-    trims = [(cell, _trim(rng)) for cell in cells]
-    for number, (cell, trim) in enumerate(trims):
-        if not all(_stout(_block(cell, wider, corner, trim)) for wider in (narrow, wide)):
-            trims[number] = cell, None
-
-    def blocks(wider: float) -> tuple[list[Polygon], float]:
-        found = [_block(cell, wider, corner, trim) for cell, trim in trims]
-        return found, sum(block.area for block in found)
-
-    if blocks(narrow)[1] < request.blocked:
+    max_widening = _find_max_widening(cells, request, corner)
+    if max_widening is None:
         return None
-    for _ in range(_HALVINGS):
-        middle = (narrow + wide) / 2.0
-        narrow, wide = (middle, wide) if blocks(middle)[1] > request.blocked else (narrow, middle)
-    found, area = blocks(narrow)
-    part = math.sqrt(request.blocked / area)
-    found = [scale(block, part, part, origin="centroid") for block in found]
-    if not all(map(_stout, found)):
+    trims: list[Trim | None] = [_draw_trim(rng) for _ in cells]
+    for k, cell in enumerate(cells):
+        narrow_block = _build_block(cell, 0.0, corner, trims[k])
+        wide_block = _build_block(cell, max_widening, corner, trims[k])
+        if not _is_thick(narrow_block) or not _is_thick(wide_block):
+            trims[k] = None
+
+    def build_blocks(widening: float) -> list[Polygon]:
+        return [_build_block(cell, widening, corner, trim) for cell, trim in zip(cells, trims, strict=True)]
+
+    if _sum_areas(build_blocks(0.0)) < request.blocked:
         return None
-    return [PolygonObstacle(request.build_ring(shapely.get_coordinates(block)[:-1])) for block in found]
+    low = 0.0
+    high = max_widening
+    for _ in range(_WIDENING_STEPS):
+        middle = (low + high) / 2.0
+        if _sum_areas(build_blocks(middle)) > request.blocked:
+            low = middle
+        else:
+            high = middle
+    blocks = build_blocks(low)
+    factor = math.sqrt(request.blocked / _sum_areas(blocks))
+    blocks = [scale(block, factor, factor, origin="centroid") for block in blocks]
+    if not all(_is_thick(block) for block in blocks):
+        return None
+    return [PolygonObstacle(request.build_ring(shapely.get_coordinates(block)[:-1])) for block in blocks]
 
 
-def town_cells(request: Request, rng: np.random.Generator) -> list[Cell] | None:
-    """Return the cells of as many blocks as are wanted, None where they become too small."""
-    tilt = float(rng.choice(_TILTS))
-    # rounding may bring corners nearer to each other
+def divide_into_cells(request: Request, rng: np.random.Generator) -> list[Cell] | None:
+    """Divide a map into one cell for each block.
+
+    Parameters
+    ----------
+    request : Request
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    list of Cell or None
+        None if cells would be too small.
+    """
+    tilt = float(rng.choice(_TILTS_RAD))
+    # Corners are rounded later, which may bring them nearer to each other.
     street = request.gap + 3.0 * request.step
-    # the street along the boundary counts half, as others do: else blocks beside it were small
-    low, x, y = street / 2.0, request.width - street / 2.0, request.height - street / 2.0
-    outline = (low, low), (x, low), (x, y), (low, y)
-    waiting = [([Edge(*point, street / 2.0, _LEAST / 2.0) for point in outline], int(request.obstacles))]
+    # The streets along the boundary lie half outside. Otherwise, the blocks next to them would be smaller.
+    low = street / 2.0
+    x = request.width - street / 2.0
+    y = request.height - street / 2.0
+    outline = [(low, low), (x, low), (x, y), (low, y)]
+    whole = [Edge(*point, street / 2.0, _MIN_WIDENING_SHARE / 2.0) for point in outline]
+    waiting = [(whole, int(request.obstacles))]
     cells = []
     while waiting:
         cell, count = waiting.pop()
         if count == 1:
             cells.append(cell)
             continue
-        # streets that separate more are wider
-        more = _LEAST + (1.0 - _LEAST) * math.log(count) / math.log(request.obstacles)
-        some = count // 2 if rng.random() < 0.5 else count - count // 2
-        part = some / count + rng.uniform(-_UNEVEN, _UNEVEN) / count
-        width, height = np.ptp([edge[:2] for edge in cell], axis=0).tolist()
+        first_count = count // 2 if rng.random() < 0.5 else count - count // 2
+        fraction = first_count / count + rng.uniform(-_MAX_UNEVENNESS, _MAX_UNEVENNESS) / count
+        width, height = np.ptp([(edge.x, edge.y) for edge in cell], axis=0).tolist()
         if max(width, height) < 2.0 * street:
             return None
-        angle = (height > width) * math.pi / 2.0 + tilt * float(np.clip(rng.normal(), -1.5, 1.5))
-        normal = math.cos(angle), math.sin(angle)
-        along = [edge.x * normal[0] + edge.y * normal[1] for edge in cell]
-        # what is beside streets is divided
-        off = min(along) + street + part * (max(along) - min(along) - 2.0 * street)
-        origin = normal[0] * off, normal[1] * off
-        # half of the street on either side
-        waiting.append((cut(cell, origin, normal, street / 2.0, more / 2.0), some))
-        opposite = -normal[0], -normal[1]
-        waiting.append((cut(cell, origin, opposite, street / 2.0, more / 2.0), count - some))
+        tilt_angle = tilt * float(np.clip(rng.normal(), -_MAX_TILT_DEVIATIONS, _MAX_TILT_DEVIATIONS))
+        angle = tilt_angle + math.pi / 2.0 if height > width else tilt_angle
+        normal = (math.cos(angle), math.sin(angle))
+        # Streets that separate more blocks are wider. Half of the street lies on either side of the cut.
+        hierarchy = math.log(count) / math.log(request.obstacles)
+        share = (_MIN_WIDENING_SHARE + (1.0 - _MIN_WIDENING_SHARE) * hierarchy) / 2.0
+        first, second = _divide_cell(cell, fraction, normal, street, share)
+        waiting.append((first, first_count))
+        waiting.append((second, count - first_count))
     return cells
 
 
-def _block(cell: Cell, wider: float, corner: DiscStart, trim: Trim | None) -> Polygon:
-    """Return the block of a cell beside the square of the start, empty where there is none."""
-    block = without_streets(cell, wider)
-    (x, y), radius = corner.center, corner.radius
-    low, high = (x - radius, y - radius), (x + radius, y + radius)
-    if block and shapely.box(*low, *high).intersects(_polygon(block)):
-        # it ends at the side of the square that takes the least
-        sides = (low, (1.0, 0.0)), (low, (0.0, 1.0)), (high, (-1.0, 0.0)), (high, (0.0, -1.0))
-        block = max((cut(block, *side) for side in sides), key=lambda part: _polygon(part).area)
-    return _polygon(block) if trim is None or not block else _trimmed(block, *trim)
+def _divide_cell(
+    cell: Cell, fraction: float, normal: Point, street: float, share: float
+) -> tuple[Cell, Cell]:
+    """Return the parts of a cell on both sides of a street, the first with a fraction of the extent."""
+    distances = [edge.x * normal[0] + edge.y * normal[1] for edge in cell]
+    # Only what streets leave of the cell is divided.
+    free_extent = max(distances) - min(distances) - 2.0 * street
+    distance = min(distances) + street + fraction * free_extent
+    origin = (normal[0] * distance, normal[1] * distance)
+    opposite = (-normal[0], -normal[1])
+    first = cut_cell(cell, origin, normal, street / 2.0, share)
+    second = cut_cell(cell, origin, opposite, street / 2.0, share)
+    return first, second
 
 
-def _polygon(cell: Cell) -> Polygon:
-    return Polygon([edge[:2] for edge in cell])
+def cut_cell(
+    cell: Cell, origin: Point, normal: Point, setback: float = 0.0, widening_share: float = 0.0
+) -> Cell:
+    """Cut a cell along a line.
+
+    Parameters
+    ----------
+    cell : Cell
+    origin : (x, y), m
+        A point of the line.
+    normal : (x, y)
+        Points to the side that is removed.
+    setback : float, m
+    widening_share : float
+        Those of the new edge, see `Edge`.
+
+    Returns
+    -------
+    Cell
+        The remaining part; empty if nothing remains.
+    """
+    heights = [(edge.x - origin[0]) * normal[0] + (edge.y - origin[1]) * normal[1] for edge in cell]
+    remaining = []
+    for k, edge in enumerate(cell):
+        following = cell[(k + 1) % len(cell)]
+        height = heights[k]
+        following_height = heights[(k + 1) % len(cell)]
+        if height <= 0.0:
+            remaining.append(edge)
+        if (height <= 0.0) == (following_height <= 0.0):
+            continue
+        fraction = height / (height - following_height)
+        x = edge.x + (following.x - edge.x) * fraction
+        y = edge.y + (following.y - edge.y) * fraction
+        if height <= 0.0:
+            # The outline crosses the line outwards, so that the new edge starts here.
+            remaining.append(Edge(x, y, setback, widening_share))
+        else:
+            remaining.append(edge._replace(x=x, y=y))
+    return remaining
 
 
-def _trimmed(block: Cell, corner: int, before: float, after: float, yard: bool) -> Polygon:
-    """Return the polygon of a block without what is cut off, where that is possible."""
-    points = np.array(block)[:, :2]
-    at = corner % len(points)
-    here, previous, following = points[at], points[at - 1], points[(at + 1) % len(points)]
-    first, last = here + (previous - here) * before, here + (following - here) * after
-    inner = [first + last - here] if yard else []
-    trimmed = Polygon([*points[:at], first, *inner, last, *points[at + 1 :]])
-    return trimmed if trimmed.is_valid else _polygon(block)
+def remove_streets(cell: Cell, widening: float) -> Cell:
+    """Remove the streets along the edges of a cell.
+
+    Parameters
+    ----------
+    cell : Cell
+    widening : float, m
+        Widening of the first street, see `Edge`.
+
+    Returns
+    -------
+    Cell
+        The block; empty if nothing remains.
+    """
+    block = cell
+    for k, edge in enumerate(cell):
+        following = cell[(k + 1) % len(cell)]
+        length = math.hypot(following.x - edge.x, following.y - edge.y)
+        normal = ((following.y - edge.y) / length, (edge.x - following.x) / length)
+        distance = edge.setback + widening * edge.widening_share
+        origin = (edge.x - normal[0] * distance, edge.y - normal[1] * distance)
+        block = cut_cell(block, origin, normal)
+    return block
 
 
-def _trim(rng: np.random.Generator) -> Trim | None:
-    kind, corner = rng.random(), int(rng.integers(0, 12))
-    if kind < _CHAMFERED:
-        part = rng.uniform(0.2, 0.45)
-        return corner, part, part, False
-    if kind < _CHAMFERED + _NOTCHED:
+def _find_max_widening(cells: list[Cell], request: Request, corner: DiscStart) -> float | None:
+    """Return a widening of the streets that leaves no block too thin, m; None if there is none."""
+    widening = _MAX_WIDENING_GAPS * request.gap
+    while not all(_is_thick(_build_block(cell, widening, corner, None)) for cell in cells):
+        if widening == 0.0:
+            return None
+        widening = widening / 2.0 if widening > request.step else 0.0
+    return widening
+
+
+def _build_block(cell: Cell, widening: float, corner: DiscStart, trim: Trim | None) -> Polygon:
+    """Return the block of a cell outside the square around the start; empty if nothing remains."""
+    block = remove_streets(cell, widening)
+    if not block:
+        return Polygon()
+    x, y = corner.center
+    low = (x - corner.radius, y - corner.radius)
+    high = (x + corner.radius, y + corner.radius)
+    if shapely.box(*low, *high).intersects(_to_polygon(block)):
+        # The block ends at the side of the square that leaves the most of it.
+        remaining_parts = [
+            cut_cell(block, low, (1.0, 0.0)),
+            cut_cell(block, low, (0.0, 1.0)),
+            cut_cell(block, high, (-1.0, 0.0)),
+            cut_cell(block, high, (0.0, -1.0)),
+        ]
+        block = max(remaining_parts, key=lambda part: _to_polygon(part).area)
+    if trim is None or not block:
+        return _to_polygon(block)
+    return _trim_block(block, trim)
+
+
+def _to_polygon(cell: Cell) -> Polygon:
+    return Polygon([(edge.x, edge.y) for edge in cell])
+
+
+def _trim_block(block: Cell, trim: Trim) -> Polygon:
+    """Return the polygon of a block with the cut at its corner, if the cut gives a valid polygon."""
+    points = np.array([(edge.x, edge.y) for edge in block])
+    index = trim.corner % len(points)
+    point = points[index]
+    first = point + (points[index - 1] - point) * trim.before
+    last = point + (points[(index + 1) % len(points)] - point) * trim.after
+    cut = [first, first + last - point, last] if trim.is_yard else [first, last]
+    trimmed = Polygon([*points[:index], *cut, *points[index + 1 :]])
+    return trimmed if trimmed.is_valid else _to_polygon(block)
+
+
+def _draw_trim(rng: np.random.Generator) -> Trim | None:
+    kind = rng.random()
+    corner = int(rng.integers(0, _MAX_CORNERS))
+    if kind < _CHAMFER_PROBABILITY:
+        fraction = rng.uniform(0.2, 0.45)
+        return Trim(corner, before=fraction, after=fraction, is_yard=False)
+    if kind < _CHAMFER_PROBABILITY + _YARD_PROBABILITY:
         before, after = rng.uniform(0.35, 0.6, 2).tolist()
-        return corner, before, after, True
+        return Trim(corner, before=before, after=after, is_yard=True)
     return None
 
 
-def _stout(block: shapely.Geometry) -> bool:
-    """Return whether a block is one piece, and no part of it is thin."""
+def _is_thick(block: shapely.Geometry) -> bool:
+    """Return whether a block is one polygon without holes and without thin parts."""
     if not isinstance(block, Polygon) or block.is_empty or block.interiors:
         return False
-    thick = _THIN / 2.0 * math.sqrt(block.area)
-    opened = block.buffer(-thick, join_style="mitre").buffer(thick, join_style="mitre")
-    return isinstance(opened, Polygon) and opened.area > 0.97 * block.area
+    radius = _MIN_THICKNESS / 2.0 * math.sqrt(block.area)
+    opened = block.buffer(-radius, join_style="mitre").buffer(radius, join_style="mitre")
+    return isinstance(opened, Polygon) and opened.area > _MIN_THICK_FRACTION * block.area
+
+
+def _sum_areas(blocks: list[Polygon]) -> float:
+    return float(sum(block.area for block in blocks))

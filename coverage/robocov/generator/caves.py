@@ -1,11 +1,13 @@
 """Maps of the kind `caves`: chambers and tunnels between smooth walls of rock, and pillars.
 
-The core is where a random field, raised along the boundary, is below a level. Its parts are joined by
-tunnels, and it is dilated (J. Serra, *Image Analysis and Mathematical Morphology*, 1982) by at least half the
-gap. Where two parts of it then meet in a window that is narrower, a tunnel is led through that.
+The core of a cave, where the centre of a robot may be, is the area in which a random field, raised along the
+boundary, is below a level. Its parts are joined by tunnels, and it is dilated (J. Serra, *Image Analysis and
+Mathematical Morphology*, 1982) by at least half the gap. Where two dilated parts meet in a narrower window, a
+tunnel is led through it.
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -13,172 +15,351 @@ from scipy.cluster.hierarchy import DisjointSet
 from shapely import LineString, MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
-from robocov.environment import DiscStart, Gap, Obstacle, PolygonObstacle, find_narrow_gaps
+from robocov.arrays import Array, compute_lengths
+from robocov.environment import DiscStart, Gap, Obstacle, PolygonObstacle, Ring, find_narrow_gaps
 from robocov.generator.request import AREA_TOLERANCE, Request
 
-_WAVES, _LENGTHS = 48, (0.7, 1.7)  # of a field; shortest and longest, in sides of a usual chamber
-# steps of the mesh: in the side of a usual chamber, at most in the longer side of the map, but at least
-_FINENESS, _MOST, _COARSEST = 12, 160, 6
-_RIM = 0.012  # least thickness of rock at the boundary, in shorter sides of the map
-_SHORE, _RAISED = 0.35, 3.0  # belt where rock is likelier, in sides of a usual chamber, and how much
-_HALL, _LOWERED = 0.35, 1.5  # radius around the start where it is less likely, and how much
-_FINE, _FINEST = 0.008, 0.0027  # walls are simplified by so many sides of a usual chamber, and of the map
-_CHAMBER, _PILLAR = 0.03, 0.02  # least areas of a chamber, and of a pillar, in squares of usual chambers
-_SPIKE = 0.05  # spikes of rock of half that thickness are rounded off, in sides of a usual chamber
-_BEND = 0.25  # tunnels bend by at most so much of their length
-_USUAL, _WIDEST = 1.2, 2.0  # radius by which the level is chosen, and the largest, in the least ones
-_LEVELS, _RADII = 8, 12  # halvings of the level, and of the radius
-_ROUNDS, _PER_ROUND = 12, 0.005  # of widening windows, before a draw is given up; windows per chamber in each
-_CLOSE = 0.5  # part of the tolerance of the blocked area that is made use of; rounding takes of the rest
+# A unit is the side of a chamber of mean area, `Request.unit`. A side is the shorter side of the map.
+_WAVES = 48
+_MIN_WAVELENGTH_UNITS = 0.7
+_MAX_WAVELENGTH_UNITS = 1.7
+_MESH_STEPS_PER_UNIT = 12
+_MIN_MESH_STEPS_PER_UNIT = 6
+_MAX_MESH_STEPS_PER_SIDE = 160
+"""Large maps get a coarser mesh: at most that many steps in their longer side."""
+_RIM_SIDES = 0.012
+"""Smallest thickness of the rock along the boundary."""
+_SHORE_UNITS = 0.35
+_SHORE_RISE = 3.0
+"""Width of the belt along the boundary where the field is raised, and by how much."""
+_HALL_UNITS = 0.35
+_HALL_DEPTH = 1.5
+"""Radius around the start within which the field is lowered, and by how much."""
+_MAX_TOLERANCE_UNITS = 0.008
+_MAX_TOLERANCE_SIDES = 0.0027
+"""Tolerance with which walls are simplified."""
+_MIN_CHAMBER_AREA_UNITS2 = 0.03
+_MIN_PILLAR_AREA_UNITS2 = 0.02
+_SPIKE_UNITS = 0.05
+"""Spikes of rock of half that thickness are rounded off."""
+_MAX_BEND = 0.25
+"""Largest offset of a tunnel's middle, relative to its length."""
+_USUAL_RADIUS = 1.2
+_MAX_RADIUS = 2.0
+"""Dilation by which the level is chosen, and the largest one, relative to the smallest."""
+_LEVEL_STEPS = 8
+_RADIUS_STEPS = 12
+"""Steps of the bisections."""
+_MAX_ROUNDS = 12
+"""Rounds in which windows are widened, before a layout is given up."""
+_WINDOWS_PER_CHAMBER = 0.005
+"""Windows that are widened in one round, the narrowest first."""
+_USED_AREA_TOLERANCE = 0.5 * AREA_TOLERANCE
+"""The rest is left for errors of rounding."""
 
 
-def cave(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
-    """Return the rock around a cave and the pillars in it; None where a draw leads nowhere."""
-    unit, width, height = request.unit, float(request.width), float(request.height)
-    fine = min(_FINE * unit, _FINEST * min(width, height))
-    # what is lost when walls are simplified and rounded
-    lost = fine + 2.0 * request.step
-    least = request.gap / 2.0 + lost
+def build_cave(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
+    """Build the rock around a cave, and the pillars in it.
 
-    def inside(distance: float) -> Polygon:
-        off = _RIM * min(width, height) + distance
-        return shapely.box(off, off, width - off, height - off)
+    Parameters
+    ----------
+    request : Request
+    corner : DiscStart
+        Disc that stays free.
+    rng : numpy.random.Generator
 
-    if inside(2.0 * least).is_empty:
+    Returns
+    -------
+    list of Obstacle or None
+        None if the map is too small, too much or too little is blocked, or narrow windows remain.
+    """
+    site = _survey_site(request, corner)
+    if _build_inner_rectangle(request, 2.0 * site.min_radius).is_empty:
         return None
-    start = Point(corner.center).buffer(corner.radius + 2.0 * lost).intersection(inside(0.0))
-    points, values = random_field(request, rng)
-    off = np.minimum(points, points[-1, -1] - points).min(axis=-1)
-    values += _RAISED * np.exp(-((off / (_SHORE * unit)) ** 2))
-    off = np.hypot(*np.moveaxis(points - np.array(corner.center), -1, 0))
-    values -= _LOWERED * np.exp(-((off / (_HALL * unit)) ** 2))
+    points, values = draw_random_field(request, rng)
+    boundary_distances = np.minimum(points, points[-1, -1] - points).min(axis=-1)
+    values += _SHORE_RISE * np.exp(-((boundary_distances / (_SHORE_UNITS * request.unit)) ** 2))
+    start_distances = compute_lengths(points - np.array(corner.center))
+    values -= _HALL_DEPTH * np.exp(-((start_distances / (_HALL_UNITS * request.unit)) ** 2))
     seed = int(rng.integers(2**32))
-
-    def core(level: float) -> BaseGeometry:
-        """Return where the middle of a robot may be: what is below a level, in one piece."""
-        low = shapely.simplify(below(points, values - level), fine).intersection(inside(least))
-        parts = [part for part in shapely.get_parts(low) if part.area >= _CHAMBER * unit**2]
-        hall = start.buffer(-least)
-        whole = shapely.union_all([*parts, start.centroid if hall.is_empty else hall])
-        return shapely.union_all([whole, *tunnels(shapely.get_parts(whole), np.random.default_rng(seed))])
-
-    def free(core: BaseGeometry, radius: float) -> Polygon:
-        """Return what is nearer to the core than a radius, with smooth walls."""
-        spike = _SPIKE * unit
-        wide = core.buffer(radius + spike).buffer(-spike).intersection(inside(0.0)) | start
-        outer = max(shapely.get_parts(wide), key=lambda part: float(part.area))
-        pillars = [ring for ring in outer.interiors if Polygon(ring).area >= _PILLAR * unit**2]
-        return shapely.simplify(Polygon(outer.exterior, pillars), fine)
-
-    def blocked(space: Polygon) -> float:
-        return 1.0 - float(space.area) / (width * height)
-
-    # the level, and then the radius, are such that about as much is blocked as is wanted
-    low, high = float(values.min()), float(values.max())
-    for _ in range(_LEVELS):
-        level = (low + high) / 2.0
-        more = blocked(free(core(level), _USUAL * least)) > request.area
-        low, high = (level, high) if more else (low, level)
-    middle = core((low + high) / 2.0)
-    for _ in range(_ROUNDS):
-        low, high = least, _WIDEST * least
-        for _ in range(_RADII):
-            radius = (low + high) / 2.0
-            low, high = (radius, high) if blocked(free(middle, radius)) > request.area else (low, radius)
-        radius = (low + high) / 2.0
-        space = free(middle, radius)
-        rings = space.exterior, *space.interiors
-        outline, *pillars = (request.build_ring(shapely.get_coordinates(ring)[:-1]) for ring in rings)
+    core = _choose_core(site, points, values, seed)
+    for _ in range(_MAX_ROUNDS):
+        radius = _choose_radius(site, core)
+        outline, pillars = _round_rings(request, site.dilate(core, radius))
         space = Polygon(outline, pillars)
-        if abs(blocked(space) - request.area) > _CLOSE * AREA_TOLERANCE:
+        if abs(site.compute_blocked_fraction(space) - request.area) > _USED_AREA_TOLERANCE:
             return None
-        narrow = [
-            gap for gap in find_narrow_gaps(MultiPolygon([space]), request.gap) if gap.width < request.gap
-        ]
-        if not narrow:
-            around = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
-            rock = PolygonObstacle(around, (outline,), "rock")
-            return [rock, *(PolygonObstacle(ring, name="pillar") for ring in pillars)]
-        count = math.ceil(_PER_ROUND * request.obstacles)
-        middle = shapely.union_all([middle, *(through(gap, middle, radius) for gap in narrow[:count])])
+        gaps = find_narrow_gaps(MultiPolygon([space]), request.gap)
+        narrow_gaps = [gap for gap in gaps if gap.width < request.gap]
+        if not narrow_gaps:
+            return _build_obstacles(request, outline, pillars)
+        count = math.ceil(_WINDOWS_PER_CHAMBER * request.obstacles)
+        windows = [pass_through_window(gap, core, radius) for gap in narrow_gaps[:count]]
+        core = shapely.union_all([core, *windows])
     return None
 
 
-def random_field(request: Request, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return a mesh over the map, (rows, columns, 2) m, and a field on it of mean 0 and variance 1.
+@dataclass(frozen=True)
+class _Site:
+    """What the request says about a cave before anything is drawn.
 
-    It is a sum of waves of random direction, length and phase (M. Shinozuka and G. Deodatis, *Simulation of
-    stochastic processes by spectral representation*, Applied Mechanics Reviews 44, 1991).
+    Attributes
+    ----------
+    request : Request
+    tolerance : float, m
+        Tolerance with which walls are simplified.
+    min_radius : float, m
+        Smallest dilation of the core: half the gap, and what simplifying and rounding may take.
+    start : geometry
+        Area that stays free around the start.
     """
-    sides = request.width, request.height
-    step = max(request.unit / _FINENESS, min(max(sides) / _MOST, request.unit / _COARSEST))
-    x, y = (np.linspace(0.0, side, math.ceil(side / step) + 1) for side in sides)
+
+    request: Request
+    tolerance: float
+    min_radius: float
+    start: BaseGeometry
+
+    def build_core(self, points: Array, values: Array, seed: int) -> BaseGeometry:
+        """Return the area where a field on a mesh is below 0, joined to one piece with the start."""
+        unit = self.request.unit
+        low_area = shapely.simplify(extract_area_below_zero(points, values), self.tolerance)
+        low_area = low_area.intersection(_build_inner_rectangle(self.request, self.min_radius))
+        chambers = [
+            part for part in shapely.get_parts(low_area) if part.area >= _MIN_CHAMBER_AREA_UNITS2 * unit**2
+        ]
+        hall = self.start.buffer(-self.min_radius)
+        if hall.is_empty:
+            hall = self.start.centroid
+        whole = shapely.union_all([*chambers, hall])
+        tunnels = build_tunnels(shapely.get_parts(whole), np.random.default_rng(seed))
+        return shapely.union_all([whole, *tunnels])
+
+    def dilate(self, core: BaseGeometry, radius: float) -> Polygon:
+        """Return the area nearer to a core than a radius, with smooth walls and without small pillars."""
+        unit = self.request.unit
+        spike = _SPIKE_UNITS * unit
+        wide = (
+            core.buffer(radius + spike).buffer(-spike).intersection(_build_inner_rectangle(self.request, 0.0))
+            | self.start
+        )
+        largest = max(shapely.get_parts(wide), key=lambda part: float(part.area))
+        pillars = [
+            ring for ring in largest.interiors if Polygon(ring).area >= _MIN_PILLAR_AREA_UNITS2 * unit**2
+        ]
+        return shapely.simplify(Polygon(largest.exterior, pillars), self.tolerance)
+
+    def compute_blocked_fraction(self, space: Polygon) -> float:
+        """Return the fraction of the map outside a free space."""
+        return 1.0 - float(space.area) / (float(self.request.width) * float(self.request.height))
+
+
+def _survey_site(request: Request, corner: DiscStart) -> _Site:
+    side = min(float(request.width), float(request.height))
+    tolerance = min(_MAX_TOLERANCE_UNITS * request.unit, _MAX_TOLERANCE_SIDES * side)
+    max_error = tolerance + 2.0 * request.step
+    disc = Point(corner.center).buffer(corner.radius + 2.0 * max_error)
+    return _Site(
+        request=request,
+        tolerance=tolerance,
+        min_radius=request.gap / 2.0 + max_error,
+        start=disc.intersection(_build_inner_rectangle(request, 0.0)),
+    )
+
+
+def _build_inner_rectangle(request: Request, distance: float) -> Polygon:
+    """Return the rectangle inside the rim of rock that is some distance away from it."""
+    width = float(request.width)
+    height = float(request.height)
+    offset = _RIM_SIDES * min(width, height) + distance
+    return shapely.box(offset, offset, width - offset, height - offset)
+
+
+def _choose_core(site: _Site, points: Array, values: Array, seed: int) -> BaseGeometry:
+    """Return the core at the level at which the usual dilation blocks about the requested area."""
+    low = float(values.min())
+    high = float(values.max())
+    for _ in range(_LEVEL_STEPS):
+        level = (low + high) / 2.0
+        space = site.dilate(site.build_core(points, values - level, seed), _USUAL_RADIUS * site.min_radius)
+        if site.compute_blocked_fraction(space) > site.request.area:
+            low = level
+        else:
+            high = level
+    return site.build_core(points, values - (low + high) / 2.0, seed)
+
+
+def _choose_radius(site: _Site, core: BaseGeometry) -> float:
+    """Return the dilation of a core that blocks about the requested area, m."""
+    low = site.min_radius
+    high = _MAX_RADIUS * site.min_radius
+    for _ in range(_RADIUS_STEPS):
+        radius = (low + high) / 2.0
+        if site.compute_blocked_fraction(site.dilate(core, radius)) > site.request.area:
+            low = radius
+        else:
+            high = radius
+    return (low + high) / 2.0
+
+
+def _round_rings(request: Request, space: Polygon) -> tuple[Ring, list[Ring]]:
+    """Return the outline and the holes of a polygon in rounded coordinates."""
+    outline = request.build_ring(shapely.get_coordinates(space.exterior)[:-1])
+    holes = [request.build_ring(shapely.get_coordinates(ring)[:-1]) for ring in space.interiors]
+    return outline, holes
+
+
+def _build_obstacles(request: Request, outline: Ring, pillars: list[Ring]) -> list[Obstacle]:
+    width = float(request.width)
+    height = float(request.height)
+    boundary = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
+    rock = PolygonObstacle(boundary, (outline,), "rock")
+    return [rock, *(PolygonObstacle(ring, name="pillar") for ring in pillars)]
+
+
+def draw_random_field(request: Request, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Draw a smooth random field of mean 0 and variance 1.
+
+    Parameters
+    ----------
+    request : Request
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    points : (rows, columns, 2) array, m
+        A mesh over the map.
+    values : (rows, columns) array
+        The field at the points.
+
+    Notes
+    -----
+    The field is a sum of waves of random direction, length and phase (M. Shinozuka and G. Deodatis,
+    *Simulation of stochastic processes by spectral representation*, Applied Mechanics Reviews 44, 1991).
+    """
+    step = min(
+        max(request.width, request.height) / _MAX_MESH_STEPS_PER_SIDE,
+        request.unit / _MIN_MESH_STEPS_PER_UNIT,
+    )
+    step = max(step, request.unit / _MESH_STEPS_PER_UNIT)
+    x = np.linspace(0.0, request.width, math.ceil(request.width / step) + 1)
+    y = np.linspace(0.0, request.height, math.ceil(request.height / step) + 1)
     points = np.stack(np.meshgrid(x, y), axis=-1)
-    length = request.unit * rng.uniform(*_LENGTHS, _WAVES)
-    angle, phase = rng.uniform(0.0, 2.0 * np.pi, (2, _WAVES))
+    wavelengths = request.unit * rng.uniform(_MIN_WAVELENGTH_UNITS, _MAX_WAVELENGTH_UNITS, _WAVES)
+    directions, phases = rng.uniform(0.0, 2.0 * np.pi, (2, _WAVES))
     values = np.zeros(points.shape[:2])
-    for k in range(_WAVES):
-        along = points[..., 0] * math.cos(angle[k]) + points[..., 1] * math.sin(angle[k])
-        values += np.cos(2.0 * np.pi / length[k] * along + phase[k])
+    for wavelength, direction, phase in zip(wavelengths, directions, phases, strict=True):
+        distances = points[..., 0] * math.cos(direction) + points[..., 1] * math.sin(direction)
+        values += np.cos(2.0 * np.pi / wavelength * distances + phase)
     return points, values * math.sqrt(2.0 / _WAVES)
 
 
-def below(points: Array, values: Array) -> BaseGeometry:
-    """Return the polygons where a field on a mesh is below 0; the edge of the mesh counts as above it.
+def extract_area_below_zero(points: Array, values: Array) -> BaseGeometry:
+    """Extract the area where a field on a mesh is below 0.
 
-    By marching triangles, two to each square: there are no cases that leave open what hangs together.
+    Parameters
+    ----------
+    points : (rows, columns, 2) array, m
+    values : (rows, columns) array
+        Values on the edge of the mesh count as at least 1.
+
+    Returns
+    -------
+    geometry
+
+    Notes
+    -----
+    Each square of the mesh is divided into two triangles, in which the contour is a line ("marching
+    triangles"). Unlike in squares, it is never ambiguous which corners are connected.
     """
-    inner = values[1:-1, 1:-1]
-    values = np.maximum(values, 1.0)
-    values[1:-1, 1:-1] = inner
+    raised_values = np.maximum(values, 1.0)
+    raised_values[1:-1, 1:-1] = values[1:-1, 1:-1]
+    values = raised_values
 
-    def crossed(start: tuple[slice, slice], end: tuple[slice, slice]) -> Array:
-        """Return where edges of the mesh cross the level 0, (..., 2) m, nan where they do not."""
-        here, there = values[start], values[end]
+    def find_crossings(start: tuple[slice, slice], end: tuple[slice, slice]) -> Array:
+        """Return where edges of the mesh cross the level 0, (..., 2) m; nan if they do not."""
+        start_values = values[start]
+        end_values = values[end]
+        is_crossing = (start_values < 0.0) != (end_values < 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            part = np.where((here < 0.0) != (there < 0.0), here / (here - there), np.nan)
-        return np.asarray(points[start] + (points[end] - points[start]) * part[..., None])
+            fractions = np.where(is_crossing, start_values / (start_values - end_values), np.nan)
+        return np.asarray(points[start] + (points[end] - points[start]) * fractions[..., None])
 
-    # the edges from each point to the right, upwards, and to the point above the right one
-    right, up = crossed(np.s_[:, :-1], np.s_[:, 1:]), crossed(np.s_[:-1, :], np.s_[1:, :])
-    aslant = crossed(np.s_[:-1, :-1], np.s_[1:, 1:])
-    triangles = ((right[:-1], up[:, 1:], aslant), (aslant, right[1:], up[:, :-1]))
-    edges = np.concatenate([np.stack(three, axis=2).reshape(-1, 3, 2) for three in triangles])
-    # a contour that enters a triangle leaves it
-    segments = edges[~np.isnan(edges[..., 0])].reshape(-1, 2, 2)
+    # The edges from each point to the right, upwards, and to the point above the right one.
+    horizontal = find_crossings(np.s_[:, :-1], np.s_[:, 1:])
+    vertical = find_crossings(np.s_[:-1, :], np.s_[1:, :])
+    diagonal = find_crossings(np.s_[:-1, :-1], np.s_[1:, 1:])
+    lower_triangles = np.stack([horizontal[:-1], vertical[:, 1:], diagonal], axis=2).reshape(-1, 3, 2)
+    upper_triangles = np.stack([diagonal, horizontal[1:], vertical[:, :-1]], axis=2).reshape(-1, 3, 2)
+    crossings = np.concatenate([lower_triangles, upper_triangles])
+    # A contour that enters a triangle also leaves it, so that crossings come in pairs.
+    segments = crossings[~np.isnan(crossings[..., 0])].reshape(-1, 2, 2)
     return shapely.build_area(shapely.multilinestrings(shapely.linestrings(segments)))
 
 
-def tunnels(parts: Array, rng: np.random.Generator) -> list[LineString]:
-    """Return lines that join all parts, as short as can be, with a bend in each: a spanning tree."""
-    found: list[LineString] = []
-    tree, joined = shapely.STRtree(parts), DisjointSet(range(len(parts)))
-    reach = float(np.ptp(shapely.total_bounds(parts).reshape(2, 2), axis=0).max()) / len(parts)
+def build_tunnels(parts: Array, rng: np.random.Generator) -> list[LineString]:
+    """Build lines that join all parts, along a minimum spanning tree, each with a bend in its middle.
+
+    Parameters
+    ----------
+    parts : array of geometries
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    list of LineString
+        One less than there are parts.
+    """
+    tunnels: list[LineString] = []
+    tree = shapely.STRtree(parts)
+    joined = DisjointSet(range(len(parts)))
+    # Kruskal's algorithm for the pairs within a distance, which is doubled until everything is joined.
+    extent = np.ptp(shapely.total_bounds(parts).reshape(2, 2), axis=0)
+    distance = float(extent.max()) / len(parts)
     while joined.n_subsets > 1:
-        i, j = tree.query(parts, "dwithin", reach)
-        i, j = i[i < j], j[i < j]
+        i, j = tree.query(parts, "dwithin", distance)
+        is_ordered = i < j
+        i = i[is_ordered]
+        j = j[is_ordered]
         lines = shapely.shortest_line(parts[i], parts[j])
-        length = shapely.length(lines)
-        short = [k for k in np.lexsort((j, i, length)).tolist() if joined.merge(i[k], j[k])]
-        for begin, end in shapely.get_coordinates(lines[short]).reshape(-1, 2, 2):
-            along = end - begin
-            bend = rng.uniform(-_BEND, _BEND) * np.array([-along[1], along[0]])
-            found.append(LineString([begin, (begin + end) / 2.0 + bend, end]))
-        reach *= 2.0
-    return found
+        order = np.lexsort((j, i, shapely.length(lines))).tolist()
+        tree_lines = lines[[k for k in order if joined.merge(i[k], j[k])]]
+        for start, end in shapely.get_coordinates(tree_lines).reshape(-1, 2, 2):
+            along = end - start
+            offset = rng.uniform(-_MAX_BEND, _MAX_BEND) * np.array([-along[1], along[0]])
+            tunnels.append(LineString([start, (start + end) / 2.0 + offset, end]))
+        distance *= 2.0
+    return tunnels
 
 
-def through(gap: Gap, core: BaseGeometry, radius: float) -> BaseGeometry:
-    """Return a line through a window between two parts of a core, or its middle where there are no two."""
-    one, other = np.array(gap.between)
-    middle = (one + other) / 2.0
-    across = (other - one) / np.hypot(*(other - one)) * (1.5 * radius)
+def pass_through_window(gap: Gap, core: BaseGeometry, radius: float) -> BaseGeometry:
+    """Build a tunnel through a window between two dilated parts of a core.
+
+    Parameters
+    ----------
+    gap : Gap
+        The window.
+    core : geometry
+    radius : float, m
+        Dilation of the core.
+
+    Returns
+    -------
+    geometry
+        A line from part to part; the middle of the window if no part is near on one side.
+    """
+    first_wall = np.array(gap.between[0])
+    second_wall = np.array(gap.between[1])
+    middle = (first_wall + second_wall) / 2.0
+    across = second_wall - first_wall
+    across = across / np.hypot(across[0], across[1]) * (1.5 * radius)
     along = np.array([-across[1], across[0]])
-    left, right = middle + across, middle - across
-    # what is in the halves of a square on either side of the window
-    near = [core.intersection(Polygon([left, right, right + side, left + side])) for side in (along, -along)]
-    if any(part.is_empty for part in near):
+    left = middle + across
+    right = middle - across
+    # The parts of the core in the halves of a square on either side of the window.
+    front = core.intersection(Polygon([left, right, right + along, left + along]))
+    back = core.intersection(Polygon([left, right, right - along, left - along]))
+    if front.is_empty or back.is_empty:
         return Point(middle)
-    begin, end = (shapely.shortest_line(Point(middle), part).coords[-1] for part in near)
-    return LineString([begin, middle, end])
+    start = shapely.shortest_line(Point(middle), front).coords[-1]
+    end = shapely.shortest_line(Point(middle), back).coords[-1]
+    return LineString([start, middle, end])

@@ -25,12 +25,12 @@ from robocov.errors import (
     quote,
     require_number,
 )
-from robocov.generator.blocks import city
-from robocov.generator.caves import cave
-from robocov.generator.mazes import maze
+from robocov.generator.blocks import build_town
+from robocov.generator.caves import build_cave
+from robocov.generator.mazes import build_maze
 from robocov.generator.polygons import scatter_polygons
 from robocov.generator.request import AREA_TOLERANCE, MAX_SIDE_M, MIN_SIDE_M, Request
-from robocov.generator.rooms import building
+from robocov.generator.rooms import build_building
 from robocov.mapfile.check import check_rules
 
 Layout: TypeAlias = Callable[[Request, DiscStart, np.random.Generator], list[Obstacle] | None]
@@ -98,21 +98,21 @@ GENERATORS: dict[str, MapKind] = {
         area=0.2,
     ),
     "blocks": MapKind(
-        layout=city,
+        layout=build_town,
         description="a town: blocks between streets",
         counted="blocks",
         obstacles=12,
         area=0.4,
     ),
     "rooms": MapKind(
-        layout=building,
+        layout=build_building,
         description="a building: rooms with doors, and some furniture",
         counted="rooms",
         obstacles=6,
         area=0.12,
     ),
     "mazes": MapKind(
-        layout=maze,
+        layout=build_maze,
         description="a maze: corridors, some dead ends, some ways round",
         counted="cells",
         obstacles=36,
@@ -120,7 +120,7 @@ GENERATORS: dict[str, MapKind] = {
         is_approximate=True,
     ),
     "caves": MapKind(
-        layout=cave,
+        layout=build_cave,
         description="a cave: chambers and tunnels with smooth walls, and pillars",
         counted="chambers",
         obstacles=12,

@@ -1,187 +1,329 @@
-"""Maps of the kind `mazes`: corridors on a grid of cells, some dead ends, some ways round.
+"""Maps of the kind `mazes`: corridors on a grid of cells, some dead ends, some loops.
 
 The passages are a spanning tree of the grid, grown cell by cell ("growing tree": J. Buck, *Mazes for
-Programmers*, 2015, chapter 11): from the newest cell it makes long winding corridors, as a depth-first
-search does, from any cell many short ones. Some walls are opened after that, those at dead ends first
+Programmers*, 2015, chapter 11). From the newest cell it grows long winding corridors, as a depth-first search
+does, from a random cell many short ones. After that some walls are removed, those at dead ends first
 ("braiding").
 
-Walls are a boolean array (columns + 1, rows + 1, 2): whether one leads from a post, where lines of the grid
-cross, upwards (0) and to the right (1).
+Walls are a boolean array (columns + 1, rows + 1, 2): whether a wall leads from a post, where lines of the
+grid cross, upwards (0) and to the right (1).
 """
 
 import itertools
 import math
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TypeAlias
 
 import numpy as np
 import shapely
 
-from robocov.arrays import BoolArray
+from robocov.arrays import BoolArray, IntArray
 from robocov.environment import DiscStart, Obstacle, WallObstacle
 from robocov.generator.request import AREA_TOLERANCE, Request
 
 Cell: TypeAlias = tuple[int, int]
+"""Column and row of a cell."""
 Post: TypeAlias = tuple[int, int]
+"""Numbers of the vertical and of the horizontal line that cross at a post."""
+GridShape: TypeAlias = tuple[int, int]
+"""Number of columns and of rows."""
 
-_OBLONG = 0.5  # what oblong cells count, against a number of cells that is not the one asked for
-_NEWEST = 0.6, 0.98  # least and largest chance with which a maze grows from its newest cell
-# least and largest part of the walls that are opened, and the most where the blocked area wants it
-_OPENED, _MOST_OPENED = (0.04, 0.12), 0.4
-_DEAD_END = 0.7  # chance that the wall to be opened is one at a dead end
-_CLOSE = 0.8  # part of the tolerance of the blocked area that is made use of
+_OBLONG_WEIGHT = 0.5
+"""Weight of oblong cells, relative to that of another number of cells than the requested one."""
+_MIN_NEWEST_PROBABILITY = 0.6
+_MAX_NEWEST_PROBABILITY = 0.98
+"""Smallest and largest probability with which a maze grows from its newest cell."""
+_MIN_OPENED_FRACTION = 0.04
+_MAX_OPENED_FRACTION = 0.12
+"""Smallest and largest fraction of the walls that are removed for loops."""
+_MAX_REMOVED_FRACTION = 0.4
+"""Largest fraction of the walls that are removed until the blocked area fits."""
+_DEAD_END_PROBABILITY = 0.7
+"""Probability that the wall to be removed is one at a dead end."""
+_USED_AREA_TOLERANCE = 0.8 * AREA_TOLERANCE
+"""The rest is left for errors of rounding."""
+_GAP_TOLERANCE_M = 1e-9
 
 
-def maze(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
-    """Return walls between corridors of one width; None if they are narrower than the gap.
+def build_maze(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
+    """Build walls between corridors of equal width.
 
-    Walls are as thick as the blocked area wants; what is still too much of it, as thicknesses are rounded,
-    goes by opening some more. No wall stands in the disc of the start.
+    The thickness of the walls follows from the blocked area. Thicknesses are rounded; what they block too
+    much is mended by removing more walls.
+
+    Parameters
+    ----------
+    request : Request
+    corner : DiscStart
+        Disc that stays free of walls.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    list of Obstacle or None
+        None if the corridors would be narrower than the gap, or too few walls remain.
     """
-    shape = _shape(request)
-    walls = inner_walls(shape) & ~tree_passages(shape, rng)
-    least = (1.0 - _MOST_OPENED) * walls.sum()
-    for _ in range(round(walls.sum() * rng.uniform(*_OPENED))):
-        _open(walls, rng)
-    disc = shapely.Point(corner.center).buffer(corner.radius)
-    enough = _CLOSE * AREA_TOLERANCE * request.width * request.height
-    while walls.any() and walls.sum() >= least:
-        lines = list(trails(walls))
-
-        def built(steps: int, lines: list[list[Post]] = lines) -> tuple[list[WallObstacle], float]:
-            wide = round(steps * request.step, request.digits)
-            x, y = _grid(request, shape, wide)
-            found = [WallObstacle(tuple((x[i], y[k]) for i, k in line), wide) for line in lines]
-            return found, float(shapely.union_all([wall.polygon for wall in found]).area)
-
-        # the thickness whose blocked area is nearest to what is wanted
-        low, high = 1, math.ceil(min(request.width / shape[0], request.height / shape[1]) / request.step)
-        while high - low > 1:
-            middle = (low + high) // 2
-            low, high = (middle, high) if built(middle)[1] < request.blocked else (low, middle)
-        found, area = min(map(built, (low, high)), key=lambda each: abs(each[1] - request.blocked))
-        thickness = found[0].width
-        x, y = _grid(request, shape, thickness)
-        # the boundary has no thickness
-        centred = ([-thickness / 2.0, *line[1:-1], line[-1] + thickness / 2.0] for line in (x, y))
-        if min(np.diff(line).min() for line in centred) - thickness < request.gap - 1e-9:
+    shape = _choose_grid_shape(request)
+    walls = find_inner_walls(shape) & ~grow_passages(shape, rng)
+    min_count = (1.0 - _MAX_REMOVED_FRACTION) * walls.sum()
+    opened_fraction = rng.uniform(_MIN_OPENED_FRACTION, _MAX_OPENED_FRACTION)
+    for _ in range(round(walls.sum() * opened_fraction)):
+        _remove_wall(walls, rng)
+    max_area_error = _USED_AREA_TOLERANCE * request.width * request.height
+    while walls.any() and walls.sum() >= min_count:
+        trails = list(trace_trails(walls))
+        thickness = _choose_thickness(request, shape, trails)
+        if _compute_corridor_width(request, shape, thickness) < request.gap - _GAP_TOLERANCE_M:
             return None
-        at = np.argwhere(walls)
-        begin = np.column_stack([np.take(x, at[:, 0]), np.take(y, at[:, 1])])
-        end = np.column_stack([np.take(x, at[:, 0] + at[:, 2]), np.take(y, at[:, 1] + 1 - at[:, 2])])
-        beside = thickness / 2.0 * np.column_stack([1 - at[:, 2], at[:, 2]])
-        inside = shapely.intersects(shapely.box(*(begin - beside).T, *(end + beside).T), disc)
-        if inside.any():
-            walls[tuple(at[inside].T)] = False
-        elif abs(area - request.blocked) <= enough:
-            return [*found]
-        else:
-            _open(walls, rng)
+        obstacles = _build_walls(request, shape, trails, thickness)
+        area_error = abs(_compute_union_area(obstacles) - request.blocked)
+        if _clear_disc(request, shape, walls, thickness, corner):
+            continue
+        if area_error <= max_area_error:
+            return [*obstacles]
+        _remove_wall(walls, rng)
     return None
 
 
-def _shape(request: Request) -> Cell:
-    """Return how many columns and rows there are."""
+def _choose_grid_shape(request: Request) -> GridShape:
+    """Return numbers of columns and rows for about the requested number of nearly square cells."""
 
-    def badness(shape: Cell) -> float:
+    def compute_mismatch(shape: GridShape) -> float:
         columns, rows = shape
-        oblong = abs(math.log(request.width / columns) - math.log(request.height / rows))
-        return abs(math.log(columns * rows / request.obstacles)) + _OBLONG * oblong
+        oblongness = abs(math.log(request.width / columns) - math.log(request.height / rows))
+        return abs(math.log(columns * rows / request.obstacles)) + _OBLONG_WEIGHT * oblongness
 
-    most = int(request.obstacles)
-    return min(((c, r) for c in range(1, most + 1) for r in range(1, 2 * most // c + 1)), key=badness)
+    count = int(request.obstacles)
+    shapes = [
+        (columns, rows) for columns in range(1, count + 1) for rows in range(1, 2 * count // columns + 1)
+    ]
+    return min(shapes, key=compute_mismatch)
 
 
-def _grid(request: Request, shape: Cell, thickness: float) -> list[list[float]]:
-    """Return the x and y of the lines, m; the corridors are as wide as each other, along the boundary too."""
-    lines = []
+def _choose_thickness(request: Request, shape: GridShape, trails: list[list[Post]]) -> float:
+    """Return the rounded thickness of the walls whose blocked area is nearest to the requested one, m."""
+
+    def compute_area(steps: int) -> float:
+        thickness = round(steps * request.step, request.digits)
+        return _compute_union_area(_build_walls(request, shape, trails, thickness))
+
+    columns, rows = shape
+    low = 1
+    high = math.ceil(min(request.width / columns, request.height / rows) / request.step)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if compute_area(middle) < request.blocked:
+            low = middle
+        else:
+            high = middle
+    low_error = abs(compute_area(low) - request.blocked)
+    high_error = abs(compute_area(high) - request.blocked)
+    steps = low if low_error <= high_error else high
+    return round(steps * request.step, request.digits)
+
+
+def _build_walls(
+    request: Request, shape: GridShape, trails: list[list[Post]], thickness: float
+) -> list[WallObstacle]:
+    x = _compute_lines(request, request.width, shape[0], thickness)
+    y = _compute_lines(request, request.height, shape[1], thickness)
+    return [WallObstacle(tuple((x[column], y[row]) for column, row in trail), thickness) for trail in trails]
+
+
+def _compute_union_area(walls: list[WallObstacle]) -> float:
+    return float(shapely.union_all([wall.polygon for wall in walls]).area)
+
+
+def _compute_lines(request: Request, length: float, count: int, thickness: float) -> list[float]:
+    """Return the coordinates of the lines of the grid along one axis, m.
+
+    Corridors along the boundary, which has no thickness, are as wide as the others.
+    """
+    pitch = (length + thickness) / count
+    inner_lines = np.arange(1, count, dtype=np.float64) * pitch - thickness / 2.0
+    return [0.0, *request.round_points(inner_lines).tolist(), float(length)]
+
+
+def _compute_corridor_width(request: Request, shape: GridShape, thickness: float) -> float:
+    """Return the width of the narrowest corridor, m."""
+    widths = []
     for length, count in zip((request.width, request.height), shape, strict=True):
-        inner = np.arange(1, count, dtype=np.float64) * ((length + thickness) / count) - thickness / 2.0
-        lines.append([0.0, *request.round_points(inner).tolist(), float(length)])
-    return lines
+        lines = _compute_lines(request, length, count, thickness)
+        # As if the boundary had walls as well, whose faces are the sides of the map.
+        centre_lines = [-thickness / 2.0, *lines[1:-1], lines[-1] + thickness / 2.0]
+        widths.append(float(np.diff(centre_lines).min()) - thickness)
+    return min(widths)
 
 
-def inner_walls(shape: Cell) -> BoolArray:
-    """Return all walls between cells, those of the boundary not."""
-    walls = np.zeros((shape[0] + 1, shape[1] + 1, 2), dtype=bool)
-    walls[1:-1, :-1, 0] = walls[:-1, 1:-1, 1] = True
+def _clear_disc(
+    request: Request, shape: GridShape, walls: BoolArray, thickness: float, corner: DiscStart
+) -> bool:
+    """Remove the walls in a disc; return whether there were any."""
+    x = _compute_lines(request, request.width, shape[0], thickness)
+    y = _compute_lines(request, request.height, shape[1], thickness)
+    indices = np.argwhere(walls)
+    columns, rows, is_horizontal = indices.T
+    starts = np.column_stack([np.take(x, columns), np.take(y, rows)])
+    ends = np.column_stack([np.take(x, columns + is_horizontal), np.take(y, rows + 1 - is_horizontal)])
+    half_widths = thickness / 2.0 * np.column_stack([1 - is_horizontal, is_horizontal])
+    low = starts - half_widths
+    high = ends + half_widths
+    boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+    is_inside = shapely.intersects(boxes, shapely.Point(corner.center).buffer(corner.radius))
+    walls[tuple(indices[is_inside].T)] = False
+    return bool(is_inside.any())
+
+
+def find_inner_walls(shape: GridShape) -> BoolArray:
+    """Find all walls between cells, without those of the boundary.
+
+    Parameters
+    ----------
+    shape : pair of int
+        Number of columns and of rows.
+
+    Returns
+    -------
+    (columns + 1, rows + 1, 2) array of bool
+    """
+    columns, rows = shape
+    walls = np.zeros((columns + 1, rows + 1, 2), dtype=bool)
+    walls[1:-1, :-1, 0] = True
+    walls[:-1, 1:-1, 1] = True
     return walls
 
 
-def tree_passages(shape: Cell, rng: np.random.Generator) -> BoolArray:
-    """Return where walls are missing so that there is one way from each cell to each other."""
-    newest = rng.uniform(*_NEWEST)
-    growing = [(int(rng.integers(shape[0])), int(rng.integers(shape[1])))]
-    unreached = {*itertools.product(range(shape[0]), range(shape[1]))} - {*growing}
-    passages = np.zeros_like(inner_walls(shape))
+def grow_passages(shape: GridShape, rng: np.random.Generator) -> BoolArray:
+    """Grow passages that connect every cell to every other by exactly one path.
+
+    Parameters
+    ----------
+    shape : pair of int
+        Number of columns and of rows.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (columns + 1, rows + 1, 2) array of bool
+        Walls that are removed.
+    """
+    columns, rows = shape
+    newest_probability = rng.uniform(_MIN_NEWEST_PROBABILITY, _MAX_NEWEST_PROBABILITY)
+    first = (int(rng.integers(columns)), int(rng.integers(rows)))
+    unreached = set(itertools.product(range(columns), range(rows)))
+    unreached.remove(first)
+    growing = [first]
+    passages = np.zeros_like(find_inner_walls(shape))
     while growing:
-        at = len(growing) - 1 if rng.random() < newest else int(rng.integers(len(growing)))
-        column, row = growing[at]
-        around = (column + 1, row), (column, row + 1), (column - 1, row), (column, row - 1)
-        fresh = [cell for cell in around if cell in unreached]
-        if fresh:
-            cell = fresh[int(rng.integers(len(fresh)))]
-            passages[(*max(growing[at], cell), int(column == cell[0]))] = True
-            unreached.remove(cell)
-            growing.append(cell)
-        else:
-            growing.pop(at)
+        is_newest = rng.random() < newest_probability
+        index = len(growing) - 1 if is_newest else int(rng.integers(len(growing)))
+        column, row = growing[index]
+        neighbours = [(column + 1, row), (column, row + 1), (column - 1, row), (column, row - 1)]
+        unreached_neighbours = [cell for cell in neighbours if cell in unreached]
+        if not unreached_neighbours:
+            growing.pop(index)
+            continue
+        neighbour = unreached_neighbours[int(rng.integers(len(unreached_neighbours)))]
+        # The wall between two cells starts at the lower left post of the right or upper one.
+        post = max((column, row), neighbour)
+        is_horizontal = int(neighbour[0] == column)
+        passages[post[0], post[1], is_horizontal] = True
+        unreached.remove(neighbour)
+        growing.append(neighbour)
     return passages
 
 
-def _open(walls: BoolArray, rng: np.random.Generator) -> None:
-    """Take away a wall, if possible one held at both ends, which makes a way round; often at a dead end."""
-    at = np.argwhere(walls)
-    along = np.column_stack([at[:, 2], 1 - at[:, 2]])
-    posts_and_cells = at[:, :2], at[:, :2] + along, at[:, :2] - along[:, ::-1]
-    begin, end, beside = (tuple(each.T) for each in posts_and_cells)
-    meeting = np.zeros(walls.shape[:2], dtype=int)
-    for posts in (begin, end):
-        np.add.at(meeting, posts, 1)
-    held = meeting > 1
-    held[[0, -1]] = held[:, [0, -1]] = True
-    good = held[begin] & held[end]
-    good |= not good.any()
-    if rng.random() < _DEAD_END:
-        passages = inner_walls((walls.shape[0] - 1, walls.shape[1] - 1)) & ~walls
-        around = passages[:-1, :-1].sum(axis=2) + passages[1:, :-1, 0] + passages[:-1, 1:, 1]
-        # a wall is between the cell whose lower left post it begins at, and the one beside
-        dead_end = good & ((around[begin] == 1) | (around[beside] == 1))
-        good = dead_end if dead_end.any() else good
-    places = np.flatnonzero(good)
-    walls[tuple(at[places[int(rng.integers(len(places)))]])] = False
+def _remove_wall(walls: BoolArray, rng: np.random.Generator) -> None:
+    """Remove a wall, if possible one that is attached at both ends, which makes a loop.
 
-
-def trails(walls: BoolArray) -> Iterator[list[Post]]:
-    """Yield poly-lines that have every wall once, by the posts at their ends and bends.
-
-    They go straight on where they can, and round a corner where nothing else meets there.
+    Often it is one at a dead end.
     """
-    arms: defaultdict[Post, set[Post]] = defaultdict(set)
-    for i, k, right in np.argwhere(walls).tolist():
-        one, other = (i, k), (i + right, k + 1 - right)
-        arms[one].add(other)
-        arms[other].add(one)
-    done: set[tuple[Post, Post]] = set()
+    columns, rows, is_horizontal = np.argwhere(walls).T
+    starts = (columns, rows)
+    ends = (columns + is_horizontal, rows + 1 - is_horizontal)
+    wall_counts = np.zeros(walls.shape[:2], dtype=int)
+    np.add.at(wall_counts, starts, 1)
+    np.add.at(wall_counts, ends, 1)
+    is_attached = wall_counts > 1
+    # Posts on the boundary.
+    is_attached[[0, -1]] = True
+    is_attached[:, [0, -1]] = True
+    is_candidate = is_attached[starts] & is_attached[ends]
+    if not is_candidate.any():
+        is_candidate[:] = True
+    if rng.random() < _DEAD_END_PROBABILITY:
+        opening_counts = _count_openings(walls)
+        # A wall is between the cell whose lower left post it starts at, and the cell on its other side.
+        other_cells = (columns - (1 - is_horizontal), rows - is_horizontal)
+        is_dead_end = (opening_counts[starts] == 1) | (opening_counts[other_cells] == 1)
+        if (is_candidate & is_dead_end).any():
+            is_candidate &= is_dead_end
+    candidates = np.flatnonzero(is_candidate)
+    chosen = candidates[int(rng.integers(len(candidates)))]
+    walls[columns[chosen], rows[chosen], is_horizontal[chosen]] = False
 
-    def straight(before: Post, here: Post) -> Post:
-        return 2 * here[0] - before[0], 2 * here[1] - before[1]
 
-    def onward(before: Post, here: Post) -> Post | None:
-        others = arms[here] - {before}
-        if straight(before, here) in others:
-            return straight(before, here)
-        return others.pop() if len(others) == 1 else None
+def _count_openings(walls: BoolArray) -> IntArray:
+    """Return the number of passages from each cell, (columns, rows)."""
+    passages = find_inner_walls((walls.shape[0] - 1, walls.shape[1] - 1)) & ~walls
+    left_and_below = passages[:-1, :-1].sum(axis=2)
+    right = passages[1:, :-1, 0]
+    above = passages[:-1, 1:, 1]
+    return np.asarray(left_and_below + right + above)
 
-    for begin, step in sorted((one, other) for one in arms for other in arms[one]):
-        if onward(step, begin) is None and (begin, step) not in done:
-            trail, before = [begin], begin
-            here: Post | None = step
-            while here is not None:
-                done |= {(before, here), (here, before)}
-                following = onward(before, here)
-                if following != straight(before, here):
-                    trail.append(here)
-                before, here = here, following
-            yield trail
+
+def trace_trails(walls: BoolArray) -> Iterator[list[Post]]:
+    """Trace poly-lines that contain every wall once.
+
+    A poly-line goes straight on if it can, and round a corner if no other wall meets there.
+
+    Parameters
+    ----------
+    walls : (columns + 1, rows + 1, 2) array of bool
+        Without closed rings.
+
+    Yields
+    ------
+    list of (int, int)
+        The posts at the ends and bends of a poly-line.
+    """
+    neighbours: defaultdict[Post, set[Post]] = defaultdict(set)
+    for column, row, is_horizontal in np.argwhere(walls).tolist():
+        start = (column, row)
+        end = (column + is_horizontal, row + 1 - is_horizontal)
+        neighbours[start].add(end)
+        neighbours[end].add(start)
+    steps = sorted((post, neighbour) for post in neighbours for neighbour in neighbours[post])
+    traced: set[tuple[Post, Post]] = set()
+    for start, second in steps:
+        is_end = _find_next_post(neighbours, second, start) is None
+        if not is_end or (start, second) in traced:
+            continue
+        trail = [start]
+        previous = start
+        post = second
+        while True:
+            traced.add((previous, post))
+            traced.add((post, previous))
+            following = _find_next_post(neighbours, previous, post)
+            if following != _step_straight(previous, post):
+                trail.append(post)
+            if following is None:
+                break
+            previous = post
+            post = following
+        yield trail
+
+
+def _find_next_post(neighbours: Mapping[Post, set[Post]], previous: Post, post: Post) -> Post | None:
+    """Return the post to which a poly-line goes on from a post; None if it ends there."""
+    others = neighbours[post] - {previous}
+    straight = _step_straight(previous, post)
+    if straight in others:
+        return straight
+    return others.pop() if len(others) == 1 else None
+
+
+def _step_straight(previous: Post, post: Post) -> Post:
+    return 2 * post[0] - previous[0], 2 * post[1] - previous[1]

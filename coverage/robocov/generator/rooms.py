@@ -1,4 +1,6 @@
-"""Maps of the kind `rooms`: a building, that is a rectangle divided into rooms, with doors and furniture."""
+"""Maps of the kind `rooms`: a building, which is a rectangle divided into rooms, with doors and furniture."""
+
+from __future__ import annotations
 
 import itertools
 import math
@@ -11,29 +13,65 @@ import shapely
 from scipy.cluster.hierarchy import DisjointSet
 from shapely import Polygon
 
+from robocov.arrays import Array
 from robocov.environment import CircleObstacle, DiscStart, Obstacle, PolygonObstacle, WallObstacle
 from robocov.generator.request import Request
 
-_CORRIDOR, _MANY = 0.5, 5  # chance of a corridor across a plan, and the least number of rooms for one
-_NARROWEST = 1.5  # least side of a room, in gaps
-_UNEVEN = 0.3  # a wall is off the even division by at most so much of one room's share
-_DOORS = 1.06, 1.6  # least and largest width of a door, in gaps
-_LOOPS = 0.3  # chance of a door that is not needed
-_STUB = 0.05  # least length of a piece of wall beside a door, in sides of a usual room
-# part of the blocked area that walls take: the least, the most, and the most where rooms are small
-_WALLS = 0.3, 0.5, 0.9
-_SMALL, _SMALLEST = 6.0, 3.0  # sides of usual rooms with little, and very little, room for furniture, in gaps
-_LENGTH = 1.5  # of the walls of a room without doors, in its sides, each wall counted half for each room
-_THICKEST = 0.06  # largest thickness of walls, in sides of a usual room
-_PIECES = 2.2  # pieces of furniture in a room, on average
-_TRIES = 32  # places that are tried for one piece, and pieces in a row that find none before that is given up
-_SHRINKING, _SHRUNK = 0.92, 0.2  # a piece that finds no place makes the next so much smaller; the smallest
-_DENSEST = 0.35  # part of the rooms that furniture fills at most: more finds no place
-_ENOUGH = 0.001  # what is left to be blocked, as a part of the map, which is too little for a piece
+# A unit is the side of a room of mean area, `Request.unit`.
+_CORRIDOR_PROBABILITY = 0.5
+_MIN_CORRIDOR_ROOMS = 5
+"""Smallest number of rooms of a building with a corridor."""
+_MIN_CORRIDOR_GAPS = 1.6
+_MAX_CORRIDOR_GAPS = 2.2
+"""Smallest and largest width of a corridor."""
+_MIN_ROOM_GAPS = 1.5
+"""Smallest side of a room."""
+_MAX_UNEVENNESS = 0.3
+"""Largest offset of a wall from the even division, in the share of one room."""
+_MIN_DOOR_GAPS = 1.06
+_MAX_DOOR_GAPS = 1.6
+"""Smallest and largest width of a door."""
+_LOOP_PROBABILITY = 0.3
+"""Probability of a door between rooms that are already connected."""
+_MIN_WALL_PIECE_UNITS = 0.05
+"""Smallest length of a wall next to a door."""
+_MIN_WALL_FRACTION = 0.3
+_MAX_WALL_FRACTION = 0.5
+_MAX_WALL_FRACTION_OF_SMALL_ROOMS = 0.9
+"""Smallest and largest fraction of the blocked area that walls take; small rooms have less furniture."""
+_SMALL_ROOM_GAPS = 6.0
+_SMALLEST_ROOM_GAPS = 3.0
+"""Sides of mean rooms from which, and at which, that largest fraction is in full that of small rooms."""
+_WALL_LENGTH_UNITS = 1.5
+"""Length of the walls of a room without doors; half of each wall counts for each of its rooms."""
+_MAX_THICKNESS_UNITS = 0.06
+_PIECES_PER_ROOM = 2.2
+_CANDIDATES_PER_PIECE = 32
+"""Positions that are compared for one piece of furniture."""
+_MAX_FAILURES = 32
+"""Pieces in a row that find no position, before the layout is given up."""
+_FAILURE_SHRINKAGE = 0.92
+_MIN_SHRINKAGE = 0.2
+"""A piece that finds no position makes the next one that much smaller, down to the smallest factor."""
+_MAX_FURNITURE_FRACTION = 0.35
+"""Fraction of the rooms that furniture fills at most: more finds no position."""
+_AREA_TOLERANCE = 0.001
+"""Fraction of the map that is too small for a piece of furniture."""
+_PIECE_PROBABILITIES = {"cabinet": 0.5, "table": 0.3, "round table": 0.2}
+_CABINET_STRETCH = (1.6, 3.5)
+_TABLE_STRETCH = (1.0, 2.0)
+"""Smallest and largest ratio of the sides of a piece of furniture."""
+_MIN_PIECE_STEPS = 4.0
+"""Smallest side of a piece of furniture, in rounding steps."""
 
 
 class Box(NamedTuple):
-    """A rectangle along the axes, m."""
+    """A rectangle along the axes.
+
+    Attributes
+    ----------
+    left, bottom, right, top : float, m
+    """
 
     left: float
     bottom: float
@@ -42,227 +80,404 @@ class Box(NamedTuple):
 
     @property
     def sides(self) -> tuple[float, float]:
-        """Its width and height."""
+        """Width and height, m."""
         return self.right - self.left, self.top - self.bottom
+
+    @property
+    def area(self) -> float:
+        """Area, m²."""
+        width, height = self.sides
+        return width * height
+
+    def crop(self, axis: int, low: float | None = None, high: float | None = None) -> Box:
+        """Return the part of the rectangle between two coordinates on an axis.
+
+        Parameters
+        ----------
+        axis : int
+            0 for x, 1 for y.
+        low, high : float or None, m
+            The edges of the rectangle by default.
+
+        Returns
+        -------
+        Box
+        """
+        edges = list(self)
+        if low is not None:
+            edges[axis] = low
+        if high is not None:
+            edges[axis + 2] = high
+        return Box(*edges)
 
 
 class Wall(NamedTuple):
-    """A wall from `begin` to `end` on one axis, with its middle line `at` (m) on the axis that it crosses."""
+    """A wall along one of the axes.
 
-    across: int
-    at: float
-    begin: float
+    Attributes
+    ----------
+    axis : int
+        Axis that the wall crosses: 0 for a vertical wall, 1 for a horizontal one.
+    position : float, m
+        Coordinate of its middle line on that axis.
+    start, end : float, m
+        Coordinates of its ends on the other axis.
+    """
+
+    axis: int
+    position: float
+    start: float
     end: float
 
-    def part(self, begin: float, end: float, thickness: float) -> WallObstacle:
-        """Return a part of the wall."""
-        upright, flat = ((self.at, begin), (self.at, end)), ((begin, self.at), (end, self.at))
-        return WallObstacle(flat if self.across else upright, thickness)
+    def build_piece(self, start: float, end: float, thickness: float) -> WallObstacle:
+        """Build a piece of the wall.
+
+        Parameters
+        ----------
+        start, end : float, m
+        thickness : float, m
+
+        Returns
+        -------
+        WallObstacle
+        """
+        if self.axis == 0:
+            return WallObstacle(((self.position, start), (self.position, end)), thickness)
+        return WallObstacle(((start, self.position), (end, self.position)), thickness)
 
 
 class Door(NamedTuple):
-    """An opening in a wall, between two rooms by their numbers."""
+    """An opening in a wall.
+
+    Attributes
+    ----------
+    wall : Wall
+    start, end : float, m
+        Its ends along the wall.
+    rooms : pair of int
+        Indices of the rooms that it connects.
+    """
 
     wall: Wall
-    begin: float
+    start: float
     end: float
     rooms: tuple[int, int]
 
 
 @dataclass
 class FloorPlan:
-    """Rooms, up to the middle lines of their walls, and the walls and doors between them."""
+    """Rooms, and the walls and doors between them.
+
+    Attributes
+    ----------
+    thickness : float, m
+        Thickness of the walls.
+    rooms : list of Box
+        Rooms up to the middle lines of their walls.
+    walls : list of Wall
+    doors : list of Door
+    corridor : int or None
+        Index of the room that is a corridor.
+    """
 
     thickness: float
     rooms: list[Box] = field(default_factory=list)
     walls: list[Wall] = field(default_factory=list)
     doors: list[Door] = field(default_factory=list)
+    corridor: int | None = None
 
-    def solid(self) -> list[WallObstacle]:
-        """Return the walls with their doors left out."""
+    def build_walls(self) -> list[WallObstacle]:
+        """Build the pieces of the walls between their doors.
+
+        Returns
+        -------
+        list of WallObstacle
+        """
         openings: defaultdict[Wall, list[float]] = defaultdict(list)
         for door in sorted(self.doors):
-            openings[door.wall] += door.begin, door.end
+            openings[door.wall] += [door.start, door.end]
         pieces = []
         for wall in self.walls:
-            ends = [wall.begin, *openings[wall], wall.end]
-            for begin, end in zip(ends[::2], ends[1::2], strict=True):
-                pieces.append(wall.part(begin, end, self.thickness))
+            ends = [wall.start, *openings[wall], wall.end]
+            for start, end in zip(ends[::2], ends[1::2], strict=True):
+                pieces.append(wall.build_piece(start, end, self.thickness))
         return pieces
 
 
-def building(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
-    """Return walls and furniture, against walls or with gaps around it; None if there is no room for it."""
-    least, most, of_small = _WALLS
-    small = min(max((_SMALL - request.unit / request.gap) / (_SMALL - _SMALLEST), 0.0), 1.0)
-    part = rng.uniform(least, most + (of_small - most) * small)
-    half = min(part * request.area / _LENGTH, _THICKEST) * request.unit / 2.0
-    # so that the faces of walls have rounded coordinates
-    thickness = 2.0 * max(request.round_down(half), request.step)
-    plan = floor_plan(request, thickness, rng)
+def build_building(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
+    """Build walls, and furniture that stands against walls or keeps the gap from them.
+
+    Parameters
+    ----------
+    request : Request
+    corner : DiscStart
+        Disc that stays free of furniture.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    list of Obstacle or None
+        None if rooms would be too small, or the furniture finds no room.
+    """
+    plan = draw_floor_plan(request, _draw_thickness(request, rng), rng)
     if plan is None:
         return None
-    walls: list[Obstacle] = [*plan.solid()]
-    whole = shapely.box(0.0, 0.0, request.width, request.height)
-    built = shapely.union_all([wall.polygon for wall in walls]).intersection(whole).area if walls else 0.0
-    furniture = _furniture(request, corner, plan, request.blocked - built, rng)
+    walls: list[Obstacle] = [*plan.build_walls()]
+    map_area = shapely.box(0.0, 0.0, request.width, request.height)
+    wall_area = 0.0
+    if walls:
+        wall_area = shapely.union_all([wall.polygon for wall in walls]).intersection(map_area).area
+    furniture = _place_furniture(request, corner, plan, request.blocked - wall_area, rng)
     return None if furniture is None else [*walls, *furniture]
 
 
-def floor_plan(request: Request, thickness: float, rng: np.random.Generator) -> FloorPlan | None:
-    """Return a plan with as many rooms as are wanted; None if they become too small."""
+def _draw_thickness(request: Request, rng: np.random.Generator) -> float:
+    """Return a random thickness of walls, m."""
+    room_gaps = request.unit / request.gap
+    smallness = (_SMALL_ROOM_GAPS - room_gaps) / (_SMALL_ROOM_GAPS - _SMALLEST_ROOM_GAPS)
+    smallness = min(max(smallness, 0.0), 1.0)
+    max_fraction = _MAX_WALL_FRACTION + (_MAX_WALL_FRACTION_OF_SMALL_ROOMS - _MAX_WALL_FRACTION) * smallness
+    fraction = rng.uniform(_MIN_WALL_FRACTION, max_fraction)
+    thickness_units = min(fraction * request.area / _WALL_LENGTH_UNITS, _MAX_THICKNESS_UNITS)
+    # Half of the thickness is rounded, so that the faces of walls have rounded coordinates.
+    half_thickness = thickness_units * request.unit / 2.0
+    return 2.0 * max(request.round_down(half_thickness), request.step)
+
+
+def draw_floor_plan(request: Request, thickness: float, rng: np.random.Generator) -> FloorPlan | None:
+    """Draw a plan with the requested number of rooms.
+
+    Parameters
+    ----------
+    request : Request
+    thickness : float, m
+        Thickness of the walls.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    FloorPlan or None
+        None if rooms would be too small, or cannot be connected by doors.
+    """
     plan = FloorPlan(thickness)
     waiting = [(Box(0.0, 0.0, float(request.width), float(request.height)), int(request.obstacles))]
-    corridor = None
-    if request.obstacles >= _MANY and rng.random() < _CORRIDOR:
-        corridor = _with_corridor(request, plan, waiting, rng)
-    least = _NARROWEST * request.gap + thickness
+    if request.obstacles >= _MIN_CORRIDOR_ROOMS and rng.random() < _CORRIDOR_PROBABILITY:
+        box, count = waiting[0]
+        waiting = _divide_by_corridor(request, plan, box, count, rng)
+    min_side = _MIN_ROOM_GAPS * request.gap + thickness
     while waiting:
         box, count = waiting.pop()
         if count == 1:
             plan.rooms.append(box)
             continue
-        across = int(box.sides[1] > box.sides[0])
-        some = count // 2 if rng.random() < 0.5 else count - count // 2
-        part = some / count + rng.uniform(-_UNEVEN, _UNEVEN) / count
-        low, high = box[across] + least, box[across + 2] - least
+        width, height = box.sides
+        axis = 1 if height > width else 0
+        first_count = count // 2 if rng.random() < 0.5 else count - count // 2
+        fraction = first_count / count + rng.uniform(-_MAX_UNEVENNESS, _MAX_UNEVENNESS) / count
+        low = box[axis] + min_side
+        high = box[axis + 2] - min_side
         if low > high:
             return None
-        at = round(min(max(box[across] + part * box.sides[across], low), high), request.digits)
-        plan.walls.append(Wall(across, at, box[1 - across], box[3 - across]))
-        first, second = list(box), list(box)
-        first[across + 2] = second[across] = at
-        waiting += [(Box(*first), some), (Box(*second), count - some)]
-    return plan if _add_doors(request, plan, corridor, rng) else None
+        position = min(max(box[axis] + fraction * box.sides[axis], low), high)
+        position = round(position, request.digits)
+        plan.walls.append(Wall(axis, position, box[1 - axis], box[3 - axis]))
+        waiting.append((box.crop(axis, high=position), first_count))
+        waiting.append((box.crop(axis, low=position), count - first_count))
+    return plan if _add_doors(request, plan, rng) else None
 
 
-def _with_corridor(
-    request: Request, plan: FloorPlan, waiting: list[tuple[Box, int]], rng: np.random.Generator
-) -> int | None:
-    """Divide the plan by a corridor along its longer side; return its number, None if there is no room."""
-    whole, count = waiting[0]
-    across = int(whole.sides[0] >= whole.sides[1])
-    wide = rng.uniform(1.6, 2.2) * request.gap + plan.thickness
-    begin = (whole.sides[across] - wide) * rng.uniform(0.38, 0.62)
-    begin, end = round(begin, request.digits), round(begin + wide, request.digits)
-    if min(begin, whole.sides[across] - end) < 2.0 * _NARROWEST * request.gap:
-        return None
-    below, above, middle = list(whole), list(whole), list(whole)
-    below[across + 2] = middle[across] = begin
-    above[across] = middle[across + 2] = end
-    share = begin / (whole.sides[across] - wide)
-    some = min(max(round((count - 1) * share), 1), count - 2)
-    waiting[:] = [(Box(*below), some), (Box(*above), count - 1 - some)]
-    plan.walls += [Wall(across, at, whole[1 - across], whole[3 - across]) for at in (begin, end)]
-    plan.rooms.append(Box(*middle))
-    return len(plan.rooms) - 1
+def _divide_by_corridor(
+    request: Request, plan: FloorPlan, box: Box, count: int, rng: np.random.Generator
+) -> list[tuple[Box, int]]:
+    """Divide a rectangle by a corridor along its longer side, which is added to the plan.
+
+    Return the parts with their numbers of rooms; the whole rectangle if there is no room for a corridor.
+    """
+    width, height = box.sides
+    axis = 1 if width >= height else 0
+    extent = box.sides[axis]
+    corridor_width = rng.uniform(_MIN_CORRIDOR_GAPS, _MAX_CORRIDOR_GAPS) * request.gap + plan.thickness
+    offset = (extent - corridor_width) * rng.uniform(0.38, 0.62)
+    start = round(offset, request.digits)
+    end = round(offset + corridor_width, request.digits)
+    if min(start, extent - end) < 2.0 * _MIN_ROOM_GAPS * request.gap:
+        return [(box, count)]
+    plan.walls.append(Wall(axis, start, box[1 - axis], box[3 - axis]))
+    plan.walls.append(Wall(axis, end, box[1 - axis], box[3 - axis]))
+    plan.corridor = len(plan.rooms)
+    plan.rooms.append(box.crop(axis, low=start, high=end))
+    first_share = start / (extent - corridor_width)
+    first_count = min(max(round((count - 1) * first_share), 1), count - 2)
+    return [
+        (box.crop(axis, high=start), first_count),
+        (box.crop(axis, low=end), count - 1 - first_count),
+    ]
 
 
-def _add_doors(request: Request, plan: FloorPlan, corridor: int | None, rng: np.random.Generator) -> bool:
-    """Add doors so that all rooms hang together, and some more; return whether that is possible."""
-    joined = DisjointSet(range(len(plan.rooms)))
-    stub = _STUB * request.unit + plan.thickness / 2.0
-    # the rooms by each of their four edges: which, and where it is
-    beside: defaultdict[tuple[int, float], list[int]] = defaultdict(list)
-    for number, room in enumerate(plan.rooms):
-        for edge, at in enumerate(room):
-            beside[edge, at].append(number)
-    between: list[tuple[Wall, int, int]] = []
-    for wall in plan.walls:
-        rooms = beside[wall.across + 2, wall.at], beside[wall.across, wall.at]
-        between += [(wall, i, j) for i, j in itertools.product(*rooms)]
-    key, loop, place = rng.random((3, len(between)))
-    widths = request.gap * rng.uniform(*_DOORS, len(between))
-    # doors to the corridor come first
-    for k in sorted(range(len(between)), key=lambda k: (corridor not in between[k][1:], key[k])):
-        wall, i, j = between[k]
-        one, other, side = plan.rooms[i], plan.rooms[j], 1 - wall.across
-        # the end is before the begin where the wall does not lie between the two
-        low, high = max(wall.begin, one[side], other[side]), min(wall.end, one[side + 2], other[side + 2])
-        wide = request.round_down(min(float(widths[k]), high - low - 2.0 * stub))
-        if wide < request.gap + request.step or (joined.connected(i, j) and loop[k] > _LOOPS):
+def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> bool:
+    """Add doors that connect all rooms, and some more; return whether all rooms are connected."""
+    connected = DisjointSet(range(len(plan.rooms)))
+    min_piece = _MIN_WALL_PIECE_UNITS * request.unit + plan.thickness / 2.0
+    places = _find_door_places(plan)
+    order_keys, loop_draws, relative_positions = rng.random((3, len(places)))
+    widths = request.gap * rng.uniform(_MIN_DOOR_GAPS, _MAX_DOOR_GAPS, len(places))
+
+    def leads_to_corridor(k: int) -> bool:
+        _, first, second = places[k]
+        return plan.corridor in (first, second)
+
+    # Doors to the corridor come first.
+    for k in sorted(range(len(places)), key=lambda k: (not leads_to_corridor(k), order_keys[k])):
+        wall, first, second = places[k]
+        first_room = plan.rooms[first]
+        second_room = plan.rooms[second]
+        along = 1 - wall.axis
+        # If the wall does not lie between the two rooms, the end is before the start.
+        low = max(wall.start, first_room[along], second_room[along])
+        high = min(wall.end, first_room[along + 2], second_room[along + 2])
+        width = request.round_down(min(float(widths[k]), high - low - 2.0 * min_piece))
+        is_unneeded = connected.connected(first, second) and loop_draws[k] > _LOOP_PROBABILITY
+        if width < request.gap + request.step or is_unneeded:
             continue
-        begin = round(low + stub + (high - low - 2.0 * stub - wide) * float(place[k]), request.digits)
-        plan.doors.append(Door(wall, begin, round(begin + wide, request.digits), (i, j)))
-        joined.merge(i, j)
-    return joined.n_subsets == 1
+        play = high - low - 2.0 * min_piece - width
+        start = round(low + min_piece + play * float(relative_positions[k]), request.digits)
+        end = round(start + width, request.digits)
+        plan.doors.append(Door(wall, start, end, (first, second)))
+        connected.merge(first, second)
+    return connected.n_subsets == 1
 
 
-def _furniture(
+def _find_door_places(plan: FloorPlan) -> list[tuple[Wall, int, int]]:
+    """Return each wall with each pair of rooms that end at it on either side."""
+    # Rooms by the number and the coordinate of each of their four edges.
+    rooms_at: defaultdict[tuple[int, float], list[int]] = defaultdict(list)
+    for index, room in enumerate(plan.rooms):
+        for edge, coordinate in enumerate(room):
+            rooms_at[edge, coordinate].append(index)
+    places: list[tuple[Wall, int, int]] = []
+    for wall in plan.walls:
+        before = rooms_at[wall.axis + 2, wall.position]
+        behind = rooms_at[wall.axis, wall.position]
+        places += [(wall, first, second) for first, second in itertools.product(before, behind)]
+    return places
+
+
+def _place_furniture(
     request: Request, corner: DiscStart, plan: FloorPlan, area: float, rng: np.random.Generator
 ) -> list[Obstacle] | None:
-    """Return furniture that blocks so much, None if it finds no place."""
-    enough = _ENOUGH * request.width * request.height
-    if area < -enough:
+    """Return furniture that blocks an area, m²; None if it finds no room."""
+    min_area = _AREA_TOLERANCE * request.width * request.height
+    if area < -min_area:
         return None
-    clear = shapely.Point(corner.center).buffer(corner.radius)
-    inner = [_inner(request, box, plan.thickness) for box in plan.rooms]
-    sizes = np.array([math.prod(box.sides) for box in inner])
-    if area > _DENSEST * sizes.sum():
+    inner_rooms = [_find_inner_room(request, room, plan.thickness) for room in plan.rooms]
+    room_areas = np.array([room.area for room in inner_rooms])
+    if area > _MAX_FURNITURE_FRACTION * room_areas.sum():
         return None
-    kept: list[list[Polygon]] = [[] for _ in inner]
+    start_disc = shapely.Point(corner.center).buffer(corner.radius)
+    shapes: list[list[Polygon]] = [[] for _ in inner_rooms]
     for door in plan.doors:
-        for number in door.rooms:
-            kept[number].append(door.wall.part(door.begin, door.end, plan.thickness).polygon)
-    chances = np.cumsum(sizes / sizes.sum())
-    # pieces are as large as a few of them for each room must be
-    usual, missed = area / (_PIECES * len(inner)), 0
+        opening = door.wall.build_piece(door.start, door.end, plan.thickness)
+        for room in door.rooms:
+            shapes[room].append(opening.polygon)
+    cumulative_areas = np.cumsum(room_areas / room_areas.sum())
+    mean_piece_area = area / (_PIECES_PER_ROOM * len(inner_rooms))
+    failures = 0
     furniture: list[Obstacle] = []
-    while area > enough:
-        room = int(np.searchsorted(chances / chances[-1], rng.random(), side="right"))
-        wanted = min(area, usual * rng.uniform(0.5, 1.5) * max(_SHRUNK, _SHRINKING**missed))
-        piece = _piece(request, inner[room], kept[room], clear, wanted, rng)
-        if piece is not None:
-            kept[room].append(piece.polygon)
-            furniture.append(piece)
-            area -= piece.polygon.area
-        missed = missed + 1 if piece is None else 0
-        if missed == _TRIES:
-            return None
+    while area > min_area:
+        draw = rng.random()
+        room = int(np.searchsorted(cumulative_areas / cumulative_areas[-1], draw, side="right"))
+        shrinkage = max(_MIN_SHRINKAGE, _FAILURE_SHRINKAGE**failures)
+        piece_area = min(area, mean_piece_area * rng.uniform(0.5, 1.5) * shrinkage)
+        piece = _draw_piece(request, piece_area, rng)
+        obstacle = _place_piece(request, piece, inner_rooms[room], shapes[room], start_disc, rng)
+        if obstacle is None:
+            failures += 1
+            if failures == _MAX_FAILURES:
+                return None
+        else:
+            failures = 0
+            shapes[room].append(obstacle.polygon)
+            furniture.append(obstacle)
+            area -= obstacle.polygon.area
     return furniture
 
 
-def _inner(request: Request, room: Box, thickness: float) -> Box:
-    """Return a room up to the faces of its walls; the boundary has none."""
-    half, bounds = thickness / 2.0, (0.0, 0.0, request.width, request.height)
-    inward = [half * (edge != bound) for edge, bound in zip(room, bounds, strict=True)]
-    faces = np.array(room) + inward * np.array([1.0, 1.0, -1.0, -1.0])
-    return Box(*(round(face, request.digits) for face in faces.tolist()))
+def _find_inner_room(request: Request, room: Box, thickness: float) -> Box:
+    """Return a room up to the faces of its walls; the boundary has no thickness."""
+    half = thickness / 2.0
+    left = room.left if room.left == 0.0 else room.left + half
+    bottom = room.bottom if room.bottom == 0.0 else room.bottom + half
+    right = room.right if room.right == request.width else room.right - half
+    top = room.top if room.top == request.height else room.top - half
+    return Box(*(round(float(edge), request.digits) for edge in (left, bottom, right, top)))
 
 
-def _piece(
-    request: Request, room: Box, others: list[Polygon], clear: Polygon, area: float, rng: np.random.Generator
-) -> CircleObstacle | PolygonObstacle | None:
-    """Return a piece of furniture of about that area at a free place of a room, None if there is none."""
-    kind = str(rng.choice(["cabinet", "table", "round table"], p=[0.5, 0.3, 0.2]))
-    stretch = rng.uniform(*((1.6, 3.5) if kind == "cabinet" else (1.0, 2.0)))
-    long, deep = math.sqrt(area * stretch), math.sqrt(area / stretch)
-    size = np.array([long, deep] if rng.random() < 0.5 else [deep, long])
+class _Piece(NamedTuple):
+    """A piece of furniture: its kind, and the sides of its bounding box, (2,) m."""
+
+    kind: str
+    size: Array
+
+    @property
+    def is_round(self) -> bool:
+        """Whether it is a circle."""
+        return self.kind == "round table"
+
+
+def _draw_piece(request: Request, area: float, rng: np.random.Generator) -> _Piece:
+    """Return a random piece of furniture of about some area, m²."""
+    kind = str(rng.choice(list(_PIECE_PROBABILITIES), p=list(_PIECE_PROBABILITIES.values())))
+    stretch = rng.uniform(*(_CABINET_STRETCH if kind == "cabinet" else _TABLE_STRETCH))
+    length = math.sqrt(area * stretch)
+    depth = math.sqrt(area / stretch)
+    size = np.array([length, depth] if rng.random() < 0.5 else [depth, length])
     if kind == "round table":
         size = np.full(2, 2.0 * math.sqrt(area / math.pi))
-    size = np.maximum(request.round_points(size), 4.0 * request.step)
-    space = np.array(room.sides) - size
-    if (space < 0.0).any():
+    return _Piece(kind, np.maximum(request.round_points(size), _MIN_PIECE_STEPS * request.step))
+
+
+def _place_piece(
+    request: Request,
+    piece: _Piece,
+    room: Box,
+    others: list[Polygon],
+    start_disc: Polygon,
+    rng: np.random.Generator,
+) -> CircleObstacle | PolygonObstacle | None:
+    """Return a piece of furniture at a free position of a room; None if none is found."""
+    room_low = np.array(room[:2])
+    room_high = np.array(room[2:])
+    play = room_high - room_low - piece.size
+    if (play < 0.0).any():
         return None
-    off = rng.random((_TRIES, 2)) * space
-    if kind == "cabinet":
-        # with its back to the wall
-        side = int(size[0] > size[1])
-        off[:, side] = space[side] * rng.integers(0, 2, _TRIES)
-    low = request.round_points(off + room[:2])
-    free = np.column_stack([low - room[:2], np.array(room[2:]) - low - size])
-    # what is round would touch a wall in a point
-    against = (free < request.step / 2.0) & (kind != "round table")
-    low = low[(against | (free >= request.gap)).all(axis=1)]
-    high, middle = request.round_points(low + size), request.round_points(low + size / 2.0)
-    radius = request.round_down(size[0] / 2.0 - request.step / 2.0) if kind == "round table" else 0.0
-    shapes = shapely.points(middle) if radius else shapely.box(*low.T, *high.T)
-    good = shapely.distance(shapes, clear) > radius
+    offsets = rng.random((_CANDIDATES_PER_PIECE, 2)) * play
+    if piece.kind == "cabinet":
+        # Its longer side stands against one of the two walls.
+        axis = int(piece.size[0] > piece.size[1])
+        offsets[:, axis] = play[axis] * rng.integers(0, 2, _CANDIDATES_PER_PIECE)
+    low = request.round_points(offsets + room_low)
+    clearances = np.column_stack([low - room_low, room_high - low - piece.size])
+    # A round table would touch a wall in a single point.
+    is_good = clearances >= request.gap
+    if not piece.is_round:
+        is_good |= clearances < request.step / 2.0
+    low = low[is_good.all(axis=1)]
+    high = request.round_points(low + piece.size)
+    middle = request.round_points(low + piece.size / 2.0)
+    radius = request.round_down(piece.size[0] / 2.0 - request.step / 2.0) if piece.is_round else 0.0
+    if piece.is_round:
+        shapes = shapely.points(middle)
+    else:
+        shapes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+    is_free = shapely.distance(shapes, start_disc) > radius
     if others:
-        good &= shapely.distance(shapes, shapely.MultiPolygon(others)) >= request.gap + radius
-    if not good.any():
+        is_free &= shapely.distance(shapes, shapely.MultiPolygon(others)) >= request.gap + radius
+    if not is_free.any():
         return None
-    (left, bottom), (right, top), (x, y) = (at[int(good.argmax())].tolist() for at in (low, high, middle))
-    if radius:
-        return CircleObstacle((x, y), radius, kind)
-    return PolygonObstacle(((left, bottom), (right, bottom), (right, top), (left, top)), name=kind)
+    chosen = int(is_free.argmax())
+    if piece.is_round:
+        x, y = middle[chosen].tolist()
+        return CircleObstacle((x, y), radius, piece.kind)
+    left, bottom = low[chosen].tolist()
+    right, top = high[chosen].tolist()
+    return PolygonObstacle(((left, bottom), (right, bottom), (right, top), (left, top)), name=piece.kind)

@@ -15,7 +15,12 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array
 from robocov.environment import Gap, PolygonObstacle, find_narrowest_gap
 from robocov.generator import generate_map
-from robocov.generator.caves import below, random_field, through, tunnels
+from robocov.generator.caves import (
+    build_tunnels,
+    draw_random_field,
+    extract_area_below_zero,
+    pass_through_window,
+)
 from robocov.generator.request import Request
 
 SEEDS = range(10)
@@ -23,7 +28,7 @@ SEEDS = range(10)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
-def test_rock_goes_all_round_and_pillars_stand_apart(seed: int) -> None:
+def test_rock_surrounds_the_cave_and_pillars_stand_apart(seed: int) -> None:
     environment = generate_map(seed, kind="caves")
     rock, *pillars = environment.obstacles
     assert isinstance(rock, PolygonObstacle)
@@ -52,7 +57,7 @@ def test_vertices_are_few_and_walls_smooth() -> None:
             angle = np.arctan2(step[:, 1], step[:, 0])
             turns.append(np.abs((np.roll(angle, -1) - angle + np.pi) % (2.0 * np.pi) - np.pi))
         turn = np.degrees(np.concatenate(turns))
-        # at a vertex a wall turns by less than 30 degrees on average, and it hardly ever juts
+        # At a vertex a wall turns by less than 30 degrees on average; spikes are rare.
         assert turn.mean() < 30.0
         assert (turn > 100.0).mean() < 0.02
 
@@ -64,7 +69,7 @@ def test_caves_have_chambers_and_tunnels_and_sometimes_pillars() -> None:
         environment = generate_map(seed, kind="caves")
         (free,) = environment.free.geoms
         pillars += len(free.interiors)
-        # what a disc of twice the gap does not get through
+        # The parts between which a disc of twice the gap does not fit through.
         narrow.append(len(shapely.get_parts(free.buffer(-0.6))))
     assert pillars >= 10
     assert sum(count > 1 for count in narrow) >= 10
@@ -80,8 +85,8 @@ def test_caves_have_chambers_and_tunnels_and_sometimes_pillars() -> None:
 )
 def test_no_passage_is_narrower_than_the_gap(seed: int, chambers: int, area: float, gap: float) -> None:
     environment = generate_map(seed, kind="caves", obstacles=chambers, area=area, gap=gap, width=12, height=9)
-    found = find_narrowest_gap(environment.free)
-    assert found is None or found.width >= gap
+    narrowest = find_narrowest_gap(environment.free)
+    assert narrowest is None or narrowest.width >= gap
     (free,) = environment.free.geoms
     room = free.buffer(-gap / 2.0 + 1e-6)
     assert room.geom_type == "Polygon" and len(room.interiors) == len(free.interiors)
@@ -89,47 +94,47 @@ def test_no_passage_is_narrower_than_the_gap(seed: int, chambers: int, area: flo
 
 @settings(max_examples=50)
 @given(st.lists(st.tuples(st.floats(0, 10), st.floats(0, 10)), min_size=1, max_size=8, unique=True))
-def test_tunnels_join_everything_and_there_are_no_more_than_that_takes(
-    places: list[tuple[float, float]],
+def test_tunnels_join_all_parts_without_loops(
+    centers: list[tuple[float, float]],
 ) -> None:
-    parts = [Point(place).buffer(0.01) for place in places]
+    parts = [Point(center).buffer(0.01) for center in centers]
     parts = [*shapely.get_parts(shapely.union_all(parts))]
-    found = tunnels(np.array(parts), np.random.default_rng(0))
-    assert len(found) == len(parts) - 1
-    whole = shapely.union_all([*parts, *found]).buffer(1e-6)
+    lines = build_tunnels(np.array(parts), np.random.default_rng(0))
+    assert len(lines) == len(parts) - 1
+    whole = shapely.union_all([*parts, *lines]).buffer(1e-6)
     assert whole.geom_type == "Polygon"
 
 
-def test_a_window_is_passed_from_side_to_side() -> None:
-    # two parts side by side; when they are widened by 1, they meet above each other in a window
+def test_a_tunnel_leads_through_a_window_from_part_to_part() -> None:
+    # Two parallel lines; dilated by 1 they meet in a window.
     core = shapely.union_all([LineString([(0, 0), (0, 4)]), LineString([(1.8, 0), (1.8, 4)])])
     gap = Gap(0.9, ((0.9, 1.5), (0.9, 2.4)))
-    line = shapely.get_coordinates(through(gap, core, 1.0))
+    line = shapely.get_coordinates(pass_through_window(gap, core, 1.0))
     np.testing.assert_allclose(line[line[:, 0].argsort()], [[0.0, 1.95], [0.9, 1.95], [1.8, 1.95]])
 
 
-def test_where_there_is_nothing_on_one_side_the_window_itself_is_made_room_in() -> None:
+def test_a_window_with_nothing_on_one_side_is_widened_itself() -> None:
     gap = Gap(0.9, ((0.9, 1.5), (0.9, 2.4)))
-    assert through(gap, LineString([(0, 0), (0, 4)]), 1.0) == Point(0.9, 1.95)
+    assert pass_through_window(gap, LineString([(0, 0), (0, 4)]), 1.0) == Point(0.9, 1.95)
 
 
 REQUEST = Request(9, 0.4, 0.6, 12.0, 9.0)
 
 
-def under(function: Callable[[Array, Array], Array], level: float) -> BaseGeometry:
+def extract_area_below(function: Callable[[Array, Array], Array], level: float) -> BaseGeometry:
     points = np.stack(np.meshgrid(*[np.linspace(0.0, 10.0, 101)] * 2), axis=-1)
-    return below(points, function(points[..., 0], points[..., 1]) - level)
+    return extract_area_below_zero(points, function(points[..., 0], points[..., 1]) - level)
 
 
 def test_a_disc() -> None:
-    (disc,) = shapely.get_parts(under(lambda x, y: np.hypot(x - 5.0, y - 4.0), 2.0))
+    (disc,) = shapely.get_parts(extract_area_below(lambda x, y: np.hypot(x - 5.0, y - 4.0), 2.0))
     assert disc.area == pytest.approx(4.0 * np.pi, rel=2e-3)
     assert disc.hausdorff_distance(shapely.Point(5, 4).buffer(2.0, quad_segs=64)) < 0.01
 
 
-def test_rings_have_holes_and_what_is_in_a_hole_is_apart() -> None:
-    waves = under(lambda x, y: np.cos(np.hypot(x - 5.0, y - 5.0) * 3.0), 0.0)
-    # below zero from pi/6 to 3 pi/6, from 5 pi/6 to 7 pi/6, and from 9 pi/6 on
+def test_rings_have_holes_and_islands_in_holes_are_parts() -> None:
+    waves = extract_area_below(lambda x, y: np.cos(np.hypot(x - 5.0, y - 5.0) * 3.0), 0.0)
+    # The waves are below zero from pi/6 to 3 pi/6, from 5 pi/6 to 7 pi/6, and from 9 pi/6 on
     parts = sorted(shapely.get_parts(waves), key=lambda part: part.area)
     rings = [part for part in parts if part.interiors]
     for ring, (low, high) in zip(rings, ((1, 3), (5, 7)), strict=False):
@@ -138,18 +143,18 @@ def test_rings_have_holes_and_what_is_in_a_hole_is_apart() -> None:
 
 
 def test_the_edge_of_the_mesh_is_above_every_level() -> None:
-    (whole,) = shapely.get_parts(under(lambda x, y: x * 0.0 - 5.0, 0.0))
+    (whole,) = shapely.get_parts(extract_area_below(lambda x, y: x * 0.0 - 5.0, 0.0))
     low_x, low_y, high_x, high_y = whole.bounds
     assert 0.0 < low_x < 0.1 and 9.9 < high_y < 10.0
     assert 0.0 < low_y < 0.1 and 9.9 < high_x < 10.0
-    assert under(lambda x, y: x * 0.0 - 5.0, -6.0).is_empty
+    assert extract_area_below(lambda x, y: x * 0.0 - 5.0, -6.0).is_empty
 
 
 @settings(max_examples=30)
 @given(st.integers(0, 2**32), st.floats(-1.0, 1.0))
 def test_points_of_the_mesh_are_on_their_side(seed: int, level: float) -> None:
-    points, values = random_field(REQUEST, np.random.default_rng(seed))
-    low = below(points, values - level)
+    points, values = draw_random_field(REQUEST, np.random.default_rng(seed))
+    low = extract_area_below_zero(points, values - level)
     assert low.is_valid
     inner = points[1:-1, 1:-1].reshape(-1, 2)
     inside = shapely.contains_xy(low, inner[:, 0], inner[:, 1])
@@ -157,11 +162,11 @@ def test_points_of_the_mesh_are_on_their_side(seed: int, level: float) -> None:
 
 
 def test_a_field_has_mean_zero_and_variance_one_and_is_smooth() -> None:
-    fields = [random_field(REQUEST, np.random.default_rng(seed)) for seed in range(40)]
-    values = np.stack([each for _, each in fields])
+    fields = [draw_random_field(REQUEST, np.random.default_rng(seed)) for seed in range(40)]
+    values = np.stack([field for _, field in fields])
     assert abs(values.mean()) < 0.1
     assert values.var() == pytest.approx(1.0, abs=0.15)
     assert fields[0][0][-1, -1].tolist() == [12.0, 9.0]
-    # the shortest waves are eight steps of the mesh long
+    # The shortest waves are eight steps of the mesh long.
     assert np.abs(np.diff(values, axis=2)).std() < 0.5
     assert fields[0][1].min() < -1.0 and fields[0][1].max() > 1.0

@@ -1,4 +1,4 @@
-"""Mazes: what their walls say against the free space that they leave."""
+"""Mazes: their walls and the free space between them."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from shapely import Point
 
 from robocov.environment import Environment, WallObstacle, find_narrowest_gap
 from robocov.generator import generate_map
-from robocov.generator.mazes import inner_walls, trails, tree_passages
+from robocov.generator.mazes import find_inner_walls, grow_passages, trace_trails
 
 
-def components(count: int, pairs: list[tuple[int, int]]) -> int:
+def count_components(count: int, pairs: list[tuple[int, int]]) -> int:
     group = list(range(count))
     for i, j in pairs:
         group = [group[i] if number == group[j] else number for number in group]
@@ -25,43 +25,43 @@ def components(count: int, pairs: list[tuple[int, int]]) -> int:
 
 @settings(max_examples=60)
 @given(st.integers(1, 9), st.integers(1, 9), st.integers(0, 2**32))
-def test_a_tree_leads_to_every_cell_in_one_way(columns: int, rows: int, seed: int) -> None:
-    passages = tree_passages((columns, rows), np.random.default_rng(seed))
-    inner = inner_walls((columns, rows))
+def test_passages_connect_all_cells_without_loops(columns: int, rows: int, seed: int) -> None:
+    passages = grow_passages((columns, rows), np.random.default_rng(seed))
+    inner = find_inner_walls((columns, rows))
     assert inner.sum() == 2 * columns * rows - columns - rows
     assert not (passages & ~inner).any()
     assert passages.sum() == columns * rows - 1
     number = {cell: k for k, cell in enumerate(itertools.product(range(columns), range(rows)))}
     pairs = []
     for i, k, right in np.argwhere(passages).tolist():
-        # an upright wall is between a cell and the one to its left
+        # A vertical wall is between a cell and the one to its left.
         other = (i, k - 1) if right else (i - 1, k)
         pairs.append((number[i, k], number[other]))
-    assert components(columns * rows, pairs) == 1
+    assert count_components(columns * rows, pairs) == 1
 
 
 @settings(max_examples=60)
 @given(st.sets(st.tuples(st.integers(0, 5), st.integers(0, 5), st.booleans()), max_size=40))
-def test_trails_have_every_piece_of_a_forest_once(drawn: set[tuple[int, int, bool]]) -> None:
+def test_trails_contain_every_wall_of_a_forest_once(drawn: set[tuple[int, int, bool]]) -> None:
     pieces = {((x, y), (x + 1, y) if flat else (x, y + 1)) for x, y, flat in drawn}
     posts = sorted({post for piece in pieces for post in piece})
-    # closed rings would lock something in: no maze has them
+    # No maze has closed rings, which would enclose cells.
     forest: set = set()
     for piece in sorted(pieces):
         pairs = [(posts.index(a), posts.index(b)) for a, b in (*forest, piece)]
-        if components(len(posts), pairs) == len(posts) - len(pairs):
+        if count_components(len(posts), pairs) == len(posts) - len(pairs):
             forest.add(piece)
     found = []
     walls = np.zeros((7, 7, 2), dtype=bool)
     for (x, y), (u, _) in forest:
         walls[x, y, u - x] = True
-    for trail in trails(walls):
+    for trail in trace_trails(walls):
         for (x, y), (u, v) in itertools.pairwise(trail):
             assert (x == u) != (y == v)
             steps = max(abs(u - x), abs(v - y))
             line = [(x + (u - x) * k // steps, y + (v - y) * k // steps) for k in range(steps + 1)]
             found += [tuple(sorted(pair)) for pair in itertools.pairwise(line)]
-        # a bend at every point between the ends
+        # There is a bend at every post between the ends.
         for a, b, c in zip(trail, trail[1:], trail[2:], strict=False):
             assert (b[0] - a[0]) * (c[1] - b[1]) != (b[1] - a[1]) * (c[0] - b[0])
     assert len(found) == len(set(found))
@@ -80,18 +80,18 @@ def test_walls_are_of_one_thickness_and_corridors_of_one_width(seed: int) -> Non
     count, (thickness,) = corridors(environment)
     gap = find_narrowest_gap(environment.free)
     assert gap is not None
-    # eight corridors and seven walls side by side, on whole centimetres
+    # Eight corridors and seven walls side by side, on whole centimetres.
     assert gap.width == pytest.approx((10.0 - 7 * thickness) / 8, abs=0.011)
     assert 10 < count < 49
     assert sum(len(wall.points) for wall in environment.obstacles) < 3 * count + 10  # type: ignore[union-attr]
 
 
 @pytest.mark.slow
-def test_there_are_dead_ends_and_ways_round() -> None:
+def test_mazes_have_dead_ends_and_loops() -> None:
     for seed in range(20):
         environment = generate_map(seed, kind="mazes")
         (free,) = environment.free.geoms
-        # a hole for each way round
+        # The free space has one hole for each loop.
         assert 1 <= len(free.interiors) <= 8
         (thickness,) = {wall.width for wall in environment.obstacles}  # type: ignore[union-attr]
         lines = [(10.0 + thickness) / 6 * k - thickness / 2.0 for k in range(7)]
@@ -114,7 +114,7 @@ def test_there_are_dead_ends_and_ways_round() -> None:
     ("obstacles", "width", "height", "cells"),
     [(36, 10.0, 10.0, (6, 6)), (12, 20.0, 15.0, (4, 3)), (30, 20.0, 8.0, (10, 3)), (37, 10.0, 10.0, (6, 6))],
 )
-def test_the_grid_has_about_as_many_cells_as_are_wanted(
+def test_the_grid_has_about_the_requested_number_of_cells(
     obstacles: int, width: float, height: float, cells: tuple[int, int]
 ) -> None:
     found: tuple[set[int], set[int]] = (set(), set())
@@ -136,7 +136,7 @@ def test_the_grid_has_about_as_many_cells_as_are_wanted(
 @pytest.mark.slow
 def test_no_wall_stands_in_the_start() -> None:
     for seed in range(12):
-        # corridors are narrower than the disc
+        # The corridors are narrower than the disc.
         environment = generate_map(seed, kind="mazes", obstacles=144, area=0.15)
         start = environment.starts["corner"]
         assert start.radius == 0.6  # type: ignore[union-attr]

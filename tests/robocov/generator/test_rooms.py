@@ -7,7 +7,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from robocov.generator.request import Request
-from robocov.generator.rooms import floor_plan
+from robocov.generator.rooms import draw_floor_plan
 
 THICKNESS = 0.1
 
@@ -15,13 +15,13 @@ THICKNESS = 0.1
 @given(st.integers(0, 2**32), st.integers(1, 30), st.floats(0.3, 0.8), st.sampled_from([10, 15.5, 24.0]))
 def test_rooms_tile_the_plan_and_doors_join_them(seed, count, gap, width):
     request = Request(count, 0.1, gap, width, 12.0)
-    plan = floor_plan(request, THICKNESS, np.random.default_rng(seed))
+    plan = draw_floor_plan(request, THICKNESS, np.random.default_rng(seed))
     assume(plan is not None)
     rooms = [shapely.box(*room) for room in plan.rooms]
     assert len(rooms) == count
     assert sum(room.area for room in rooms) == pytest.approx(width * 12.0)
     assert shapely.union_all(rooms).area == pytest.approx(width * 12.0)
-    # rooms without their walls let a disc as wide as the gap in
+    # A disc as wide as the gap fits into every room without its walls.
     assert all(min(room.sides) - THICKNESS >= gap for room in plan.rooms)
 
     reached = {0}
@@ -29,25 +29,27 @@ def test_rooms_tile_the_plan_and_doors_join_them(seed, count, gap, width):
         reached |= {room for door in plan.doors for room in door.rooms if reached & set(door.rooms)}
     assert len(reached) == count
 
-    solid = shapely.union_all([wall.polygon for wall in plan.solid()])
+    solid = shapely.union_all([wall.polygon for wall in plan.build_walls()])
     for door in plan.doors:
-        assert door.end - door.begin >= gap
-        opening = door.wall.part(door.begin, door.end, THICKNESS).polygon
-        assert opening.area == pytest.approx((door.end - door.begin) * THICKNESS)
+        assert door.end - door.start >= gap
+        opening = door.wall.build_piece(door.start, door.end, THICKNESS).polygon
+        assert opening.area == pytest.approx((door.end - door.start) * THICKNESS)
         assert opening.intersection(solid).area < 1e-9
         one, other = (rooms[k] for k in door.rooms)
-        # half of it lies in either room
+        # Half of the opening lies in either room.
         assert opening.intersection(one).area == pytest.approx(opening.area / 2)
         assert opening.intersection(other).area == pytest.approx(opening.area / 2)
-    # but for doors the rooms are apart
-    openings = [door.wall.part(door.begin, door.end, THICKNESS).polygon.buffer(1e-9) for door in plan.doors]
+    # Only doors connect the rooms.
+    openings = [
+        door.wall.build_piece(door.start, door.end, THICKNESS).polygon.buffer(1e-9) for door in plan.doors
+    ]
     closed = shapely.box(0, 0, width, 12) - shapely.union_all([solid.buffer(1e-9), *openings])
     assert len(shapely.get_parts(closed)) == count
 
 
 def test_some_plans_have_a_corridor():
     request = Request(8, 0.1, 0.6, 12.0, 10.0)
-    plans = [floor_plan(request, THICKNESS, np.random.default_rng(seed)) for seed in range(60)]
+    plans = [draw_floor_plan(request, THICKNESS, np.random.default_rng(seed)) for seed in range(60)]
     through = [
         any(room.sides[0] == 12.0 and room.sides[1] < 1.6 for room in plan.rooms)
         for plan in plans
@@ -57,5 +59,5 @@ def test_some_plans_have_a_corridor():
     assert 0.25 < np.mean(through) < 0.75
 
 
-def test_rooms_that_become_too_small_are_no_plan():
-    assert floor_plan(Request(60, 0.1, 1.0, 10.0, 10.0), THICKNESS, np.random.default_rng(0)) is None
+def test_there_is_no_plan_if_rooms_would_be_too_small():
+    assert draw_floor_plan(Request(60, 0.1, 1.0, 10.0, 10.0), THICKNESS, np.random.default_rng(0)) is None
