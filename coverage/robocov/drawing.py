@@ -1,7 +1,8 @@
-"""Drawing backends of installed packages: how the library reaches pictures without knowing how to draw.
+"""Drawing backends: how the library plots maps, runs and results without knowing how to draw.
 
-A backend is an object, most simply a module, with the functions of `DrawingBackend` and a name in the
-entry-point group ``robocov.drawing``, as pandas has it. The application offers ``matplotlib``.
+A backend is an object, most simply a module, with the functions of `DrawingBackend`. Its package names it in
+the entry-point group ``robocov.drawing``, as backends of pandas are named. The application offers
+``matplotlib``.
 """
 
 from collections.abc import Callable
@@ -10,17 +11,25 @@ from typing import Any, ClassVar, Protocol
 
 from robocov.errors import ParameterError, RobocovError, describe_unknown_name
 
-GROUP = "robocov.drawing"
-DEFAULT = "matplotlib"
-"""The backend that draws where none is named; where it is not there, the first by name."""
+ENTRY_POINT_GROUP = "robocov.drawing"
+DEFAULT_BACKEND = "matplotlib"
+"""Backend that draws if none is named; if it is not installed, the first by name does."""
 
 
 class DrawingBackend(Protocol):
     """Interface of a drawing backend; axes and options are the backend's own types.
 
-    ``plot_...(thing, axes=None, **options)`` draws on the axes and returns them; where they are None, on a
-    page of its own, and returns that page's. Notebooks show what ``..._html(thing)`` returns, a str, and
-    where there is no HTML ``..._png(thing)``, bytes; and what ``show(map, **options)`` returns, see `show`.
+    Attributes
+    ----------
+    plot_environment, plot_record, plot_history, plot_result : callable
+        ``plot_...(item, axes=None, **options)`` draws an item on axes and returns them. If the axes are None,
+        it draws on a page of its own, and returns the axes of that page.
+    environment_html, record_html : callable
+        Return the HTML, a str, that a notebook displays for an item.
+    environment_png, record_png : callable
+        Return the image, bytes, that a notebook displays if it displays no HTML.
+    show : callable
+        ``show(map, **options)`` returns what a notebook displays for `robocov.show`.
     """
 
     plot_environment: Callable[..., Any]
@@ -35,84 +44,136 @@ class DrawingBackend(Protocol):
 
 
 class Drawable:
-    """A thing that backends draw; notebooks show it where the backend has an HTML page or a PNG of it."""
+    """An object that backends draw, and that notebooks display if the backend has an image of it."""
 
-    _drawn_as: ClassVar[str]  # in the names of the backend's functions
+    _drawing_name: ClassVar[str]
+    """Name of the class in the names of a backend's functions."""
 
     def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
-        """Plot it on axes, or on a page with a title, a scale bar or a legend; return the axes.
+        """Plot the object on axes, or on a page with a title, a scale bar or a legend.
 
         Parameters
         ----------
-        axes : matplotlib Axes or None
-            None makes the page, which is the ``figure`` of the axes that are returned.
+        axes : matplotlib.axes.Axes or None
+            By default the axes of a new page, which is their ``figure``.
         backend : str or None
-            See `robocov.drawing`; matplotlib by default, with these options:
-        theme, size : {"light", "dark"}, (width, height) of the page, px
-        colours : {"paper", "robots"}
-            Of a record: green starts, red trajectories, blue final positions, or a hue for each robot.
-        mean_distance, mean_time : float, m, s
-            Of a record's final positions, for the page's title.
-        label, controller, title : str
-            Of a cost history: the curve's name, whose it is (the paper's controllers have colours of their
-            own), and the page's title.
-        radius : float or (n,), m
-            Of the robots of a coverage result.
+            Name of a drawing backend, see `robocov.drawing`; ``matplotlib`` by default.
+        **options
+            Options of the backend. Those of ``matplotlib`` are:
 
-        Raises ParameterError on axes or options that cannot be used.
+            theme : {"light", "dark"}
+            size : (width, height), px
+                Size of the page.
+            colours : {"paper", "robots"}
+                Of a record: green starts, red trajectories and blue final positions, or a hue for each robot.
+            mean_distance, mean_time : float, m, s
+                Of a record's final positions, for the title of the page.
+            label, controller, title : str
+                Of a cost history: the label of the curve, the controller (those of the paper have their own
+                colours), and the title of the page.
+            radius : float or (n,) array, m
+                Of a coverage result: the radii of the robots.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            Or what another backend returns.
+
+        Raises
+        ------
+        ParameterError
+            If the axes or an option cannot be used, or there is no such backend.
         """
-        return getattr(load_drawing_backend(backend), f"plot_{self._drawn_as}")(self, axes, **options)
+        plot = getattr(load_drawing_backend(backend), f"plot_{self._drawing_name}")
+        return plot(self, axes, **options)
 
     def _repr_html_(self) -> Any:
-        return self._displayed("html")
+        return self._draw_for_notebook("html")
 
     def _repr_png_(self) -> Any:
-        return self._displayed("png")
+        return self._draw_for_notebook("png")
 
-    def _displayed(self, form: str) -> Any:
+    def _draw_for_notebook(self, form: str) -> Any:
+        """Return what the backend draws in some form; None, so that the text is displayed, if it cannot."""
         try:
-            draw = getattr(load_drawing_backend(), f"{self._drawn_as}_{form}", None)
+            backend = load_drawing_backend()
         except RobocovError:
-            return None  # notebooks show the text instead
+            return None
+        draw = getattr(backend, f"{self._drawing_name}_{form}", None)
         return None if draw is None else draw(self)
 
 
-def show(map: Any, **options: Any) -> Any:  # noqa: A002 - as everywhere else
-    """Show the interactive window of a map live in a notebook's cell: what is returned, as its last line.
+def show(map: Any, **options: Any) -> Any:  # noqa: A002 - The parameter has this name in all functions.
+    """Show the interactive window of a map in a cell of a notebook.
 
     Parameters
     ----------
     map : str, Path, Environment or Simulation
-        A bundled map's name, a file, the map itself, or what is to go on, with all but `height` as there.
-    robots, seed : int
-        How many robots start, and the seed of where: 6 and 0 by default.
-    controllers : sequence of str
-        Up to four, side by side: names, or mine.py:MyController.
-    height : int
-        Of the cell, px.
+        Name of a bundled map, a file, the map itself, or a simulation to continue; only `height` goes with a
+        simulation.
+    **options
+        Options of the window:
 
-    Needs ``robocov[web]``; without it, a replay of one minute is returned. Raises RobocovError for whatever
-    the window cannot begin with.
+        robots : int
+            Number of robots; 6 by default.
+        seed : int
+            Seed of their starts; 0 by default.
+        controllers : sequence of str
+            Up to four controllers side by side: names, or ``mine.py:MyController``.
+        height : int, px
+            Height of the cell.
+
+    Returns
+    -------
+    object
+        The window, which the notebook displays if it is the value of the last line of a cell.
+
+    Raises
+    ------
+    RobocovError
+        If the window cannot start.
+
+    Notes
+    -----
+    A live window needs ``robocov[web]``. Without it, a replay of one minute is returned.
     """
     return load_drawing_backend().show(map, **options)
 
 
 def load_drawing_backend(name: str | None = None) -> DrawingBackend:
-    """Return the backend called `name`.
+    """Load a drawing backend.
 
-    Raises ParameterError for an unknown name, RobocovError when there is none at all or it cannot be loaded.
+    Parameters
+    ----------
+    name : str or None
+        `DEFAULT_BACKEND` by default.
+
+    Returns
+    -------
+    DrawingBackend
+
+    Raises
+    ------
+    ParameterError
+        If the name is unknown.
+    RobocovError
+        If no backend is installed, or it cannot be loaded.
     """
-    entries = {entry.name: entry for entry in entry_points(group=GROUP)}
+    entries = {entry.name: entry for entry in entry_points(group=ENTRY_POINT_GROUP)}
     if not entries:
-        what = f"no drawing backend is installed (entry-point group {GROUP!r})"
-        raise RobocovError(f"{what}: pip install robocov")
-    name = (DEFAULT if DEFAULT in entries else min(entries)) if name is None else name
+        raise RobocovError(
+            f"no drawing backend is installed (entry-point group {ENTRY_POINT_GROUP!r}): pip install robocov"
+        )
+    if name is None:
+        name = DEFAULT_BACKEND if DEFAULT_BACKEND in entries else min(entries)
     if name not in entries:
         raise ParameterError(describe_unknown_name("drawing backend", name, entries))
     entry = entries[name]
     try:
         backend: DrawingBackend = entry.load()
     except Exception as error:
-        what = f"drawing backend {name!r} of entry point {entry.value!r} cannot be loaded"
-        raise RobocovError(f"{what}: {type(error).__name__}: {error}") from error
+        raise RobocovError(
+            f"drawing backend {name!r} of entry point {entry.value!r} cannot be loaded: "
+            f"{type(error).__name__}: {error}"
+        ) from error
     return backend

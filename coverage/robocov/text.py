@@ -1,37 +1,36 @@
-"""Text of others, made safe to display and to take in."""
+"""Control characters in texts from files, keyboards and users' controllers."""
 
 from __future__ import annotations
 
 import re
 
 _CONTROLS = (
-    r"\x00-\x08\x0b-\x1f\x7f-\x9f"  # C0 (without tab and line feed), DEL and C1: they drive terminals
-    r"\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069"  # marks, embeddings and isolates that reorder text
-    r"\xad\u180e\u200b\u2060-\u2065\u206a-\u206f\ufeff\ufff9-\ufffb\U000e0000-\U000e007f"  # not seen
+    r"\x00-\x08\x0b-\x1f\x7f-\x9f"  # C0 without tab and line feed, DEL and C1: they control terminals
+    r"\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069"  # marks, embeddings and isolates, which reorder text
+    r"\xad\u180e\u200b\u2060-\u2065\u206a-\u206f\ufeff\ufff9-\ufffb\U000e0000-\U000e007f"  # invisible ones
     r"\u2028\u2029"  # line and paragraph separators
-    r"\ud800-\udfff"  # bytes of file names that are no text
+    r"\ud800-\udfff"  # bytes of file names that are not UTF-8
 )
 _UNSAFE = re.compile(f"[{_CONTROLS}]")
 _UNSAFE_IN_LINE = re.compile(f"[{_CONTROLS}\t\n]")
 
 
 def escape_controls(text: str, *, single_line: bool = False) -> str:
-    r"""Return a text with visible escapes in place of its control characters.
+    r"""Replace the control characters of a text by visible escapes.
 
-    Names and messages from files and from controllers of users may hold characters that colour or overwrite
-    a terminal, or that display text in another order than it has. Joiners, which some scripts need, stay.
+    Names and messages from files and from users' controllers may contain characters that colour or overwrite
+    a terminal, or that change the order in which text is displayed. Joiners, which some scripts need, stay.
 
     Parameters
     ----------
     text : str
-        Any text.
     single_line : bool
         Also escape tabs and line feeds.
 
     Returns
     -------
     str
-        The text, unchanged if it has no such characters.
+        Equal to `text` if it has no such characters.
 
     Examples
     --------
@@ -45,22 +44,22 @@ def escape_controls(text: str, *, single_line: bool = False) -> str:
 
 
 def remove_controls(text: str, *, single_line: bool = False) -> str:
-    r"""Return a text without control characters.
+    r"""Remove the control characters of a text.
 
-    Whatever enters a window passes through this function: clipboard, keyboard, input methods, messages of a
-    page. SDL refuses NUL and halves of surrogate pairs, and others would spoil names and files.
+    All text that enters a window passes through this function: from the clipboard, the keyboard, input
+    methods and the messages of a web page. SDL rejects NUL and unpaired surrogates; other control characters
+    would spoil names and files.
 
     Parameters
     ----------
     text : str
-        Any text.
     single_line : bool
         Also remove tabs and line feeds.
 
     Returns
     -------
     str
-        The text, unchanged if it has no such characters; line ends are line feeds.
+        All line ends are line feeds.
 
     Examples
     --------
@@ -73,5 +72,5 @@ def remove_controls(text: str, *, single_line: bool = False) -> str:
     return pattern.sub("", text.replace("\r\n", "\n").replace("\r", "\n"))
 
 
-def _escape_match(found: re.Match[str]) -> str:
-    return ascii(found[0])[1:-1]
+def _escape_match(match: re.Match[str]) -> str:
+    return ascii(match[0])[1:-1]

@@ -48,7 +48,7 @@ def sketches(monkeypatch: pytest.MonkeyPatch) -> Sketches:
 
 def offering(monkeypatch: pytest.MonkeyPatch, **offered: str) -> None:
     """Let these be the entry points that installed packages have."""
-    entries = [EntryPoint(name, value, drawing.GROUP) for name, value in offered.items()]
+    entries = [EntryPoint(name, value, drawing.ENTRY_POINT_GROUP) for name, value in offered.items()]
 
     def found(*, group: str) -> list[EntryPoint]:
         return [entry for entry in entries if entry.group == group]

@@ -48,13 +48,13 @@ def _kept() -> Path:
     import robocov
     from robocov.files.array_files import ArrayCache
 
-    cache = ArrayCache.of_user()
+    cache = ArrayCache.open_default()
     home = Path(tempfile.mkdtemp(prefix="robocov-")) if cache is None else cache.folder / "handbook"
     # another folder when a page or a module of the program has changed
     roots = (sources(), Path(__file__).parents[1], Path(robocov.__file__).parent)
     files = sorted(file for root in roots for file in root.rglob("*") if file.suffix in (".py", ".md"))
     written = [file for file in files if sources() / "reference" not in file.parents]
-    pages = home / ArrayCache.key(*(f"{file} {file.stat().st_mtime_ns}" for file in written))
+    pages = home / ArrayCache.compute_key(*(f"{file} {file.stat().st_mtime_ns}" for file in written))
     if not (pages / "index.html").is_file():
         if cache is not None:
             shutil.rmtree(home, ignore_errors=True)  # those of an earlier state

@@ -179,9 +179,9 @@ def with_references(result: Result, *, search: bool, tell: Callable[[int], None]
 
 def _reference(record: Record, lattice: int, *, search: bool) -> Reference | None:
     environment, robots, radius = record.environment, len(record.team), float(record.team.radius.max())
-    cache = ArrayCache.of_user()
+    cache = ArrayCache.open_default()
     content = json.dumps(to_json(environment), sort_keys=True)
-    key = ArrayCache.key("optimum", __version__, content, robots, radius, lattice, RESTARTS)
+    key = ArrayCache.compute_key("optimum", __version__, content, robots, radius, lattice, RESTARTS)
     kept = None if cache is None else cache.load(key)
     if kept is not None:
         return Reference(*kept["reference"].tolist())

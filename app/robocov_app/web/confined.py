@@ -67,7 +67,7 @@ def confined(folder: Path) -> Iterator[None]:
         *packages,
         *(path.parent for path in list_bundled_maps().values()),
     )
-    arrays = ArrayCache.of_user()
+    arrays = ArrayCache.open_default()
     caches = [each for each in (cache_folder(), arrays and arrays.folder) if each]
     before = tempfile.tempdir
     with tempfile.TemporaryDirectory(prefix="robocov-") as own:

@@ -53,7 +53,7 @@ class CoverageResult(Drawable):
         With `speeds`, the mean time until the first robot arrives at a site.
     """
 
-    _drawn_as = "result"
+    _drawing_name = "result"
 
     mean_distance: float
     value: float

@@ -64,7 +64,7 @@ class Environment(Drawable):
     96.86
     """
 
-    _drawn_as = "environment"
+    _drawing_name = "environment"
 
     name: str
     boundary: Ring

@@ -1,1 +1,10 @@
-"""Files: read strictly, written whole or not at all, and every mistake in them named by its place."""
+"""Files: strict reading, and writing that is complete or does not happen.
+
+- `strictjson`: JSON and TOML, with the line and the column of each mistake
+- `array_files`: arrays in .npz files, and a cache of them
+- `csv_cells`: cells of CSV files
+- `writing`: files that are replaced atomically
+- `result_folder`: folders of results that are replaced atomically
+- `folder_lock`: locks on folders
+- `cache_folders`: folders of caches
+"""

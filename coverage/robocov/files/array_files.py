@@ -1,4 +1,4 @@
-"""Arrays in .npz files: read after a look at their sizes, and kept in a cache between runs."""
+"""Arrays in .npz files: read only if their sizes are reasonable, and cached between runs."""
 
 from __future__ import annotations
 
@@ -22,53 +22,82 @@ from robocov.errors import InputError, OutputError
 from robocov.files.cache_folders import find_cache_root, is_private
 from robocov.files.writing import replace_file
 
-MOST_BYTES = 2_000_000_000
-"""Bytes that the arrays of one file may take: about the largest run that can be asked for."""
-_MOST_SQUEEZED, _MODEST = 100, 256_000_000
-"""Bytes of arrays that one byte of a file may stand for, where they are more than so many."""
-_LARGEST_READ = 1 << 20
-"""Bytes that are read in one go: the directory of a file of arrays is short."""
-_BROKEN = (
-    *(ValueError, EOFError, OSError, MemoryError, NotImplementedError, RuntimeError),
-    *(zipfile.BadZipFile, zlib.error, struct.error),
+MAX_BYTES = 2_000_000_000
+"""Default limit for the arrays of one file: about the largest run that the application accepts."""
+_MAX_COMPRESSION_RATIO = 100
+_MIN_RATIO_BYTES = 256_000_000
+"""Bytes of arrays up to which the compression ratio does not matter."""
+_MAX_READ_BYTES = 1 << 20
+"""Largest single read: the directory of an array file is short."""
+_DAMAGE_ERRORS = (
+    ValueError,
+    EOFError,
+    OSError,
+    MemoryError,
+    NotImplementedError,
+    RuntimeError,
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
 )
-"""Errors that zipfile, zlib and numpy raise on a damaged file."""
-_SUFFIX, _FORMAT = ".robocov", b"robocov arrays 1\n"
-_DIGEST = 16
-"""Bytes of the check sum that stands before the data of a cached file."""
-_STALE = 24 * 3600.0
-"""Seconds after which a half-written file has no writer any more."""
+"""Errors that zipfile, zlib and numpy raise for damaged files."""
+_SUFFIX = ".robocov"
+_FORMAT = b"robocov arrays 1\n"
+_DIGEST_BYTES = 16
+"""Length of the check sum between the format and the data of a cached file."""
+_STALE_S = 24 * 3600.0
+"""Age at which a partly written file counts as abandoned."""
 
 
-def read_arrays(file: BinaryIO, where: str, most_bytes: int = MOST_BYTES) -> dict[str, NDArray[Any]]:
-    """Return the arrays in an .npz file, which messages call `where`.
+def read_arrays(file: BinaryIO, where: str, max_bytes: int = MAX_BYTES) -> dict[str, NDArray[Any]]:
+    """Read the arrays of an .npz file.
 
-    Raises `InputError` on whatever is wrong with it: also objects, or more than is good for the machine.
+    Parameters
+    ----------
+    file : binary file
+        Open for reading, and seekable.
+    where : str
+        Name of the file in messages.
+    max_bytes : int
+        Largest total size of the arrays.
+
+    Returns
+    -------
+    dict of str to array
+
+    Raises
+    ------
+    InputError
+        If the file is damaged or too large, contains an entry twice, or Python objects.
     """
     try:
-        size = file.seek(0, io.SEEK_END)
-        with zipfile.ZipFile(_Sparing(file)) as archive:
+        file_size = file.seek(0, io.SEEK_END)
+        with zipfile.ZipFile(_LimitedReader(file)) as archive:
             entries = archive.infolist()
-            # a stream ends where its entry says, whatever there may be in it
-            total = sum(entry.file_size for entry in entries)
-            if total > min(most_bytes, max(_MODEST, _MOST_SQUEEZED * size)):
-                found = f"{total / 1e6:,.0f} MB of arrays in a file of {size / 1e6:,.1f} MB"
-                raise ValueError(f"{found} are too many")
-            for name, times in Counter(entry.filename for entry in entries).most_common(1):
-                if times > 1:
-                    raise ValueError(f"{name!r} is in it {times} times")
+            _require_reasonable_entries(entries, file_size, max_bytes)
             arrays = {}
             for entry in entries:
                 with archive.open(entry) as stream:
                     array = np.lib.format.read_array(stream, allow_pickle=False)
                 arrays[entry.filename.removesuffix(".npy")] = array
             return arrays
-    except _BROKEN as error:
+    except _DAMAGE_ERRORS as error:
         raise InputError(f"{where}: cannot be read: {error or type(error).__name__}") from error
 
 
-class _Sparing:
-    """A file of which nothing large is read in one go, as a directory of millions of entries would be."""
+def _require_reasonable_entries(entries: list[zipfile.ZipInfo], file_size: int, max_bytes: int) -> None:
+    """Raise ValueError if entries are too large, or have the same name."""
+    # No stream yields more than the size in its entry, whatever it contains.
+    total = sum(entry.file_size for entry in entries)
+    if total > min(max_bytes, max(_MIN_RATIO_BYTES, _MAX_COMPRESSION_RATIO * file_size)):
+        raise ValueError(f"too many arrays: {total / 1e6:,.0f} MB in a file of {file_size / 1e6:,.1f} MB")
+    for name, count in Counter(entry.filename for entry in entries).items():
+        if count > 1:
+            raise ValueError(f"duplicate entry {name!r}")
+
+
+class _LimitedReader:
+    """A file from which nothing large is read at once, such as a directory of millions of entries."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -77,54 +106,104 @@ class _Sparing:
         return getattr(self._file, name)
 
     def read(self, size: int = -1) -> bytes:
-        if size > _LARGEST_READ:
+        if size > _MAX_READ_BYTES:
             raise zipfile.BadZipFile("its directory is too large")
         return self._file.read(size)
 
 
 class ArrayCache:
-    """A folder of arrays, each entry a file named by what the arrays were computed from.
+    """A folder of cached arrays, whose files are named by what the arrays were computed from.
 
-    A cache is never in the way: an entry that is damaged, foreign or unreadable counts as missing, and one
-    that cannot be written is not written. Any number of processes may use one folder at the same time. When
-    its files grow beyond `limit` bytes, those that were not used for the longest time are removed.
+    An entry that is damaged, not private or unreadable counts as missing, and one that cannot be written is
+    not written. Any number of processes may use a folder at the same time.
+
+    Parameters
+    ----------
+    folder : Path
+        Created by the first `save`.
+    max_bytes : int
+        Largest total size of the files. Beyond it, the least recently used ones are removed.
+
+    Attributes
+    ----------
+    folder : Path
+    max_bytes : int
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     cache = ArrayCache(Path(folder))
+    ...     key = ArrayCache.compute_key("squares", 3)
+    ...     cache.save(key, {"squares": np.arange(3) ** 2})
+    ...     cache.load(key)
+    {'squares': array([0, 1, 4])}
     """
 
-    def __init__(self, folder: Path, limit: int = 1 << 30) -> None:
-        self.folder, self.limit = folder, limit
+    def __init__(self, folder: Path, max_bytes: int = 1 << 30) -> None:
+        self.folder = folder
+        self.max_bytes = max_bytes
 
     @classmethod
-    def of_user(cls) -> ArrayCache | None:
-        """Return the cache in the user's folder, or that of ``ROBOCOV_CACHE``; None if that is empty."""
+    def open_default(cls) -> ArrayCache | None:
+        """Open the cache in the user's folder, or in that of the environment variable ``ROBOCOV_CACHE``.
+
+        Returns
+        -------
+        ArrayCache or None
+            None if the variable is empty.
+        """
         folder = find_cache_root()
         return None if folder is None else cls(folder)
 
     @staticmethod
-    def key(*parts: bytes | str | float) -> str:
-        """Return a name for what is computed from these parts, a digest of their exact values."""
+    def compute_key(*parts: bytes | str | float) -> str:
+        """Compute the key of arrays from what they are computed from.
+
+        Parameters
+        ----------
+        *parts : bytes, str, int or float
+
+        Returns
+        -------
+        str
+            A digest of the types and exact values.
+        """
         digest = hashlib.blake2b(digest_size=20)
         for part in parts:
             if isinstance(part, float):
                 data = struct.pack("<d", part)
+            elif isinstance(part, bytes):
+                data = part
             else:
-                data = part if isinstance(part, bytes) else str(part).encode()
+                data = str(part).encode()
             digest.update(b"%s %d\n" % (type(part).__name__.encode(), len(data)) + data)
         return digest.hexdigest()
 
     def load(self, key: str) -> dict[str, NDArray[Any]] | None:
-        """Return the arrays that were saved under a key, read-only, None if there are none that are whole."""
+        """Load the arrays of a key.
+
+        Parameters
+        ----------
+        key : str
+
+        Returns
+        -------
+        dict of str to array, or None
+            Read-only arrays; None if there is no intact entry.
+        """
         path = self.folder / f"{key}{_SUFFIX}"
-        # what was written whole can be read, except by a numpy that knows less than the writer's
+        # Intact arrays may still be unreadable, for a numpy that is older than the one that wrote them.
         with suppress(OSError, InputError):
-            if path.stat().st_size > self.limit or not is_private(path):
+            if path.stat().st_size > self.max_bytes or not is_private(path):
                 return None
             data = path.read_bytes()
-            start = len(_FORMAT) + _DIGEST
+            start = len(_FORMAT) + _DIGEST_BYTES
             payload = memoryview(data)[start:]
-            if data[:start] != _FORMAT + _digest(payload):
+            if data[:start] != _FORMAT + _compute_digest(payload):
                 path.unlink()
                 return None
-            arrays = read_arrays(io.BytesIO(payload), path.name, self.limit)
+            arrays = read_arrays(io.BytesIO(payload), path.name, self.max_bytes)
             for array in arrays.values():
                 array.setflags(write=False)
             with suppress(OSError):
@@ -133,37 +212,43 @@ class ArrayCache:
         return None
 
     def save(self, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Keep arrays under a key, if that is possible."""
+        """Save arrays under a key, if possible.
+
+        Parameters
+        ----------
+        key : str
+        arrays : mapping of str to array
+        """
         buffer = io.BytesIO()
         np.savez(buffer, **arrays)  # type: ignore[arg-type]
         payload = buffer.getvalue()
-        if len(payload) > self.limit:
+        if len(payload) > self.max_bytes:
             return
         with suppress(OSError, OutputError):
             self.folder.mkdir(parents=True, exist_ok=True)
             with replace_file(self.folder / f"{key}{_SUFFIX}", durable=False) as path:
-                path.write_bytes(b"".join([_FORMAT, _digest(payload), payload]))
-                path.chmod(0o600)  # `load` ignores what others may have written
-            self._tidy()
+                path.write_bytes(b"".join([_FORMAT, _compute_digest(payload), payload]))
+                path.chmod(0o600)  # `load` ignores files that others may have written.
+            self._remove_old_files()
 
-    def _tidy(self) -> None:
-        """Remove what was not used for the longest time beyond the limit, and what was left half-written."""
-        found: list[tuple[float, int, Path]] = []
+    def _remove_old_files(self) -> None:
+        """Remove the least recently used files beyond the limit, and abandoned temporary files."""
+        entries: list[tuple[float, int, Path]] = []
         for path in self.folder.glob(f"*{_SUFFIX}"):
-            with suppress(OSError):  # another process may have been quicker
+            with suppress(OSError):  # Another process may have removed it.
                 status = path.stat()
                 if not path.name.startswith("."):
-                    found.append((status.st_mtime, status.st_size, path))
-                elif status.st_mtime < time.time() - _STALE:
+                    entries.append((status.st_mtime, status.st_size, path))
+                elif status.st_mtime < time.time() - _STALE_S:
                     path.unlink()
-        total = sum(size for _, size, _ in found)
-        for _, size, path in sorted(found):
-            if total <= self.limit:
+        total = sum(size for _, size, _ in entries)
+        for _, size, path in sorted(entries):
+            if total <= self.max_bytes:
                 break
             with suppress(OSError):
                 path.unlink()
             total -= size
 
 
-def _digest(payload: bytes | memoryview) -> bytes:
-    return hashlib.blake2b(payload, digest_size=_DIGEST).digest()
+def _compute_digest(payload: bytes | memoryview) -> bytes:
+    return hashlib.blake2b(payload, digest_size=_DIGEST_BYTES).digest()

@@ -1,4 +1,4 @@
-"""Text cells of CSV files that spreadsheets would otherwise take for formulas."""
+"""Cells of CSV files that spreadsheets would otherwise evaluate as formulas."""
 
 from __future__ import annotations
 
@@ -6,25 +6,25 @@ import re
 from typing import Any
 
 _FORMULA = re.compile(r"'*[=+\-@\t\r\n＝＋－＠]")
-"""A text that a spreadsheet may evaluate, also one that is already behind apostrophes."""
+"""Start of a text that a spreadsheet may evaluate, or that has already been quoted."""
 _QUOTED_FORMULA = re.compile(r"'+[=+\-@\t\r\n＝＋－＠]")
 
 
 def quote_cell(value: Any) -> Any:
-    """Return the content of a CSV cell in a form that no spreadsheet evaluates.
+    """Quote the content of a CSV cell, so that no spreadsheet evaluates it.
 
-    A text that begins with ``=``, ``+``, ``-``, ``@``, a tab or a line break gets a leading apostrophe, as
-    spreadsheets mark text themselves. Numbers stay as they are, and None is an empty cell.
+    A text that starts with ``=``, ``+``, ``-``, ``@``, a tab or a line break gets a leading apostrophe, with
+    which spreadsheets themselves mark text.
 
     Parameters
     ----------
     value : object
-        The content of a cell. Only a `str` is ever changed.
+        Content of a cell. Only a `str` is ever changed.
 
     Returns
     -------
     object
-        The content to write, from which `unquote_cell` restores the text.
+        Content to write, from which `unquote_cell` restores the text.
 
     Examples
     --------
@@ -37,7 +37,15 @@ def quote_cell(value: Any) -> Any:
 
 
 def unquote_cell(text: str) -> str:
-    """Return the text that `quote_cell` was given.
+    """Restore a text from a cell that `quote_cell` returned.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
 
     Examples
     --------

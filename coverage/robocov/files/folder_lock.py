@@ -1,4 +1,4 @@
-"""A lock on a folder, which one process holds at a time."""
+"""Locks on folders, so that two processes do not write to one folder."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def lock_folder(folder: Path, name: str = ".lock", *, remove: bool = False) -> I
         yield
     finally:
         if remove:
-            # While the lock is held: a process that waits for this file notices that it has no name any more.
+            # Removed while it is locked: a process that waits for this file notices that its name is gone.
             with suppress(OSError):
                 path.unlink()
         lock.release()

@@ -113,7 +113,7 @@ GENERATORS: dict[str, MapKind] = {
     ),
     "mazes": MapKind(
         layout=build_maze,
-        description="a maze: corridors, some dead ends, some ways round",
+        description="a maze: corridors, some dead ends, some loops",
         counted="cells",
         obstacles=36,
         area=0.12,

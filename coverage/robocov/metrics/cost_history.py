@@ -23,7 +23,7 @@ MAX_RATE_WITH_MOVING_OBSTACLES_HZ = 1.0
 class CostHistory(Drawable):
     """The coverage cost (22) along a run, at K of its moments."""
 
-    _drawn_as = "history"
+    _drawing_name = "history"
 
     time: Array
     """(K,) s"""

@@ -69,7 +69,7 @@ class Record(Drawable):
         The robots that joined during the run, and their positions then.
     """
 
-    _drawn_as = "record"
+    _drawing_name = "record"
 
     environment: Environment
     team: Team

@@ -23,7 +23,7 @@ arrays = st.dictionaries(
 SOME = {"corner": np.arange(7), "length": np.array([[1.5, np.inf], [np.nan, -0.0]])}
 
 
-def same(one, other):
+def require_equal(one, other):
     assert sorted(one) == sorted(other)
     for name, array in one.items():
         assert array.dtype == other[name].dtype
@@ -33,22 +33,22 @@ def same(one, other):
 
 @settings(max_examples=60)
 @given(arrays)
-def test_what_is_saved_is_loaded_bit_for_bit(tmp_path_factory, given_arrays):
+def test_saved_arrays_are_loaded_bit_for_bit(tmp_path_factory, given_arrays):
     cache = ArrayCache(tmp_path_factory.mktemp("cache"))
     cache.save("entry", given_arrays)
     loaded = cache.load("entry")
-    same(given_arrays, loaded)
+    require_equal(given_arrays, loaded)
     assert not any(array.flags.writeable for array in loaded.values())
     assert len(list(cache.folder.iterdir())) == 1
 
 
-def test_what_was_not_saved_is_missing(tmp_path):
+def test_arrays_that_were_not_saved_are_missing(tmp_path):
     assert ArrayCache(tmp_path / "nowhere").load("entry") is None
     assert not (tmp_path / "nowhere").exists()
 
 
 @pytest.mark.parametrize("cut", [0, 1, 16, 17, 33, 40, 0.5, 0.9, -1])
-def test_a_cut_file_is_missing_and_removed(tmp_path, cut):
+def test_a_truncated_file_counts_as_missing_and_is_removed(tmp_path, cut):
     cache = ArrayCache(tmp_path)
     cache.save("entry", SOME)
     (path,) = tmp_path.iterdir()
@@ -57,16 +57,16 @@ def test_a_cut_file_is_missing_and_removed(tmp_path, cut):
     assert cache.load("entry") is None
     assert not path.exists()
     cache.save("entry", SOME)
-    same(cache.load("entry"), SOME)
+    require_equal(cache.load("entry"), SOME)
 
 
-def test_no_byte_can_be_wrong(tmp_path):
+def test_a_file_with_any_wrong_byte_counts_as_missing(tmp_path):
     cache = ArrayCache(tmp_path)
     cache.save("entry", {"a": np.arange(3)})
     (path,) = tmp_path.iterdir()
     data = path.read_bytes()
-    for place in range(len(data)):
-        path.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
+    for offset in range(len(data)):
+        path.write_bytes(data[:offset] + bytes([data[offset] ^ 1]) + data[offset + 1 :])
         assert cache.load("entry") is None
 
 
@@ -84,14 +84,14 @@ def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):
         assert cache.load("entry") is None
 
 
-def test_beyond_the_limit_the_least_recently_used_goes(tmp_path):
+def test_the_least_recently_used_file_is_removed_beyond_the_limit(tmp_path):
     one = {"a": np.zeros(1000)}
-    cache = ArrayCache(tmp_path, limit=30_000)
+    cache = ArrayCache(tmp_path, max_bytes=30_000)
     for number, key in enumerate(["old", "used", "newer"]):
         cache.save(key, one)
         (tmp_path / f"{key}.robocov").touch()
         os.utime(tmp_path / f"{key}.robocov", (number, number))
-    assert cache.load("old") is not None  # which makes it the newest
+    assert cache.load("old") is not None  # This makes it the newest.
     cache.save("newest", one)
     assert [cache.load(key) is not None for key in ("old", "used", "newer", "newest")] == [
         True,
@@ -104,7 +104,7 @@ def test_beyond_the_limit_the_least_recently_used_goes(tmp_path):
     assert cache.load("newest") is not None
 
 
-def test_what_a_killed_writer_left_goes_after_a_day(tmp_path):
+def test_abandoned_temporary_files_are_removed_after_a_day(tmp_path):
     cache = ArrayCache(tmp_path)
     stale, fresh, foreign = (
         tmp_path / ".a.1.part.robocov",
@@ -125,7 +125,7 @@ def _write(folder, value):
 
 
 @pytest.mark.slow
-def test_writers_at_the_same_time_leave_a_whole_entry(tmp_path):
+def test_concurrent_writers_leave_a_complete_entry(tmp_path):
     context = multiprocessing.get_context("spawn")
     writers = [context.Process(target=_write, args=(tmp_path, value)) for value in (1.0, 2.0)]
     for writer in writers:
@@ -141,19 +141,19 @@ def test_writers_at_the_same_time_leave_a_whole_entry(tmp_path):
     assert len(cache.load("entry")["a"]) == 20_000
 
 
-def test_keys_tell_values_and_kinds_apart():
+def test_keys_differ_for_different_values_and_types():
     keys = [
-        ArrayCache.key(*parts)
+        ArrayCache.compute_key(*parts)
         for parts in ([1], [1.0], ["1"], [b"1"], [1, 1], [11], ["1", ""], [0.1 + 0.2], [0.3], [-0.0], [0.0])
     ]
     assert len(set(keys)) == len(keys)
-    assert ArrayCache.key("a", 0.5, b"x") == ArrayCache.key("a", 0.5, b"x")
+    assert ArrayCache.compute_key("a", 0.5, b"x") == ArrayCache.compute_key("a", 0.5, b"x")
 
 
-def test_the_users_folder_can_be_named_or_refused(monkeypatch, tmp_path):
+def test_the_default_folder_can_be_changed_or_switched_off(monkeypatch, tmp_path):
     monkeypatch.setenv("ROBOCOV_CACHE", str(tmp_path / "there"))
-    assert ArrayCache.of_user().folder == tmp_path / "there"
+    assert ArrayCache.open_default().folder == tmp_path / "there"
     monkeypatch.setenv("ROBOCOV_CACHE", "")
-    assert ArrayCache.of_user() is None
+    assert ArrayCache.open_default() is None
     monkeypatch.delenv("ROBOCOV_CACHE")
-    assert "robocov" in str(ArrayCache.of_user().folder)
+    assert "robocov" in str(ArrayCache.open_default().folder)

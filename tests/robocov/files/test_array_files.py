@@ -13,55 +13,58 @@ import pytest
 from robocov.errors import InputError
 from robocov.files.array_files import read_arrays
 
-MANY = 1_600_000_000
-"""Bytes that an array claims to have."""
+CLAIMED_BYTES = 1_600_000_000
+"""Size of an array according to its header."""
 
 
-def saved(**arrays: np.ndarray) -> bytes:
+def save_arrays(**arrays: np.ndarray) -> bytes:
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
     return buffer.getvalue()
 
 
-def read(content: bytes, most: int = 1_000_000_000) -> dict[str, np.ndarray]:
-    return read_arrays(io.BytesIO(content), "x.npz", most)
+def read(content: bytes, max_bytes: int = 1_000_000_000) -> dict[str, np.ndarray]:
+    return read_arrays(io.BytesIO(content), "x.npz", max_bytes)
 
 
-def claimed(size: int) -> bytes:
-    """Return the header of an array of so many bytes."""
+def build_header(size: int) -> bytes:
+    """Return the header of an array of some bytes."""
     head = io.BytesIO()
     header = {"descr": "<f8", "fortran_order": False, "shape": (size // 8,)}
     np.lib.format.write_array_header_1_0(head, header)
     return head.getvalue()
 
 
-def squeezed(path: Path, arrays: int) -> None:
-    """Write a file of some arrays of nothing but zeros, each of `MANY` bytes, which all are really there."""
+def write_zeros(path: Path, arrays: int) -> None:
+    """Write a file of some arrays of zeros, each of `CLAIMED_BYTES` bytes, which it really contains."""
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
-    head = packer.compress(claimed(MANY)) + packer.flush(zlib.Z_FULL_FLUSH)
+    head = packer.compress(build_header(CLAIMED_BYTES)) + packer.flush(zlib.Z_FULL_FLUSH)
     million = packer.compress(bytes(1_000_000)) + packer.flush(zlib.Z_FULL_FLUSH)
-    stream = head + million * (MANY // 1_000_000) + packer.flush()
+    stream = head + million * (CLAIMED_BYTES // 1_000_000) + packer.flush()
     with zipfile.ZipFile(path, "w") as archive:
         for k in range(arrays):
             archive.writestr(f"a{k}.npy", stream + bytes(7_000_000 - len(stream)))
         for entry in archive.filelist:
-            entry.compress_type, entry.file_size = zipfile.ZIP_DEFLATED, MANY + len(claimed(MANY))
+            entry.compress_type, entry.file_size = (
+                zipfile.ZIP_DEFLATED,
+                CLAIMED_BYTES + len(build_header(CLAIMED_BYTES)),
+            )
 
 
-def test_it_reads_what_numpy_writes() -> None:
+def test_files_of_numpy_are_read() -> None:
     arrays = {"a": np.arange(6.0).reshape(2, 3), "b": np.asfortranarray(np.eye(3)), "c": np.array([], "i4")}
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
-    for content in (saved(**arrays), buffer.getvalue()):
-        found = read(content)
-        assert list(found) == list(arrays)
+    for content in (save_arrays(**arrays), buffer.getvalue()):
+        loaded = read(content)
+        assert list(loaded) == list(arrays)
         for name, values in arrays.items():
-            np.testing.assert_array_equal(found[name], values)
-            assert found[name].dtype == values.dtype
+            np.testing.assert_array_equal(loaded[name], values)
+            assert loaded[name].dtype == values.dtype
 
 
-def patched(content: bytes, **changes: object) -> bytes:
-    """Return a zip file whose directory says something else of its last entry."""
+def patch_directory(content: bytes, **changes: object) -> bytes:
+    """Return a zip file with changes to the last entry of its directory."""
     buffer = io.BytesIO(content)
     with zipfile.ZipFile(buffer, "a") as archive:
         for name, value in changes.items():
@@ -70,11 +73,11 @@ def patched(content: bytes, **changes: object) -> bytes:
     return buffer.getvalue()
 
 
-TWO = saved(a=np.zeros(20_000), b=np.ones(20_000))
+TWO = save_arrays(a=np.zeros(20_000), b=np.ones(20_000))
 
 
-def test_what_one_patches_is_read_without_the_patch() -> None:
-    assert sorted(read(patched(TWO))) == ["a", "b"]
+def test_the_patched_file_is_read_without_the_patch() -> None:
+    assert sorted(read(patch_directory(TWO))) == ["a", "b"]
 
 
 @pytest.mark.parametrize(
@@ -83,16 +86,16 @@ def test_what_one_patches_is_read_without_the_patch() -> None:
         (b"", "not a zip file"),
         (TWO[:-30], "not a zip file"),
         (TWO[:200] + b"x" + TWO[201:], "CRC"),
-        (saved(a=np.array([print], dtype=object)), "Object arrays cannot be loaded"),
-        (patched(TWO, file_size=MANY), "many"),
-        (patched(TWO, file_size=150_000), "'b.npy'"),
-        (patched(TWO, header_offset=0, filename="a.npy"), "'a.npy'"),
-        (patched(TWO, compress_type=99), "compression"),
-        (patched(TWO, flag_bits=1), "encrypted"),
+        (save_arrays(a=np.array([print], dtype=object)), "Object arrays cannot be loaded"),
+        (patch_directory(TWO, file_size=CLAIMED_BYTES), "too many arrays"),
+        (patch_directory(TWO, file_size=150_000), "'b.npy'"),
+        (patch_directory(TWO, header_offset=0, filename="a.npy"), "duplicate entry 'a.npy'"),
+        (patch_directory(TWO, compress_type=99), "compression"),
+        (patch_directory(TWO, flag_bits=1), "encrypted"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_what_is_none_is_refused_in_one_line(content: bytes, message: str) -> None:
+def test_damaged_files_are_rejected_in_one_line(content: bytes, message: str) -> None:
     with pytest.raises(InputError, match=r"^x\.npz: cannot be read: .+$") as caught:
         read(content)
     assert message in str(caught.value)
@@ -102,7 +105,7 @@ def test_what_is_none_is_refused_in_one_line(content: bytes, message: str) -> No
     "header",
     ["{'descr': '<f8', 'fortran_order': False, 'shape': (-1, -4)}", "{" * 60_000, "[]", "print(1)"],
 )
-def test_a_header_that_is_none_is_refused(header: str) -> None:
+def test_invalid_headers_are_rejected(header: str) -> None:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         text = f"{header}\n".encode()
@@ -114,11 +117,11 @@ def test_a_header_that_is_none_is_refused(header: str) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
 @pytest.mark.parametrize("hostile", ["zeros", "entries"])
-def test_a_file_that_would_take_gigabytes_is_refused_at_once(tmp_path: Path, hostile: str) -> None:
-    """35 MB that would be 8 GB; a directory of 250,000 entries. In a process of its own."""
+def test_files_that_expand_to_gigabytes_are_rejected_early(tmp_path: Path, hostile: str) -> None:
+    """35 MB that expand to 8 GB, and a directory of 250,000 entries, each in a process of its own."""
     path = tmp_path / "x.npz"
     if hostile == "zeros":
-        squeezed(path, 5)
+        write_zeros(path, 5)
     else:
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr("a.npy", b"")
