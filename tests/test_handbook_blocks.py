@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fuzz_seeds import IMDF, imdf_zip
 from swept import InProcess
 
 from robocov.errors import InputError
@@ -65,6 +66,8 @@ def test_the_blocks_of_a_page_run_one_after_the_other(page: Path, folder: Path) 
     if page.stem == "benchmark":
         mine = (sources() / "own-controller.md").read_text()
         (folder / "mine.py").write_text(next(re.finditer(r"```python\n(# mine.py.*?)```", mine, re.S))[1])
+    if page.stem == "maps":
+        (folder / "museum.zip").write_bytes(imdf_zip(IMDF))
     names: dict[str, Any] = {}
     for found in re.finditer(r"```(\w+)\n(.*?)```", text, re.S):
         kind, code = found.groups()

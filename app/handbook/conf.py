@@ -18,10 +18,12 @@ html_css_files = ["handbook.css"]
 html_copy_source = False
 html_show_sphinx = False
 default_role = "code"
+napoleon_use_ivar = True  # attributes of a dataclass are listed once
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
 python_maximum_signature_line_length = 90
 toc_object_entries_show_parents = "hide"
 # a terminal's characters, and a map with comments, are no language that the highlighter knows
-suppress_warnings = ["misc.highlighting_failure"]
+# and words like "path" or "positions" name attributes of several classes
+suppress_warnings = ["misc.highlighting_failure", "ref.python"]

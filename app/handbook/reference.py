@@ -6,6 +6,7 @@ import contextlib
 import inspect
 import io
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -154,9 +155,18 @@ def names() -> str:
             text += f".. autoclass:: robocov.{name}{members}\n"
         elif callable(value):
             text += f".. autofunction:: robocov.{name}\n"
-        else:  # what it is stands beside it in its own module
-            text += f".. autodata:: {rc._modules[name]}.{name}\n   :no-value:\n"
+        else:
+            text += f".. autodata:: {_find_documenting_module(name)}.{name}\n   :no-value:\n"
     return text
+
+
+def _find_documenting_module(name: str) -> str:
+    """Return the module of the library in which a comment beside a constant documents it."""
+    for module in sorted(sys.modules):
+        is_candidate = module.startswith("robocov.") and hasattr(sys.modules[module], name)
+        if is_candidate and ("", name) in ModuleAnalyzer.for_module(module).find_attr_docs():
+            return module
+    raise LookupError(f"{name}: expected a comment beside it, got none")
 
 
 def _cell(text: str) -> str:

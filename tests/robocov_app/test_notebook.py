@@ -70,7 +70,7 @@ def executed(tmp_path_factory):
         work = folder / "work"
         work.mkdir()
         client = NotebookClient(
-            notebook, km=manager, timeout=120, resources={"metadata": {"path": str(work)}}
+            notebook, km=manager, timeout=600, resources={"metadata": {"path": str(work)}}
         )
         client.execute(cleanup_kc=True)
     if kept := os.environ.get("ROBOCOV_KEEP_NOTEBOOK"):

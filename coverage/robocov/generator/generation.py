@@ -89,6 +89,7 @@ class MapKind:
     is_approximate: bool = False
 
 
+#: Kinds of generated maps by name, with their default numbers of obstacles and blocked areas.
 GENERATORS: dict[str, MapKind] = {
     "polygons": MapKind(
         layout=scatter_polygons,

@@ -15,9 +15,8 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import GRID_M
-from robocov_app.formats.geometry.polygons import polygons_of, sides_of, united
+from robocov_app.formats.geometry.polygons import buffer_with_mitres, polygons_of, sides_of, united
 
-_MITRE_LIMIT = 5.0
 _DIGITS = 9  # of distances in metres: what is less comes of rounding
 _OVERLAP_M = 2 * GRID_M  # by how much what is filled or cut reaches beyond a hair
 _MAX_SAMPLES = 4_000  # places along walls whose distances are measured
@@ -110,12 +109,12 @@ def _open(area: BaseGeometry, width: float) -> BaseGeometry:
 
 
 def _offset(area: BaseGeometry, distance: float) -> BaseGeometry:
-    grown: BaseGeometry = shapely.buffer(area, distance, join_style="mitre", mitre_limit=_MITRE_LIMIT)
+    grown: BaseGeometry = buffer_with_mitres(area, distance)
     return grown
 
 
 def _grow(pieces: Array) -> Sequence[BaseGeometry]:
-    return list(shapely.buffer(pieces, _OVERLAP_M, join_style="mitre"))
+    return list(buffer_with_mitres(pieces, _OVERLAP_M))
 
 
 def _round(area: BaseGeometry) -> MultiPolygon:

@@ -25,6 +25,7 @@ from robocov_app.formats.base import ForeignMap, ImportReport, Options, Primitiv
 from robocov_app.formats.geometry.cleaning import Cleaned, Deviation, measure_deviation, remove_hairs
 from robocov_app.formats.geometry.polygons import (
     bounded,
+    buffer_with_mitres,
     filled,
     made_valid,
     polygons,
@@ -58,7 +59,6 @@ _MOST_ROBOTS = 1000  # of a file, so many are looked at
 _ZERO = 1e-100  # coordinates nearer to zero, in metres, are zero; as of map files
 _SQUARES, _MOST_RAYS = 1024, 5_000_000  # squares of each size that are cut; sides that rays may cross
 _QUARTERS = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])
-_MITRE_LIMIT = 5.0  # of corners when an area is grown or shrunk
 _BESIDE = 1e-3  # metres from a pocket to the obstacles beside it
 _MAX_ROUNDS = 5  # of the search for primitives that leave no pockets
 _SLIVER = 2.0  # tolerances of width below which a difference is a wall that moved, not one that was lost
@@ -263,8 +263,8 @@ class _Shaper:
         if not walls:
             return outline
         reach = max(wall.width for wall in walls) / 2 + 2 * self._tolerance()
-        grown = outline.buffer(reach, join_style="mitre", mitre_limit=_MITRE_LIMIT)
-        closed = grown.buffer(-reach, join_style="mitre", mitre_limit=_MITRE_LIMIT)
+        grown = buffer_with_mitres(outline, reach)
+        closed = buffer_with_mitres(grown, -reach)
         notches = np.array(polygons(shapely.difference(closed & outline.convex_hull, outline)), dtype=object)
         covered = shapely.union_all([wall.polygon for wall in walls]).buffer(2 * self._tolerance())
         notches = notches[shapely.covers(covered, notches)]

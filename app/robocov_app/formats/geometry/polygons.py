@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import shapely
@@ -15,6 +15,7 @@ from robocov.environment import GRID_M
 from robocov.errors import MapError
 
 Rule: TypeAlias = Literal["holes", "evenodd", "nonzero"]  # holes in the first ring, or SVG's ``fill-rule``
+_MITRE_LIMIT = 5.0  # sharper corners are cut when an area is grown or shrunk
 DIGITS = 6  # decimals of metres by default: the free space is known to a micrometre
 # edges may cross each other so often in a file, those of all its shapes together. A ring of some kB can cross
 # itself millions of times, and to find all of these places takes minutes and gigabytes.
@@ -114,6 +115,26 @@ def united(areas: Sequence[BaseGeometry]) -> BaseGeometry:
     return (
         union if shapely.dwithin(union, corners, GRID_M).all() else shapely.union_all(areas, grid_size=GRID_M)
     )
+
+
+def buffer_with_mitres(geometry: Any, distance: float) -> Any:
+    """Grow areas by a distance, or shrink them by a negative one, with corners that stay corners.
+
+    Parameters
+    ----------
+    geometry : shapely geometry, or array of geometries
+    distance : float, m
+
+    Returns
+    -------
+    shapely geometry, or array of geometries
+
+    Notes
+    -----
+    GEOS divides by the length of an edge, also where points are repeated, and drops such edges afterwards.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return shapely.buffer(geometry, distance, join_style="mitre", mitre_limit=_MITRE_LIMIT)
 
 
 def _has_three(ring: Array) -> bool:

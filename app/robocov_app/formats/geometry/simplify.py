@@ -25,6 +25,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges, find_run_starts
 from robocov.errors import format_count
+from robocov_app.formats.geometry.polygons import buffer_with_mitres
 from robocov_app.formats.geometry.vectorize import NECK
 
 KEPT_OUTLINE, KEPT_AREA = 0.1, 0.02  # parts of an outline's area, and of all that is free, that may change
@@ -56,7 +57,6 @@ _THIN_SLACK = (
 _MAX_THIN_VERTICES = (
     80_000  # of an outline: in larger ones to look for thin parts takes more than some seconds
 )
-_MITRE_LIMIT = 5.0  # of corners when an area is grown or shrunk
 _LONGEST = 1024  # most vertices between two that must stay: the algorithm's depth may grow with their number
 
 
@@ -529,7 +529,7 @@ def _stairs(path: Rings, kept: IntArray, drawing: Rings) -> tuple[BoolArray, Arr
 
 def _offset(area: BaseGeometry, distance: float) -> BaseGeometry:
     """Return an area grown by a distance, m, with corners as they are."""
-    grown: BaseGeometry = shapely.buffer(area, distance, join_style="mitre", mitre_limit=_MITRE_LIMIT)
+    grown: BaseGeometry = buffer_with_mitres(area, distance)
     return grown
 
 

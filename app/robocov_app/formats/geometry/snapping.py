@@ -23,12 +23,11 @@ from robocov.arrays import Array
 from robocov.environment import GRID_M
 from robocov.errors import format_count
 from robocov.mapfile.models import SMALLEST
-from robocov_app.formats.geometry.polygons import polygons_of, united
+from robocov_app.formats.geometry.polygons import buffer_with_mitres, polygons_of, united
 
 DEFAULT_SNAP_M = 0.01  # thinner than any wall of a building
 MAX_DEFAULT_SNAP = 1e-3  # as a fraction of the larger side of a drawing: a table-top arena has thin walls
 _OVERLAP_M = 2 * GRID_M  # by how much what fills a gap reaches into what is beside it
-_MITRE_LIMIT = 5.0
 _REACH = 1.01  # in tolerances: how far beside an outline its neighbours are looked for
 _MIN_LENGTH = 3.0  # of a gap, in tolerances: beside a corner not more than two of them are near
 _MAX_WIDENING = 0.25  # by how many tolerances the middle half of a gap may widen
@@ -166,8 +165,8 @@ def _measure_distance(walls: Array, parts: Array, place: float) -> Array:
 
 def _find_narrow(area: MultiPolygon, width: float) -> Array:
     """Return what is not in an area, and narrower than `width`: what a disc of that width cannot reach."""
-    grown = shapely.buffer(area, width / 2, join_style="mitre", mitre_limit=_MITRE_LIMIT)
-    closed = shapely.buffer(grown, -width / 2, join_style="mitre", mitre_limit=_MITRE_LIMIT)
+    grown = buffer_with_mitres(area, width / 2)
+    closed = buffer_with_mitres(grown, -width / 2)
     pieces = shapely.get_parts(shapely.difference(closed, area))
     return np.asarray(pieces[shapely.area(pieces) > GRID_M * GRID_M])
 
@@ -178,5 +177,5 @@ def _fill(area: MultiPolygon, gaps: _Gaps, width: float) -> MultiPolygon:
         return area
     around = shapely.union_all(gaps.surroundings)
     fillings = shapely.intersection(shapely.union_all(_find_narrow(area, width)), around)
-    fillings = shapely.buffer(fillings, _OVERLAP_M, join_style="mitre")
+    fillings = buffer_with_mitres(fillings, _OVERLAP_M)
     return union_on_grid([area, fillings])
