@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 from sphinx.pycode import ModuleAnalyzer
 
 import robocov as rc
-from robocov.controllers import controller_kinds, gains_of, information_of
-from robocov.controllers.base import Law
-from robocov.controllers.gains import Option, value_text
+from robocov.controllers import get_gains, get_information, list_controller_classes
+from robocov.controllers.base import BaseController
+from robocov.controllers.gains import Option, format_value
 from robocov.mapfile import build_map_schema
 from robocov.metrics.run_metrics import COLUMNS
 from robocov_app.cli import COMMANDS, main
@@ -46,7 +46,7 @@ def write(app: Sphinx) -> None:
 def gains_as_signature(*event: Any) -> tuple[str, None] | None:
     """Return the gains of a control law in the place of what its ``__new__`` takes."""
     _, what, _, value = event[:4]
-    if what != "class" or not issubclass(value, Law):
+    if what != "class" or not issubclass(value, BaseController):
         return None
     return str(inspect.signature(value, eval_str=True)).removesuffix(" -> None"), None
 
@@ -69,17 +69,17 @@ def gains() -> str:
     text += (
         "`rc.Rapf(k_rep=1.0)` in Python. [Control laws](../controllers.md) says where each law comes from.\n"
     )
-    for name, kind in controller_kinds().items():
+    for name, kind in list_controller_classes().items():
         summary = f"{kind.summary[0].upper()}{kind.summary[1:].rstrip('.')}."
-        text += f"\n## {name}\n\n{summary} Information that it uses: {information_of(kind)}.\n"
-        rows = gains_of(kind).values()
+        text += f"\n## {name}\n\n{summary} Information that it uses: {get_information(kind)}.\n"
+        rows = get_gains(kind).values()
         text += "\n| gain | meaning | default | unit | range |\n|---|---|---|---|---|\n" if rows else ""
         for gain in rows:
             if isinstance(gain, Option):
                 span = ", ".join(gain.words)
             else:
                 span = f"{gain.low:g} to {gain.high:g}{', or null' * gain.optional}"
-            default = value_text(gain.default, none="null")
+            default = format_value(gain.default, none="null")
             text += f"| `{gain.name}` | {_cell(gain.meaning)} | {default} | {gain.unit} | {span} |\n"
     return text
 

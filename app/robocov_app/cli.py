@@ -117,9 +117,9 @@ def _find_users_fault(error: BaseException) -> "RobocovError | None":
     """Return what is wrong in a user's own code, if the error comes from there."""
     if "robocov.controllers" not in sys.modules:
         return None  # Without it, which takes long to import, no code of users has run.
-    from robocov.controllers.user_modules import users_fault
+    from robocov.controllers.user_modules import explain_user_fault
 
-    return users_fault(error)
+    return explain_user_fault(error)
 
 
 def _explain(error: BaseException, name: str) -> int:

@@ -14,7 +14,8 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
-from robocov.controllers.gains import gain_values
+from robocov.controllers.gains import get_gain_values
+from robocov.controllers.individual import unwrap_controller
 from robocov.cost import DEFAULT_LATTICE, CoverageResult
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, format_count, quote
@@ -198,7 +199,7 @@ def _live(simulation: Simulation, height: int) -> LiveWindow:
     from robocov_app.viewer.session.session import Session
 
     law, team = simulation.controller, simulation.team
-    choice = (ControllerChoice(law.name, gain_values(getattr(law, "law", law))),)
+    choice = (ControllerChoice(law.name, get_gain_values(unwrap_controller(law))),)
     now = simulation.positions, simulation.velocities, simulation.conditions
     given = simulation.environment, choice, len(team), None, 0, TeamSpec.of(team), simulation.dt
     session = Session(Scenario(*given, *now))

@@ -42,7 +42,7 @@ def __getattr__(name: str) -> object:
         )
     value = getattr(importlib.import_module(_modules[name]), name)
     if name == "CONTROLLERS":  # with those of installed packages
-        value = importlib.import_module("robocov.controllers").controller_kinds()
+        value = importlib.import_module("robocov.controllers").list_controller_classes()
     globals()[name] = value
     return value
 

@@ -12,7 +12,7 @@ from .controllers import Atlas as Atlas
 from .controllers import AtlasShared as AtlasShared
 from .controllers import Controller as Controller
 from .controllers import IndividualController as IndividualController
-from .controllers import Individually as Individually
+from .controllers import IndividualControllerAdapter as IndividualControllerAdapter
 from .controllers import Lloyd as Lloyd
 from .controllers import OwnView as OwnView
 from .controllers import Rapf as Rapf

@@ -17,6 +17,7 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.observation.bins import find_bin, sort_into_bins
+from robocov.observation.neighbours import NeighbourPositions
 
 CONTACT_DISTANCE = 0.01
 """Distance below which the repulsion no longer grows, m: a tenth of a robot's radius."""
@@ -25,23 +26,6 @@ GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 _MIN_DISTANCE = 1e-12
 """Distance that robots at the same position are treated as having, m."""
-
-
-class HeardPositions(NamedTuple):
-    """Which robots each robot knows of, and where it believes them to be.
-
-    Attributes
-    ----------
-    indptr : (n + 1,) or (0,) int array
-        Robot i knows of the robots ``indices[indptr[i]:indptr[i + 1]]``. Empty: each robot knows of all.
-    indices : (m,) int array
-    reported : (m, 2) or (0, 2) array, m
-        Positions that these robots have reported, in the order of `indices`. Empty: the true ones.
-    """
-
-    indptr: IntArray
-    indices: IntArray
-    reported: Array
 
 
 class PotentialGains(NamedTuple):
@@ -88,14 +72,18 @@ class PotentialForces(NamedTuple):
 
 @kernel
 def compute_potential_forces(
-    positions: Array, heard: HeardPositions, obstacle_points: Array, goals: Array, gains: PotentialGains
+    positions: Array,
+    neighbours: NeighbourPositions,
+    obstacle_points: Array,
+    goals: Array,
+    gains: PotentialGains,
 ) -> PotentialForces:
     """Compute the forces (25) + (27) on each robot.
 
     Parameters
     ----------
     positions : (n, 2) array, m
-    heard : HeardPositions
+    neighbours : NeighbourPositions
         Robots that repel each other.
     obstacle_points : (n, 2) array, m
         Closest obstacle point of each robot; nan if none is in range.
@@ -124,8 +112,8 @@ def compute_potential_forces(
         slope = _compute_attraction(dx * dx + dy * dy, gains.k_att, gains.max_attraction)
         attraction[i, 0] = slope * dx
         attraction[i, 1] = slope * dy
-    if len(heard.indptr) > 0:
-        robots = _sum_repulsion_of_heard_robots(positions, heard, gains)
+    if len(neighbours.indptr) > 0:
+        robots = _sum_repulsion_of_neighbours(positions, neighbours, gains)
     else:
         robots = _sum_repulsion_of_all_robots(positions, gains)
     total = attraction + robots + obstacle
@@ -170,16 +158,18 @@ def _compute_attraction(squared_distance: float, k_att: float, max_attraction: f
 
 
 @kernel
-def _sum_repulsion_of_heard_robots(positions: Array, heard: HeardPositions, gains: PotentialGains) -> Array:
+def _sum_repulsion_of_neighbours(
+    positions: Array, neighbours: NeighbourPositions, gains: PotentialGains
+) -> Array:
     """Return the sums of (24) over the robots that each robot knows of, (n, 2) N."""
     sums = np.zeros((len(positions), 2))
-    has_reports = len(heard.reported) > 0
+    has_reports = len(neighbours.positions) > 0
     for i in range(len(positions)):
-        for k in range(heard.indptr[i], heard.indptr[i + 1]):
-            j = heard.indices[k]
+        for k in range(neighbours.indptr[i], neighbours.indptr[i + 1]):
+            j = neighbours.indices[k]
             if has_reports:
-                dx = positions[i, 0] - heard.reported[k, 0]
-                dy = positions[i, 1] - heard.reported[k, 1]
+                dx = positions[i, 0] - neighbours.positions[k, 0]
+                dy = positions[i, 1] - neighbours.positions[k, 1]
             else:
                 dx = positions[i, 0] - positions[j, 0]
                 dy = positions[i, 1] - positions[j, 1]

@@ -7,7 +7,7 @@ import pytest
 
 import robocov as rc
 from robocov import errors
-from robocov.controllers import controller_kinds
+from robocov.controllers import list_controller_classes
 from robocov.errors import InputError, MapError, Mistake, format_path
 
 
@@ -120,18 +120,20 @@ def test_mistakes_in_python_are_told_as_those_in_files(call: Callable[[], object
 
 def test_a_package_whose_controller_cannot_be_loaded_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     broken = EntryPoint("theirs", "no_such_module:Theirs", "robocov.controllers")
-    monkeypatch.setattr("robocov.controllers.entry_points", lambda group: [broken])
+    monkeypatch.setattr("robocov.controllers.registry.entry_points", lambda group: [broken])
     with pytest.warns(UserWarning, match="controller 'theirs' of entry point"):
-        assert "theirs" not in controller_kinds()
+        assert "theirs" not in list_controller_classes()
 
 
 def test_a_package_that_takes_the_name_of_a_built_in_controller_is_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     theirs = EntryPoint("rapf", "robocov.controllers.lloyd:Lloyd", "robocov.controllers")
-    monkeypatch.setattr("robocov.controllers.entry_points", lambda group: [theirs])
-    with pytest.warns(UserWarning, match="'rapf' of entry point .* the name is that of a built-in one"):
-        assert controller_kinds()["rapf"] is rc.Rapf
+    monkeypatch.setattr("robocov.controllers.registry.entry_points", lambda group: [theirs])
+    with pytest.warns(
+        UserWarning, match="'rapf' of entry point .* expected another name than that of a built-in"
+    ):
+        assert list_controller_classes()["rapf"] is rc.Rapf
 
 
 def test_the_nearest_name_of_the_package_is_known_to_python() -> None:
@@ -142,7 +144,7 @@ def test_the_nearest_name_of_the_package_is_known_to_python() -> None:
 
 def test_controllers_of_packages_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
     theirs = EntryPoint("theirs", "robocov.controllers.lloyd:Lloyd", "robocov.controllers")
-    monkeypatch.setattr("robocov.controllers.entry_points", lambda group: [theirs])
+    monkeypatch.setattr("robocov.controllers.registry.entry_points", lambda group: [theirs])
     monkeypatch.delitem(vars(rc), "CONTROLLERS", raising=False)
     assert rc.CONTROLLERS["theirs"] is rc.Lloyd
     monkeypatch.delitem(vars(rc), "CONTROLLERS")

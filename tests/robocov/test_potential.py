@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.observation.neighbours import NO_INDICES, Neighbours
+from robocov.observation.neighbours import NeighbourPositions, Neighbours
 from robocov.potential import (
     CONTACT_DISTANCE,
-    HeardPositions,
     PotentialGains,
     compute_potential_forces,
     compute_separations,
@@ -23,15 +22,15 @@ def forces(
     obstacle_points: np.ndarray | None = None,
     goals: np.ndarray | None = None,
     k: tuple[float, ...] = (0.0, 2.0, 0.0, np.inf),
-    links: tuple[np.ndarray, np.ndarray] = (NO_INDICES, NO_INDICES),
+    neighbours: Neighbours | None = None,
     reported: np.ndarray | None = None,
 ) -> np.ndarray:
     """Return all forces, by strength and range of the repulsion, strength and limit of the attraction."""
     points = np.full_like(positions, np.nan) if obstacle_points is None else obstacle_points
-    reported = np.empty((0, 2)) if reported is None else reported
     goals = positions if goals is None else goals
-    heard = HeardPositions(*links, reported)
-    return np.stack(compute_potential_forces(positions, heard, points, goals, PotentialGains(*k)))
+    graph = neighbours or Neighbours(len(positions))
+    known = NeighbourPositions.from_graph(graph, reported)
+    return np.stack(compute_potential_forces(positions, known, points, goals, PotentialGains(*k)))
 
 
 def repulsive_force(offset: np.ndarray, k_rep: float, rho_0: float) -> np.ndarray:
@@ -149,10 +148,8 @@ def test_all_forces_against_one_pair_after_the_other(n: int, seed: int, rho_0: f
     neighbours = Neighbours(n) if heard == "all" else Neighbours.from_ranges(positions, rng.uniform(0, 8, n))
     robot, other = neighbours.list_pairs()
     places = positions[other] + (0.1 * rng.normal(size=(len(other), 2)) if heard == "reports" else 0.0)
-    links = (NO_INDICES, NO_INDICES) if neighbours.indptr is None else (neighbours.indptr, other)
-    found = forces(
-        positions, points, goals, (0.7, rho_0, 1.3, 5.0), links, places if heard == "reports" else None
-    )
+    reported = places if heard == "reports" else None
+    found = forces(positions, points, goals, (0.7, rho_0, 1.3, 5.0), neighbours, reported)
     expected = np.zeros((4, n, 2))
     for i, place in zip(robot.tolist(), places, strict=True):
         expected[2, i] += repulsive_force((positions[i] - place)[None], 0.7, rho_0)[0]

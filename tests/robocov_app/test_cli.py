@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robocov
-from robocov.controllers import CONTROLLERS, gains_of
+from robocov.controllers import CONTROLLERS, get_gains
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.cli import COMMANDS, main
 
@@ -56,7 +56,7 @@ def test_controllers_lists_gains_with_units_and_marks_the_flagship(
     rows = {row["name"]: row for row in answer(capsys, "controllers")["controllers"]}
     assert [name for name, row in rows.items() if row["flagship"]] == ["rapf"]
     for name, kind in CONTROLLERS.items():
-        assert [gain["name"] for gain in rows[name]["gains"]] == list(gains_of(kind))
+        assert [gain["name"] for gain in rows[name]["gains"]] == list(get_gains(kind))
     assert rows["rapf"]["gains"][0]["unit"] == "N m³"
     assert (rows["rapf"]["information"], rows["geodesic-lloyd"]["information"]) == ("own", "whole map")
     assert main(["controllers"]) == 0

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from robocov.arrays import Array, IntArray
-from robocov.controllers.base import Law
+from robocov.controllers.base import BaseController
 from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.geodesic_lloyd import Plan
@@ -42,7 +42,7 @@ class OracleMemory:
 
 
 @dataclass(frozen=True)
-class Oracle(Law):
+class Oracle(BaseController):
     """Walks to the best placement: a yardstick for the time and ways of robots that know the map.
 
     Robots are assigned to places such that the sum of the squared ways, geodesic ones, is least, anew in
@@ -63,7 +63,7 @@ class Oracle(Law):
     response_time: float = response_time_gain()
     environment: Environment | None = field(default=None, repr=False, compare=False)
 
-    def informed(self, environment: Environment) -> Oracle:
+    def inform(self, environment: Environment) -> Oracle:
         """Return the same law with the map."""
         return replace(self, environment=environment)
 

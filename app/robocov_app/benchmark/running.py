@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from robocov.controllers import information_of, make_controller
+from robocov.controllers import get_information, make_controller
 from robocov.controllers.gains import Value
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, quote
@@ -82,7 +82,7 @@ class Contender:
         return {
             "controller": self.controller.rpartition("/")[2],
             "label": getattr(kind, "label", kind.__name__),
-            "information": information_of(kind),
+            "information": get_information(kind),
             "gains": dict(study.gains_of(name).choices[0]),
             "set": dict(self.gains),
             "source_sha256": hashlib.sha256("\0".join(texts).encode()).hexdigest() if texts else None,

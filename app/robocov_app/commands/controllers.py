@@ -6,8 +6,8 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from robocov.controllers import FLAGSHIP, controller_kinds, gains_of, information_of
-from robocov.controllers.gains import Gain, Option, value_text
+from robocov.controllers import RECOMMENDED_CONTROLLER, get_gains, get_information, list_controller_classes
+from robocov.controllers.gains import Gain, Option, format_value
 from robocov.text import escape_controls
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.output import console, tell
@@ -25,20 +25,20 @@ class Arguments(JsonOption):
 
 def command(options: Arguments) -> None:
     out, rows = console(), []
-    for name, kind in controller_kinds().items():
+    for name, kind in list_controller_classes().items():
         label, summary = str(getattr(kind, "label", name)), str(getattr(kind, "summary", ""))
-        information, gains = information_of(kind), gains_of(kind).values()
-        row = {"name": name, "label": label, "summary": summary, "flagship": name == FLAGSHIP}
+        information, gains = get_information(kind), get_gains(kind).values()
+        row = {"name": name, "label": label, "summary": summary, "flagship": name == RECOMMENDED_CONTROLLER}
         rows.append(row | {"information": information, "gains": list(map(_told, gains))})
         if options.json:
             continue
-        mark = "   (recommended)" * (name == FLAGSHIP)
+        mark = "   (recommended)" * (name == RECOMMENDED_CONTROLLER)
         mark += f"   (informed: {information})" * (information != "own")
         out.print(Text.assemble((escape_controls(name), "bold"), escape_controls(f"   {label}{mark}")))
         out.print(Text(escape_controls(f"  {summary}")))
         table = Table(box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 0))
         for gain in gains:
-            default = value_text(gain.default, none="null")
+            default = format_value(gain.default, none="null")
             if isinstance(gain, Option):
                 span = " | ".join(gain.words)
             else:

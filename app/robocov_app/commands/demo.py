@@ -92,13 +92,13 @@ def command(options: Arguments) -> int:
 
 
 def _open_window(options: Arguments, *, headless: bool) -> int:
-    from robocov.controllers import controller_kinds
+    from robocov.controllers import list_controller_classes
     from robocov_app.viewer.launch import Launcher
     from robocov_app.viewer.session.file import SUFFIX, load_session
     from robocov_app.viewer.session.session import Session
     from robocov_app.web import show
 
-    file, name, laws = None, options.map, (*controller_kinds(), *options.controllers)
+    file, name, laws = None, options.map, (*list_controller_classes(), *options.controllers)
     if options.map.endswith(SUFFIX):
         file = Path(options.map)
         saved = load_session(file, laws)

@@ -91,11 +91,11 @@ def _replay(options: Arguments) -> int:
     saved = load_saved(options.run)
     if options.headless:
         return make_film(options, saved)
-    from robocov.controllers import controller_kind
+    from robocov.controllers import load_controller_class
     from robocov_app.viewer.session.recorded import replayed_session
 
     for controller in options.controller:
-        controller_kind(controller)
+        load_controller_class(controller)
         names = [each.record.controller for each in saved]
         if controller.rpartition(":")[2] not in (name.rpartition(":")[2] for name in names):
             wanted = f"the controller of a run was wanted: {summarize_names(names)}"

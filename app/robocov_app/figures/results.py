@@ -15,7 +15,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullLocator
 
 from robocov.arrays import Array
-from robocov.controllers.gains import Value, value_text
+from robocov.controllers.gains import Value, format_value
 from robocov_app.figures.curves import draw_curves, end_label
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TEXT, Page, cut_to, figure_of, quiet_axes, tone, value_axis
@@ -300,8 +300,8 @@ def plot_gain_grid(
         style["fontweight"] = "bold" if values[row, column] == low else "normal"
         axes.text(column, row, f"{values[row, column]:.{decimals}f}", **style)
     axes.set(xlim=(-0.5, len(first) - 0.5), ylim=(-0.5, len(second) - 0.5))
-    axes.set_xticks(range(len(first)), [value_text(value, digits=4) for value in first])
-    axes.set_yticks(range(len(second)), [value_text(value, digits=4) for value in second])
+    axes.set_xticks(range(len(first)), [format_value(value, digits=4) for value in first])
+    axes.set_yticks(range(len(second)), [format_value(value, digits=4) for value in second])
     x, y = (cut_to(gain, len, MOST_LETTERS) for gain in gains)
     quiet_axes(axes, theme, x, y)
     axes.tick_params(length=0.0)
@@ -337,7 +337,7 @@ def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
         ticks = [float(value) for value in locator.tick_values(low, high) if low <= value <= high]
     axes.xaxis.set_major_locator(FixedLocator(ticks + [end] * unlimited))
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xticklabels([value_text(value, digits=4) for value in ticks] + ["none"] * unlimited)
+    axes.set_xticklabels([format_value(value, digits=4) for value in ticks] + ["none"] * unlimited)
     return end if unlimited else None
 
 

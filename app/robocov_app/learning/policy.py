@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array
-from robocov.controllers import informed
+from robocov.controllers import inform_controller
 from robocov.controllers.base import Controller
 from robocov.controllers.gains import gain, validate_gains
 from robocov.errors import ParameterError, require_type
@@ -147,7 +147,7 @@ class ControllerPolicy:
     def _decided(self, episode: Episode) -> Array:
         if self._episode is not episode:
             self._episode, self._asked_at, self._scan_number = episode, -1, -1
-            self._law = informed(self.controller, episode.environment)
+            self._law = inform_controller(self.controller, episode.environment)
             self._memory = self._law.begin(episode.environment.region, episode.team)
         if self._asked_at != episode.cycle:
             seen = replace(episode.observe(), scans=self._scanned(episode))

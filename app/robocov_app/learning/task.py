@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.conditions import Conditions
-from robocov.controllers.base import cells_seen
+from robocov.controllers.known_cells import compute_known_cells
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.environment import Environment
 from robocov.errors import (
@@ -277,7 +277,7 @@ class ObservationLayout:
                 raise ParameterError(f"observation.rays: {wanted}, but {found} are there")
             rows[:, places["rays"]] = np.where(scans.hit, scans.distances / reach, 1.0)
         if self.centroid:
-            centroid = cells_seen(seen, "distance", None).centroid
+            centroid = compute_known_cells(seen, "distance", None).centroid
             rows[:, places["centroid"]] = (centroid - seen.positions) / unit
         # what is believed of places may be off by more than there is
         return np.minimum(np.maximum(rows, -1.0), 1.0).astype(np.float32)

@@ -21,7 +21,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.controllers import controller_kind, information_of
+from robocov.controllers import get_information, load_controller_class
 from robocov_app.figures.statistics import Interval, bootstrap, bootstrap_by, median_time, share, spread
 from robocov_app.figures.statistics import holm as adjusted_by_holm
 from robocov_app.replication import contenders as laws
@@ -718,7 +718,7 @@ def rival_claims(outcomes: Outcomes, ours: Contender, contenders: Sequence[Conte
     found = [gap_closed(outcomes, ours, papers[0])] if papers else []
     others = [each for each in contenders if each.controller not in (*PAPER, *OURS)]
     for other in (*papers, *others):
-        knows = information_of(controller_kind(other.controller))
+        knows = get_information(load_controller_class(other.controller))
         text = f"{ours.label} ends at a lower cost than {other.label}"
         text += "." if knows == "own" else f", which goes by the {knows}."
         head = Claim(f"beyond-{ours.key}-{other.key}", RIVALS, text)

@@ -7,8 +7,8 @@ from itertools import product
 from pathlib import Path
 from typing import TypeAlias
 
-from robocov.controllers import CONTROLLERS, gain_values, make_controller
-from robocov.controllers.gains import Value, value_text
+from robocov.controllers import CONTROLLERS, get_gain_values, make_controller
+from robocov.controllers.gains import Value, format_value
 
 ASSETS = Path(__file__).parent / "assets"
 
@@ -45,7 +45,7 @@ class Contender:
 
     @property
     def all_gains(self) -> dict[str, Value]:
-        return dict(gain_values(make_controller(self.controller, self.gains)))
+        return dict(get_gain_values(make_controller(self.controller, self.gains)))
 
     @property
     def gains_text(self) -> str:
@@ -127,7 +127,7 @@ def potential_text(gains: Mapping[str, Value], no_limit: str = "") -> str:
     """Return gains of the potential, numbers all: "(k_rep 1, rho_0 2)"; `no_limit`: unlimited attraction."""
     known = {name: each for name, each in gains.items() if not isinstance(each, str) and name != "height"}
     parts = [
-        no_limit if each is None and name == "attraction_limit" else f"{name} {value_text(each)}"
+        no_limit if each is None and name == "attraction_limit" else f"{name} {format_value(each)}"
         for name, each in known.items()
         if each is not None or no_limit
     ]

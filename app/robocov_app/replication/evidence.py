@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.controllers import controller_kind, gain_values, information_of, make_controller
-from robocov.controllers.gains import value_text
+from robocov.controllers import get_gain_values, get_information, load_controller_class, make_controller
+from robocov.controllers.gains import format_value
 from robocov_app.figures.statistics import Interval, bootstrap, median_time
 from robocov_app.replication.claims import amount, capitalised, share_above_zero
 from robocov_app.replication.contenders import ASSETS, OWN, Contender
@@ -64,13 +64,13 @@ class Evidence:
 @cache
 def account_of(controller: str) -> Account:
     """Return what is said of a controller; of one that nothing is known of, its own summary."""
-    kind = controller_kind(controller)
+    kind = load_controller_class(controller)
     known = tomllib.loads((ASSETS / "controllers.toml").read_text(encoding="utf-8")).get(controller, {})
     source = known.get("source", "")
     if not known.get("read", True):
         source = source.removesuffix(".") + "; made from what is generally known of it, not from its text."
     does = known.get("does") or f"{capitalised(kind.summary).rstrip('.')}."
-    return Account(controller, kind.label, information_of(kind), known.get("short", "–"), source, does)
+    return Account(controller, kind.label, get_information(kind), known.get("short", "–"), source, does)
 
 
 def law_rows(outcomes: Outcomes, contenders: Iterable[Contender], duration: float) -> list[LawRow]:
@@ -160,8 +160,8 @@ def gains_text(controller: str, grid: GainOutcomes) -> str:
         return "Gains: its defaults; in every scenario of the tuning some run failed."
     best, worst = grid.best(), int(np.argmax(grid.excess.mean(axis=1)))
     varied = [name for name in grid.gains[best] if len({gains[name] for gains in grid.gains}) > 1]
-    values = ", ".join(f"{name} {value_text(grid.gains[best][name])}" for name in varied)
-    usual = dict(gain_values(make_controller(controller)))
+    values = ", ".join(f"{name} {format_value(grid.gains[best][name])}" for name in varied)
+    usual = dict(get_gain_values(make_controller(controller)))
     own = next((k for k, gains in enumerate(grid.gains) if dict(gains) == usual), None)
     means = [amount(mean) for mean in grid.excess.mean(axis=1)]
 

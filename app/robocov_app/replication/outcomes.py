@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
-from robocov.controllers import CONTROLLERS, gains_of
+from robocov.controllers import CONTROLLERS, get_gains
 from robocov.controllers.gains import Value
 from robocov.metrics import CostHistory
 from robocov.metrics.results import read_results
@@ -257,4 +257,4 @@ def _rows(folder: Path, scenarios: Iterable[Scenario]) -> Iterator[tuple[int, di
 
 def _law(controller: str, gains: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return what tells laws apart: the controller and the values of all its gains."""
-    return (controller, *(gains[name] for name in gains_of(CONTROLLERS.get(controller))))
+    return (controller, *(gains[name] for name in get_gains(CONTROLLERS.get(controller))))

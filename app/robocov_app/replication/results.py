@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 import robocov
-from robocov.controllers import CONTROLLERS, controller_kind
+from robocov.controllers import CONTROLLERS, load_controller_class
 from robocov.cost import CoverageCost
 from robocov.errors import InputError
 from robocov.files.result_folder import for_results
@@ -386,7 +386,7 @@ def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
         # of few maps runs are drawn one by one: the interval is then of these maps alone
         clusters = names if len(set(names)) >= FEW_MAPS else None
         ratio = bootstrap([*ratios.values()], clusters=clusters) if ratios else UNKNOWN
-        label = str(controller_kind(controller).label)
+        label = str(load_controller_class(controller).label)
         found.append(Degradation(axis, value, controller, label, ratio, len(ratios)))
 
     for part, (controllers, _, axes) in parts.items():

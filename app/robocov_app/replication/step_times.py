@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from robocov.controllers import gain_values, make_controller
+from robocov.controllers import get_gain_values, make_controller
 from robocov.files.writing import replace_file
 from robocov.mapfile import load_map
 from robocov.record import list_versions
@@ -68,7 +68,7 @@ def step_times(
         clock = time.process_time if fine else time.perf_counter
     for robots, controllers in wanted.items():
         names = list(dict.fromkeys((YARDSTICK, *controllers)))
-        gains = {name: dict(gain_values(make_controller(name))) for name in names}
+        gains = {name: dict(get_gain_values(make_controller(name))) for name in names}
         blocks = plan.beyond.warm_up, plan.beyond.blocks
         content = [robots, plan.dt, dict(TEAM), *blocks, gains, list_versions()["robocov"]]
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.controllers.gains import Value, value_text
+from robocov.controllers.gains import Value, format_value
 from robocov_app.figures.statistics import Interval, bootstrap, mean_with_t_interval
 from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
 from robocov_app.report.results import Entry, Gains, Result, Setting
@@ -72,7 +72,7 @@ def _suffixes(sets: Sequence[Gains]) -> list[str]:
         return [""]
     differing = [own for own in zip(*sets, strict=False) if len(set(own)) > 1]
     if len(differing) == 1 and len({name for name, _ in differing[0]}) == 1:
-        named = [f" {name} {value_text(value, digits=4)}" for name, value in differing[0]]
+        named = [f" {name} {format_value(value, digits=4)}" for name, value in differing[0]]
         if len(set(named)) == len(sets) and max(map(len, named)) <= _DIRECT:
             return named
     turns = [divmod(number, len(LETTERS)) for number in range(len(sets))]
@@ -150,7 +150,7 @@ def dependences(result: Result) -> dict[str, list[str]]:
 def gain_text(gains: Sequence[tuple[str, Value]], units: Mapping[str, str]) -> str:
     """Return gains as a line of text: "k_rep 0.3 N m³, attraction_limit none"."""
     known = [(name, value, "" if value is None else units.get(name, "")) for name, value in gains]
-    return ", ".join(f"{name} {value_text(value)} {unit}".rstrip() for name, value, unit in known)
+    return ", ".join(f"{name} {format_value(value)} {unit}".rstrip() for name, value, unit in known)
 
 
 class MapPairs(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from robocov.arrays import Array
-from robocov.controllers.gains import Value, value_text
+from robocov.controllers.gains import Value, format_value
 from robocov.errors import format_count
 from robocov.metrics.run_metrics import RunMetrics, compute_run_metrics
 from robocov_app.figures import results as drawing
@@ -149,7 +149,7 @@ class _Parameter(NamedTuple):
         return self.choices[int(place)] if self.choices else place
 
     def text(self, place: float) -> str:
-        return value_text(self.level(place), digits=4)
+        return format_value(self.level(place), digits=4)
 
     def dependence(self, group: Group, scales: Scales, style: CurveStyle) -> Dependence:
         """Return the scaled costs of a group's runs over the parameter, of those that have one."""

@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from robocov import __version__
-from robocov.controllers import CONTROLLERS, gains_of
+from robocov.controllers import CONTROLLERS, get_gains
 from robocov.controllers.gains import Value
 from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, RobocovError, quote
@@ -342,7 +342,7 @@ def _known_gains(
 ) -> tuple[dict[str, str], dict[str, str]]:
     """Return units and meanings of gains: of the built-in controllers, and what a table says of others."""
     kinds = dict.fromkeys(CONTROLLERS[each.controller] for each in entries if each.controller in CONTROLLERS)
-    gains = {name: gain for kind in kinds for name, gain in gains_of(kind).items()}
+    gains = {name: gain for kind in kinds for name, gain in get_gains(kind).items()}
     units = {name: gain.unit for name, gain in gains.items()}
     meanings = {name: gain.meaning for name, gain in gains.items()}
     for name, (unit, meaning) in others.items():

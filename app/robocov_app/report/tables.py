@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from robocov.controllers.gains import value_text
+from robocov.controllers.gains import format_value
 from robocov.errors import format_count
 from robocov_app.report import groups as grouped
 from robocov_app.report.groups import Comparison, Group, gain_text, parted, ratio_text, setting_label
@@ -208,7 +208,7 @@ def _ranges_text(group: Group, result: Result) -> str:
         every = [value for _, value in own]
         numbers = [value for value in every if isinstance(value, int | float)]
         if any(isinstance(value, str) for value in every):
-            span = " or ".join(dict.fromkeys(map(value_text, every)))
+            span = " or ".join(dict.fromkeys(map(format_value, every)))
         elif numbers:
             low, high = min(numbers), max(numbers)
             unit = f" {result.units.get(name, '')}".rstrip()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.controllers import controller_kind, gains_of
+from robocov.controllers import get_gains, load_controller_class
 from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.errors import ParameterError, describe_unknown_name, format_count
 from robocov.files.result_folder import Kind, results
@@ -63,7 +63,7 @@ def performed(
 
 def gains_for(names: Sequence[str], given: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the gains of each controller: ``k_rep`` is for all that have it, ``rapf.k_rep`` for one."""
-    known = {name: gains_of(controller_kind(name)) for name in names}
+    known = {name: get_gains(load_controller_class(name)) for name in names}
     chosen: list[dict[str, Any]] = [{} for _ in names]
     # what is said of one controller alone counts for more than what is said of all
     for key, value in sorted(given.items(), key=lambda item: "." in item[0]):

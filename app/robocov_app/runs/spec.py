@@ -9,7 +9,7 @@ from robocov.arrays import Array
 from robocov.conditions import Conditions
 from robocov.controllers import Controller, make_controller
 from robocov.controllers.gains import Value
-from robocov.controllers.user_modules import Source, provided
+from robocov.controllers.user_modules import ControllerSource, provide_modules
 from robocov.environment import Environment
 from robocov.record import Record, Recorder
 from robocov.simulation import DEFAULT_DT, Simulation, TeamState, check_joins
@@ -31,7 +31,7 @@ class RunSpec:
     environment: Environment
     controller: str = "rapf"
     gains: Mapping[str, Value] = field(default_factory=dict)
-    source: Source | None = None
+    source: ControllerSource | None = None
     team: Team = field(default_factory=lambda: Team.homogeneous(6))
     start: str | None = None
     seed: int | None = 0
@@ -107,7 +107,7 @@ class RunSpec:
         watch: Callable[[int], bool] = lambda step: False,
     ) -> Record:
         """Simulate, and return the record of one step in `every` and the last; `watch` may end the run."""
-        with provided(self.source.modules if self.source else {}):
+        with provide_modules(self.source.modules if self.source else {}):
             simulation = simulation or self.simulation()
             recorder = self.recorder(simulation.controller, self.controller)
             for step, snapshot in enumerate(simulation.snapshots(self.duration)):

@@ -18,9 +18,9 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.conditions import PARAMETERS, Conditions, Failure, Join, parse_event
 from robocov.conditions import UNITS as CONDITION_UNITS
-from robocov.controllers import controller_kind, gain_values, gains_of
-from robocov.controllers.gains import Gain, Option, Value, with_gains
-from robocov.controllers.user_modules import Source, own_modules
+from robocov.controllers import get_gain_values, get_gains, load_controller_class
+from robocov.controllers.gains import Gain, Option, Value, instantiate_controller
+from robocov.controllers.user_modules import ControllerSource, find_own_modules
 from robocov.environment import Environment
 from robocov.errors import (
     InputError,
@@ -119,18 +119,18 @@ class Gains:
             return _of_axes(kind, wanted, sampling, path)
         if not wanted:
             raise ParameterError(f"{format_path(path)}: none, but at least one set of gains was wanted")
-        known = gains_of(kind)
+        known = get_gains(kind)
         choices = []
         for k, given in enumerate(wanted):
             values = {name: _value(known, name, value, (*path, k, name)) for name, value in given.items()}
-            choices.append(gain_values(with_gains(kind, values)))
+            choices.append(get_gain_values(instantiate_controller(kind, values)))
         once(choices, path)
         return cls(tuple(choices))
 
 
 def _of_axes(kind: type[Any], axes: Mapping[str, Any], sampling: Sampling | None, path: Place) -> Gains:
     """Return every combination of the lists with every sample of the ranges, the samples innermost."""
-    known = gains_of(kind)
+    known = get_gains(kind)
     lists: dict[str, list[Value]] = {}
     ranges: dict[str, Range] = {}
     for name, given in axes.items():
@@ -150,7 +150,9 @@ def _of_axes(kind: type[Any], axes: Mapping[str, Any], sampling: Sampling | None
         columns = [each.values(points[:, k]) for k, each in enumerate(ranges.values())]
         samples = list(zip(*columns, strict=True))
     choices = [
-        gain_values(with_gains(kind, dict(zip([*lists, *ranges], (*row, *sample), strict=True))))
+        get_gain_values(
+            instantiate_controller(kind, dict(zip([*lists, *ranges], (*row, *sample), strict=True)))
+        )
         for row, sample in product(product(*lists.values()), samples)
     ]
     once(choices, (*path, "samples"))  # as of a range that is narrower than the digits of a sample
@@ -162,7 +164,7 @@ def _value(known: Mapping[str, Gain | Option], name: str, value: object, path: P
     gain = _known(known, name, path)
     if gain.optional and value in (NO_LIMIT, math.inf):
         return None
-    return placed(path, lambda: gain.validated(value, ""))
+    return placed(path, lambda: gain.validate(value, ""))
 
 
 def _known(known: Mapping[str, Gain | Option], name: str, path: Place) -> Gain | Option:
@@ -183,7 +185,7 @@ def _checked_range(known: Mapping[str, Gain | Option], name: str, given: Range, 
     for end, value in (("low", given.low), ("high", given.high)):
         if value is None:
             raise ParameterError(f"{format_path((*path, end))}: {quote(None)}, but a number was wanted")
-        ends.append(placed((*path, end), partial(gain.validated, value, "")) or 0.0)
+        ends.append(placed((*path, end), partial(gain.validate, value, "")) or 0.0)
     low, high = ends
     if given.scale not in get_args(Scale):
         unknown = describe_unknown_name("scale", given.scale, get_args(Scale))
@@ -343,7 +345,7 @@ class Study:
     sampling: Sampling | None = None
     max_runs: int = DEFAULT_MAX_RUNS  # a study of more is refused before its combinations are made
     folder: Path = Path()  # where relative paths of controllers begin
-    sources: Mapping[str, Source] = field(init=False)  # of the users' controllers, as they are now
+    sources: Mapping[str, ControllerSource] = field(init=False)  # of the users' controllers, as they are now
     teams: tuple[Mapping[str, TeamValue], ...] = field(init=False)  # combinations of team and conditions
 
     def __post_init__(self) -> None:
@@ -433,7 +435,7 @@ class Study:
         return known or (each.environment.start().name,)
 
     def kind(self, controller: str) -> type[Any]:
-        return controller_kind(controller, source=self.sources.get(controller))
+        return load_controller_class(controller, source=self.sources.get(controller))
 
     def to_json(self) -> dict[str, Any]:
         controllers = [{"name": each, **source_json(self.sources.get(each))} for each in self.controllers]
@@ -454,7 +456,7 @@ class Study:
             **{name: getattr(self, name) for name in ("lattice", "cost_hz", "record_hz", "metrics")},
         }
 
-    def _controllers(self) -> tuple[dict[str, Source], dict[str, Gains]]:
+    def _controllers(self) -> tuple[dict[str, ControllerSource], dict[str, Gains]]:
         """Return the sources of the users' controllers, and what is tried of each controller."""
         for name in self.gains:
             if name not in self.controllers:
@@ -466,16 +468,16 @@ class Study:
             if class_name and file.endswith(".py"):
                 path = (self.folder / file).resolve()
                 try:
-                    sources[name] = Source(str(path), path.read_text(encoding="utf-8"))
+                    sources[name] = ControllerSource(str(path), path.read_text(encoding="utf-8"))
                 except (OSError, ValueError) as error:
                     reason = error.strerror if isinstance(error, OSError) else "not UTF-8"
                     raise ParameterError(f"controllers[{k}]: {quote(name)}: {path}: {reason}") from None
             try:
-                kind = controller_kind(name, source=sources.get(name))
+                kind = load_controller_class(name, source=sources.get(name))
             except ParameterError as error:
                 raise ParameterError(f"controllers[{k}]: {error}") from error
             if source := sources.get(name):  # now: it may have added folders to sys.path
-                sources[name] = source._replace(modules=own_modules(source.text))
+                sources[name] = source._replace(modules=find_own_modules(source.text))
             gains[name] = Gains.of(kind, self.gains.get(name, {}), self.sampling, ("gains", name))
         if self.sampling is not None and not any(each.ranges for each in gains.values()):
             raise ParameterError("sampling: no gain has a range {low, high}, but at least one was wanted")
@@ -542,7 +544,7 @@ def _round_count(count: int) -> str:
     return f"{count:.3g}" if count < 10**300 else "more than 1e300"
 
 
-def source_json(source: Source | None) -> dict[str, Any]:
+def source_json(source: ControllerSource | None) -> dict[str, Any]:
     """Return what files say of a controller's source: its text, and those of the modules that it imports."""
     modules = {name: module.text for name, module in source.modules.items()} if source else {}
     return ({"source": source.text} if source else {}) | ({"modules": modules} if modules else {})
@@ -592,7 +594,7 @@ class Task:
     map: str
     document: str
     controller: str
-    source: Source | None
+    source: ControllerSource | None
     gains: Mapping[str, Value]
     robots: int
     team: Mapping[str, TeamValue]

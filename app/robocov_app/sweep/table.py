@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from robocov.controllers import gains_of
+from robocov.controllers import get_gains
 from robocov.controllers.gains import Option
 from robocov.errors import OutputError
 from robocov.files.writing import flush_to_disk, resolve_target
@@ -66,7 +66,7 @@ def columns_of(study: Study) -> tuple[Column, ...]:
     """Return the columns of a study's table: the gains and the teams that it tries among those of all."""
     gains: dict[str, Column] = {}
     for controller in study.controllers:
-        known = gains_of(study.kind(controller))
+        known = get_gains(study.kind(controller))
         for name in study.gains_of(controller).choices[0]:
             kind = "string" if isinstance(known[name], Option) else "double"
             column = Column(gain_column(name), kind, known[name].unit, known[name].meaning)

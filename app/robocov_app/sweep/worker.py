@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from robocov.controllers import information_of
+from robocov.controllers import get_information
 from robocov.controllers.teammates import Teammates
-from robocov.controllers.user_modules import provided
+from robocov.controllers.user_modules import provide_modules
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import RobocovError
@@ -131,7 +131,7 @@ def measured(task: Task, environment: Environment) -> tuple[Record, dict[str, fl
     more: dict[str, Any] = {"duration": task.duration, "dt": task.dt}
     more["conditions"] = conditions_of(task.team, task.seed, task.robots)
     spec = RunSpec(environment, *law, team, task.start, task.seed, **more)
-    with provided(spec.source.modules if spec.source else {}):
+    with provide_modules(spec.source.modules if spec.source else {}):
         simulation = spec.simulation()
         telling = Telling(simulation)
 
@@ -159,7 +159,7 @@ class Telling:
         self._simulation = simulation
         rate: float | None = getattr(simulation.conditions, "message_rate", None)
         self._share = 1.0 if rate is None else min(1.0, rate * simulation.dt)
-        self._sharing = information_of(simulation.controller) == "shared map"
+        self._sharing = get_information(simulation.controller) == "shared map"
         self._maps, self._reports = self._known(), self._told()
         self.bytes: float | None = 0.0
 

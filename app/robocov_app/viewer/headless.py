@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pygame
 
-from robocov.controllers import remembers
+from robocov.controllers import has_memory
 from robocov.environment import CircleObstacle
 from robocov.errors import InputError, to_one_line
 from robocov.files.result_folder import ResultFolder
@@ -127,7 +127,7 @@ def _session_of(part: Part, setup: PaneSetup, record: Record, dt: float) -> dict
         said.setdefault("touched", []).append({**times, "robots": [robot]})
     for step, robot in part.placed:
         said.setdefault("placed", []).append({"time_s": (step - part.begin) * dt, "robots": [robot]})
-    known = part.begin == 0 or not remembers(setup.law.made())
+    known = part.begin == 0 or not has_memory(setup.law.made())
     turned = record.steering is not None and bool(record.steering[0].any())
     repeatable = known and not part.touched and not turned
     return {**said, "repeatable": repeatable} if said or not repeatable else {}

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from robocov.controllers import controller_kind, short_name
+from robocov.controllers import get_controller_label, load_controller_class
 from robocov.errors import ParameterError
 from robocov_app.render.fonts import shortened
 from robocov_app.toolkit.command import Commands
@@ -272,9 +272,9 @@ def law_labels(names: Iterable[str], shown: Mapping[str, str]) -> dict[str, str]
     found: dict[str, str] = {}
     for name in dict.fromkeys([*names, *shown]):
         try:
-            label = shown[name] if name in shown else str(controller_kind(name).label)
+            label = shown[name] if name in shown else str(load_controller_class(name).label)
         except ParameterError:  # its file has changed since
-            label = short_name(name)
+            label = get_controller_label(name)
         file = Path(name.rpartition(":")[0]).name
         tried = (label, f"{label} ({file})", f"{label} ({name})")
         found[name] = next(each for each in tried if each not in found.values())

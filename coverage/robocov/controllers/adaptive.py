@@ -9,7 +9,7 @@ import scipy
 
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
-from robocov.controllers.base import Law
+from robocov.controllers.base import BaseController
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.observation import Decision, Observations
@@ -39,7 +39,7 @@ class AdaptiveMemory:
 
 
 @dataclass(frozen=True)
-class Adaptive(Law):
+class Adaptive(BaseController):
     """Lloyd's algorithm with a density that is learned (Schwager, Rus and Slotine, IJRR 28, 2009).
 
     What a robot measures is the density in the place where it is, and nowhere else. Its estimate of it is

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.controllers.base import Law
+from robocov.controllers.base import BaseController
 from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.localization import Estimates, assume_closer_neighbours, estimate_positions
@@ -181,7 +181,7 @@ _LATEST_PLANS: WeakKeyDictionary[GridPlanner, _TeamPlan] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
-class Atlas(Law):
+class Atlas(BaseController):
     """Each robot plans for its whole team on its own discovered map, and goes to its own goal in that plan.
 
     Twice a second every robot scans, and adds what it sees to its own grid (`DiscoveredMap`). Cells where the

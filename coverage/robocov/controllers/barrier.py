@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
+from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
     arrange_in_rows,
     collect_obstacle_points,
@@ -15,6 +15,7 @@ from robocov.controllers.driving import (
     update_returns,
 )
 from robocov.controllers.gains import gain, response_time_gain
+from robocov.controllers.known_cells import cells_choice, compute_known_cells
 from robocov.observation import Decision, Observations, Scanning
 from robocov.potential import compute_separations
 from robocov.team import Team
@@ -39,7 +40,7 @@ class BarrierMemory(Memory):
 
 
 @dataclass(frozen=True)
-class Barrier(Law):
+class Barrier(BaseController):
     """Lloyd's algorithm, filtered by safety barrier certificates (Wang, Ames and Egerstedt 2017).
 
     Two robots that brake as hard as they can must come to rest at the safe distance D_s or before:
@@ -66,19 +67,19 @@ class Barrier(Law):
     label = "LA, safe"
     summary = "Lloyd's algorithm with safety barrier certificates (Wang, Ames and Egerstedt 2017)"
     scanning = Scanning(rays=72, period=0.1)
-    memory = BarrierMemory
+    memory_type = BarrierMemory
 
     safe_gap: float = gain(0.05, "m", "least distance between surfaces: D_s less the radii", high=100.0)
     gamma: float = gain(20.0, "s/m²", "how fast h may fall, as gamma h³", low=1e-3)
     braking: float = gain(0.8, "a_max", "alpha: the part of the acceleration counted on", low=0.05, high=1.0)
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()
-    cells: str = choice_of_cells()
+    cells: str = cells_choice()
 
     def decide(self, seen: Observations, memory: BarrierMemory) -> Decision:
         """Return the forces of the nearest accelerations to Lloyd's that are certified."""
         team = memory.team
-        cells = cells_seen(seen, self.cells, memory.triangulation)
+        cells = compute_known_cells(seen, self.cells, memory.triangulation)
         wanted = compute_approach_velocities(cells.centroid - seen.positions, self.k_prop, team.max_speed)
         wanted = (wanted - seen.velocities) / self.response_time
         chosen, memory = self.certified(seen, memory, wanted)

@@ -10,7 +10,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray, freeze
 from robocov.compiled import kernel
-from robocov.controllers.base import Law, Memory
+from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
     Margins,
     avoid_collisions,
@@ -96,7 +96,7 @@ class BoostingMemory(Memory):
 
 
 @dataclass(frozen=True)
-class Boosting(Law):
+class Boosting(BaseController):
     """Coverage by joint detection, with boosting functions (Sun, Cassandras and Gokbayrak, CDC 2014).
 
     A robot detects an event at x, in line of sight and at a distance d within its sensing range, with the
@@ -134,7 +134,7 @@ class Boosting(Law):
     label = "Boosting"
     summary = "gradient of joint detection in sight, boosted at local optima (Sun and Cassandras 2014)"
     scanning = Scanning(rays=72, period=0.2)
-    memory = BoostingMemory
+    memory_type = BoostingMemory
 
     decay: float = gain(0.1, "1/m", "λ, how fast detection falls with distance", low=1e-3, high=100.0)
     boost: str = choice("phi", ("phi", "p", "neighbours"), "the boosting function")

@@ -13,7 +13,7 @@ from scipy.spatial import Delaunay
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
-from robocov.controllers.base import Law
+from robocov.controllers.base import BaseController
 from robocov.controllers.driving import (
     Margins,
     avoid_collisions,
@@ -44,7 +44,7 @@ class DiffeomorphismMemory:
 
 
 @dataclass(frozen=True)
-class Diffeomorphism(Law):
+class Diffeomorphism(BaseController):
     """Coverage of a non-convex region by way of a convex one (Caicedo-Núñez and Žefran 2008).
 
     A diffeomorphism F takes the free space to the convex region without some points, or slits: the
@@ -88,7 +88,7 @@ class Diffeomorphism(Law):
     response_time: float = response_time_gain()
     environment: Environment | None = field(default=None, repr=False, compare=False)
 
-    def informed(self, environment: Environment) -> Diffeomorphism:
+    def inform(self, environment: Environment) -> Diffeomorphism:
         """Return the same law with the map."""
         return replace(self, environment=environment)
 
@@ -121,7 +121,7 @@ class Diffeomorphism(Law):
 
     def _chart(self, team: Team) -> Chart:
         if self.environment is None:
-            told = "it has not been told the map; informed(environment) was wanted"
+            told = "it has not been told the map; inform(environment) was wanted"
             raise ParameterError(f"controller {self.name!r}: {told}")
         keep = float(team.radius.max()) + self.clearance
         return _cached(self.environment, keep, int(self.lattice), self.shrink)

@@ -5,17 +5,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from typing import Any, ClassVar, TypeAlias
 
-from robocov.controllers.user_modules import fault_of
+from robocov.controllers.user_modules import explain_fault
 from robocov.errors import ParameterError, RobocovError, describe_unknown_name, is_number, quote
 
 Value: TypeAlias = float | str | None
 """Value of a gain: a number, None for no limit, or one of the words of an `Option`."""
 
 
-def value_text(value: Value, *, digits: int = 6, none: str = "none") -> str:
+def format_value(value: Value, *, digits: int = 6, none: str = "none") -> str:
     """Return a value as people write it: a number to so many digits, `none` for no limit.
 
-    >>> value_text(0.30000001), value_text(None), value_text("median")
+    >>> format_value(0.30000001), format_value(None), format_value("median")
     ('0.3', 'none', 'median')
     """
     if value is None:
@@ -36,7 +36,7 @@ class Gain:
     optional: bool = False
     whole: bool = False
 
-    def validated(self, value: object, where: str) -> float | None:
+    def validate(self, value: object, where: str) -> float | None:
         """Return `value` as the gain takes it, or raise a ParameterError that names `where`."""
         if value is None and self.optional:
             return None
@@ -59,7 +59,7 @@ class Option:
     unit: ClassVar[str] = ""
     optional: ClassVar[bool] = False
 
-    def validated(self, value: object, where: str) -> str:
+    def validate(self, value: object, where: str) -> str:
         """Return `value` when it is one of the words, or raise a ParameterError that names `where`."""
         if isinstance(value, str) and value in self.words:
             return value
@@ -78,7 +78,7 @@ def gain(
     >>> @dataclass(frozen=True)
     ... class Mine:
     ...     k: float = gain(1.0, "N/m", "stiffness")
-    >>> gains_of(Mine)["k"].unit
+    >>> get_gains(Mine)["k"].unit
     'N/m'
     """
     known = Gain("", default, unit, low, high, meaning, optional, whole)
@@ -97,7 +97,7 @@ def choice(default: str, words: Sequence[str], meaning: str) -> Any:
     return field(default=default, metadata={"gain": Option("", default, tuple(words), meaning)})
 
 
-def gains_of(controller: Any) -> dict[str, Gain | Option]:
+def get_gains(controller: Any) -> dict[str, Gain | Option]:
     """Return the gains of a controller class or instance by name, in their order of declaration.
 
     One that is no dataclass has none; a plain number of a user's dataclass is a gain of any value.
@@ -115,31 +115,31 @@ def gains_of(controller: Any) -> dict[str, Gain | Option]:
     return found
 
 
-def gain_values(controller: Any) -> dict[str, Value]:
+def get_gain_values(controller: Any) -> dict[str, Value]:
     """Return the values of the gains of a controller instance."""
-    return {name: getattr(controller, name) for name in gains_of(controller)}
+    return {name: getattr(controller, name) for name in get_gains(controller)}
 
 
 def validate_gains(controller: Any) -> None:
     """Check every gain of a controller instance, or raise a ParameterError, from ``__post_init__``."""
     where = getattr(controller, "name", type(controller).__name__)
-    for name, known in gains_of(controller).items():
-        object.__setattr__(controller, name, known.validated(getattr(controller, name), where))
+    for name, known in get_gains(controller).items():
+        object.__setattr__(controller, name, known.validate(getattr(controller, name), where))
 
 
-def with_gains(kind: type[Any], values: Mapping[str, object]) -> Any:
+def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any:
     """Return an instance of the controller class `kind` with the given gains.
 
     A ParameterError tells of an unknown gain (with the nearest name), a value out of range, or a fault in it.
     """
-    known, where = gains_of(kind), getattr(kind, "name", kind.__name__)
+    known, where = get_gains(kind), getattr(kind, "name", kind.__name__)
     for name in values:
         if name not in known:
             nothing = f"{where}.{name}: controller {where!r} has no gains"
             raise ParameterError(
                 f"{where}: {describe_unknown_name('gain', name, known)}" if known else nothing
             )
-    given = {name: known[name].validated(value, where) for name, value in values.items()}
+    given = {name: known[name].validate(value, where) for name, value in values.items()}
     try:
         return kind(**given)
     except RobocovError:
@@ -147,4 +147,4 @@ def with_gains(kind: type[Any], values: Mapping[str, object]) -> Any:
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        raise fault_of(f"controller {where!r} cannot be made", error) from error
+        raise explain_fault(f"controller {where!r} cannot be made", error) from error

@@ -10,7 +10,7 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array
-from robocov.controllers.base import Law
+from robocov.controllers.base import BaseController
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.cost import CoverageCost
@@ -38,7 +38,7 @@ class GeodesicMemory:
 
 
 @dataclass(frozen=True)
-class GeodesicLloyd(Law):
+class GeodesicLloyd(BaseController):
     """Lloyd's algorithm with geodesic Voronoi cells of the known map.
 
     Pimenta et al. (CDC 2008) and Bhattacharya, Ghrist and Kumar (IJRR 33, 2014) descend the cost with the
@@ -70,7 +70,7 @@ class GeodesicLloyd(Law):
     response_time: float = response_time_gain()
     environment: Environment | None = field(default=None, repr=False, compare=False)
 
-    def informed(self, environment: Environment) -> GeodesicLloyd:
+    def inform(self, environment: Environment) -> GeodesicLloyd:
         """Return the same law with the map."""
         return replace(self, environment=environment)
 
@@ -97,7 +97,7 @@ class GeodesicLloyd(Law):
 
     def _plan(self, team: Team) -> Plan:
         if self.environment is None:
-            told = "it has not been told the map; informed(environment) was wanted"
+            told = "it has not been told the map; inform(environment) was wanted"
             raise ParameterError(f"controller {self.name!r}: {told}")
         return _cached(self.environment, float(team.radius.max()) + self.clearance, int(self.lattice))
 

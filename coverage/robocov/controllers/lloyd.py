@@ -4,16 +4,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
+from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import choice, gain, response_time_gain
+from robocov.controllers.known_cells import cells_choice, compute_known_cells
 from robocov.locational_cost.best_points import HEIGHT_HELP, TARGET_HELP, TARGETS, find_targets
 from robocov.observation import Decision, Observations
 from robocov.voronoi import build_disc_limited_polygons, compute_disc_limited_moments
 
 
 @dataclass(frozen=True)
-class Lloyd(Law):
+class Lloyd(BaseController):
     """Lloyd's algorithm (Cortés et al. 2004; section III-B of the paper), called LA there.
 
     Every robot heads for the centroid of its Voronoi cell at full speed, and slows down on the last metres so
@@ -29,12 +30,12 @@ class Lloyd(Law):
 
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()
-    cells: str = choice_of_cells()
+    cells: str = cells_choice()
     target: str = choice("centroid", TARGETS, TARGET_HELP)
     height: float = gain(1.0, "m", HEIGHT_HELP, low=1e-6)
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
-        cells = cells_seen(seen, self.cells, memory.triangulation)
+        cells = compute_known_cells(seen, self.cells, memory.triangulation)
         goals = find_targets(cells, seen.density, self.target, self.height)
         wanted = compute_approach_velocities(goals - seen.positions, self.k_prop, memory.team.max_speed)
         forces = compute_drive_forces(wanted, seen, memory.team, self.response_time)
@@ -43,7 +44,7 @@ class Lloyd(Law):
 
 
 @dataclass(frozen=True)
-class RangeLimited(Law):
+class RangeLimited(BaseController):
     """Lloyd's algorithm with limited-range interactions (Cortés, Martínez and Bullo 2005).
 
     The cell of a robot is the part of its Voronoi cell within half the communication range r, so that
@@ -72,7 +73,7 @@ class RangeLimited(Law):
     response_time: float = response_time_gain()
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
-        cells = cells_seen(seen, "distance", memory.triangulation)
+        cells = compute_known_cells(seen, "distance", memory.triangulation)
         reach = np.inf if self.interaction_range is None else self.interaction_range
         radius = 0.5 * np.minimum(memory.team.communication_range, reach)
         area, offset = compute_disc_limited_moments(cells.edges, radius)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
+from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
     Margins,
     avoid_collisions,
@@ -15,13 +15,13 @@ from robocov.controllers.driving import (
     update_returns,
 )
 from robocov.controllers.gains import choice, gain, response_time_gain
+from robocov.controllers.known_cells import cells_choice, compute_known_cells
 from robocov.locational_cost.best_points import HEIGHT_HELP, TARGET_HELP, TARGETS, find_targets
 from robocov.observation import Decision, Observations, Scanning
-from robocov.observation.neighbours import NO_INDICES
+from robocov.observation.neighbours import NeighbourPositions
 from robocov.observation.region import Region
 from robocov.potential import (
     CONTACT_DISTANCE,
-    HeardPositions,
     PotentialForces,
     PotentialGains,
     compute_potential_forces,
@@ -35,26 +35,17 @@ _NEAREST = 0.05  # metres below which Howard's forces no longer grow; robots tha
 _WALL = 2.0 / (3.0 * np.pi)  # what a wall does by all its rays, in parts of what a point as near does
 _STRETCHED = 0.999  # part of the range of a link beyond which the force that holds it no longer grows
 _STILL = 0.01  # speed in m/s below which a robot has no direction in which it could go on
-_NOT_REPORTED = np.empty((0, 2))
 
 
 def _compute_potential_forces(
     seen: Observations, goals: Array, gains: PotentialGains, *, includes_robots: bool = True
 ) -> PotentialForces:
     """Return the forces of the potentials on all robots, from what they observe."""
-    links = seen.neighbours
-    if not includes_robots:
-        indptr = np.zeros(len(seen.positions) + 1, np.intp)
-    elif links.indptr is None:
-        indptr = NO_INDICES
+    if includes_robots:
+        neighbours = NeighbourPositions.from_graph(seen.neighbours, seen.reported_positions)
     else:
-        indptr = links.indptr
-    heard = HeardPositions(
-        indptr=indptr,
-        indices=NO_INDICES if links.indices is None else links.indices,
-        reported=_NOT_REPORTED if seen.reported_positions is None else seen.reported_positions,
-    )
-    return compute_potential_forces(seen.positions, heard, seen.obstacle_points, goals, gains)
+        neighbours = NeighbourPositions.build_empty(len(seen.positions))
+    return compute_potential_forces(seen.positions, neighbours, seen.obstacle_points, goals, gains)
 
 
 def _close_pairs(seen: Observations, reach: float) -> tuple[IntArray, IntArray, Array, Array]:
@@ -66,7 +57,7 @@ def _close_pairs(seen: Observations, reach: float) -> tuple[IntArray, IntArray, 
 
 
 @dataclass(frozen=True)
-class Rpf(Law):
+class Rpf(BaseController):
     """Repulsive potential field (Howard, Mataric and Sukhatme 2002), equations (23)-(25).
 
     Every robot is pushed away from the neighbours within `rho_0` and from the single closest
@@ -91,7 +82,7 @@ class Rpf(Law):
 
 
 @dataclass(frozen=True)
-class Rapf(Law):
+class Rapf(BaseController):
     """Repulsive and attractive potential field (Renzaglia and Martinelli), equations (23)-(28).
 
     As RPF, but every robot is also drawn to the centroid of its Voronoi cell of the known convex
@@ -114,7 +105,7 @@ class Rapf(Law):
     attraction_limit: float | None = gain(
         2.0, "N", "cap of the attraction; null is the paper's formula", low=1e-6, optional=True
     )
-    cells: str = choice_of_cells()
+    cells: str = cells_choice()
     target: str = choice("centroid", TARGETS, TARGET_HELP)
     height: float = gain(1.0, "m", HEIGHT_HELP, low=1e-6)
 
@@ -122,7 +113,7 @@ class Rapf(Law):
         """Nothing is remembered yet; later, the triangulation from which the next cells start."""
 
     def decide(self, seen: Observations, memory: Mesh | None) -> Decision:
-        cells = cells_seen(seen, self.cells, memory)
+        cells = compute_known_cells(seen, self.cells, memory)
         goals = find_targets(cells, seen.density, self.target, self.height)
         max_attraction = np.inf if self.attraction_limit is None else float(self.attraction_limit)
         gains = PotentialGains(float(self.k_rep), float(self.rho_0), float(self.k_att), max_attraction)
@@ -136,7 +127,7 @@ class Rapf(Law):
 
 
 @dataclass(frozen=True)
-class Howard(Law):
+class Howard(BaseController):
     """Potential field of Howard, Mataric and Sukhatme (DARS 2002).
 
     Every robot is an electric charge among charges: the potential is the sum of k / r over all that the
@@ -187,7 +178,7 @@ def _inverse_square(offset: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Poduri(Law):
+class Poduri(BaseController):
     """Constrained coverage (Poduri and Sukhatme, ICRA 2004): area, with a degree of at least K.
 
     Two robots have a link when they are at most R_c apart. F_cover pushes every linked pair apart with
@@ -284,7 +275,7 @@ def _rank(robot: IntArray, distance: Array) -> IntArray:
 
 
 @dataclass(frozen=True)
-class Dispersion(Law):
+class Dispersion(BaseController):
     """Local dispersion, the anonymous variant (Batalin and Sukhatme 2002, "Spreading out").
 
     Three behaviours, the first that has something to say before the others. *Avoid*: whatever is

@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.controllers.base import Information, Law
+from robocov.controllers.base import BaseController, Information
 from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.route_following import follow_routes
@@ -186,7 +186,7 @@ class SharedMapMemory:
 
 
 @dataclass(frozen=True)
-class SharedMapController(Law):
+class SharedMapController(BaseController):
     """Base class of controllers by which each robot plans for itself and all robots that it hears.
 
     Robots scan and merge their maps with those of the robots that they hear (`DiscoveredMap`). Once in

@@ -11,7 +11,7 @@ import numpy as np
 
 from robocov.arrays import Array, ComplexArray, freeze
 from robocov.compiled import kernel
-from robocov.controllers.base import Law, Memory, cells_seen, choice_of_cells
+from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
     Margins,
     avoid_collisions,
@@ -21,6 +21,7 @@ from robocov.controllers.driving import (
     update_returns,
 )
 from robocov.controllers.gains import gain, response_time_gain
+from robocov.controllers.known_cells import cells_choice, compute_known_cells
 from robocov.observation import Decision, Observations, Scanning, compute_headings
 from robocov.team import Team
 
@@ -86,7 +87,7 @@ class TangentBugMemory(Memory):
 
 
 @dataclass(frozen=True)
-class TangentBug(Law):
+class TangentBug(BaseController):
     """Voronoi coverage of non-convex environments (Breitenmoser et al., ICRA 2010).
 
     The goal of every robot is the centroid of its Voronoi cell of the convex region, as Lloyd's
@@ -115,7 +116,7 @@ class TangentBug(Law):
     label = "LA + TangentBug"
     summary = "Lloyd's algorithm, with TangentBug to go round obstacles (Breitenmoser et al. 2010)"
     scanning = Scanning(rays=120, period=0.1)
-    memory = TangentBugMemory
+    memory_type = TangentBugMemory
 
     clearance: float = gain(0.05, "m", "distance kept from obstacles and robots, rim to rim", high=10.0)
     jump: float = gain(0.5, "m", "depth of a step in the view that is an end of an obstacle", low=0.01)
@@ -123,10 +124,10 @@ class TangentBug(Law):
     moved: float = gain(0.25, "m", "way of a goal given up after which it is tried again", high=1e4)
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
-    cells: str = choice_of_cells()
+    cells: str = cells_choice()
 
     def decide(self, seen: Observations, memory: TangentBugMemory) -> Decision:
-        team, cells = memory.team, cells_seen(seen, self.cells, memory.triangulation)
+        team, cells = memory.team, compute_known_cells(seen, self.cells, memory.triangulation)
         goals, returns, met = cells.centroid, update_returns(seen, memory.returns), memory.met
         points = collect_obstacle_points(seen, returns)
         bugs = memory.bugs or tuple(Bug(Mode.GOAL, 1, position) for position in seen.positions)

@@ -26,22 +26,22 @@ _OURS = str(Path(__file__).parents[1])
 _INSTALLED = frozenset(("site-packages", "dist-packages"))  # folders of packages, which have versions
 
 
-class Module(NamedTuple):
+class ModuleText(NamedTuple):
     """A module that a controller's file imports; a package without ``__init__.py`` has no path."""
 
     path: str
     text: str
 
 
-class Source(NamedTuple):
-    """The file of a controller, its absolute path, and the `own_modules` that it imports, by name."""
+class ControllerSource(NamedTuple):
+    """The file of a controller, its absolute path, and the `find_own_modules` that it imports, by name."""
 
     path: str
     text: str
-    modules: Mapping[str, Module] = {}
+    modules: Mapping[str, ModuleText] = {}
 
 
-def fault_of(where: str, error: BaseException, when: str = "") -> RobocovError:
+def explain_fault(where: str, error: BaseException, when: str = "") -> RobocovError:
     """Describe what went wrong in code that is not ours.
 
     Parameters
@@ -75,7 +75,7 @@ def fault_of(where: str, error: BaseException, when: str = "") -> RobocovError:
     return ControllerEndedError(f"{where}: it ended Python by {what}{at}{notes}{when}")
 
 
-def location_of(function: object) -> str:
+def format_location(function: object) -> str:
     """Return file and line of a function or method of a user, as " (mine.py, line 12)"; empty if unknown."""
     with suppress(Exception):  # it may be any object that can be called
         code = inspect.unwrap(getattr(function, "__func__", function)).__code__  # type: ignore[arg-type]
@@ -83,10 +83,10 @@ def location_of(function: object) -> str:
     return ""
 
 
-def users_fault(error: BaseException) -> RobocovError | None:
+def explain_user_fault(error: BaseException) -> RobocovError | None:
     """Return what tells of an error that came up in a user's file; None where it did elsewhere."""
     theirs = any(frame[0].startswith(_MODULE) for frame in _frames(error))
-    return fault_of("a controller of your own", error) if theirs else None
+    return explain_fault("a controller of your own", error) if theirs else None
 
 
 def _frames(error: BaseException) -> list[tuple[str, str, int]]:
@@ -95,7 +95,7 @@ def _frames(error: BaseException) -> list[tuple[str, str, int]]:
     return [(str(call.f_globals.get("__name__")), call.f_code.co_filename, line) for call, line in calls]
 
 
-def class_in_file(name: str, source: Source | None) -> type[Any]:
+def load_class(name: str, source: ControllerSource | None) -> type[Any]:
     """Return the controller class ``file.py:ClassName``; this runs the file, or its text in `source`."""
     file, _, class_name = name.rpartition(":")
     where = f"controller {quote(name)}"
@@ -111,12 +111,12 @@ def class_in_file(name: str, source: Source | None) -> type[Any]:
     assert spec is not None and spec.loader is not None
     sys.modules[module_name] = module = importlib.util.module_from_spec(spec)
     try:
-        with provided({} if source is None else source.modules):
+        with provide_modules({} if source is None else source.modules):
             spec.loader.exec_module(module)
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        raise fault_of(f"{where}: {file} cannot be run", error) from error
+        raise explain_fault(f"{where}: {file} cannot be run", error) from error
     kind, wrong = vars(module).get(class_name), ""
     if kind is None:
         classes = {key: each for key, each in vars(module).items() if isinstance(each, type)}
@@ -131,14 +131,14 @@ def class_in_file(name: str, source: Source | None) -> type[Any]:
     return kind
 
 
-def own_modules(text: str) -> dict[str, Module]:
+def find_own_modules(text: str) -> dict[str, ModuleText]:
     """Return the modules that a text imports, and those that these import, as far as they are its author's.
 
     They are found on ``sys.path`` without being executed. The standard library, installed packages and
     robocov are left out; so is what cannot be read, and what is imported by a name put together at run time.
     """
     importlib.invalidate_caches()
-    found: dict[str, Module] = {}
+    found: dict[str, ModuleText] = {}
     places: dict[str, list[str] | None] = {}  # where the submodules of what was looked for are
     waiting = list(_imported(text, ""))
     while waiting:
@@ -150,11 +150,11 @@ def own_modules(text: str) -> dict[str, Module]:
                 if spec is None or not _is_own(spec):
                     places[part] = None
                 elif spec.origin is None:
-                    found[part] = Module("", "")
+                    found[part] = ModuleText("", "")
                 elif spec.origin.endswith(".py"):
                     with suppress(OSError, SyntaxError, ValueError):
                         text = importlib.util.decode_source(Path(spec.origin).read_bytes())
-                        found[part] = Module(spec.origin, text)
+                        found[part] = ModuleText(spec.origin, text)
                         package = part if spec.submodule_search_locations else part.rpartition(".")[0]
                         waiting += _imported(text, package)
             where = places[part]
@@ -206,7 +206,7 @@ class _TextLoader(importlib.abc.ExecutionLoader):
 class _TextFinder(importlib.abc.MetaPathFinder):
     """Finds modules by name among texts."""
 
-    def __init__(self, modules: Mapping[str, Module]) -> None:
+    def __init__(self, modules: Mapping[str, ModuleText]) -> None:
         self.modules = modules
 
     def find_spec(self, fullname: str, path: object, target: object = None) -> ModuleSpec | None:
@@ -218,7 +218,7 @@ class _TextFinder(importlib.abc.MetaPathFinder):
 
 
 @contextmanager
-def provided(modules: Mapping[str, Module]) -> Iterator[None]:
+def provide_modules(modules: Mapping[str, ModuleText]) -> Iterator[None]:
     """Have these modules imported from their texts while the context lasts, whatever else has their names."""
     if any(isinstance(each, _TextFinder) and each.modules is modules for each in sys.meta_path):
         yield  # they are already, and are loaded once

@@ -6,7 +6,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
-from robocov.controllers.base import Law, Memory
+from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
     Margins,
     avoid_collisions,
@@ -42,7 +42,7 @@ class VisibilityMemory(Memory):
 
 
 @dataclass(frozen=True)
-class Visibility(Law):
+class Visibility(BaseController):
     """Coverage with visibility sensing constraints (Kantaros, Thanou and Tzes 2015).
 
     The robots maximise the area (weighted by the density) that anybody sees: what lies within its sensing
@@ -71,7 +71,7 @@ class Visibility(Law):
     label = "Visibility"
     summary = "gradient of the area in view, each robot in its own cell (Kantaros, Thanou and Tzes 2015)"
     scanning = Scanning(rays=120, period=0.2)
-    memory = VisibilityMemory
+    memory_type = VisibilityMemory
 
     k_area: float = gain(0.1, "1/s", "wanted speed per metre by which the area in view grows", high=100.0)
     jump: float = gain(0.3, "m", "depth of a step in the view that is a window", low=0.01)

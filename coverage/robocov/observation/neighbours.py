@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.observation.close_pairs import find_pairs_in_range
 
-NO_INDICES: IntArray = np.empty(0, dtype=np.intp)
-"""What kernels take instead of ``indptr`` and ``indices`` of a complete graph."""
+_NO_INDICES: IntArray = np.empty(0, dtype=np.intp)
+_NO_POSITIONS: Array = np.empty((0, 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,3 +114,37 @@ class Neighbours:
         robot, neighbour = self.list_pairs()
         is_kept = working[robot] & working[neighbour]
         return Neighbours.from_pairs(self.count, robot[is_kept], neighbour[is_kept], self.ranges)
+
+
+class NeighbourPositions(NamedTuple):
+    """The neighbours of each robot, and where it knows them to be, in the form that kernels use."""
+
+    indptr: IntArray
+    """(n + 1,) or (0,) ``indices[indptr[i]:indptr[i + 1]]`` are the neighbours of robot i. Empty: all other
+    robots are."""
+    indices: IntArray
+    """(m,)"""
+    positions: Array
+    """(m, 2) or (0, 2) m, in the order of `indices`. Empty: all robots know where the others are."""
+
+    @classmethod
+    def from_graph(cls, neighbours: Neighbours, reported_positions: Array | None) -> NeighbourPositions:
+        """Build the positions from a communication graph.
+
+        Parameters
+        ----------
+        neighbours : Neighbours
+        reported_positions : (m, 2) array or None, m
+            As in `Observations`; ignored if the graph is complete.
+        """
+        if neighbours.indptr is None or neighbours.indices is None:
+            return cls(_NO_INDICES, _NO_INDICES, _NO_POSITIONS)
+        if reported_positions is None:
+            return cls(neighbours.indptr, neighbours.indices, _NO_POSITIONS)
+        positions = np.ascontiguousarray(reported_positions, dtype=np.float64)
+        return cls(neighbours.indptr, neighbours.indices, positions)
+
+    @classmethod
+    def build_empty(cls, robots: int) -> NeighbourPositions:
+        """Build the positions for a number of robots without any neighbours."""
+        return cls(np.zeros(robots + 1, dtype=np.intp), _NO_INDICES, _NO_POSITIONS)

@@ -13,7 +13,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.conditions import Conditions, JoinedRobot
-from robocov.controllers import short_name
+from robocov.controllers import get_controller_label
 from robocov.controllers.gains import Value
 from robocov.drawing import Drawable
 from robocov.environment import Environment
@@ -383,7 +383,7 @@ class Record(Drawable):
             environment=environment,
             team=team,
             controller=document.controller.name,
-            label=short_name(document.controller.name),
+            label=get_controller_label(document.controller.name),
             gains=document.controller.gains,
             start=document.start,
             seed=document.seed,

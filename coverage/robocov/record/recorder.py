@@ -9,8 +9,9 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.conditions import Conditions, JoinedRobot
-from robocov.controllers import Controller, gain_values
+from robocov.controllers import Controller, get_gain_values
 from robocov.controllers.gains import Value
+from robocov.controllers.individual import unwrap_controller
 from robocov.environment import Environment
 from robocov.errors import ParameterError, quote, to_one_line
 from robocov.observation import Snapshot
@@ -56,7 +57,7 @@ class Recorder:
     def __post_init__(self) -> None:
         if self.name is None:
             self.name = self.controller.name
-        self._gains = gain_values(getattr(self.controller, "law", self.controller))
+        self._gains = get_gain_values(unwrap_controller(self.controller))
         for gain, value in self._gains.items():
             if not _is_recordable(value):
                 raise ParameterError(

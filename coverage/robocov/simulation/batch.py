@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
-from robocov.controllers import remembers
-from robocov.controllers.base import Controller, IndividualController
+from robocov.controllers import has_memory
+from robocov.controllers.base import Controller
+from robocov.controllers.individual import IndividualController
 from robocov.environment import Environment, require_environment
 from robocov.errors import ParameterError, StartError, format_count, to_floats
 from robocov.observation import Decision, Observations, Scans, Snapshot, check_forces
@@ -122,7 +123,7 @@ class SimulationBatch:
         self._complete_graphs: list[Neighbours] | None = None
         if np.isinf(self.team.communication_range).all():
             self._complete_graphs = [Neighbours(robots)] * runs
-        self._decides_jointly = robots <= MAX_JOINT_TEAM_SIZE and not remembers(self.controller)
+        self._decides_jointly = robots <= MAX_JOINT_TEAM_SIZE and not has_memory(self.controller)
         self._memories: list[Any] = []
         if self._decides_jointly:
             self._memories = [self._caller.begin(environment.region, self._joint_team, self.time)]

@@ -7,9 +7,14 @@ from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
-from robocov.controllers import CONTROLLERS, informed
-from robocov.controllers.base import Controller, IndividualController, Individually, for_team
-from robocov.controllers.user_modules import fault_of, location_of
+from robocov.controllers import CONTROLLERS, inform_controller
+from robocov.controllers.base import Controller
+from robocov.controllers.individual import (
+    IndividualController,
+    IndividualControllerAdapter,
+    to_team_controller,
+)
+from robocov.controllers.user_modules import explain_fault, format_location
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, quote
 from robocov.observation import Decision, Observations, Scanning, check_decision, copy_decision
@@ -48,7 +53,7 @@ class ControllerCaller:
     def __init__(
         self, controller: Controller | IndividualController, environment: Environment, time: float
     ) -> None:
-        team_controller = for_team(controller)
+        team_controller = to_team_controller(controller)
         if isinstance(team_controller, type) or not isinstance(team_controller, Controller):
             raise ParameterError(
                 "controller: expected a controller, as in Rapf(), with a method decide or force, "
@@ -56,7 +61,9 @@ class ControllerCaller:
             )
         self.controller: Controller = team_controller
         self._is_built_in = type(team_controller) in CONTROLLERS.values()
-        self._informed_controller: Controller = self._call(time, informed, team_controller, environment)
+        self._informed_controller: Controller = self._call(
+            time, inform_controller, team_controller, environment
+        )
         self.scanning: Scanning | None = self._call(time, getattr, team_controller, "scanning", None)
         if not isinstance(self.scanning, Scanning | None):
             raise ParameterError(
@@ -88,7 +95,11 @@ class ControllerCaller:
         if self._is_built_in:
             return check_decision(decide(observations, memory), robots, name, observations.time)
         answer = self._call(observations.time, decide, replace(observations), _copy_memory(memory))
-        source = "" if isinstance(self._informed_controller, Individually) else location_of(decide)
+        source = (
+            ""
+            if isinstance(self._informed_controller, IndividualControllerAdapter)
+            else format_location(decide)
+        )
         decision = check_decision(answer, robots, name, observations.time, source)
         return copy_decision(decision, name, source)
 
@@ -101,7 +112,7 @@ class ControllerCaller:
         except BaseException as error:
             if self._is_built_in:
                 raise
-            raise fault_of(f"controller {self.controller.name!r}", error, f" at {time:.3f} s") from error
+            raise explain_fault(f"controller {self.controller.name!r}", error, f" at {time:.3f} s") from error
 
 
 def _copy_memory(memory: Any) -> Any:

@@ -13,7 +13,8 @@ from robocov.arrays import Array, BoolArray
 from robocov.conditions import Conditions, JoinedRobot
 from robocov.conditions.communication import Inbox
 from robocov.conditions.perception import Perception, ignore_idle_robots
-from robocov.controllers.base import Controller, IndividualController
+from robocov.controllers.base import Controller
+from robocov.controllers.individual import IndividualController
 from robocov.drawing import show
 from robocov.environment import Environment, require_environment
 from robocov.errors import format_count

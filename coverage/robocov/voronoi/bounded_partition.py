@@ -13,9 +13,9 @@ from robocov.density.base import Density
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import InputError, quote
 from robocov.observation import Cells
-from robocov.observation.neighbours import NO_INDICES, Neighbours
+from robocov.observation.neighbours import NeighbourPositions, Neighbours
 from robocov.observation.region import Region
-from robocov.voronoi.clipped_cells import KnownNeighbours, compute_clipped_cells
+from robocov.voronoi.clipped_cells import compute_clipped_cells
 from robocov.voronoi.clipping import CellArrays
 from robocov.voronoi.delaunay import CORNER, Mesh
 from robocov.voronoi.triangulated_cells import compute_triangulated_cells
@@ -23,7 +23,6 @@ from robocov.voronoi.triangulated_cells import compute_triangulated_cells
 _MIN_TRIANGULATED_ROBOTS = 16
 """Team size from which a triangulation is faster than clipping each cell by all other robots."""
 
-_NO_POSITIONS = np.empty((0, 2))
 _NO_EDGES = np.empty((0, 6))
 
 _AnyCells = TypeVar("_AnyCells", bound=Cells)
@@ -100,7 +99,7 @@ def partition(
     if neighbours is None:
         neighbours = Neighbours(len(points))
     check_neighbours(neighbours, reported_positions, len(points))
-    known = _convert_neighbours(neighbours, reported_positions)
+    known = NeighbourPositions.from_graph(neighbours, reported_positions)
     mesh = _create_mesh(len(points), triangulation, is_complete=neighbours.is_complete)
     cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=_NO_EDGES)
     count = _compute_cells(points, region.sides, known, mesh, cells)
@@ -173,16 +172,6 @@ def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
     return cells
 
 
-def _convert_neighbours(neighbours: Neighbours, reported_positions: Array | None) -> KnownNeighbours:
-    """Convert a communication graph, and positions in its order, for the kernels."""
-    if neighbours.indptr is None or neighbours.indices is None:
-        return KnownNeighbours(_NO_POSITIONS, NO_INDICES, NO_INDICES)
-    if reported_positions is None:
-        return KnownNeighbours(_NO_POSITIONS, neighbours.indptr, neighbours.indices)
-    positions = np.ascontiguousarray(reported_positions, dtype=np.float64)
-    return KnownNeighbours(positions, neighbours.indptr, neighbours.indices)
-
-
 def _create_mesh(robots: int, previous: Mesh | None, *, is_complete: bool) -> Mesh:
     """Create the mesh from which the triangulation starts; it has no columns if there is to be none."""
     if not is_complete or robots < _MIN_TRIANGULATED_ROBOTS:
@@ -193,7 +182,7 @@ def _create_mesh(robots: int, previous: Mesh | None, *, is_complete: bool) -> Me
     return np.full((2, size), -1, dtype=np.int32)
 
 
-def _find_edges(points: Array, sides: Array, known: KnownNeighbours, mesh: Mesh, count: int) -> CellEdges:
+def _find_edges(points: Array, sides: Array, known: NeighbourPositions, mesh: Mesh, count: int) -> CellEdges:
     """Compute all cells once more, now with their edges, whose number is known."""
     edges = np.empty((count, 6))
     cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=edges)
@@ -209,7 +198,7 @@ def _find_edges(points: Array, sides: Array, known: KnownNeighbours, mesh: Mesh,
 
 @kernel
 def _compute_cells(
-    points: Array, sides: Array, neighbours: KnownNeighbours, mesh: Mesh, cells: CellArrays
+    points: Array, sides: Array, neighbours: NeighbourPositions, mesh: Mesh, cells: CellArrays
 ) -> int:
     """Compute all cells; return the number of edges, or -1 - i if generator i is not finite.
 

@@ -1,9 +1,8 @@
 """Cells that are clipped by all neighbours of their robots, one robot at a time."""
 
-from typing import NamedTuple
-
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array
 from robocov.compiled import kernel
+from robocov.observation.neighbours import NeighbourPositions
 from robocov.voronoi.clipping import (
     CellArrays,
     Workspace,
@@ -14,19 +13,10 @@ from robocov.voronoi.clipping import (
 )
 
 
-class KnownNeighbours(NamedTuple):
-    """The neighbours of each robot, and where it knows them to be."""
-
-    positions: Array
-    """(m, 2) m, in the order of `indices`. Empty: all robots know where the others are."""
-    indptr: IntArray
-    """(n + 1,) ``indices[indptr[i]:indptr[i + 1]]`` are the neighbours of robot i. Empty: all others are."""
-    indices: IntArray
-    """(m,)"""
-
-
 @kernel
-def compute_clipped_cells(points: Array, sides: Array, neighbours: KnownNeighbours, cells: CellArrays) -> int:
+def compute_clipped_cells(
+    points: Array, sides: Array, neighbours: NeighbourPositions, cells: CellArrays
+) -> int:
     """Compute all cells, each clipped by the bisectors to the neighbours of its robot.
 
     Parameters
@@ -35,7 +25,7 @@ def compute_clipped_cells(points: Array, sides: Array, neighbours: KnownNeighbou
         The generators.
     sides : (k, 5) array
         The region, as `Region.sides`.
-    neighbours : KnownNeighbours
+    neighbours : NeighbourPositions
     cells : CellArrays
         Changed in place.
 
@@ -57,7 +47,9 @@ def compute_clipped_cells(points: Array, sides: Array, neighbours: KnownNeighbou
 
 
 @kernel
-def _add_listed_neighbours(workspace: Workspace, points: Array, neighbours: KnownNeighbours, i: int) -> int:
+def _add_listed_neighbours(
+    workspace: Workspace, points: Array, neighbours: NeighbourPositions, i: int
+) -> int:
     """Add the neighbours of robot i at their known positions; return their number."""
     near = workspace.neighbours
     indices = neighbours.indices

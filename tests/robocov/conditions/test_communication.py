@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from robocov.conditions import LOSS, Conditions
 from robocov.conditions.communication import Inbox, Radio
 from robocov.conditions.random_streams import RandomStream
-from robocov.controllers import CONTROLLERS, Controller, atlas, informed
+from robocov.controllers import CONTROLLERS, Controller, atlas, inform_controller
 from robocov.environment import Environment
 from robocov.errors import InputError
 from robocov.observation import Observations, Scans
@@ -173,7 +173,7 @@ def seen_by(
 
 def made(kind: type) -> Controller:
     """Return a controller, the informed ones with the map."""
-    controller: Controller = informed(kind(), OPEN)
+    controller: Controller = inform_controller(kind(), OPEN)
     return controller
 
 

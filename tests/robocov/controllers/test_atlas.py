@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from robocov.conditions import Conditions, Failure
-from robocov.controllers import Atlas, AtlasShared, Rapf, atlas, information_of, make_controller
+from robocov.controllers import Atlas, AtlasShared, Rapf, atlas, get_information, make_controller
 from robocov.controllers.atlas import MAX_PLANNING_GROUP, AtlasMemory, PlannerState
 from robocov.controllers.teammates import Teammates
 from robocov.cost import CoverageCost
@@ -141,8 +141,8 @@ def test_maps_are_shared_where_it_says_so() -> None:
     assert len(set(unknown[AtlasShared])) == 1
     assert len(set(unknown[Atlas])) > 1
     assert max(unknown[AtlasShared]) < min(unknown[Atlas])
-    assert information_of(Atlas()) == "own"
-    assert information_of(AtlasShared()) == "shared map"
+    assert get_information(Atlas()) == "own"
+    assert get_information(AtlasShared()) == "shared map"
 
 
 @pytest.mark.slow

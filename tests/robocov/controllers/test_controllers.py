@@ -11,19 +11,19 @@ from hypothesis import strategies as st
 
 from robocov.controllers import (
     CONTROLLERS,
-    FLAGSHIP,
+    RECOMMENDED_CONTROLLER,
     Adaptive,
     Boosting,
     Controller,
-    Individually,
+    IndividualControllerAdapter,
     Lloyd,
     OwnView,
     Rapf,
     Rpf,
-    gain_values,
-    gains_of,
-    information_of,
-    informed,
+    get_gain_values,
+    get_gains,
+    get_information,
+    inform_controller,
     make_controller,
 )
 from robocov.controllers.gains import Gain, Option, choice, gain
@@ -64,14 +64,14 @@ COARSE = {
 LARGEST = {"atlas": 12, "atlas-shared": 12, **dict.fromkeys(SHARING, 3)}
 """Teams of laws that plan are small here, as they are slow."""
 ALL = [
-    *(informed(kind(**COARSE.get(name, {})), ROOM) for name, kind in CONTROLLERS.items()),
+    *(inform_controller(kind(**COARSE.get(name, {})), ROOM) for name, kind in CONTROLLERS.items()),
     Adaptive(estimate="gp"),
     *(Boosting(boost=word) for word in ("p", "neighbours")),
     *(Rapf(target=word, height=0.5) for word in ("sensing", "median")),
     Lloyd(target="median"),
     *(Rapf(cells="time", target=word) for word in ("centroid", "median")),
     Lloyd(cells="time"),
-    Individually(Homing()),
+    IndividualControllerAdapter(Homing()),
 ]
 EACH = [
     pytest.param(each, id=each.name, marks=[pytest.mark.slow] if each.name in LARGEST else []) for each in ALL
@@ -121,7 +121,7 @@ def test_a_robot_uses_only_what_it_knows(controller: Controller, seed: int, n: i
         seen = observations(positions, reach, seed + step)
         seen = replace(seen, time=step * 0.2, scans=scans(controller, n, rng))
         telling = np.arange(n) == i
-        if information_of(controller) == "shared map":
+        if get_information(controller) == "shared map":
             telling = connected(seen.neighbours, i)
         changed = with_others_changed(seen, i, telling, reach, rng)
         decisions = controller.decide(seen, one), controller.decide(changed, other)
@@ -129,7 +129,7 @@ def test_a_robot_uses_only_what_it_knows(controller: Controller, seed: int, n: i
             assert before.tobytes() == after.tobytes()
         one, other = decisions[0].memory, decisions[1].memory
         # who comes to be heard by moving may tell of those whom only it heard before
-        if information_of(controller) != "shared map":
+        if get_information(controller) != "shared map":
             positions = positions + rng.uniform(-0.05, 0.05, size=(n, 2))
 
 
@@ -296,7 +296,7 @@ def test_gains_are_validated_by_name_and_range() -> None:
     with pytest.raises(ParameterError, match=r"rapf.k_rep: True"):
         Rapf(k_rep=True)
     with pytest.raises(ParameterError, match=r"mine.k: inf, but a number from 0 to inf was wanted"):
-        Gain("k", 1.0, "", 0.0, math.inf, "").validated(math.inf, "mine")
+        Gain("k", 1.0, "", 0.0, math.inf, "").validate(math.inf, "mine")
 
 
 @pytest.mark.slow
@@ -315,7 +315,7 @@ def test_any_gains_make_a_controller_or_one_clear_line(name: str, gains: dict[st
         assert "\n" not in str(error)
         assert str(error).startswith(name)
     else:
-        values = gain_values(controller)
+        values = get_gain_values(controller)
         assert set(gains) <= set(values) and not any(isinstance(value, int) for value in values.values())
 
 
@@ -324,17 +324,17 @@ def test_every_gain_has_a_unit_a_meaning_and_a_default_in_range() -> None:
         assert kind.summary
         assert kind.label
         declared = {each.name: each.metadata["gain"].unit for each in fields(kind) if "gain" in each.metadata}
-        for known in gains_of(kind).values():
+        for known in get_gains(kind).values():
             assert isinstance(known, Option) or declared[known.name]
             assert known.unit != "1"  # nobody reads it behind a number
             assert known.meaning
-            known.validated(known.default, kind.name)
-    assert FLAGSHIP in CONTROLLERS
+            known.validate(known.default, kind.name)
+    assert RECOMMENDED_CONTROLLER in CONTROLLERS
 
 
 def test_gains_may_be_words() -> None:
     assert make_controller("rapf", {"target": "median"}) == Rapf(target="median")
-    assert gain_values(Rapf())["target"] == "centroid"
+    assert get_gain_values(Rapf())["target"] == "centroid"
     for wrong in ("Median", "", 3, None, True, ["median"]):
         with pytest.raises(ParameterError, match=r"^rapf\.target: .*centroid, "):
             Rapf(target=wrong)  # type: ignore[arg-type]

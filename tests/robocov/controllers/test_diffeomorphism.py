@@ -92,7 +92,7 @@ def test_samples_belong_to_the_nearest_robot_that_is_heard() -> None:
 def test_without_obstacles_it_is_lloyds_algorithm(density: Gaussians | None) -> None:
     """Where F is the identity; cells are sampled, so that centroids agree to a centimetre or two."""
     environment = PENTAGON.with_density(density) if density else PENTAGON
-    law = Diffeomorphism(shrink=1.0, clearance=0.0).informed(environment)
+    law = Diffeomorphism(shrink=1.0, clearance=0.0).inform(environment)
     positions = np.array([[2.0, 2.0], [3.0, 5.0], [8.0, 4.0], [7.0, 1.5]])
     nothing, region = np.full((4, 2), np.nan), environment.region
     seen = Observations(positions, np.zeros((4, 2)), Neighbours(4), nothing, region, density=density)
@@ -119,4 +119,4 @@ def test_what_it_needs_is_told() -> None:
     with pytest.raises(ParameterError, match="'diffeomorphism': it has not been told the map"):
         Diffeomorphism().begin(DOOR.region, team)
     with pytest.raises(ParameterError, match=r"map .door. has no room for robots that keep 5\.1 m"):
-        Diffeomorphism(clearance=5.0).informed(DOOR).begin(DOOR.region, team)
+        Diffeomorphism(clearance=5.0).inform(DOOR).begin(DOOR.region, team)

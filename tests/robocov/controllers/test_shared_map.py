@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from robocov.conditions import Conditions
-from robocov.controllers import CONTROLLERS, Rapf, information_of, make_controller
+from robocov.controllers import CONTROLLERS, Rapf, get_information, make_controller
 from robocov.controllers.frontier_median import FrontierMedian
 from robocov.controllers.greedy_submodular import GreedySubmodular
 from robocov.controllers.shared_map import Circle, Situation, assign_goals, list_circles, update_maps
@@ -103,7 +103,7 @@ def test_who_fails_is_forgotten_and_its_place_taken(name: str) -> None:
 
 
 def test_what_they_go_by() -> None:
-    assert {information_of(CONTROLLERS[name]) for name in LAWS} == {"shared map"}
+    assert {get_information(CONTROLLERS[name]) for name in LAWS} == {"shared map"}
     with pytest.raises(ParameterError, match=r"voronoi-graph.nodes: 3, but a whole number from 16"):
         make_controller("voronoi-graph", {"nodes": 3})
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from robocov.controllers import controller_kind
-from robocov.controllers.user_modules import Module, Source, own_modules, provided
+from robocov.controllers import load_controller_class
+from robocov.controllers.user_modules import ControllerSource, ModuleText, find_own_modules, provide_modules
 
 LAW = """
 from dataclasses import dataclass
@@ -51,23 +51,23 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def test_all_modules_of_the_author_are_found_and_nothing_is_executed(folder: Path) -> None:
-    found = own_modules(LAW)
+    found = find_own_modules(LAW)
     assert list(found) == [
         *("late_one", "plain_b", "plain_b.part"),
         *("tree_a", "tree_a.branch", "tree_a.inner", "tree_a.inner.core", "tree_a.leaf", "tree_a.twig"),
         "unreadable_one",
     ]
-    assert found["tree_a.leaf"] == Module(str(folder / "tree_a" / "leaf.py"), FILES["tree_a/leaf.py"])
-    assert found["plain_b"] == Module("", "")
+    assert found["tree_a.leaf"] == ModuleText(str(folder / "tree_a" / "leaf.py"), FILES["tree_a/leaf.py"])
+    assert found["plain_b"] == ModuleText("", "")
     assert "tree_a" not in sys.modules
-    assert pickle.loads(pickle.dumps(Source("mine.py", LAW, found))).modules == found
+    assert pickle.loads(pickle.dumps(ControllerSource("mine.py", LAW, found))).modules == found
 
 
 def test_installed_packages_are_not_the_authors(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (folder / "site-packages").mkdir()
     (folder / "site-packages" / "installed_c.py").touch()
     monkeypatch.syspath_prepend(str(folder / "site-packages"))
-    assert own_modules("import installed_c") == {}
+    assert find_own_modules("import installed_c") == {}
 
 
 def test_modules_are_imported_from_their_texts_and_leave_no_trace(
@@ -78,13 +78,13 @@ def test_modules_are_imported_from_their_texts_and_leave_no_trace(
         "import json, numpy, robocov, builtins, nothing_of_that_name", "word, TWO = leaf.word, late_two.TWO"
     )
     (folder / "late_two.py").write_text("TWO = 2\n")
-    source = Source("/nowhere/mine.py", text, own_modules(text))
+    source = ControllerSource("/nowhere/mine.py", text, find_own_modules(text))
     monkeypatch.setattr(sys, "path", [path for path in sys.path if path != str(folder)])
     import types
 
     monkeypatch.setitem(sys.modules, "late_two", others := types.ModuleType("late_two"))
-    with provided(source.modules):
-        module = sys.modules[controller_kind("mine.py:Mine", source=source).__module__]
+    with provide_modules(source.modules):
+        module = sys.modules[load_controller_class("mine.py:Mine", source=source).__module__]
         assert (module.word, module.TWO) == ("ü", 2)
         import tree_a.leaf
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from robocov.conditions import Conditions
-from robocov.controllers import Individually, Rapf, Rpf, gain_values, make_controller
+from robocov.controllers import IndividualControllerAdapter, Rapf, Rpf, get_gain_values, make_controller
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, RobocovError
 from robocov.files.writing import replace_file
@@ -39,7 +39,7 @@ def test_load_gives_what_was_saved(record: Record, tmp_path: Path) -> None:
     for name in ARRAYS:
         assert getattr(again, name).tobytes() == getattr(record, name).tobytes()
     assert again.environment == record.environment
-    assert again.gains == gain_values(Rapf(k_rep=0.2, attraction_limit=None))
+    assert again.gains == get_gain_values(Rapf(k_rep=0.2, attraction_limit=None))
     assert again.gains["attraction_limit"] is None and again.gains["target"] == "centroid"
     assert (again.controller, again.label, again.start, again.seed, again.dt) == (
         "rapf",
@@ -106,7 +106,7 @@ def test_the_gains_of_a_law_for_each_robot_are_recorded(empty: Environment) -> N
         def force(self, own: object) -> list[float]:
             return [self.pull, 0.0]
 
-    made = Simulation(empty, Individually(Drift(pull=0.25)), [[2.0, 2.0]]).run(0.1)
+    made = Simulation(empty, IndividualControllerAdapter(Drift(pull=0.25)), [[2.0, 2.0]]).run(0.1)
     assert made.gains == {"pull": 0.25}
 
 

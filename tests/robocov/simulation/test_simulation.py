@@ -315,7 +315,7 @@ class NewsReader(Wild):
     def __init__(self, mass: float = 0.0) -> None:
         super().__init__(np.full((1, 2), mass))
 
-    def informed(self, environment: Environment) -> NewsReader:
+    def inform(self, environment: Environment) -> NewsReader:
         return NewsReader(float(environment.free_masses.sum()))
 
 

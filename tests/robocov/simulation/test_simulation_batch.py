@@ -67,6 +67,29 @@ def test_memory_belongs_to_one_run() -> None:
     assert_equal_records(together, alone)
 
 
+def test_individual_controllers_without_begin_keep_numbers_and_memory_within_a_run() -> None:
+    class Counter:
+        def force(self, own: OwnView) -> list[float]:
+            own.memory = (own.memory or 0) + 1
+            return [0.01 * own.memory, 0.01 * own.number]
+
+    starts = [ROOMS.start().sample(2, seed=seed) for seed in range(2)]
+    batch = SimulationBatch(ROOMS, Counter(), starts)
+    alone = [Simulation(ROOMS, Counter(), positions) for positions in starts]
+    for _ in range(5):
+        batch.step()
+        for simulation in alone:
+            simulation.step()
+    batch.restart(1, starts[1])
+    alone[1] = Simulation(ROOMS, Counter(), starts[1])
+    for _ in range(5):
+        batch.step()
+        for simulation in alone:
+            simulation.step()
+    for run, simulation in enumerate(alone):
+        assert batch.positions[run].tobytes() == simulation.positions.tobytes()
+
+
 def test_a_restarted_run_is_the_same_as_alone() -> None:
     first, second, third = (ROOMS.start().sample(3, seed=seed) for seed in range(3))
     batch = SimulationBatch(ROOMS, Lloyd(), [first, second])

@@ -26,7 +26,7 @@ from voronoi_cases import (
 
 from robocov.arrays import Array
 from robocov.compiled import kernel
-from robocov.controllers import Individually, Lloyd, OwnView, Rapf
+from robocov.controllers import IndividualControllerAdapter, Lloyd, OwnView, Rapf
 from robocov.controllers.base import Controller
 from robocov.environment import Environment, PolygonObstacle
 from robocov.observation.region import Region
@@ -246,7 +246,9 @@ class Home:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("controller", [Rapf(), Lloyd(), Individually(Home())], ids=lambda law: law.name)
+@pytest.mark.parametrize(
+    "controller", [Rapf(), Lloyd(), IndividualControllerAdapter(Home())], ids=lambda law: law.name
+)
 def test_repairs_stay_correct_for_thousands_of_steps(controller: Controller) -> None:
     room = Environment(
         "room",

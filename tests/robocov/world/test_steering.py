@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.conditions import Conditions, Failure, Join
-from robocov.controllers import Atlas, Barrier, Individually, OwnView, Rapf
+from robocov.controllers import Atlas, Barrier, IndividualControllerAdapter, OwnView, Rapf
 from robocov.environment import Environment
 from robocov.errors import ParameterError, StartError
 from robocov.mapfile import load_map
@@ -213,7 +213,7 @@ class Counting:
 def test_a_law_for_one_robot_remembers(empty: Environment) -> None:
     team = Team.homogeneous(2, kinematics="unicycle")
     run = Simulation(empty, Counting(), [[2.0, 2.0], [6.0, 6.0]], team)
-    assert isinstance(run.controller, Individually)
+    assert isinstance(run.controller, IndividualControllerAdapter)
     for _ in range(12):
         run.step()
         _ = run.observe_and_decide(), run.observe_and_decide()

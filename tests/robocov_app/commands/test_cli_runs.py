@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from called import SHORT, answer, complaint
 
-from robocov.controllers import CONTROLLERS, gains_of
+from robocov.controllers import CONTROLLERS, get_gains
 from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.runs import options
@@ -31,7 +31,7 @@ def test_run_saves_everything_and_says_where(tmp_path: Path, capsys: pytest.Capt
     assert len(rows) == 11
     run = json.loads((out / "run.json").read_text())
     assert run["summary"]["mean_distance_m"] == float(rows[-1].split(",")[1])
-    gains = {gain.name: gain.default for gain in gains_of(CONTROLLERS["rapf"]).values()}
+    gains = {gain.name: gain.default for gain in get_gains(CONTROLLERS["rapf"]).values()}
     assert run["controller"] == {"name": "rapf", "gains": gains}
     assert len(Record.load(out)) == 61
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tiny_paper import TINY
 
-from robocov.controllers import gain_values, make_controller
+from robocov.controllers import get_gain_values, make_controller
 from robocov.mapfile import load_map
 from robocov.metrics import CostHistory
 from robocov_app.replication import results, studies
@@ -139,7 +139,7 @@ def test_outcomes_are_joined_by_scenario(study, folder):
     assert half.scenarios == right.scenarios
 
 
-DEFAULTS = gain_values(make_controller("range-limited"))
+DEFAULTS = get_gain_values(make_controller("range-limited"))
 
 
 def grid(*excess: tuple[float, ...]) -> GainOutcomes:

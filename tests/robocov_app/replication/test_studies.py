@@ -5,7 +5,7 @@ import pytest
 import shapely
 from tiny_paper import TINY
 
-from robocov.controllers import CONTROLLERS, gain_values, gains_of, make_controller
+from robocov.controllers import CONTROLLERS, get_gain_values, get_gains, make_controller
 from robocov.environment import CircleObstacle, DiscStart, Environment, PolygonObstacle
 from robocov.errors import StartError
 from robocov.mapfile import list_bundled_maps, load_map
@@ -279,9 +279,9 @@ class TestBeyond:
 
     @pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - {*PAPER, *OURS}))
     def test_every_baseline_has_a_grid_and_its_defaults_are_in_it(self, name):
-        known, usual = gains_of(CONTROLLERS[name]), gain_values(make_controller(name))
+        known, usual = get_gains(CONTROLLERS[name]), get_gain_values(make_controller(name))
         sets = [
-            {**usual, **{gain: known[gain].validated(value, "grid") for gain, value in gains.items()}}
+            {**usual, **{gain: known[gain].validate(value, "grid") for gain, value in gains.items()}}
             for gains in GRIDS[name]
         ]
         assert usual in sets

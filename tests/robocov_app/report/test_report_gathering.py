@@ -10,7 +10,7 @@ import pytest
 from drawn_run import ROOMS, SQUARE
 from reported_results import HOSTILE, saved_comparison, saved_run, walk
 
-from robocov.controllers import CONTROLLERS, gains_of
+from robocov.controllers import CONTROLLERS, get_gains
 from robocov.errors import InputError
 from robocov_app.report.results import FIGURES, gathered, printable
 from robocov_app.sweep.study import Study, StudyMap
@@ -84,7 +84,7 @@ def test_a_sweep_is_its_table(folder) -> None:
     assert (result.kind, len(result.entries), result.wanted, result.missing) == ("sweep", 24, 24, 0)
     assert list(result.maps) == ["yard", "flat"] and result.maps["flat"] == ROOMS
     rapf = [each for each in result.entries if each.controller == "rapf"]
-    assert [name for name, _ in rapf[0].gains] == list(gains_of(CONTROLLERS["rapf"]))
+    assert [name for name, _ in rapf[0].gains] == list(get_gains(CONTROLLERS["rapf"]))
     assert dict(rapf[0].gains)["target"] == "centroid"
     assert {dict(each.gains)["attraction_limit"] for each in rapf} == {2.0, None}
     assert {each.team for each in rapf} == {(("max_speed", 0.5),), (("max_speed", 1.0),)}

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.controllers import Rapf, Rpf, gain_values, gains_of
+from robocov.controllers import Rapf, Rpf, get_gain_values, get_gains
 from robocov.errors import ParameterError
 from robocov_app.sweep.study import Gains, Method, Range, Sampling
 
@@ -29,13 +29,13 @@ def test_lists_are_combined_in_order() -> None:
     tried = [(choice["k_rep"], choice["attraction_limit"]) for choice in gains.choices]
     assert tried == [(0.1, 2.0), (0.1, None), (1.0, 2.0), (1.0, None)]
     assert all(choice["k_att"] == 3.0 and choice["rho_0"] == Rapf().rho_0 for choice in gains.choices)
-    assert all(list(choice) == list(gains_of(Rapf)) for choice in gains.choices)
+    assert all(list(choice) == list(get_gains(Rapf)) for choice in gains.choices)
 
 
 def test_sets_of_gains_are_taken_one_by_one() -> None:
     paper = {"k_rep": 1, "rho_0": 2, "k_att": 3, "attraction_limit": None}
     gains = Gains.of(Rapf, [paper, {}], None)
-    assert gains.choices == (gain_values(Rapf(**paper)), gain_values(Rapf()))
+    assert gains.choices == (get_gain_values(Rapf(**paper)), get_gain_values(Rapf()))
     assert Gains.of(Rapf, gains, None) == gains
 
 

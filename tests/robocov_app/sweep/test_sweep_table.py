@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from swept import small_study, tables
 
-from robocov.controllers import Rapf, gains_of
+from robocov.controllers import Rapf, get_gains
 from robocov.errors import OutputError, RobocovError
 from robocov.metrics.results import read_results
 from robocov_app.cli import main
@@ -54,7 +54,7 @@ def test_the_columns_are_those_of_the_study() -> None:
     study = small_study(max_speed=[0.5, 1], controllers=("rpf", "rapf"), starts=("*",))
     assert [column.name for column in columns_of(study)] == [
         *("map", "controller", "robots", "start", "seed"),
-        *gains_of(Rapf),
+        *get_gains(Rapf),
         "max_speed_m_s",
         "duration_s",
         *("mean_distance_m", "mean_distance_over_run_m", "cost_m3", "uncovered_area_m2", "settled_at_s"),

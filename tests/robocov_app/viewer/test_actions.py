@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import robocov_app.viewer as package
-from robocov.controllers import CONTROLLERS, gains_of
+from robocov.controllers import CONTROLLERS, get_gains
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.command import Command, matching
 from robocov_app.toolkit.input import key_words
@@ -110,7 +110,7 @@ def test_every_button_of_the_panel_that_has_a_name_does_that_action_or_is_the_pa
     shared: Driver, actions: list[Command]
 ) -> None:
     names = {action.name for action in actions}
-    options = {name for law in CONTROLLERS.values() for name in gains_of(law)}
+    options = {name for law in CONTROLLERS.values() for name in get_gains(law)}
     for tab in panel.TABS:
         shared.window.panel.show_tab(tab)
         shared.settle()

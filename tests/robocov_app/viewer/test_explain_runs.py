@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pytest
 from explained_moments import line, run, says_no_nonsense, sums_up, texts
 
-from robocov import Individually, Lloyd, Rapf, Rpf, Simulation, Team, load_map
+from robocov import IndividualControllerAdapter, Lloyd, Rapf, Rpf, Simulation, Team, load_map
 from robocov.controllers import make_controller
 from robocov_app.viewer.explain import REST, explain
 
@@ -77,7 +77,7 @@ class Home:
 
 
 def test_laws_that_tell_no_terms():
-    simulation = Simulation(load_map("square"), Individually(Home()), [[2.0, 3.0], [7.0, 3.0]])
+    simulation = Simulation(load_map("square"), IndividualControllerAdapter(Home()), [[2.0, 3.0], [7.0, 3.0]])
     report = run(simulation, 1.0)[0]
     assert line(report, REST).text.endswith("by its law")
     assert [text for text in texts(report) if re.fullmatch(r"its centroid is \d\.\d m away", text)]

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.controllers import Individually
-from robocov.controllers.gains import Gain, gain, gains_of
+from robocov.controllers import IndividualControllerAdapter
+from robocov.controllers.gains import Gain, gain, get_gains
 from robocov.errors import ParameterError
 from robocov.team import UNITS
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
@@ -223,7 +223,7 @@ def test_gains_of_a_law_of_ones_own():
         def force(self, own):
             return (self.k, self.bias)
 
-    assert Individually(Mine()).name == "Mine"
-    k, bias = gain_parameters(Odd(**gains_of(Mine)))
+    assert IndividualControllerAdapter(Mine()).name == "Mine"
+    k, bias = gain_parameters(Odd(**get_gains(Mine)))
     assert (k.low, k.high) == pytest.approx((1 / 30, 30.0))
     assert (bias.low, bias.high) == (-30.0, 30.0)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pygame
 
-from robocov.controllers import controller_kinds
+from robocov.controllers import list_controller_classes
 from robocov.cost import DEFAULT_LATTICE
 from robocov.environment import Environment
 from robocov_app.editor.model.selection import Change, Selection
@@ -27,7 +27,7 @@ class PlayPresenter(Presenter):
 
     def __init__(self, session: Session, costs: Costs, shown: set[str], folder: Path, title: str) -> None:
         self.tried, self._title = session.environment, title
-        super().__init__(session, costs, shown, folder, title, controller_kinds())
+        super().__init__(session, costs, shown, folder, title, list_controller_classes())
 
     def open_map(self, name: str) -> None:
         if name == self._title:

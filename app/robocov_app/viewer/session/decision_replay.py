@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from robocov.conditions.perception import Perception
-from robocov.controllers import informed
+from robocov.controllers import inform_controller
 from robocov.controllers.base import Controller
 from robocov.environment import Environment
 from robocov.errors import ParameterError
@@ -62,7 +62,7 @@ def _decision(seen: Observations, state: State) -> Decision:
 @lru_cache(maxsize=8)  # as many as there are panes, and some more
 def _controller(setup: PaneSetup) -> Controller | None:
     with suppress(ParameterError):  # what a saved run was made with may be gone
-        return informed(setup.law.made(), setup.solid.static)
+        return inform_controller(setup.law.made(), setup.solid.static)
     return None
 
 

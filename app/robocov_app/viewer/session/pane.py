@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.controllers import remembers
+from robocov.controllers import has_memory
 from robocov.errors import StartError
 from robocov.observation import Snapshot
 from robocov.simulation import Simulation
@@ -75,7 +75,7 @@ class Pane:
     def state(self) -> State:
         simulation = self.simulation
         # who wrote a controller may have it change what it remembers
-        memory = deepcopy(simulation.memory) if remembers(simulation.controller) else None
+        memory = deepcopy(simulation.memory) if has_memory(simulation.controller) else None
         moving = simulation.positions, simulation.velocities
         return State(self.setup, *moving, memory, None, simulation.inbox, simulation.steering)
 
@@ -88,7 +88,7 @@ class Pane:
         old, setup = self.simulation, wanted.setup
         environment, team = setup.solid, setup.team
         # the same controller goes on remembering; one without memory begins anew, as when resumed
-        goes_on = setup.law == self.law and remembers(old.controller)
+        goes_on = setup.law == self.law and has_memory(old.controller)
         controller = None if goes_on else setup.law.made()
         known = attrgetter("law", "limits", "numbers", "failed")
         alike = wanted.positions is None and known(self.setup) == known(setup)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from robocov.controllers import CONTROLLERS, informed, remembers
+from robocov.controllers import CONTROLLERS, has_memory, inform_controller
 from robocov.controllers.base import Controller
 from robocov.controllers.gains import Gain, Option
 from robocov.errors import InputError, ParameterError, RobocovError
@@ -188,9 +188,9 @@ def _memories_of(record: Record, law: ControllerChoice) -> list[Any]:
     found: list[Any] = []
     with suppress(BaseException):  # a user's controller may do anything; a lost one is not there
         controller = law.made()
-        if not remembers(controller):
+        if not has_memory(controller):
             return [None] * len(record)
-        controller = informed(controller, record.environment.static)
+        controller = inform_controller(controller, record.environment.static)
         memory = controller.begin(record.environment.region, record.team)
         for k in range(len(record)):
             found.append(deepcopy(memory))

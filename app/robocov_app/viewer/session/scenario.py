@@ -11,9 +11,9 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from robocov.arrays import Array
 from robocov.conditions import Conditions
-from robocov.controllers import CONTROLLERS, controller_kind, gains_of, make_controller
+from robocov.controllers import CONTROLLERS, get_gains, load_controller_class, make_controller
 from robocov.controllers.base import Controller
-from robocov.controllers.gains import Gain, Option, Value, value_text
+from robocov.controllers.gains import Gain, Option, Value, format_value
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, quote
 from robocov.simulation import DEFAULT_DT
@@ -101,11 +101,11 @@ class ControllerChoice:
 
     @cached_property  # for to look at a controller in a file is to run that file
     def label(self) -> str:
-        return str(controller_kind(self.name).label)
+        return str(load_controller_class(self.name).label)
 
     @cached_property
     def known(self) -> dict[str, Gain | Option]:
-        return gains_of(controller_kind(self.name))
+        return get_gains(load_controller_class(self.name))
 
     def value(self, gain: str) -> Value:
         return self.gains[gain] if gain in self.gains else self.known[gain].default
@@ -131,7 +131,7 @@ class ControllerChoice:
 
 
 def _said(value: Value) -> str:
-    return value_text(value, digits=3, none="no limit")
+    return format_value(value, digits=3, none="no limit")
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,206 @@
+"""Controllers of one robot, which are called for each robot in turn, and their adapter for a team."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.controllers.base import Controller, Information
+from robocov.controllers.user_modules import format_location
+from robocov.errors import ParameterError, quote
+from robocov.observation import Decision, Observations, to_numbers
+from robocov.observation.region import Region
+from robocov.team import Team
+from robocov.voronoi import VoronoiPartition, partition
+from robocov.voronoi.delaunay import Mesh
+
+
+@dataclass(eq=False)
+class OwnView:
+    """Everything that one robot knows."""
+
+    number: int
+    """Its own number, from 0."""
+    position: Array
+    """(2,) m"""
+    velocity: Array
+    """(2,) m/s"""
+    neighbours: Array
+    """(k, 2) m, positions of the robots within communication range, by their last messages."""
+    obstacle_point: Array | None
+    """(2,) m, the closest obstacle or boundary point within sensing range; None if there is none."""
+    region: Region
+    """The known convex outer boundary."""
+    time: float
+    """s"""
+    _cells: VoronoiPartition
+    heading: float | None = None
+    """Heading of a unicycle, rad from +x; None in a team of points."""
+    memory: Any = None
+    """Memory of the robot: what ``begin`` returned, or what was assigned here in the last step."""
+
+    @property
+    def centroid(self) -> Array:
+        """Centroid of the robot's Voronoi cell, (2,) m."""
+        return np.asarray(self._cells.centroid[self.number])
+
+    @property
+    def cell(self) -> Array:
+        """The robot's Voronoi cell, (k, 2) m, counter-clockwise."""
+        return self._cells.polygons[self.number]
+
+
+@runtime_checkable
+class IndividualController(Protocol):
+    """A controller of one robot: one method, from what the robot knows to its force.
+
+    An optional method ``begin(number, team)`` returns the memory of the robot with a number, from 0, at the
+    start. The controller reads it from ``own.memory``, and may assign the next memory there.
+    """
+
+    def force(self, own: OwnView) -> Sequence[float] | Array:
+        """Return the force on the robot, two numbers in newtons."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IndividualMemories:
+    """Memories of the robots under an individual controller."""
+
+    own: Sequence[Any]
+    """Memory of each robot."""
+    triangulation: Mesh | None = None
+    """Triangulation from which the next cells are computed."""
+
+
+class IndividualControllerAdapter:
+    """Controller of a team that calls an individual controller for each robot in turn.
+
+    Parameters
+    ----------
+    controller : IndividualController
+
+    Attributes
+    ----------
+    controller : IndividualController
+    name, label, summary : str
+        Those of the individual controller; by default its class and the first line of its docstring.
+    information : Information
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Homing:
+    ...     stiffness: float = 0.5
+    ...     def force(self, own):
+    ...         return self.stiffness * (own.centroid - own.position)
+    >>> IndividualControllerAdapter(Homing()).name
+    'Homing'
+    """
+
+    def __init__(self, controller: IndividualController) -> None:
+        kind = type(controller)
+        first_line = (kind.__doc__ or "").strip().split("\n")[0]
+        self.controller = controller
+        self.name = str(getattr(controller, "name", kind.__name__))
+        self.label = str(getattr(controller, "label", self.name))
+        self.summary = str(getattr(controller, "summary", first_line))
+        self.information: Information = getattr(controller, "information", "own")
+
+    def begin(self, region: Region, team: Team) -> IndividualMemories:
+        """Return the memories of the robots before their first decision."""
+        begin = getattr(self.controller, "begin", None)
+        if begin is None:
+            return IndividualMemories([None] * len(team))
+        return IndividualMemories([begin(number, team) for number in range(len(team))])
+
+    def decide(self, seen: Observations, memory: IndividualMemories | None) -> Decision:
+        """Call the individual controller for each robot.
+
+        Parameters
+        ----------
+        seen : Observations
+        memory : IndividualMemories or None
+            None if the robots remember nothing.
+
+        Raises
+        ------
+        ParameterError
+            If a force is anything but two finite numbers.
+        """
+        if memory is None:
+            memory = IndividualMemories([None] * len(seen.positions))
+        cells = partition(
+            seen.positions,
+            seen.region,
+            neighbours=seen.neighbours,
+            triangulation=memory.triangulation,
+            reported_positions=seen.reported_positions,
+            density=seen.density,
+        )
+        forces = np.empty_like(seen.positions)
+        memories = []
+        for robot in range(len(forces)):
+            own = _build_view(seen, cells, robot, memory.own[robot])
+            forces[robot] = self._call_controller(own)
+            memories.append(own.memory)
+        return Decision(
+            forces=forces,
+            goals=cells.centroid,
+            cells=cells,
+            memory=IndividualMemories(memories, cells.triangulation),
+        )
+
+    def _call_controller(self, own: OwnView) -> Array:
+        """Return the force on one robot."""
+        try:
+            answer = self.controller.force(own)
+        except BaseException as error:
+            error.add_note(f"robot {own.number + 1}")  # `explain_fault` puts it into the message.
+            raise
+        force = to_numbers(answer)
+        if force is not None and force.shape == (2,) and isfinite(force[0]) and isfinite(force[1]):
+            return force
+        hint = " (is a return statement missing?)" if answer is None else ""
+        raise ParameterError(
+            f"controller {self.name!r}: force(own) returned {quote(answer)}{hint} for robot {own.number + 1} "
+            f"at {own.time:.3f} s{format_location(self.controller.force)}, "
+            "expected two finite numbers in newtons"
+        )
+
+
+def _build_view(seen: Observations, cells: VoronoiPartition, robot: int, memory: Any) -> OwnView:
+    """Return what one robot knows, in arrays that the controller may change."""
+    obstacle_point = None
+    if not np.isnan(seen.obstacle_points[robot, 0]):
+        obstacle_point = seen.obstacle_points[robot].copy()
+    return OwnView(
+        number=robot,
+        position=seen.positions[robot].copy(),
+        velocity=seen.velocities[robot].copy(),
+        neighbours=seen.get_neighbour_positions(robot),
+        obstacle_point=obstacle_point,
+        region=seen.region,
+        time=seen.time,
+        _cells=cells,
+        heading=None if seen.steering is None else float(seen.steering[robot, 0]),
+        memory=memory,
+    )
+
+
+def to_team_controller(controller: Any) -> Any:
+    """Adapt an individual controller to a team; return anything else as it is."""
+    is_individual = isinstance(controller, IndividualController) and not isinstance(controller, type)
+    if is_individual and not hasattr(controller, "decide"):
+        return IndividualControllerAdapter(controller)
+    return controller
+
+
+def unwrap_controller(controller: Controller) -> Controller | IndividualController:
+    """Return the individual controller within an adapter, which has the gains; any other one as it is."""
+    if isinstance(controller, IndividualControllerAdapter):
+        return controller.controller
+    return controller

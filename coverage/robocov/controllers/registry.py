@@ -1,0 +1,200 @@
+"""Controllers by name.
+
+A controller is named in one of three ways: a built-in name (``rapf``), a name that an installed package
+offers in the entry-point group ``robocov.controllers``, or a class in a file (``mine.py:MyController``).
+
+The latter two can only be loaded by running their code. Therefore `load_controller_class` and
+`make_controller` are for names that a user has entered: on a command line, in a study file, in a program. A
+name in a file of results is only looked up in `CONTROLLERS`, and shown by `get_controller_label`.
+"""
+
+import warnings
+from collections.abc import Mapping
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from robocov.controllers.adaptive import Adaptive
+from robocov.controllers.atlas import Atlas, AtlasShared
+from robocov.controllers.barrier import Barrier
+from robocov.controllers.base import Controller
+from robocov.controllers.boosting import Boosting
+from robocov.controllers.diffeomorphism import Diffeomorphism
+from robocov.controllers.frontier_median import FrontierMedian
+from robocov.controllers.gains import instantiate_controller
+from robocov.controllers.geodesic_lloyd import GeodesicLloyd
+from robocov.controllers.greedy_submodular import GreedySubmodular
+from robocov.controllers.individual import to_team_controller
+from robocov.controllers.lloyd import Lloyd, RangeLimited
+from robocov.controllers.repulsion import Dispersion, Howard, Poduri, Rapf, Rpf
+from robocov.controllers.tangentbug import TangentBug
+from robocov.controllers.user_modules import ControllerSource, explain_fault, load_class
+from robocov.controllers.visibility import Visibility
+from robocov.controllers.voronoi_graph import VoronoiGraphCoverage
+from robocov.errors import ParameterError, describe_unknown_name, require_type
+
+CONTROLLERS: dict[str, type[Any]] = {
+    kind.name: kind
+    for kind in (
+        # The default comparison comes first, in this order.
+        *(Rapf, Rpf, Lloyd, Atlas),
+        *(Howard, Poduri, Dispersion, RangeLimited, TangentBug, Barrier, GeodesicLloyd),
+        *(Visibility, Boosting, Adaptive, Diffeomorphism),
+        *(FrontierMedian, GreedySubmodular, VoronoiGraphCoverage, AtlasShared),
+    )
+}
+"""The built-in controllers by name."""
+
+RECOMMENDED_CONTROLLER = "rapf"
+"""The controller that the project recommends."""
+
+_ENTRY_POINT_GROUP = "robocov.controllers"
+_MEMORYLESS: tuple[type[Any], ...] = (Rapf, Rpf, Lloyd, RangeLimited)
+"""Controllers whose memory only saves time at the next decision."""
+
+
+def has_memory(controller: object) -> bool:
+    """Return whether the memory of a controller may change its decisions.
+
+    Parameters
+    ----------
+    controller : Controller
+
+    Examples
+    --------
+    >>> has_memory(Rapf()), has_memory(Atlas())
+    (False, True)
+    """
+    return type(controller) not in _MEMORYLESS
+
+
+def get_controller_label(name: str) -> str:
+    """Return the label of a controller of any name, without loading it.
+
+    Parameters
+    ----------
+    name : str
+
+    Examples
+    --------
+    >>> get_controller_label("rapf"), get_controller_label("somewhere/mine.py:Mine")
+    ('RAPF', 'Mine')
+    """
+    if name in CONTROLLERS:
+        return str(CONTROLLERS[name].label)
+    return name.rpartition(":")[2]
+
+
+def list_controller_classes() -> dict[str, type[Any]]:
+    """List all controller classes by name: those of installed packages, and the built-in ones.
+
+    Returns
+    -------
+    dict of str to type
+        A class of an installed package that cannot be loaded is left out, with a warning.
+    """
+    classes: dict[str, type[Any]] = {}
+    for entry in entry_points(group=_ENTRY_POINT_GROUP):
+        try:
+            classes[entry.name] = _load_entry(entry)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            warnings.warn(str(_explain_entry_fault(entry, error)), stacklevel=2)
+    return {**classes, **CONTROLLERS}
+
+
+def _load_entry(entry: EntryPoint) -> type[Any]:
+    """Load the controller class of an installed package, which runs its code."""
+    if entry.name in CONTROLLERS:
+        raise ParameterError("expected another name than that of a built-in controller")
+    return _add_names(entry.load(), entry.name)
+
+
+def _explain_entry_fault(entry: EntryPoint, error: BaseException) -> Exception:
+    """Return the error that explains why a controller of an installed package cannot be loaded."""
+    return explain_fault(f"controller {entry.name!r} of entry point {entry.value!r} cannot be loaded", error)
+
+
+def _add_names(kind: type[Any], name: str) -> type[Any]:
+    """Give a class the name, label and summary that it does not define itself."""
+    summary = (kind.__doc__ or "").strip().split("\n")[0]
+    defaults = {"name": name, "label": kind.__name__, "summary": summary}
+    for attribute, default in defaults.items():
+        if not hasattr(kind, attribute):
+            setattr(kind, attribute, default)
+    return kind
+
+
+def load_controller_class(name: str, *, source: ControllerSource | None = None) -> type[Any]:
+    """Load a controller class; code outside robocov is run.
+
+    Parameters
+    ----------
+    name : str
+        A built-in name, a name that an installed package offers, or ``file.py:ClassName``.
+    source : ControllerSource or None
+        Text of the file, and of the modules that it imports, which then need not exist.
+
+    Returns
+    -------
+    type
+
+    Raises
+    ------
+    ParameterError
+        If there is no such controller, with the most similar name; or if its code cannot be run.
+
+    Examples
+    --------
+    >>> load_controller_class("rapf").label
+    'RAPF'
+    """
+    require_type("controller", name, str, "a name, as in 'rapf' or 'mine.py:MyController'")
+    if ".py:" in name or name.endswith(".py"):
+        return _add_names(load_class(name, source), name.rpartition(":")[2])
+    if name in CONTROLLERS:
+        return CONTROLLERS[name]
+    # Only the package that offers the name is loaded. If several do, the last one counts.
+    entries = [entry for entry in entry_points(group=_ENTRY_POINT_GROUP) if entry.name == name]
+    if not entries:
+        raise ParameterError(describe_unknown_name("controller", name, list_controller_classes()))
+    entry = entries[-1]
+    try:
+        return _load_entry(entry)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise _explain_entry_fault(entry, error) from error
+
+
+def make_controller(
+    name: str, gains: Mapping[str, object] | None = None, *, source: ControllerSource | None = None
+) -> Controller:
+    """Make a controller by name; code outside robocov is run.
+
+    Parameters
+    ----------
+    name : str
+        As for `load_controller_class`.
+    gains : mapping of str to object, or None
+        Values of gains; all others have their defaults.
+    source : ControllerSource or None
+        As for `load_controller_class`.
+
+    Returns
+    -------
+    Controller
+
+    Raises
+    ------
+    ParameterError
+        If there is no such controller or gain, with the most similar name, or a value is out of range.
+
+    Examples
+    --------
+    >>> make_controller("rapf", {"k_rep": 0.3}).k_rep
+    0.3
+    """
+    kind = load_controller_class(name, source=source)
+    controller: Controller = to_team_controller(instantiate_controller(kind, gains or {}))
+    return controller
