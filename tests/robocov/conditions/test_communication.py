@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
+from math import floor
 
 import numpy as np
 import pytest
@@ -109,6 +111,22 @@ def test_a_delay_of_whole_steps_is_that_many_and_silence_as_well(delay: float, d
         inbox = radio.exchange_messages(inbox, step, places, places, working)
         heard.append(len(radio.read_reports(inbox, step, working)[1]) > 0)
     assert np.flatnonzero(heard).tolist() == list(range(steps, steps + 4))
+
+
+@pytest.mark.parametrize(("dt", "rate"), [("0.03", 30), ("0.03", 15), ("0.1", 4)])
+def test_messages_are_sent_whenever_a_period_has_passed(dt: str, rate: int) -> None:
+    """Also where 30 * (0.03 * 30) is less than 27 by rounding."""
+    radio = Radio(Conditions(message_rate=rate), np.full(2, np.inf), float(dt))
+    positions = np.array([[0.0, 0.0], [1.0, 0.0]])
+    working = np.ones(2, dtype=bool)
+    inbox = Inbox.create_empty(2)
+    sent_steps = []
+    for step in range(100):
+        inbox = radio.exchange_messages(inbox, step, positions, positions, working)
+        if inbox.sent[0, 1] == step:
+            sent_steps.append(step)
+    messages = [floor(Fraction(dt) * rate * step) for step in range(-1, 100)]
+    assert sent_steps == [step for step in range(100) if messages[step + 1] > messages[step]]
 
 
 def test_an_inbox_is_replaced_and_never_changed() -> None:

@@ -62,6 +62,15 @@ def test_the_gradient_is_that_of_the_value(seed: int) -> None:
         assert slope == pytest.approx(result.gradient[i, axis], abs=1e-4)
 
 
+def test_of_robots_that_arrive_together_the_fastest_owns_the_site() -> None:
+    """Robot 0 needs 0.5 s for 0.25 m, robot 1 needs 0.5 s for 0.5 m."""
+    site = ROOM.points[16 * 32 + 12]
+    result = ROOM([site - [0.25, 0.0], site + [0.5, 0.0]], speeds=np.array([0.5, 1.0]))
+    assert result.owner[16 * 32 + 12] == 1
+    assert result.distances[16 * 32 + 12] == 0.5
+    assert result.times[16 * 32 + 12] == 0.5
+
+
 def test_a_fast_robot_takes_over_what_is_nearer_to_a_slow_one() -> None:
     robots = np.array([[0.4, 0.5], [0.6, 0.5]])
     result = ROOM(robots, speeds=np.array([0.1, 1.0]))

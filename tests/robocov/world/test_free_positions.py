@@ -12,7 +12,7 @@ from robocov.environment import CircleObstacle, Environment
 from robocov.errors import StartError
 from robocov.simulation import Simulation
 from robocov.team import Team
-from robocov.world.free_positions import relocate_robots
+from robocov.world.free_positions import find_free_position, relocate_robots
 
 SQUARE = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
 EMPTY = Environment("empty", SQUARE)
@@ -68,6 +68,18 @@ def test_where_there_is_no_room_a_robot_is_named():
         relocate_robots(EMPTY, np.ones((2, 2)), Team(**_radii([0.1, 5.0])))
     with pytest.raises(StartError, match="have no room next to each other"):
         relocate_robots(EMPTY, np.full((40, 2), 4.0), Team.homogeneous(40, radius=1.0))
+
+
+@pytest.mark.parametrize(("radius", "other_radius"), [(0.1, 0.5), (0.5, 0.1)])
+def test_a_robot_that_joins_keeps_clear_of_robots_of_another_size(radius, other_radius):
+    others = np.array([[4.0, 4.0]])
+    radii = np.array([other_radius])
+    expected_distance = radius + other_radius
+    too_close = (4.0 + expected_distance - 0.05, 4.0)
+    x, y = find_free_position(EMPTY, radius, others, too_close, radii)
+    assert expected_distance <= np.hypot(x - 4.0, y - 4.0) < expected_distance + 0.01
+    far_enough = (4.0 + expected_distance + 0.01, 4.0)
+    assert find_free_position(EMPTY, radius, others, far_enough, radii) == far_enough
 
 
 def _radii(radii):

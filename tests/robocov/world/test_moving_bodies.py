@@ -14,6 +14,7 @@ from robocov.environment import CircleObstacle, Environment, ObstaclePath, Polyg
 from robocov.errors import StartError
 from robocov.metrics import MAX_RATE_WITH_MOVING_OBSTACLES_HZ, compute_clearances, compute_cost_history
 from robocov.simulation import Simulation, TeamState
+from robocov.world import MAX_PENETRATION
 
 
 def box(x: float, y: float, width: float, height: float, path: ObstaclePath | None = None) -> PolygonObstacle:
@@ -70,6 +71,19 @@ def test_nobody_is_pushed_into_a_wall_or_through_one(
             assert side.contains(shapely.Point(place))
             assert side.boundary.distance(shapely.Point(place)) > 0.1 - 3e-3
     assert np.isfinite(one.velocities).all()
+
+
+@pytest.mark.parametrize("speed", [0.5, 2.0])
+def test_a_robot_that_is_pushed_into_a_corner_stays_in_front_of_both_walls(speed: float) -> None:
+    route = ObstaclePath(((2.0, 2.0), (3.9, 3.9)), speed)
+    corner = Environment(
+        "corner", ((0, 0), (4, 0), (4, 4), (0, 4)), (CircleObstacle((2, 2), 0.4, path=route),)
+    )
+    simulation = Simulation(corner, Rapf(), [[2.9, 2.9]])
+    for _ in range(int(3.0 / speed * 60)):
+        simulation.step(forces=np.zeros((1, 2)))
+        assert simulation.positions.max() <= 3.9 + MAX_PENETRATION
+    assert simulation.positions.max() > 3.89
 
 
 def test_who_was_run_over_comes_out_again() -> None:
