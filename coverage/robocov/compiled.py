@@ -78,6 +78,27 @@ def kernel(function: _Function) -> _Function:
     return Kernel(function)  # type: ignore[return-value]
 
 
+def inlined_kernel(function: _Function) -> _Function:
+    """Compile a function as a part of each kernel that calls it.
+
+    For short functions in inner loops: a call counts the references to all arrays that it passes, which takes
+    longer than some arithmetic. Longer kernels take longer to compile.
+
+    Parameters
+    ----------
+    function : callable
+        As `kernel` takes it.
+
+    Returns
+    -------
+    callable
+        A `Kernel`, or the function itself if the compiler is disabled.
+    """
+    if not IS_COMPILER_ENABLED:
+        return function
+    return Kernel(function, is_inlined=True)  # type: ignore[return-value]
+
+
 class Kernel:
     """A function that is compiled when it is first called.
 
@@ -87,12 +108,15 @@ class Kernel:
         The function in Python.
     name : str
         Its module and name.
+    is_inlined : bool
+        Whether it becomes part of the kernels that call it.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], *, is_inlined: bool = False) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
         self.name = f"{function.__module__}.{function.__qualname__}"
+        self.is_inlined = is_inlined
         self._dispatcher: Any = None
         self._is_cached = False
         _kernels.add(self)
@@ -127,8 +151,22 @@ class Kernel:
         with _lock:
             if self._dispatcher is None or (self._is_cached and not _is_cache_usable):
                 self._is_cached = _is_cache_usable and cache_folder() is not None
-                self._dispatcher = _build_dispatcher(self.py_func, is_cached=self._is_cached)
+                self._dispatcher = self._build_dispatcher()
             return self._dispatcher
+
+    def _build_dispatcher(self) -> Any:
+        numba = import_numba()
+        options = {"error_model": "numpy", "forceinline": self.is_inlined}
+        # A cache finds its folder when the dispatcher is built; the setting is numba's own again afterwards.
+        previous = numba.config.CACHE_DIR
+        try:
+            if self._is_cached:
+                numba.config.CACHE_DIR = str(cache_folder())
+                with suppress(RuntimeError):  # for functions that are in no file, such as those of an example
+                    return numba.njit(self.py_func, cache=True, **options)
+            return numba.njit(self.py_func, **options)
+        finally:
+            numba.config.CACHE_DIR = previous
 
 
 def interpret_kernels(must_interpret: Callable[[str], bool] | None) -> None:
@@ -151,20 +189,6 @@ def is_interpreting() -> bool:
 def list_compiled_kernels() -> list[str]:
     """Return the names of the kernels that this process has compiled, or loaded from the cache."""
     return sorted(each.name for each in _kernels if each.is_compiled)
-
-
-def _build_dispatcher(function: Callable[..., Any], *, is_cached: bool) -> Any:
-    numba = import_numba()
-    # A cache finds its folder when the dispatcher is built; the setting is numba's own again afterwards.
-    previous = numba.config.CACHE_DIR
-    try:
-        if is_cached:
-            numba.config.CACHE_DIR = str(cache_folder())
-            with suppress(RuntimeError):  # for functions that are in no file, such as those of an example
-                return numba.njit(function, cache=True, error_model="numpy")
-        return numba.njit(function, error_model="numpy")
-    finally:
-        numba.config.CACHE_DIR = previous
 
 
 def _disable_cache() -> None:

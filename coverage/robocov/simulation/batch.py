@@ -123,6 +123,7 @@ class SimulationBatch:
         self._complete_graphs: list[Neighbours] | None = None
         if np.isinf(self.team.communication_range).all():
             self._complete_graphs = [Neighbours(robots)] * runs
+            self._complete_joint_graph = Neighbours.combine(self._complete_graphs)
         self._decides_jointly = robots <= MAX_JOINT_TEAM_SIZE and not has_memory(self.controller)
         self._memories: list[Any] = []
         if self._decides_jointly:
@@ -216,7 +217,7 @@ class SimulationBatch:
                 sensor=self.sensor,
                 environment=self.environment,
                 team=self._joint_team,
-                neighbours=Neighbours.combine(self._get_graphs()),
+                neighbours=self._get_joint_graph(),
                 time=self.time,
                 scanning=scanning if is_scan_due(scanning, self._steps, self.dt) else None,
             )
@@ -258,6 +259,12 @@ class SimulationBatch:
                 Neighbours.from_ranges(self._world.positions[rows], ranges) for rows in self._rows
             ]
         return self._graphs
+
+    def _get_joint_graph(self) -> Neighbours:
+        """Return the communication graph of all robots, which links only those of the same run."""
+        if self._complete_graphs is not None:
+            return self._complete_joint_graph
+        return Neighbours.combine(self._get_graphs())
 
     def _observe_and_decide(self) -> _BatchDecision:
         """Let all robots observe and the controller decide, once in each step."""

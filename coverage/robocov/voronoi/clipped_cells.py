@@ -1,7 +1,7 @@
 """Cells that are clipped by all neighbours of their robots, one robot at a time."""
 
 from robocov.arrays import Array
-from robocov.compiled import kernel
+from robocov.compiled import inlined_kernel, kernel
 from robocov.observation.neighbours import NeighbourPositions
 from robocov.voronoi.clipping import (
     CellArrays,
@@ -46,7 +46,7 @@ def compute_clipped_cells(
     return total
 
 
-@kernel
+@inlined_kernel
 def _add_listed_neighbours(
     workspace: Workspace, points: Array, neighbours: NeighbourPositions, i: int
 ) -> int:
@@ -67,7 +67,7 @@ def _add_listed_neighbours(
     return count
 
 
-@kernel
+@inlined_kernel
 def _add_all_robots(workspace: Workspace, points: Array, i: int) -> int:
     """Add all robots as neighbours of robot i; return their number."""
     near = workspace.neighbours

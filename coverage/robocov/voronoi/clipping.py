@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.compiled import kernel
+from robocov.compiled import inlined_kernel, kernel
 from robocov.density.cell_edges import REGION
 
 X = 0
@@ -69,7 +69,7 @@ def create_workspace(robots: int, sides: int) -> Workspace:
     return Workspace(np.empty((2, sides + robots + 2, 4)), np.empty((robots, 4)))
 
 
-@kernel
+@inlined_kernel
 def add_neighbour(neighbours: Array, count: int, dx: float, dy: float, robot: int) -> int:
     """Add a neighbour that may bound a cell to those of a workspace; return their new number.
 
@@ -82,7 +82,7 @@ def add_neighbour(neighbours: Array, count: int, dx: float, dy: float, robot: in
     return count + 1 if neighbours[count, SQUARE] > 0.0 else count
 
 
-@kernel
+@inlined_kernel
 def clip_cell(workspace: Workspace, neighbours: int, points: Array, sides: Array, i: int) -> CellPolygon:
     """Cut the region by the bisectors between robot i and its neighbours.
 
@@ -123,7 +123,7 @@ def clip_cell(workspace: Workspace, neighbours: int, points: Array, sides: Array
     return CellPolygon(ring, count, 0)
 
 
-@kernel
+@inlined_kernel
 def _compute_max_square(rings: Array, ring: int, count: int) -> float:
     """Return the square of twice the distance from the generator to the farthest vertex, m²."""
     max_square = 0.0
@@ -134,7 +134,7 @@ def _compute_max_square(rings: Array, ring: int, count: int) -> float:
     return max_square
 
 
-@kernel
+@inlined_kernel
 def _move_nearest(near: Array, turn: int, count: int) -> None:
     """Move the nearest neighbour from row `turn` on to that row."""
     best = turn
@@ -145,7 +145,7 @@ def _move_nearest(near: Array, turn: int, count: int) -> None:
         near[turn, column], near[best, column] = near[best, column], near[turn, column]
 
 
-@kernel
+@inlined_kernel
 def _cut(rings: Array, old: int, count: int, near: Array, turn: int) -> int:
     """Write the part of a polygon on the generator's side of a bisector to the other ring.
 
@@ -188,7 +188,7 @@ def _cut(rings: Array, old: int, count: int, near: Array, turn: int) -> int:
     return size
 
 
-@kernel
+@inlined_kernel
 def _compute_excess(rings: Array, ring: int, count: int, near: Array, turn: int) -> int:
     """Compute the excess of each vertex over a bisector; return the vertex farthest beyond it, or -1."""
     dx = near[turn, DX]
@@ -205,7 +205,7 @@ def _compute_excess(rings: Array, ring: int, count: int, near: Array, turn: int)
     return worst
 
 
-@kernel
+@inlined_kernel
 def _add_crossing(rings: Array, old: int, size: int, inner: int, outer: int, beyond: float) -> None:
     """Write the intersection of an edge with the bisector as vertex `size` of the other ring."""
     inner_excess = rings[old, inner, _EXCESS]
@@ -216,7 +216,7 @@ def _add_crossing(rings: Array, old: int, size: int, inner: int, outer: int, bey
     rings[1 - old, size, BEYOND] = beyond
 
 
-@kernel
+@inlined_kernel
 def write_cell(
     workspace: Workspace, polygon: CellPolygon, points: Array, i: int, cells: CellArrays, total: int
 ) -> int:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocov.arrays import Array, IntArray
-from robocov.compiled import kernel
+from robocov.compiled import inlined_kernel, kernel
 
 Mesh: TypeAlias = NDArray[np.int32]
 """Corners and twins of the half-edges of a triangulation of n points, (2, 8 n + 4)."""
@@ -60,13 +60,13 @@ def update_triangulation(mesh: Mesh, points: Array, cotangents: Array, stack: In
     return _build(mesh, points, cotangents, stack)
 
 
-@kernel
+@inlined_kernel
 def get_next(h: int) -> int:
     """Return the half-edge that follows h in its triangle."""
     return h + 1 if h & 3 < 2 else h - 2
 
 
-@kernel
+@inlined_kernel
 def get_previous(h: int) -> int:
     """Return the half-edge of the same triangle that ends where h begins."""
     return h - 1 if h & 3 else h + 2
@@ -127,7 +127,7 @@ def _split_triangle(mesh: Mesh, triangle: int, new: int, i: int) -> None:
     _link(mesh, new + 5, triangle + 2)
 
 
-@kernel
+@inlined_kernel
 def _link(mesh: Mesh, h: int, twin: int) -> None:
     """Make two half-edges each other's twins; -1 is none."""
     mesh[TWIN, h] = twin
@@ -135,7 +135,7 @@ def _link(mesh: Mesh, h: int, twin: int) -> None:
         mesh[TWIN, twin] = h
 
 
-@kernel
+@inlined_kernel
 def _compute_all_cotangents(mesh: Mesh, points: Array, cotangents: Array) -> bool:
     """Compute the cotangents in all triangles; return whether all are upright."""
     is_upright = True
@@ -144,7 +144,7 @@ def _compute_all_cotangents(mesh: Mesh, points: Array, cotangents: Array) -> boo
     return is_upright
 
 
-@kernel
+@inlined_kernel
 def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, h: int) -> bool:
     """Compute the cotangents in the triangle whose first half-edge is h; return whether it is upright.
 
@@ -166,7 +166,7 @@ def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, h: int) ->
     return is_upright
 
 
-@kernel
+@inlined_kernel
 def _must_flip(mesh: Mesh, cotangents: Array, h: int) -> bool:
     """Return whether the edge of a half-edge with a twin is not Delaunay, or its angles are undefined."""
     one = cotangents[h]
@@ -194,7 +194,7 @@ def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, tr
     return -1
 
 
-@kernel
+@inlined_kernel
 def _flip_from(
     mesh: Mesh, points: Array, cotangents: Array, stack: IntArray, h: int, flips: int
 ) -> tuple[int, bool]:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.compiled import kernel
+from robocov.compiled import inlined_kernel, kernel
 from robocov.voronoi.clipping import (
     BEYOND,
     DX,
@@ -144,7 +144,7 @@ def _compute_area(sides: Array) -> float:
     return area
 
 
-@kernel
+@inlined_kernel
 def _find_cell(
     workspace: Workspace, triangulation: Triangulation, points: Array, sides: Array, i: int
 ) -> CellPolygon:
@@ -160,7 +160,7 @@ def _find_cell(
     return clip_cell(workspace, fan.neighbours, points, sides, i)
 
 
-@kernel
+@inlined_kernel
 def _walk_around(
     workspace: Workspace, triangulation: Triangulation, points: Array, i: int, begin: int
 ) -> _Fan:
