@@ -76,7 +76,7 @@ def gains() -> str:
         text += "\n| gain | meaning | default | unit | range |\n|---|---|---|---|---|\n" if rows else ""
         for gain in rows:
             if isinstance(gain, Option):
-                span = ", ".join(gain.words)
+                span = ", ".join(gain.choices)
             else:
                 span = f"{gain.low:g} to {gain.high:g}{', or null' * gain.optional}"
             default = format_value(gain.default, none="null")

@@ -333,7 +333,7 @@ def require_number(
     if not is_number(value, kind) or not minimum <= value <= maximum:
         description = "a whole number" if whole else "a number"
         expected = f"{description} from {minimum:g} to {maximum:g} {unit}".rstrip()
-        raise ParameterError(f"{name}: {quote(value)}, but {expected} was wanted")
+        raise ParameterError(f"{name}: expected {expected}, got {quote(value)}")
     return float(value)
 
 
@@ -367,7 +367,7 @@ def to_floats(
     array([[1., 2.]])
     >>> to_floats("starts", "abc", "[x, y] of each robot")
     Traceback (most recent call last):
-    robocov.errors.ParameterError: starts: 'abc', but [x, y] of each robot was wanted
+    robocov.errors.ParameterError: starts: expected [x, y] of each robot, got 'abc'
     """
     # Imported only now, because `robocov bench` limits the number of threads before numpy is loaded.
     import numpy as np
@@ -375,7 +375,7 @@ def to_floats(
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        raise error_type(f"{name}: {quote(values)}, but {expected} was wanted") from None
+        raise error_type(f"{name}: expected {expected}, got {quote(values)}") from None
 
 
 def require_type(name: str, value: object, kind: type, expected: str) -> None:
@@ -396,7 +396,7 @@ def require_type(name: str, value: object, kind: type, expected: str) -> None:
         If the value has another type.
     """
     if not isinstance(value, kind):
-        raise ParameterError(f"{name}: {quote(value)}, but {expected} was wanted")
+        raise ParameterError(f"{name}: expected {expected}, got {quote(value)}")
 
 
 def summarize_names(names: Sequence[str]) -> str:

@@ -79,14 +79,17 @@ def test_a_study_takes_lists_of_words(study: Path) -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ('target = ["centroid", "mediam"]', r"gains\.rapf\.target\[1\]: unknown word 'mediam': did you mean"),
-        ("target = 3", r"gains\.rapf\.target: 3\.0, but one of centroid, sensing, median was wanted"),
+        (
+            'target = ["centroid", "mediam"]',
+            r"gains\.rapf\.target\[1\]: unknown choice 'mediam': did you mean",
+        ),
+        ("target = 3", r"gains\.rapf\.target: expected one of centroid, sensing, median, got 3\.0"),
         ('target = ["median", "median"]', r"gains\.rapf\.target\[1\]: 'median' is given already at"),
         (
             "target = {low = 0, high = 1}",
             r"gains\.rapf\.target: a range, but one of centroid, sensing, median",
         ),
-        ('target = "null"', r"gains\.rapf\.target: unknown word 'null'"),
+        ('target = "null"', r"gains\.rapf\.target: unknown choice 'null'"),
     ],
 )
 def test_a_study_with_a_wrong_word_is_told_where(study: Path, wrong: str, message: str) -> None:
@@ -167,7 +170,7 @@ def test_laws_of_the_window_say_words() -> None:
     )
     assert after.words_since(before) == "attraction_limit = no limit, target = median"
     assert after.words == "RAPF, target median, attraction_limit no limit"
-    with pytest.raises(ParameterError, match="unknown word 'mediam'"):
+    with pytest.raises(ParameterError, match="unknown choice 'mediam'"):
         before.with_gain("target", "mediam")
 
 

@@ -40,7 +40,7 @@ def command(options: Arguments) -> None:
         for gain in gains:
             default = format_value(gain.default, none="null")
             if isinstance(gain, Option):
-                span = " | ".join(gain.words)
+                span = " | ".join(gain.choices)
             else:
                 span = f"{gain.low:g} to {gain.high:g}{', or null' if gain.optional else ''}"
             cells = ("   ", gain.name, f"{default} {gain.unit}", span, gain.meaning)
@@ -53,7 +53,7 @@ def command(options: Arguments) -> None:
 def _told(gain: Gain | Option) -> dict[str, Any]:
     told: dict[str, Any] = {"name": gain.name, "default": gain.default, "unit": gain.unit}
     if isinstance(gain, Option):
-        told["words"] = list(gain.words)
+        told["words"] = list(gain.choices)
     else:
         told |= {"low": gain.low, "high": gain.high, "nullable": gain.optional}
     return {**told, "meaning": gain.meaning}

@@ -179,7 +179,7 @@ def _known(known: Mapping[str, Gain | Option], name: str, path: Place) -> Gain |
 def _checked_range(known: Mapping[str, Gain | Option], name: str, given: Range, path: Place) -> Range:
     gain = _known(known, name, path)
     if isinstance(gain, Option):
-        wanted = f"one of {', '.join(gain.words)}, or a list of them,"
+        wanted = f"one of {', '.join(gain.choices)}, or a list of them,"
         raise ParameterError(f"{format_path(path)}: a range, but {wanted} was wanted")
     ends = []
     for end, value in (("low", given.low), ("high", given.high)):
@@ -558,7 +558,7 @@ def _value_of(name: str, value: object, path: Place) -> TeamValue:
             )
         return str(value)
     if name in EVENTS:
-        require_type(format_path(path), value, str, 'a text, as in "3@20",')
+        require_type(format_path(path), value, str, 'a text, as in "3@20"')
         try:
             return " ".join(str(parse_event(EVENTS[name], word)) for word in str(value).split())
         except ParameterError as error:

@@ -99,7 +99,7 @@ def gain_parameters(law: ControllerChoice) -> Iterator[Parameter | Pick]:
         value = law.value(name)
         if isinstance(gain, Option):
             word = value if isinstance(value, str) else gain.default
-            yield Pick(name, name, gain.meaning, word, gain.default, gain.words)
+            yield Pick(name, name, gain.meaning, word, gain.default, gain.choices)
             continue
         number = None if isinstance(value, str) else value
         usual = min(max(gain.default if gain.default else 1.0, gain.low), gain.high)

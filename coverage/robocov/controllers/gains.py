@@ -1,20 +1,36 @@
-"""Gains of a controller: numbers with a unit and a range, or words to choose from, as dataclass fields."""
+"""Gains of a controller, as dataclass fields: numbers with a unit and a range, or one of several choices."""
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
+from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, replace
 from typing import Any, ClassVar, TypeAlias
 
 from robocov.controllers.user_modules import explain_fault
 from robocov.errors import ParameterError, RobocovError, describe_unknown_name, is_number, quote
 
 Value: TypeAlias = float | str | None
-"""Value of a gain: a number, None for no limit, or one of the words of an `Option`."""
+"""Value of a gain: a number, None for no limit, or one of the choices of an `Option`."""
+
+_METADATA_KEY = "gain"
+_MAX_PLAIN_GAIN = 1e12
+"""Range of a plain number that a user's dataclass declares without `gain`."""
+_DIMENSIONLESS = "1"
+"""Unit in formulas that is not written after a number."""
 
 
 def format_value(value: Value, *, digits: int = 6, none: str = "none") -> str:
-    """Return a value as people write it: a number to so many digits, `none` for no limit.
+    """Format the value of a gain.
 
+    Parameters
+    ----------
+    value : float, str or None
+    digits : int
+        Maximum number of significant digits.
+    none : str
+        Text for None, which means no limit.
+
+    Examples
+    --------
     >>> format_value(0.30000001), format_value(None), format_value("median")
     ('0.3', 'none', 'median')
     """
@@ -25,126 +41,248 @@ def format_value(value: Value, *, digits: int = 6, none: str = "none") -> str:
 
 @dataclass(frozen=True)
 class Gain:
-    """A gain that is a number from `low` to `high`, or, where it is `optional`, None for no limit."""
+    """A gain that is a number."""
 
     name: str
     default: float | None
     unit: str
     low: float
+    """Minimum."""
     high: float
+    """Maximum."""
     meaning: str
+    """Description on one line."""
     optional: bool = False
+    """Whether None is allowed, which means no limit."""
     whole: bool = False
+    """Whether only whole numbers are allowed."""
 
     def validate(self, value: object, where: str) -> float | None:
-        """Return `value` as the gain takes it, or raise a ParameterError that names `where`."""
+        """Return a value of the gain as a float, or raise an error.
+
+        Parameters
+        ----------
+        value : object
+        where : str
+            Name of the controller, with which the message begins.
+
+        Raises
+        ------
+        ParameterError
+            If the value is not in the range of the gain.
+        """
         if value is None and self.optional:
             return None
-        inside = is_number(value) and self.low <= value <= min(self.high, sys.float_info.max)
-        if is_number(value) and inside and (not self.whole or value == int(value)):
+        if is_number(value) and self._is_in_range(value):
             return float(value)
-        what = f"a {'whole ' if self.whole else ''}number from {self.low:g} to {self.high:g} {self.unit}"
-        also = ", or null for no limit," if self.optional else ""
-        raise ParameterError(f"{where}.{self.name}: {quote(value)}, but {what.rstrip()}{also} was wanted")
+        kind = "whole number" if self.whole else "number"
+        expected = f"a {kind} from {self.low:g} to {self.high:g} {self.unit}".rstrip()
+        if self.optional:
+            expected += ", or null for no limit"
+        raise ParameterError(f"{where}.{self.name}: expected {expected}, got {quote(value)}")
+
+    def _is_in_range(self, number: Any) -> bool:
+        if not self.low <= number <= min(self.high, sys.float_info.max):
+            return False
+        return not self.whole or bool(number == int(number))
 
 
 @dataclass(frozen=True)
 class Option:
-    """A gain that is one of several words."""
+    """A gain that is one of several choices."""
 
     name: str
     default: str
-    words: tuple[str, ...]
+    choices: tuple[str, ...]
     meaning: str
+    """Description on one line."""
     unit: ClassVar[str] = ""
     optional: ClassVar[bool] = False
 
     def validate(self, value: object, where: str) -> str:
-        """Return `value` when it is one of the words, or raise a ParameterError that names `where`."""
-        if isinstance(value, str) and value in self.words:
-            return value
-        told = f"{quote(value)}, but one of {', '.join(self.words)} was wanted"
-        if isinstance(value, str):
-            told = describe_unknown_name("word", value, self.words)
-        raise ParameterError(f"{where}.{self.name}: {told}")
+        """Return a value of the gain, or raise an error.
+
+        Parameters
+        ----------
+        value : object
+        where : str
+            Name of the controller, with which the message begins.
+
+        Raises
+        ------
+        ParameterError
+            If the value is none of the choices.
+        """
+        if not isinstance(value, str):
+            expected = ", ".join(self.choices)
+            raise ParameterError(f"{where}.{self.name}: expected one of {expected}, got {quote(value)}")
+        if value not in self.choices:
+            raise ParameterError(
+                f"{where}.{self.name}: {describe_unknown_name('choice', value, self.choices)}"
+            )
+        return value
 
 
 def gain(
-    default: float | None, unit: str, meaning: str, *,
-    low: float = 0.0, high: float = 1e6, optional: bool = False, whole: bool = False,
-) -> Any:  # fmt: skip
-    """Declare a gain as a dataclass field.
+    default: float | None,
+    unit: str,
+    meaning: str,
+    *,
+    low: float = 0.0,
+    high: float = 1e6,
+    optional: bool = False,
+    whole: bool = False,
+) -> Any:
+    """Declare a gain that is a number, as a dataclass field.
 
+    Parameters
+    ----------
+    default : float or None
+    unit : str
+        "1" if there is none.
+    meaning : str
+        Description on one line.
+    low, high : float
+        Range, including both.
+    optional : bool
+        Whether None is allowed, which means no limit.
+    whole : bool
+        Whether only whole numbers are allowed.
+
+    Examples
+    --------
     >>> @dataclass(frozen=True)
-    ... class Mine:
-    ...     k: float = gain(1.0, "N/m", "stiffness")
-    >>> get_gains(Mine)["k"].unit
+    ... class Homing:
+    ...     stiffness: float = gain(1.0, "N/m", "pull to the centroid")
+    >>> get_gains(Homing)["stiffness"].unit
     'N/m'
     """
-    known = Gain("", default, unit, low, high, meaning, optional, whole)
-    return field(default=default, metadata={"gain": known})
+    declared = Gain("", default, unit, low, high, meaning, optional, whole)
+    return field(default=default, metadata={_METADATA_KEY: declared})
 
 
 def response_time_gain() -> Any:
-    """Declare the gain that says how fast a law drives its robots to the velocities that it wants."""
-    return gain(0.1, "s", "time constant with which the wanted velocity is reached", low=0.02, high=10.0)
+    """Declare the time constant with which robots reach their desired velocities, as a dataclass field."""
+    return gain(0.1, "s", "time constant with which the desired velocity is reached", low=0.02, high=10.0)
 
 
-def choice(default: str, words: Sequence[str], meaning: str) -> Any:
-    """Declare a gain that is one of several words as a dataclass field."""
-    if default not in words:
-        raise ValueError(f"default {default!r}, but one of {', '.join(words)} was wanted")
-    return field(default=default, metadata={"gain": Option("", default, tuple(words), meaning)})
+def choice(default: str, choices: Sequence[str], meaning: str) -> Any:
+    """Declare a gain that is one of several choices, as a dataclass field.
+
+    Parameters
+    ----------
+    default : str
+    choices : sequence of str
+    meaning : str
+        Description on one line.
+
+    Raises
+    ------
+    ValueError
+        If the default is none of the choices.
+
+    Examples
+    --------
+    >>> @dataclass(frozen=True)
+    ... class Passing:
+    ...     side: str = choice("left", ("left", "right"), "where to pass")
+    >>> get_gains(Passing)["side"].choices
+    ('left', 'right')
+    """
+    if default not in choices:
+        raise ValueError(f"default: expected one of {', '.join(choices)}, got {default!r}")
+    return field(default=default, metadata={_METADATA_KEY: Option("", default, tuple(choices), meaning)})
 
 
 def get_gains(controller: Any) -> dict[str, Gain | Option]:
-    """Return the gains of a controller class or instance by name, in their order of declaration.
+    """Return the gains of a controller, in the order of their declaration.
 
-    One that is no dataclass has none; a plain number of a user's dataclass is a gain of any value.
+    Parameters
+    ----------
+    controller : object or type
+        A controller, or a class of controllers. What is no dataclass has no gains.
+
+    Returns
+    -------
+    dict of str to Gain or Option
+        A plain number in a user's dataclass is a gain with a very wide range.
     """
-    found: dict[str, Gain | Option] = {}
-    for each in fields(controller) if is_dataclass(controller) else ():
-        known = each.metadata.get("gain")
-        default = None if each.default is MISSING else each.default
+    if not is_dataclass(controller):
+        return {}
+    gains: dict[str, Gain | Option] = {}
+    for declared in fields(controller):
+        known = _to_gain(declared)
         if known is not None:
-            # 1 is a unit in formulas, and nothing behind a number
-            unit = {"unit": ""} if known.unit == "1" else {}
-            found[each.name] = replace(known, name=each.name, default=default, **unit)
-        elif is_number(default):
-            found[each.name] = Gain(each.name, default, "", -1e12, 1e12, "")
-    return found
+            gains[declared.name] = known
+    return gains
+
+
+def _to_gain(declared: Field[Any]) -> Gain | Option | None:
+    """Return the gain that a dataclass field declares; None if it declares none."""
+    known = declared.metadata.get(_METADATA_KEY)
+    default = None if declared.default is MISSING else declared.default
+    if known is None and is_number(default):
+        return Gain(declared.name, default, "", -_MAX_PLAIN_GAIN, _MAX_PLAIN_GAIN, "")
+    if known is None:
+        return None
+    complete: Gain | Option = replace(known, name=declared.name, default=default)
+    if isinstance(complete, Gain) and complete.unit == _DIMENSIONLESS:
+        complete = replace(complete, unit="")
+    return complete
 
 
 def get_gain_values(controller: Any) -> dict[str, Value]:
-    """Return the values of the gains of a controller instance."""
+    """Return the values of the gains of a controller, in the order of their declaration."""
     return {name: getattr(controller, name) for name in get_gains(controller)}
 
 
 def validate_gains(controller: Any) -> None:
-    """Check every gain of a controller instance, or raise a ParameterError, from ``__post_init__``."""
+    """Check every gain of a controller, and replace its value by a float or a string.
+
+    It is called by ``__post_init__`` of the controller, whose name begins the messages.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not allowed.
+    """
     where = getattr(controller, "name", type(controller).__name__)
     for name, known in get_gains(controller).items():
-        object.__setattr__(controller, name, known.validate(getattr(controller, name), where))
+        value = known.validate(getattr(controller, name), where)
+        object.__setattr__(controller, name, value)  # Attributes of a frozen object cannot be assigned.
 
 
 def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any:
-    """Return an instance of the controller class `kind` with the given gains.
+    """Create a controller of a class.
 
-    A ParameterError tells of an unknown gain (with the nearest name), a value out of range, or a fault in it.
+    Parameters
+    ----------
+    kind : type
+    values : mapping of str to object
+        Values of gains; all others have their defaults.
+
+    Returns
+    -------
+    Controller or IndividualController
+
+    Raises
+    ------
+    ParameterError
+        If there is no such gain, with the most similar name; if a value is not allowed; or if the class of a
+        user raises an error.
     """
-    known, where = get_gains(kind), getattr(kind, "name", kind.__name__)
-    for name in values:
-        if name not in known:
-            nothing = f"{where}.{name}: controller {where!r} has no gains"
-            raise ParameterError(
-                f"{where}: {describe_unknown_name('gain', name, known)}" if known else nothing
-            )
-    given = {name: known[name].validate(value, where) for name, value in values.items()}
+    gains = get_gains(kind)
+    where = getattr(kind, "name", kind.__name__)
+    arguments = {}
+    for name, value in values.items():
+        if not gains:
+            raise ParameterError(f"{where}.{name}: controller {where!r} has no gains")
+        if name not in gains:
+            raise ParameterError(f"{where}: {describe_unknown_name('gain', name, gains)}")
+        arguments[name] = gains[name].validate(value, where)
     try:
-        return kind(**given)
-    except RobocovError:
-        raise
-    except KeyboardInterrupt:
+        return kind(**arguments)
+    except (RobocovError, KeyboardInterrupt):
         raise
     except BaseException as error:
-        raise explain_fault(f"controller {where!r} cannot be made", error) from error
+        raise explain_fault(f"controller {where!r} cannot be created", error) from error

@@ -232,4 +232,4 @@ def require_environment(value: object) -> None:
     ParameterError
         If the value is not an `Environment`.
     """
-    require_type("environment", value, Environment, 'a map, as in load_map("rooms"),')
+    require_type("environment", value, Environment, 'a map, as in load_map("rooms")')

@@ -31,12 +31,12 @@ def test_without_anything_they_are_ideal() -> None:
 @pytest.mark.parametrize(
     ("given_", "message"),
     [
-        ({"loss": 1.5}, "conditions.loss: 1.5, but a number from 0 to 1 was wanted"),
-        ({"loss": True}, "conditions.loss: True, but"),
-        ({"delay": -1}, "conditions.delay: -1, but a number from 0 to 1000 s was wanted"),
-        ({"delay": math.nan}, "conditions.delay: nan, but"),
-        ({"message_rate": 0}, r"conditions.message_rate: 0, but .* Hz or null was wanted"),
-        ({"position_noise": "much"}, "conditions.position_noise: 'much', but"),
+        ({"loss": 1.5}, "conditions.loss: expected a number from 0 to 1, got 1.5"),
+        ({"loss": True}, "conditions.loss: expected a number from 0 to 1, got True"),
+        ({"delay": -1}, "conditions.delay: expected a number from 0 to 1000 s, got -1"),
+        ({"delay": math.nan}, "conditions.delay: expected a number from 0 to 1000 s, got nan"),
+        ({"message_rate": 0}, r"conditions.message_rate: expected .* Hz or null, got 0"),
+        ({"position_noise": "much"}, "conditions.position_noise: expected a number from"),
         (
             {"message_rate": 0.1},
             "conditions.forget_after: expected at least the 10 s between two messages, got 3 s",

@@ -281,21 +281,19 @@ def test_gains_are_validated_by_name_and_range() -> None:
         k_rep=1.0, attraction_limit=None
     )
     assert isinstance(make_controller("rapf", {"k_rep": 1}).k_rep, float)
-    with pytest.raises(
-        ParameterError, match=r"rapf.k_rep: -1, but a number from 0 to 1e\+06 N m³ was wanted"
-    ):
+    with pytest.raises(ParameterError, match=r"rapf.k_rep: expected a number from 0 to 1e\+06 N m³, got -1"):
         make_controller("rapf", {"k_rep": -1})
     with pytest.raises(ParameterError, match=r"rapf: unknown gain 'krep': did you mean 'k_rep'\?"):
         make_controller("rapf", {"krep": 1})
     with pytest.raises(ParameterError, match=r"unknown controller 'raff': did you mean 'rapf'\?"):
         make_controller("raff")
-    with pytest.raises(ParameterError, match=r"rapf.rho_0: 'wide', but a number"):
+    with pytest.raises(ParameterError, match=r"rapf.rho_0: expected a number from .*, got 'wide'"):
         make_controller("rapf", {"rho_0": "wide"})
-    with pytest.raises(ParameterError, match=r"rapf.k_att: nan"):
+    with pytest.raises(ParameterError, match=r"rapf.k_att: expected a number .*, got nan"):
         Rapf(k_att=float("nan"))
-    with pytest.raises(ParameterError, match=r"rapf.k_rep: True"):
+    with pytest.raises(ParameterError, match=r"rapf.k_rep: expected a number .*, got True"):
         Rapf(k_rep=True)
-    with pytest.raises(ParameterError, match=r"mine.k: inf, but a number from 0 to inf was wanted"):
+    with pytest.raises(ParameterError, match=r"mine.k: expected a number from 0 to inf, got inf"):
         Gain("k", 1.0, "", 0.0, math.inf, "").validate(math.inf, "mine")
 
 
@@ -338,7 +336,7 @@ def test_gains_may_be_words() -> None:
     for wrong in ("Median", "", 3, None, True, ["median"]):
         with pytest.raises(ParameterError, match=r"^rapf\.target: .*centroid, "):
             Rapf(target=wrong)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="default 'up', but one of left, right was wanted"):
+    with pytest.raises(ValueError, match="default: expected one of left, right, got 'up'"):
         choice("up", ("left", "right"), "which way")
 
 

@@ -125,7 +125,7 @@ def test_it_must_be_told_the_map() -> None:
         GeodesicLloyd().begin(SQUARE.region, Team.homogeneous(2))
     with pytest.raises(ParameterError, match="no room for robots that keep 6 m"):
         GeodesicLloyd(clearance=5.9).inform(SQUARE).begin(SQUARE.region, Team.homogeneous(2))
-    with pytest.raises(ParameterError, match=r"lattice: 12.5, but a whole number from 4 to 512 cells"):
+    with pytest.raises(ParameterError, match=r"lattice: expected a whole number from 4 to 512 cells"):
         make_controller("geodesic-lloyd", {"lattice": 12.5})
 
 

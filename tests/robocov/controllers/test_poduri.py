@@ -128,7 +128,7 @@ def test_the_two_forces_are_equal_where_the_paper_says() -> None:
 
 
 def test_k_is_a_whole_number() -> None:
-    with pytest.raises(ParameterError, match=r"poduri.neighbours: 2.5, but a whole number from 0 to 100"):
+    with pytest.raises(ParameterError, match=r"poduri.neighbours: expected a whole number from 0 to 100"):
         make_controller("poduri", {"neighbours": 2.5})
 
 

@@ -104,7 +104,7 @@ def test_who_fails_is_forgotten_and_its_place_taken(name: str) -> None:
 
 def test_what_they_go_by() -> None:
     assert {get_information(CONTROLLERS[name]) for name in LAWS} == {"shared map"}
-    with pytest.raises(ParameterError, match=r"voronoi-graph.nodes: 3, but a whole number from 16"):
+    with pytest.raises(ParameterError, match=r"voronoi-graph.nodes: expected a whole number from 16"):
         make_controller("voronoi-graph", {"nodes": 3})
 
 

@@ -58,11 +58,11 @@ def test_a_team_scan_equals_the_scans_of_single_robots(cluttered: Environment) -
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"rays": 0}, "scanning.rays: 0, but a whole number from 1 to 3600"),
-        ({"rays": 2.5}, "scanning.rays: 2.5"),
-        ({"rays": True}, "scanning.rays: True"),
-        ({"period": -1.0}, "scanning.period: -1"),
-        ({"period": float("nan")}, "scanning.period: nan"),
+        ({"rays": 0}, "scanning.rays: expected a whole number from 1 to 3600"),
+        ({"rays": 2.5}, "scanning.rays: expected a whole number from 1 to 3600, got 2.5"),
+        ({"rays": True}, "scanning.rays: expected a whole number from 1 to 3600, got True"),
+        ({"period": -1.0}, "scanning.period: expected a number from 0 to"),
+        ({"period": float("nan")}, "scanning.period: expected a number from 0 to"),
     ],
 )
 def test_invalid_scan_settings_are_rejected(values: dict[str, object], message: str) -> None:

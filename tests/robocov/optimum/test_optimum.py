@@ -268,14 +268,14 @@ def test_larger_robots_keep_farther_away():
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ({"robots": 0}, "robots: 0, but a whole number from 1 to 500 was wanted"),
-        ({"robots": 2.0}, "robots: 2.0, but"),
-        ({"restarts": 0}, "restarts: 0, but a whole number from 1 to 100000 was wanted"),
-        ({"restarts": True}, "restarts: True, but"),
+        ({"robots": 0}, "robots: expected a whole number from 1 to 500, got 0"),
+        ({"robots": 2.0}, "robots: expected a whole number from"),
+        ({"restarts": 0}, "restarts: expected a whole number from 1 to 100000, got 0"),
+        ({"restarts": True}, "restarts: expected a whole number from"),
         ({"seed": -1}, "seed: expected a whole number of at least 0, got -1"),
         ({"radius": 0.0}, "radius: expected a number above 0 m, got 0.0"),
         ({"radius": float("nan")}, "radius: expected a number above 0 m, got nan"),
-        ({"lattice": 0}, "lattice: 0, but a whole number from 1 to 4096 was wanted"),
+        ({"lattice": 0}, "lattice: expected a whole number from 1 to 4096, got 0"),
     ],
 )
 def test_parameters_out_of_range_are_named(words, message):

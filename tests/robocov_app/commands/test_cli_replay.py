@@ -195,8 +195,8 @@ def test_without_a_display_it_says_what_else_there_is(run: Path, monkeypatch, ca
         ("--frames --out film --controller a.py:A", "--controller: neither --frames nor --video was wanted"),
         ("--controller gone.py:Mine", "controller 'gone.py:Mine': there is no file gone.py"),
         ("--controller lloyd", "--controller: lloyd, but the controller of a run was wanted: rapf"),
-        ("--size 480x320", "--size: 480, but a number from 900 to 7680 pixels wide was wanted"),
-        ("--frames --out film --fps 0", "--fps: 0, but a number from 1 to 240 was wanted"),
+        ("--size 480x320", "--size: expected a number from 900 to 7680 pixels wide, got 480"),
+        ("--frames --out film --fps 0", "--fps: expected a number from 1 to 240, got 0"),
         ("--frames --out film --show cell", "--show: unknown layer 'cell'"),
     ],
 )

@@ -128,7 +128,7 @@ def test_a_dry_run_says_what_is_done_already(study: Path, capsys: pytest.Capture
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--workers", "0"), "--workers: 0, but a number from 1 to 1024 was wanted"),
+        (("--workers", "0"), "--workers: expected a number from 1 to 1024, got 0"),
         (("--workers", "2", "--scheduler", "tcp://here:1"), "--workers: those of a cluster are its own"),
         (("--seeds", "3"), "unknown option --seeds"),
     ],

@@ -54,11 +54,11 @@ def test_what_is_not_known(tmp_path: Path) -> None:
     ):
         export_map(ROOM, tmp_path / "a.png", options=WriteOptions(mode="raw"))
     for options, wanted in (
-        ({"cell": 0.0}, "cell: 0"),
+        ({"cell": 0.0}, "cell: expected a number from"),
         ({"mode": "binary"}, "mode: 'binary', but one of trinary, scale, raw"),
         ({"image": "bmp"}, "image: 'bmp'"),
         ({"digits": 99}, "digits: 99"),
-        ({"scale": float("nan")}, "scale: nan"),
+        ({"scale": float("nan")}, "scale: expected a number from"),
     ):
         with pytest.raises(ParameterError, match=wanted):
             WriteOptions(**options)  # type: ignore[arg-type]

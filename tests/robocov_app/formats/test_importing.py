@@ -83,12 +83,12 @@ def test_a_format_may_be_forced(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "wanted"),
     [
-        ({"cell": 0.0}, "cell: 0"),
-        ({"cell": float("nan")}, "cell: nan"),
-        ({"scale": -1.0}, "scale: -1"),
-        ({"thickness": float("inf")}, "thickness: inf"),
-        ({"threshold": 1.1}, "threshold: 1.1, but a number from 0 to 1"),
-        ({"threshold": float("nan")}, "threshold: nan"),
+        ({"cell": 0.0}, "cell: expected a number from"),
+        ({"cell": float("nan")}, "cell: expected a number from"),
+        ({"scale": -1.0}, "scale: expected a number from"),
+        ({"thickness": float("inf")}, "thickness: expected a number from"),
+        ({"threshold": 1.1}, "threshold: expected a number from 0 to 1"),
+        ({"threshold": float("nan")}, "threshold: expected a number from"),
         ({"unknown": "solid"}, "unknown: 'solid', but one of obstacle, free, cut"),
         ({"trees": "green"}, "trees: 'green', but one of obstacle, free"),
     ],

@@ -129,9 +129,9 @@ def test_a_message_that_is_old_is_told_as_it_came() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"neighbours": -1}, r"observation.neighbours: -1, but a whole number from 0 to 1000 was wanted"),
-        ({"rays": 2.5}, r"observation.rays: 2.5, but a whole number"),
-        ({"centroid": 1}, r"observation.centroid: 1, but true or false was wanted"),
+        ({"neighbours": -1}, r"observation.neighbours: expected a whole number from 0 to 1000, got -1"),
+        ({"rays": 2.5}, r"observation.rays: expected a whole number from 0 to 3600, got 2.5"),
+        ({"centroid": 1}, r"observation.centroid: expected true or false, got 1"),
     ],
 )
 def test_what_cannot_be_told(values: dict[str, object], message: str) -> None:

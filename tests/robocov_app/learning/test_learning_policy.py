@@ -251,7 +251,7 @@ def test_what_is_no_policy(empty: Environment) -> None:
         run(PolicyController(lambda observation: (np.nan, 0.0)))
     with pytest.raises(ParameterError, match="action: unknown kind of action 'steer'"):
         PolicyController(action="steer")
-    with pytest.raises(ParameterError, match="layout: 3, but an ObservationLayout was wanted"):
+    with pytest.raises(ParameterError, match="layout: expected an ObservationLayout, got 3"):
         PolicyController(layout=3)
-    with pytest.raises(ParameterError, match=r"policy.period: -1"):
+    with pytest.raises(ParameterError, match=r"policy.period: expected a number from .* got -1"):
         PolicyController(period=-1.0)

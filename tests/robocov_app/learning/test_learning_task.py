@@ -29,9 +29,9 @@ def test_the_team_goes_before_the_number() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"robots": 0}, "robots: 0, but a whole number from 1 to 10000 was wanted"),
-        ({"repeat": 1.5}, r"repeat: 1\.5, but a whole number"),
-        ({"reward_every": 0}, "reward_every: 0, but a whole number"),
+        ({"robots": 0}, "robots: expected a whole number from 1 to 10000, got 0"),
+        ({"repeat": 1.5}, r"repeat: expected a whole number from .* got 1\.5"),
+        ({"reward_every": 0}, "reward_every: expected a whole number from .* got 0"),
         ({"duration": 0.05}, r"duration: 0\.05 s, but at least the time of one action, 0\.1 s"),
         ({"duration": float("nan")}, "duration: nan s"),
         ({"dt": 2.0}, r"dt: expected a number .*, got 2\.0"),
@@ -39,8 +39,8 @@ def test_the_team_goes_before_the_number() -> None:
         ({"reward": "none"}, "reward: unknown kind of reward 'none'"),
         ({"action": "velocity", "dt": 0.2}, r"dt: 0\.2 s, but at most 0\.1 s was wanted"),
         ({"contact_penalty": -1.0}, r"contact_penalty: -1\.0"),
-        ({"team": 6}, "team: 6, but a Team was wanted"),
-        ({"observation": None}, "observation: None, but a ObservationLayout was wanted"),
+        ({"team": 6}, "team: expected a Team, got 6"),
+        ({"observation": None}, "observation: expected a ObservationLayout, got None"),
         (
             {"conditions": Conditions(failures=((7, 3.0),))},
             r"conditions\.failures\[0\]: expected a robot from 1 to 6, got robot 7",

@@ -6,7 +6,9 @@ from called import complaint
 def test_bad_input(tmp_path, capsys):
     (tmp_path / "notes.txt").write_text("mine")
     assert "is no study of the paper" in complaint(capsys, "paper", "--out", str(tmp_path))
-    assert "--workers: 0" in complaint(capsys, "paper", "--out", "x", "--workers", "0")
+    assert "--workers: expected a number from 1 to 1024, got 0" in complaint(
+        capsys, "paper", "--out", "x", "--workers", "0"
+    )
     assert "--out" in complaint(capsys, "paper")
     said = complaint(capsys, "paper", "--out", "x", "--beyond-only", "--figures-only")
     assert "--figures-only and --beyond-only: one of them was wanted" in said

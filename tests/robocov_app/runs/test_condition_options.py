@@ -31,7 +31,7 @@ def test_what_is_said_becomes_conditions() -> None:
         (ConditionOptions(fail=("3",)), "--fail: expected ROBOT@SECONDS, as in 3@20, got '3'"),
         (ConditionOptions(join=("3@x",)), "--join: expected ROBOT@SECONDS or ROBOT@SECONDS:X,Y, got '3@x'"),
         (ConditionOptions(fail=("9@1",)), "expected a robot from 1 to 6, got robot 9"),
-        (ConditionOptions(loss=2.0), "conditions.loss: 2.0, but a number from 0 to 1"),
+        (ConditionOptions(loss=2.0), "conditions.loss: expected a number from 0 to 1"),
     ],
 )
 def test_what_cannot_be_is_named(options: ConditionOptions, message: str) -> None:

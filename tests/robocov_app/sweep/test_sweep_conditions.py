@@ -50,12 +50,12 @@ def test_a_run_is_under_its_conditions() -> None:
     ("given", "message"),
     [
         ({"lost": 1}, r"conditions: unknown condition 'lost': did you mean 'loss'\?"),
-        ({"loss": [0.1, 2]}, r"conditions.loss\[1\]: 2, but a number from 0 to 1 was wanted"),
+        ({"loss": [0.1, 2]}, r"conditions.loss\[1\]: expected a number from 0 to 1, got 2"),
         ({"loss": []}, "conditions.loss: none, but at least one"),
         ({"loss": [0.1, 0.1]}, r"conditions.loss\[1\]"),
-        ({"fail": 3}, "conditions.fail: 3, but a text"),
+        ({"fail": 3}, "conditions.fail: expected a text"),
         ({"fail": ["3@1", "3"]}, r"conditions.fail\[1\]: expected ROBOT@SECONDS, as in 3@20, got '3'"),
-        ({"delay": "null"}, "conditions.delay: 'null', but a number"),
+        ({"delay": "null"}, "conditions.delay: expected a number"),
     ],
 )
 def test_what_cannot_be_is_named(given: dict[str, object], message: str) -> None:

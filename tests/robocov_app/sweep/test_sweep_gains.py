@@ -115,16 +115,16 @@ class Picky:
 
 WRONG = [
     (Rapf, {"k_rap": 1}, "gains.x: unknown gain 'k_rap': did you mean 'k_rep'? (known: "),
-    (Rapf, {"k_rep": -1}, "gains.x.k_rep: -1, but a number from 0 to 1e+06 N m³ was wanted"),
-    (Rapf, {"k_rep": [1, "big"]}, "gains.x.k_rep[1]: 'big', but a number from "),
+    (Rapf, {"k_rep": -1}, "gains.x.k_rep: expected a number from 0 to 1e+06 N m³, got -1"),
+    (Rapf, {"k_rep": [1, "big"]}, "gains.x.k_rep[1]: expected a number from "),
     (Rapf, {"k_rep": [1, 2, 1.0]}, "gains.x.k_rep[2]: 1.0 is given already at gains.x.k_rep[0]; "),
     (Rapf, {"k_rep": []}, "gains.x.k_rep: none, but at least one value was wanted"),
-    (Rapf, {"k_rep": None}, "gains.x.k_rep: None, but a number from "),
+    (Rapf, {"k_rep": None}, "gains.x.k_rep: expected a number from "),
     (Rapf, [], "gains.x: none, but at least one set of gains was wanted"),
     (Rapf, [{"k_rep": 1}, {"k_rep": 1}], "gains.x[1]: {'k_rep': 1.0, "),
-    (Rapf, [{"k_rep": -1}], "gains.x[0].k_rep: -1, but "),
+    (Rapf, [{"k_rep": -1}], "gains.x[0].k_rep: expected a number from "),
     (Rapf, {"k_rep": Range(2, 1)}, "gains.x.k_rep.high: 1, but a number above 2 was wanted"),
-    (Rapf, {"k_rep": Range(-1, 1)}, "gains.x.k_rep.low: -1, but a number from 0 to "),
+    (Rapf, {"k_rep": Range(-1, 1)}, "gains.x.k_rep.low: expected a number from 0 to "),
     (Rapf, {"k_rep": Range(0, 1, "log")}, "gains.x.k_rep.low: 0, but a number above 0, "),
     (Rapf, {"k_rep": Range(0, 1, "lag")}, "gains.x.k_rep.scale: unknown scale 'lag': did you mean 'log'?"),
     (
@@ -136,7 +136,7 @@ WRONG = [
     (
         Picky,
         {"k": [1, 2]},
-        "controller 'Picky' cannot be made: ValueError: not two (test_sweep_gains.py",
+        "controller 'Picky' cannot be created: ValueError: not two (test_sweep_gains.py",
     ),
     (object, {"k": 1}, "gains.x: 'k', but the controller has no gains"),
 ]
@@ -158,9 +158,9 @@ def test_a_range_needs_a_way_to_sample_it() -> None:
     ("said", "message"),
     [
         ({"method": "sobool"}, "sampling.method: unknown method 'sobool': did you mean 'sobol'?"),
-        ({"samples": 0}, "sampling.samples: 0, but a whole number from 1 to 100000 was wanted"),
-        ({"samples": 2.0}, "sampling.samples: 2.0, but a whole number"),
-        ({"seed": -1}, "sampling.seed: -1, but a whole number"),
+        ({"samples": 0}, "sampling.samples: expected a whole number from 1 to 100000, got 0"),
+        ({"samples": 2.0}, "sampling.samples: expected a whole number from"),
+        ({"seed": -1}, "sampling.seed: expected a whole number from"),
     ],
 )
 def test_sampling_is_checked(said: dict, message: str) -> None:

@@ -303,7 +303,7 @@ def test_two_sweeps_do_not_share_a_folder(study: Study, tmp_path: Path, here: He
 
 @pytest.mark.parametrize("workers", [0, 2000, -1])
 def test_the_number_of_workers_is_checked(workers: int, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"workers: .*, but a whole number from 1 to 1024 was wanted"):
+    with pytest.raises(ParameterError, match=r"workers: expected a whole number from 1 to 1024, got .*"):
         sweep(small_study(), tmp_path / "out", workers=workers)
     assert not (tmp_path / "out").exists()
 
