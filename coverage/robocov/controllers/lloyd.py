@@ -1,4 +1,4 @@
-"""LA, Lloyd's algorithm under kinematic limits: on whole cells, or on their parts within a range."""
+"""Lloyd's algorithm under kinematic limits: on whole Voronoi cells, or on cells of limited range."""
 
 from dataclasses import dataclass, replace
 
@@ -15,51 +15,72 @@ from robocov.voronoi import build_disc_limited_polygons, compute_disc_limited_mo
 
 @dataclass(frozen=True)
 class Lloyd(BaseController):
-    """Lloyd's algorithm (Cortés et al. 2004; section III-B of the paper), called LA there.
+    """Lloyd's algorithm (Cortés et al. 2004; LA in section III-B of the paper).
 
-    Every robot heads for the centroid of its Voronoi cell at full speed, and slows down on the last metres so
-    that its deceleration stays within the limits. The drive tracks that velocity and makes up for viscosity.
-    Another `target` than the centroid is the optimum of the cell for another locational cost (4). Obstacles
-    are not known to the law: the robot slides along them. With `cells` by time, where robots are not equally
-    fast, the goal may lie outside of the cell.
+    Each robot moves to the centroid of its Voronoi cell at full speed, and slows down over the last metres
+    such that its deceleration stays within its limits. The drive tracks this velocity and compensates the
+    viscosity. Obstacles are ignored: robots slide along them.
+
+    Another `target` than the centroid is the optimum of the cell for another performance function f of the
+    locational cost (4). With `cells` divided by time, and unequal maximum speeds, the target may lie outside
+    the robot's own cell.
+
+    Examples
+    --------
+    >>> from robocov.environment import Environment
+    >>> from robocov.simulation import Simulation
+    >>> room = Environment("room", ((0, 0), (8, 0), (8, 6), (0, 6)))
+    >>> simulation = Simulation(room, Lloyd(), [[1.0, 1.0]])
+    >>> simulation.run(20.0).positions[-1].round(1)
+    array([[4., 3.]])
     """
 
     name = "lloyd"
     label = "Lloyd"
-    summary = "Lloyd's algorithm: every robot heads for its cell's centroid, obstacles ignored"
+    summary = "Lloyd's algorithm: every robot moves to its cell's centroid, obstacles are ignored"
 
-    k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per metre of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()
     cells: str = cells_choice()
     target: str = choice("centroid", TARGETS, TARGET_HELP)
     height: float = gain(1.0, "m", HEIGHT_HELP, low=1e-6)
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
+        """Compute the forces that drive each robot to the target in its cell."""
+        team = memory.team
         cells = compute_known_cells(seen, self.cells, memory.triangulation)
         goals = find_targets(cells, seen.density, self.target, self.height)
-        wanted = compute_approach_velocities(goals - seen.positions, self.k_prop, memory.team.max_speed)
-        forces = compute_drive_forces(wanted, seen, memory.team, self.response_time)
-        memory = replace(memory, triangulation=cells.triangulation)
-        return Decision(forces, goals, {"attraction": forces}, cells, memory)
+        velocities = compute_approach_velocities(goals - seen.positions, self.k_prop, team.max_speed)
+        forces = compute_drive_forces(velocities, seen, team, self.response_time)
+        return Decision(
+            forces=forces,
+            goals=goals,
+            terms={"attraction": forces},
+            cells=cells,
+            memory=replace(memory, triangulation=cells.triangulation),
+        )
 
 
 @dataclass(frozen=True)
 class RangeLimited(BaseController):
     """Lloyd's algorithm with limited-range interactions (Cortés, Martínez and Bullo 2005).
 
-    The cell of a robot is the part of its Voronoi cell within half the communication range r, so that
-    the robots it hears determine it: whoever is farther than r is farther than r/2 from all of it. Moving
-    to the centroid of that part descends the locational cost with f = min(|q - p|², (r/2)²), which is
-    what a team can descend that hears no farther: two times the part's mass times the way to its
-    centroid is the gradient, (12) with the limited cell (the paper's own section on limited-range
-    interactions). Where everybody's cell lies within r/2 it is Lloyd's algorithm.
+    Each robot moves to the centroid of its limited cell: the part of its Voronoi cell within half the
+    interaction range r. The robots within r determine it, because a robot farther away than r is farther
+    than r/2 from all of it.
 
-    The centroid is exact with density 1; another density is integrated over a polygon, whose chords
-    stand for the arcs (see `robocov.voronoi`).
+    Notes
+    -----
+    With the limited cell, the gradient (12) is that of the locational cost with f = min(|q - p|², (r/2)²):
+    twice the mass of the limited cell times the vector from its centroid to the robot. The motion therefore
+    descends this cost. If all cells lie within r/2, the algorithm is Lloyd's.
 
-    Taken from what is generally known of the paper (ESAIM: COCV 11, 691-719), not from its text: cells,
-    cost and gradient. Decided here: that the motion is Lloyd's, straight to the centroid with the limits of
-    the robots, and that r may be less than the communication range, which in a simulation need not end.
+    The centroid is exact for the uniform density. Another density is integrated over a polygon whose chords
+    replace the arcs (see `robocov.voronoi`).
+
+    The cells, the cost and its gradient follow what is generally known of the paper (ESAIM: COCV 11,
+    691-719), not its text. Two choices are ours: robots move straight to the centroid within their limits,
+    as with `Lloyd`, and r may be smaller than the communication range, which may be infinite in a simulation.
     """
 
     name = "range-limited"
@@ -69,20 +90,29 @@ class RangeLimited(BaseController):
     interaction_range: float | None = gain(
         6.0, "m", "r, at most the communication range; null for that range itself", low=0.01, optional=True
     )
-    k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per metre of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
+        """Compute the forces that drive each robot to the centroid of its limited cell."""
+        team = memory.team
         cells = compute_known_cells(seen, "distance", memory.triangulation)
-        reach = np.inf if self.interaction_range is None else self.interaction_range
-        radius = 0.5 * np.minimum(memory.team.communication_range, reach)
-        area, offset = compute_disc_limited_moments(cells.edges, radius)
+        interaction_range = np.inf if self.interaction_range is None else self.interaction_range
+        radius = 0.5 * np.minimum(team.communication_range, interaction_range)
+        area, offsets = compute_disc_limited_moments(cells.edges, radius)
         if seen.density is not None and not seen.density.is_uniform:
-            limited = build_disc_limited_polygons(cells.edges, radius)
-            uniform = seen.positions + offset
-            _, centroid = seen.density.compute_mass_and_centroid(limited, seen.positions, area, uniform)
-            offset = centroid - seen.positions
-        wanted = compute_approach_velocities(offset, self.k_prop, memory.team.max_speed)
-        forces = compute_drive_forces(wanted, seen, memory.team, self.response_time)
-        memory = replace(memory, triangulation=cells.triangulation)
-        return Decision(forces, seen.positions + offset, {"attraction": forces}, cells, memory)
+            polygons = build_disc_limited_polygons(cells.edges, radius)
+            uniform_centroids = seen.positions + offsets
+            _, centroids = seen.density.compute_mass_and_centroid(
+                polygons, seen.positions, area, uniform_centroids
+            )
+            offsets = centroids - seen.positions
+        velocities = compute_approach_velocities(offsets, self.k_prop, team.max_speed)
+        forces = compute_drive_forces(velocities, seen, team, self.response_time)
+        return Decision(
+            forces=forces,
+            goals=seen.positions + offsets,
+            terms={"attraction": forces},
+            cells=cells,
+            memory=replace(memory, triangulation=cells.triangulation),
+        )

@@ -1,5 +1,6 @@
-"""Laws by which robots push each other apart: potential fields, and local dispersion."""
+"""Controllers that push robots apart: potential fields, and local dispersion."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from robocov.controllers.known_cells import cells_choice, compute_known_cells
 from robocov.locational_cost.best_points import HEIGHT_HELP, TARGET_HELP, TARGETS, find_targets
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.neighbours import NeighbourPositions
+from robocov.observation.observations import NearNeighbours
 from robocov.observation.region import Region
 from robocov.potential import (
     CONTACT_DISTANCE,
@@ -30,17 +32,24 @@ from robocov.potential import (
 from robocov.team import Team
 from robocov.voronoi.delaunay import Mesh
 
-_TOGETHER = 1e-9  # metres at which robots in one place are taken to be
-_NEAREST = 0.05  # metres below which Howard's forces no longer grow; robots that touch are farther apart
-_WALL = 2.0 / (3.0 * np.pi)  # what a wall does by all its rays, in parts of what a point as near does
-_STRETCHED = 0.999  # part of the range of a link beyond which the force that holds it no longer grows
-_STILL = 0.01  # speed in m/s below which a robot has no direction in which it could go on
+_MIN_DISTANCE_M = 1e-9
+"""Distance that robots at the same position are treated as having."""
+_MIN_CHARGE_DISTANCE_M = 0.05
+"""Distance below which Howard's forces no longer grow; robots in contact are farther apart."""
+_WALL_FACTOR = 2.0 / (3.0 * math.pi)
+"""Force of all rays that meet a straight wall, relative to that of a point charge at the same distance."""
+_MAX_LINK_STRETCH = 0.999
+"""Fraction of the range of a link beyond which the force that keeps it no longer grows."""
+_MIN_EXPLORING_SPEED = 0.01
+"""Speed in m/s below which a robot has no direction of motion that it could keep."""
+_BRAKING_FRACTION = 0.5
+"""Fraction of the maximum acceleration that is counted on to avoid collisions."""
 
 
 def _compute_potential_forces(
     seen: Observations, goals: Array, gains: PotentialGains, *, includes_robots: bool = True
 ) -> PotentialForces:
-    """Return the forces of the potentials on all robots, from what they observe."""
+    """Return the forces of the potentials on all robots."""
     if includes_robots:
         neighbours = NeighbourPositions.from_graph(seen.neighbours, seen.reported_positions)
     else:
@@ -48,100 +57,129 @@ def _compute_potential_forces(
     return compute_potential_forces(seen.positions, neighbours, seen.obstacle_points, goals, gains)
 
 
-def _close_pairs(seen: Observations, reach: float) -> tuple[IntArray, IntArray, Array, Array]:
-    """Return `find_near_neighbours`, with a direction apart for robots in one place, too."""
-    robot, neighbour, offset, distance = seen.find_near_neighbours(reach)
-    together = distance < _TOGETHER
-    offset[together] = _TOGETHER * compute_separations(robot[together], neighbour[together])
-    return robot, neighbour, offset, distance
+def _find_separated_neighbours(seen: Observations, reach: float) -> NearNeighbours:
+    """Return near neighbours; robots at the same position get a direction, too."""
+    pairs = seen.find_near_neighbours(reach)
+    is_same = pairs.distance < _MIN_DISTANCE_M
+    directions = compute_separations(pairs.robot[is_same], pairs.neighbour[is_same])
+    pairs.offset[is_same] = _MIN_DISTANCE_M * directions
+    return pairs
 
 
 @dataclass(frozen=True)
 class Rpf(BaseController):
     """Repulsive potential field (Howard, Mataric and Sukhatme 2002), equations (23)-(25).
 
-    Every robot is pushed away from the neighbours within `rho_0` and from the single closest
-    obstacle point; viscosity brings the team to rest. The team often trembles there, because the
-    single nearest obstacle point jumps, and the more the stronger the repulsion is, while it spreads
-    hardly better. For the paper's protocol, which gives RPF and RAPF the same potential
-    parameters, set `k_rep` and `rho_0` for both.
+    Each robot is pushed away from all neighbours within `rho_0` and from the closest obstacle point;
+    viscosity brings the team to rest. The team often oscillates there, because the closest obstacle point
+    jumps: the stronger the repulsion, the larger the oscillation. To follow the paper's protocol, which gives
+    RPF and RAPF the same parameters, set `k_rep` and `rho_0` of both.
     """
 
     name = "rpf"
     label = "RPF"
-    summary = "repulsion from robots and the nearest obstacle only, (23)-(25)"
+    summary = "repulsion from robots and the closest obstacle only, (23)-(25)"
 
     k_rep: float = gain(3.0, "N m³", "strength of the repulsion, (24)")
     rho_0: float = gain(4.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)
 
     def decide(self, seen: Observations, memory: object) -> Decision:
-        gains = PotentialGains(float(self.k_rep), float(self.rho_0), k_att=0.0, max_attraction=np.inf)
+        """Compute the forces (24) of all neighbours and of the closest obstacle point."""
+        gains = PotentialGains(
+            k_rep=float(self.k_rep), rho_0=float(self.rho_0), k_att=0.0, max_attraction=np.inf
+        )
         forces = _compute_potential_forces(seen, seen.positions, gains)
-        terms = {"repulsion_robots": forces.robots, "repulsion_obstacle": forces.obstacle}
-        return Decision(forces.total, terms=terms, memory=memory)
+        return Decision(
+            forces=forces.total,
+            terms={"repulsion_robots": forces.robots, "repulsion_obstacle": forces.obstacle},
+            memory=memory,
+        )
 
 
 @dataclass(frozen=True)
 class Rapf(BaseController):
     """Repulsive and attractive potential field (Renzaglia and Martinelli), equations (23)-(28).
 
-    As RPF, but every robot is also drawn to the centroid of its Voronoi cell of the known convex
-    region. The cells ignore the unknown obstacles; the repulsion keeps robots off them.
-    Another `target` than the centroid is the optimum of the cell for another locational cost (4).
-    The goal may lie in or behind an obstacle: then the robot rests where the forces balance. With `cells` by
-    time, where robots are not equally fast, it may lie outside of the robot's own cell as well.
+    As with `Rpf`, but each robot is also attracted by the centroid of its Voronoi cell. The cells divide the
+    known convex region and ignore the unknown obstacles; the repulsion keeps robots away from these. A
+    centroid may lie in or behind an obstacle: the robot then comes to rest where the forces balance.
 
-    With `attraction_limit` at viscosity x maximum speed (2 N by default) the attraction never
-    exceeds what drives a robot at full speed, and no wall is touched; None is the paper's (27).
+    Another `target` than the centroid is the optimum of the cell for another performance function f of the
+    locational cost (4). With `cells` divided by time, and unequal maximum speeds, the target may lie outside
+    the robot's own cell.
+
+    An `attraction_limit` of at most the viscosity times the maximum speed (2 N for default robots) never
+    drives a robot faster than its maximum speed, and robots stay clear of walls. None is the paper's (27),
+    without a limit.
+
+    Examples
+    --------
+    >>> from robocov.environment import Environment
+    >>> from robocov.simulation import Simulation
+    >>> room = Environment("room", ((0, 0), (8, 0), (8, 6), (0, 6)))
+    >>> simulation = Simulation(room, Rapf(), [[1.0, 1.0]])
+    >>> simulation.run(20.0).positions[-1].round(1)
+    array([[4., 3.]])
     """
 
     name = "rapf"
     label = "RAPF"
-    summary = "the paper's law: short-range repulsion + attraction to the cell's centroid, (23)-(28)"
+    summary = "the paper's controller: short-range repulsion + attraction to the cell's centroid, (23)-(28)"
 
     k_rep: float = gain(0.3, "N m³", "strength of the repulsion, (24)")
     rho_0: float = gain(2.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)
     k_att: float = gain(30.0, "N/m³", "strength of the attraction, (27)")
     attraction_limit: float | None = gain(
-        2.0, "N", "cap of the attraction; null is the paper's formula", low=1e-6, optional=True
+        2.0, "N", "limit of the attraction; null is the paper's formula", low=1e-6, optional=True
     )
     cells: str = cells_choice()
     target: str = choice("centroid", TARGETS, TARGET_HELP)
     height: float = gain(1.0, "m", HEIGHT_HELP, low=1e-6)
 
     def begin(self, region: Region, team: Team) -> None:
-        """Nothing is remembered yet; later, the triangulation from which the next cells start."""
+        """Return None: the memory, the triangulation of the last cells, is empty."""
 
     def decide(self, seen: Observations, memory: Mesh | None) -> Decision:
+        """Compute the forces (24) of neighbours and of the closest obstacle point, and (27) of the target."""
         cells = compute_known_cells(seen, self.cells, memory)
         goals = find_targets(cells, seen.density, self.target, self.height)
-        max_attraction = np.inf if self.attraction_limit is None else float(self.attraction_limit)
-        gains = PotentialGains(float(self.k_rep), float(self.rho_0), float(self.k_att), max_attraction)
+        gains = PotentialGains(
+            k_rep=float(self.k_rep),
+            rho_0=float(self.rho_0),
+            k_att=float(self.k_att),
+            max_attraction=np.inf if self.attraction_limit is None else float(self.attraction_limit),
+        )
         forces = _compute_potential_forces(seen, goals, gains)
         terms = {
             "attraction": forces.attraction,
             "repulsion_robots": forces.robots,
             "repulsion_obstacle": forces.obstacle,
         }
-        return Decision(forces.total, goals, terms, cells, cells.triangulation)
+        return Decision(
+            forces=forces.total, goals=goals, terms=terms, cells=cells, memory=cells.triangulation
+        )
 
 
 @dataclass(frozen=True)
 class Howard(BaseController):
     """Potential field of Howard, Mataric and Sukhatme (DARS 2002).
 
-    Every robot is an electric charge among charges: the potential is the sum of k / r over all that the
-    robot's sensors see, so that each obstacle and each robot pushes with k / r², without a range of its
-    own. The equation of motion is m q'' = F - nu q' with the law's own friction, which takes the energy
-    out until the team is at rest.
+    Each robot is an electric charge among charges: each obstacle and each other robot in view repels it with
+    k / r², without a limited range. Friction dissipates the energy until the team is at rest.
 
-    The obstacles are what the rays of the range sensor meet. Each ray carries its share of the charge,
-    so that `k_obs` means the same however many rays there are. Where there has been no scan yet, the
-    closest point stands for a straight wall across. Below 5 cm the forces no longer grow.
+    Notes
+    -----
+    The equation of motion is m q'' = F - ν q', where ν is the gain `friction`, which replaces the viscosity
+    of the robots.
 
-    Taken from what is generally known of the paper, not from its text: sum over all ranged obstacles
-    and robots, inverse-square forces, viscous friction. Decided here: the share of a ray, the cap
-    below 5 cm, and that the robots are those which are heard, as the range sensor does not see robots.
+    Obstacles are the points that the rays of the range sensor meet. Each ray carries an equal fraction of the
+    charge `k_obs`, so that its effect does not depend on the number of rays. Before the first scan the
+    closest obstacle point is taken for a straight wall.
+
+    The sum over all obstacles and robots, the inverse-square forces and the friction follow what is generally
+    known of the paper, not its text. Three choices are ours: the fraction of a ray; forces that no longer
+    grow below 5 cm; and that robots repel others if they hear them, because the range sensor does not detect
+    robots.
     """
 
     name = "howard"
@@ -151,56 +189,73 @@ class Howard(BaseController):
 
     k_robots: float = gain(3.0, "N m²", "charge of the other robots")
     k_obs: float = gain(1.0, "N m²", "charge of the obstacles, over a full turn of rays")
-    friction: float = gain(2.0, "N s/m", "nu of the law, in place of the robots' own", high=20.0)
+    friction: float = gain(2.0, "N s/m", "ν, which replaces the robots' own viscosity", high=20.0)
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
-        """Return the forces F - nu q', but for what the world's viscosity does already."""
+        """Compute the forces F - ν q', less the viscosity, which the simulation adds itself."""
         returns = update_returns(seen, memory.returns)
-        robot, _, offset, _ = _close_pairs(seen, 2.0 * seen.region.diameter)
-        robots = sum_by_robot(robot, self.k_robots * _inverse_square(offset), len(seen.positions))
+        pairs = _find_separated_neighbours(seen, 2.0 * seen.region.diameter)
+        robots = sum_by_robot(
+            pairs.robot, self.k_robots * _compute_inverse_squares(pairs.offset), len(seen.positions)
+        )
         if returns is None:
-            offset = np.nan_to_num(seen.positions - seen.obstacle_points)
-            obstacle = self.k_obs * _WALL * _inverse_square(offset)
+            offsets = np.nan_to_num(seen.positions - seen.obstacle_points)
+            obstacle = self.k_obs * _WALL_FACTOR * _compute_inverse_squares(offsets)
         else:
-            # nan where a ray met nothing
-            offset = np.nan_to_num(seen.positions[:, None] - returns)
-            obstacle = self.k_obs / returns.shape[1] * _inverse_square(offset).sum(axis=1)
+            # A ray that meets nothing has the offset nan, and exerts no force.
+            offsets = np.nan_to_num(seen.positions[:, None] - returns)
+            k_ray = self.k_obs / returns.shape[1]
+            obstacle = k_ray * _compute_inverse_squares(offsets).sum(axis=1)
         friction = seen.velocities * (memory.team.viscosity - self.friction)[:, None]
-        terms = {"repulsion_robots": robots, "repulsion_obstacle": obstacle, "friction": friction}
-        return Decision(robots + obstacle + friction, terms=terms, memory=replace(memory, returns=returns))
+        return Decision(
+            forces=robots + obstacle + friction,
+            terms={"repulsion_robots": robots, "repulsion_obstacle": obstacle, "friction": friction},
+            memory=replace(memory, returns=returns),
+        )
 
 
-def _inverse_square(offset: Array) -> Array:
-    """Return (..., 2) vectors along the offsets, of length 1 / r²; zero where the offset is."""
-    distance = np.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2)
-    scale = np.maximum(distance, _NEAREST) ** 2 * np.maximum(distance, 1e-300)
-    return np.asarray(offset / scale[..., None])
+def _compute_inverse_squares(offsets: Array) -> Array:
+    """Return vectors of length 1 / r² along offsets of length r, (..., 2); zero for an offset of zero."""
+    distance = np.sqrt(offsets[..., 0] ** 2 + offsets[..., 1] ** 2)
+    cube = np.maximum(distance, _MIN_CHARGE_DISTANCE_M) ** 2 * np.maximum(distance, 1e-300)
+    return np.asarray(offsets / cube[..., None])
 
 
 @dataclass(frozen=True)
 class Poduri(BaseController):
-    """Constrained coverage (Poduri and Sukhatme, ICRA 2004): area, with a degree of at least K.
+    """Constrained coverage (Poduri and Sukhatme, ICRA 2004): spread, but keep at least K neighbours.
 
-    Two robots have a link when they are at most R_c apart. F_cover pushes every linked pair apart with
-    k_cover / d². F_degree pulls a pair whose link is critical together with k_degree / (R_c - d)², which
-    no link survives to lose. At d = eta R_c the two are equal: k_degree = k_cover (1/eta - 1)². The
-    viscosity of the robots brings the team to rest.
+    Robots at most R_c apart have a link. They repel each other along all links; along critical links, which
+    keep the number of neighbours from falling below K, they also attract each other. Viscosity brings the
+    team to rest.
 
-    Decided here: the links of a robot to its K nearest are critical for it as soon as no more than K
-    robots are within eta R_c, that is, before they are in danger. A link is held from both its ends: as
-    robots hear positions only, each also holds a link that, by what it hears, the other may need. That
-    none is lost takes robots that can do what the forces ask for: two that part at full speed must be
-    able to stop within (1 - eta) R_c. The closest obstacle point pushes as (24) does, within `rho_obs`.
+    Notes
+    -----
+    Along a link of length d,
 
-    Taken from what is generally known of the paper, not from its text, are the two forces, their
-    balance at eta R_c and the degree of at least K; the repulsion from obstacles is (24), as RAPF has it.
+    - F_cover = k_cover / d² pushes the two robots apart, and
+    - F_degree = k_degree / (R_c - d)² pulls the two robots of a critical link together. It grows without
+      bound before the link breaks.
+
+    At d = η R_c the two are equal: k_degree = k_cover (1/η - 1)².
+
+    The two forces, their balance at η R_c and the degree of at least K follow what is generally known of the
+    paper, not its text. The following choices are ours. If at most K robots are within η R_c of a robot, the
+    links to its K nearest neighbours are critical for it, before they are in danger. Robots know only
+    positions of others: each also keeps a link that, by the positions that it knows, is critical for the
+    neighbour. The closest obstacle point repels with (24), within `rho_obs`.
+
+    Links are never lost if robots can exert these forces: two robots that move apart at full speed have to be
+    able to stop within (1 - η) R_c.
     """
 
     name = "poduri"
     label = "Constrained coverage"
     summary = "spreads, but keeps at least K neighbours within R_c (Poduri and Sukhatme 2004)"
 
-    neighbours: float = gain(2.0, "robots", "K, the neighbours that each robot keeps", high=100.0, whole=True)
+    neighbours: float = gain(
+        2.0, "robots", "K, number of neighbours that each robot keeps", high=100.0, whole=True
+    )
     link_range: float = gain(6.0, "m", "R_c, or the communication range if that is less", low=0.01, high=1e5)
     k_cover: float = gain(10.0, "N m²", "strength of F_cover")
     eta: float = gain(0.9, "R_c", "distance at which the two forces are equal", low=0.1, high=0.99)
@@ -208,67 +263,103 @@ class Poduri(BaseController):
     rho_obs: float = gain(2.0, "m", "range of that repulsion", low=0.01, high=1e4)
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
-        """Return the forces F_cover + F_degree and the repulsion from the obstacle."""
-        n, limit = len(seen.positions), np.minimum(memory.team.communication_range, self.link_range)
-        robot, neighbour, offset, distance = _close_pairs(seen, float(limit.max()))
-        reach = np.minimum(limit[robot], limit[neighbour])
-        linked = distance <= reach
-        robot, neighbour, reach = robot[linked], neighbour[linked], reach[linked]
-        offset, distance = offset[linked], distance[linked]
-        critical = self._critical(seen, robot, neighbour, distance, reach)
-        way = offset / np.maximum(distance, _TOGETHER)[:, None]
-        cover = self.k_cover / np.maximum(distance, CONTACT_DISTANCE) ** 2
-        spare = reach - np.minimum(distance, _STRETCHED * reach)
-        degree = np.where(critical, self.k_cover * (1.0 / self.eta - 1.0) ** 2 / spare**2, 0.0)
-        apart = sum_by_robot(robot, way * cover[:, None], n)
-        held = sum_by_robot(robot, way * -degree[:, None], n)
-        gains = PotentialGains(float(self.k_obs), float(self.rho_obs), k_att=0.0, max_attraction=np.inf)
-        obstacle = _compute_potential_forces(seen, seen.positions, gains, includes_robots=False).obstacle
-        terms = {"repulsion_robots": apart, "attraction": held, "repulsion_obstacle": obstacle}
-        return Decision(apart + held + obstacle, terms=terms, memory=memory)
+        """Compute the forces F_cover + F_degree and the repulsion of the closest obstacle point."""
+        n = len(seen.positions)
+        links, link_ranges = self._find_links(seen, memory.team)
+        is_critical = self._find_critical_links(seen, links, link_ranges)
+        directions = links.offset / np.maximum(links.distance, _MIN_DISTANCE_M)[:, None]
+        cover = self.k_cover / np.maximum(links.distance, CONTACT_DISTANCE) ** 2
+        slack = link_ranges - np.minimum(links.distance, _MAX_LINK_STRETCH * link_ranges)
+        k_degree = self.k_cover * (1.0 / self.eta - 1.0) ** 2
+        degree = np.where(is_critical, k_degree / slack**2, 0.0)
+        repulsion = sum_by_robot(links.robot, directions * cover[:, None], n)
+        attraction = sum_by_robot(links.robot, directions * -degree[:, None], n)
+        gains = PotentialGains(
+            k_rep=float(self.k_obs), rho_0=float(self.rho_obs), k_att=0.0, max_attraction=np.inf
+        )
+        potential = _compute_potential_forces(seen, seen.positions, gains, includes_robots=False)
+        terms = {
+            "repulsion_robots": repulsion,
+            "attraction": attraction,
+            "repulsion_obstacle": potential.obstacle,
+        }
+        return Decision(forces=repulsion + attraction + potential.obstacle, terms=terms, memory=memory)
 
-    def _critical(
-        self, seen: Observations, robot: IntArray, neighbour: IntArray, distance: Array, reach: Array
+    def _find_links(self, seen: Observations, team: Team) -> tuple[NearNeighbours, Array]:
+        """Return the links of all robots, and the range R_c of each, (m,) m."""
+        max_ranges = np.minimum(team.communication_range, self.link_range)
+        pairs = _find_separated_neighbours(seen, float(max_ranges.max()))
+        link_ranges = np.minimum(max_ranges[pairs.robot], max_ranges[pairs.neighbour])
+        is_linked = pairs.distance <= link_ranges
+        links = NearNeighbours(
+            robot=pairs.robot[is_linked],
+            neighbour=pairs.neighbour[is_linked],
+            offset=pairs.offset[is_linked],
+            distance=pairs.distance[is_linked],
+        )
+        return links, link_ranges[is_linked]
+
+    def _find_critical_links(
+        self, seen: Observations, links: NearNeighbours, link_ranges: Array
     ) -> BoolArray:
-        """Return for (m,) links whether the robot holds them, for its own sake or for the neighbour's."""
-        n, most = len(seen.positions), self.neighbours
-        near = np.zeros((n, n), dtype=bool)
-        near[robot, neighbour] = distance <= self.eta * reach
-        # for its own sake: one of its K nearest, while at most K are near
-        critical: BoolArray = (near.sum(axis=1)[robot] <= most) & (_rank(robot, distance) < most)
-        # for the neighbour's: by the same rule, on those of the neighbour's neighbours that the robot hears
-        if seen.reported_positions is not None:
-            ask = np.flatnonzero(~critical)
-            crowd, nearer = self._counted(seen, robot[ask], neighbour[ask], distance[ask], reach[ask])
-            critical[ask] = (crowd <= most) & (nearer < most)
-            return critical
-        knows = np.eye(n, dtype=bool)
+        """Return which links are critical for the robot or, as far as the robot knows, for the neighbour."""
+        n = len(seen.positions)
+        is_near = np.zeros((n, n), dtype=bool)
+        is_near[links.robot, links.neighbour] = links.distance <= self.eta * link_ranges
+        rank = _rank_by_distance(links.robot, links.distance)
+        is_critical: BoolArray = (is_near.sum(axis=1)[links.robot] <= self.neighbours) & (
+            rank < self.neighbours
+        )
+        others = np.flatnonzero(~is_critical)
+        if seen.reported_positions is None:
+            is_critical[others] = self._is_critical_for_neighbour(seen, links, is_near, others)
+        else:
+            is_critical[others] = self._is_critical_by_reports(seen, links, link_ranges, others)
+        return is_critical
+
+    def _is_critical_for_neighbour(
+        self, seen: Observations, links: NearNeighbours, is_near: BoolArray, selected: IntArray
+    ) -> BoolArray:
+        """Return whether links are critical for the neighbour, by the robots that the robot hears."""
+        n = len(is_near)
+        hears = np.eye(n, dtype=bool)
         first, second = seen.neighbours.list_pairs()
-        knows[first, second] = True
-        known = knows.astype(np.float32) @ near.astype(np.float32).T
-        ask = np.flatnonzero(~critical & (known[robot, neighbour] <= most))
-        away = np.full((n, n), np.inf)
-        away[robot, neighbour] = distance
-        nearer = ((away[neighbour[ask]] < distance[ask, None]) & knows[robot[ask]]).sum(axis=1)
-        critical[ask] = nearer < most
-        return critical
+        hears[first, second] = True
+        # Products of float matrices are much faster than those of integers.
+        near_counts = hears.astype(np.float32) @ is_near.astype(np.float32).T
+        is_critical = near_counts[links.robot, links.neighbour][selected] <= self.neighbours
+        # The table of the remaining links is large: there are few of them.
+        remaining = selected[is_critical]
+        distances = np.full((n, n), np.inf)
+        distances[links.robot, links.neighbour] = links.distance
+        is_nearer = distances[links.neighbour[remaining]] < links.distance[remaining, None]
+        nearer_counts = (is_nearer & hears[links.robot[remaining]]).sum(axis=1)
+        is_critical[is_critical] = nearer_counts < self.neighbours
+        return np.asarray(is_critical)
 
-    def _counted(
-        self, seen: Observations, robot: IntArray, neighbour: IntArray, distance: Array, reach: Array
-    ) -> tuple[IntArray, IntArray]:
-        """Return for links how many robots are near the neighbour, and nearer to it, by what was heard."""
-        counts = []
-        for i, j, far, limit in zip(robot.tolist(), neighbour.tolist(), distance, reach, strict=True):
-            ids, places = seen.neighbours.list_neighbours(i), seen.get_neighbour_positions(i)
-            here = int(np.flatnonzero(ids == j)[0])
-            away = np.hypot(*(np.delete(places, here, axis=0) - places[here]).T)
-            counts.append(((away <= self.eta * limit).sum() + (far <= self.eta * limit), (away < far).sum()))
-        crowd, nearer = np.array(counts, dtype=np.intp).reshape(-1, 2).T
-        return crowd, nearer
+    def _is_critical_by_reports(
+        self, seen: Observations, links: NearNeighbours, link_ranges: Array, selected: IntArray
+    ) -> BoolArray:
+        """Return whether links are critical for the neighbour, by the positions that the robot was sent."""
+        is_critical = np.zeros(len(selected), dtype=bool)
+        for k, link in enumerate(selected.tolist()):
+            robot = links.robot[link]
+            neighbour_positions = seen.get_neighbour_positions(robot)
+            index = int(np.flatnonzero(seen.neighbours.list_neighbours(robot) == links.neighbour[link])[0])
+            offsets = np.delete(neighbour_positions, index, axis=0) - neighbour_positions[index]
+            distances = np.hypot(*offsets.T)
+            near_range = self.eta * link_ranges[link]
+            near_count = (distances <= near_range).sum() + (links.distance[link] <= near_range)
+            nearer_count = (distances < links.distance[link]).sum()
+            is_critical[k] = near_count <= self.neighbours and nearer_count < self.neighbours
+        return is_critical
 
 
-def _rank(robot: IntArray, distance: Array) -> IntArray:
-    """Return for links, sorted by robot, how many of the robot's are shorter; of equal ones the first is."""
+def _rank_by_distance(robot: IntArray, distance: Array) -> IntArray:
+    """Return the rank of each link, (m,), among those of its robot: 0 is the shortest.
+
+    Links are sorted by robot; of links of equal length the first one has the lower rank.
+    """
     rank = np.empty(len(robot), dtype=np.intp)
     rank[np.lexsort((distance, robot))] = np.arange(len(robot))
     return rank - np.searchsorted(robot, robot)
@@ -278,50 +369,64 @@ def _rank(robot: IntArray, distance: Array) -> IntArray:
 class Dispersion(BaseController):
     """Local dispersion, the anonymous variant (Batalin and Sukhatme 2002, "Spreading out").
 
-    Three behaviours, the first that has something to say before the others. *Avoid*: whatever is
-    wanted, towards obstacle points and robots one goes only so fast that the distance falls
-    exponentially to `clearance`; along them, it slides. *Disperse*: away from all robots within `reach`,
-    by the sum of how much each is too near, at full speed at most. *Explore*: with nobody near, straight
-    on at `explore_speed`. Robots need neither to be told apart nor to say anything.
+    Three behaviours have priorities in this order:
 
-    The paper's robots go at constant speed, and never rest. For placements to compare, a robot that is
-    alone rests by default, and the speed falls to zero at `reach`, so that nobody trembles there.
+    - *Avoid*: a robot approaches obstacle points and robots only so fast that the distance decreases
+      exponentially to `clearance`, and slides along them.
+    - *Disperse*: it moves away from all robots within `reach`, the faster the nearer they are, at its maximum
+      speed at most.
+    - *Explore*: without robots within `reach` it moves straight on at `explore_speed`.
 
-    Taken from the paper's abstract and what is generally known of it, not from its text, are the
-    behaviours and their order; the formula of each is made here. That others may be as large as the
-    largest of the team is taken for granted.
+    Robots need neither identities nor communication.
+
+    Notes
+    -----
+    The behaviours and their order follow the paper's abstract and what is generally known of it, not its
+    text; the formulas are ours. Robots of the paper move at constant speed and never come to rest. To make
+    placements comparable, `explore_speed` is 0 by default, and the speed falls to zero at `reach`, so that
+    robots do not oscillate there. Each robot assumes that others may be as large as the largest of the team.
     """
 
     name = "dispersion"
     label = "Dispersion"
-    summary = "local dispersion: away from robots that are near, along obstacles (Batalin and Sukhatme 2002)"
+    summary = "local dispersion: away from near robots, along obstacles (Batalin and Sukhatme 2002)"
     scanning = Scanning(rays=36, period=0.1)
 
-    reach: float = gain(5.0, "m", "distance up to which others are fled", low=0.01, high=1e4)
-    k_disperse: float = gain(1.0, "1/s", "wanted speed per metre that another robot is too near")
-    explore_speed: float = gain(0.0, "m/s", "speed of a robot that nobody is near", high=1e3)
-    clearance: float = gain(0.2, "m", "distance from others' surfaces, to the centre", high=1e3)
-    k_avoid: float = gain(
-        2.0, "1/s", "approach speed per metre that the closest one is farther away", high=60.0
-    )
+    reach: float = gain(5.0, "m", "distance up to which a robot moves away from others", low=0.01, high=1e4)
+    k_disperse: float = gain(1.0, "1/s", "desired speed per metre that another robot is too near")
+    explore_speed: float = gain(0.0, "m/s", "speed of a robot without others in reach", high=1e3)
+    clearance: float = gain(0.2, "m", "from the centre of a robot to the surface of others", high=1e3)
+    k_avoid: float = gain(2.0, "1/s", "maximum approach speed per metre beyond the clearance", high=60.0)
     response_time: float = response_time_gain()
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
-        team, returns = memory.team, update_returns(seen, memory.returns)
-        keep, points = np.full(len(team), self.clearance), collect_obstacle_points(seen, returns)
-        wanted, apart = self._dispersing(seen, team), keep + float(team.radius.max())
-        wanted = avoid_collisions(wanted, seen, team, points, Margins(keep, apart, self.k_avoid, 0.5))
-        forces = compute_drive_forces(wanted, seen, team, self.response_time)
-        return Decision(forces, terms={"attraction": forces}, memory=replace(memory, returns=returns))
+        """Compute the forces that track the velocities of the behaviour with the highest priority."""
+        team = memory.team
+        returns = update_returns(seen, memory.returns)
+        clearance = np.full(len(team), self.clearance)
+        margins = Margins(
+            clearance=clearance,
+            separation=clearance + float(team.radius.max()),
+            rate=self.k_avoid,
+            braking=_BRAKING_FRACTION,
+        )
+        velocities = avoid_collisions(
+            self._compute_velocities(seen, team), seen, team, collect_obstacle_points(seen, returns), margins
+        )
+        forces = compute_drive_forces(velocities, seen, team, self.response_time)
+        return Decision(forces=forces, terms={"attraction": forces}, memory=replace(memory, returns=returns))
 
-    def _dispersing(self, seen: Observations, team: Team) -> Array:
+    def _compute_velocities(self, seen: Observations, team: Team) -> Array:
+        """Return the velocities of the behaviours disperse and explore, (n, 2) m/s."""
         n = len(seen.positions)
-        robot, _, offset, distance = _close_pairs(seen, self.reach)
-        flight = offset * (self.k_disperse * (self.reach / np.maximum(distance, _TOGETHER) - 1.0))[:, None]
-        wanted = sum_by_robot(robot, flight, n)
+        pairs = _find_separated_neighbours(seen, self.reach)
+        rate = self.k_disperse * (self.reach / np.maximum(pairs.distance, _MIN_DISTANCE_M) - 1.0)
+        velocities = sum_by_robot(pairs.robot, pairs.offset * rate[:, None], n)
         if self.explore_speed > 0.0:
             speed = np.hypot(*seen.velocities.T)
-            alone = (np.bincount(robot, minlength=n) == 0) & (speed > _STILL)
-            wanted[alone] = seen.velocities[alone] * (self.explore_speed / speed[alone])[:, None]
-        speed = np.hypot(*wanted.T)
-        return np.asarray(wanted * np.minimum(1.0, team.max_speed / np.maximum(speed, 1e-300))[:, None])
+            is_exploring = (np.bincount(pairs.robot, minlength=n) == 0) & (speed > _MIN_EXPLORING_SPEED)
+            factor = self.explore_speed / speed[is_exploring]
+            velocities[is_exploring] = seen.velocities[is_exploring] * factor[:, None]
+        speed = np.hypot(*velocities.T)
+        factor = np.minimum(1.0, team.max_speed / np.maximum(speed, 1e-300))
+        return np.asarray(velocities * factor[:, None])
