@@ -1,10 +1,10 @@
-"""Visibility-based coverage: robots climb the area that they see, each in its own cell."""
+"""Visibility-based coverage: robots maximise the area in view, each in its own cell."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
 from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
@@ -18,6 +18,7 @@ from robocov.controllers.driving import (
 )
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations, Scanning, compute_headings
+from robocov.observation.observations import NearNeighbours
 from robocov.observation.scanned_view import (
     View,
     compute_step_fractions,
@@ -28,43 +29,55 @@ from robocov.observation.scanned_view import (
     is_path_clear,
 )
 
-_RINGS = 12  # places along each ray at which the integrals are sampled
-_PARTS = np.append((np.arange(_RINGS) + 0.5) / _RINGS, 1.0)
+_SAMPLES_PER_RAY = 12
+_SAMPLE_FRACTIONS = np.append((np.arange(_SAMPLES_PER_RAY) + 0.5) / _SAMPLES_PER_RAY, 1.0)
+"""Points of each ray, as fractions of its length: samples of the integrals over edges, and the end."""
+_MIN_CORNER_DISTANCE_M = 1e-3
+_APPROACH_RATE = 4.0
+"""Maximum rate in 1/s at which the distance to others decreases to the clearance."""
+_BRAKING_FRACTION = 0.5
+"""Fraction of the maximum acceleration that is counted on to avoid collisions."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VisibilityMemory(Memory):
-    """Memory of the robots, with what they see and where that draws them."""
+    """Memory of the robots: their views in the last scan, and the motion that follows from these."""
 
     view: View | None = None
-    gradient: Array | None = None  # (n, 2) m
-    step: Array | None = None  # (n,), the part of full speed with which they follow it
+    gradient: Array | None = None
+    """(n, 2) m, gradient of the area in view."""
+    step: Array | None = None
+    """(n,) Fraction of full speed with which each robot follows the gradient."""
 
 
 @dataclass(frozen=True)
 class Visibility(BaseController):
     """Coverage with visibility sensing constraints (Kantaros, Thanou and Tzes 2015).
 
-    The robots maximise the area (weighted by the density) that anybody sees: what lies within its sensing
-    range R_i and in its line of sight. Of those who see a place, the one with the least power
-    |q - p_i|² - R_i² is in charge of it, the nearest where all see equally far. Robot i moves along the
-    gradient of the area W_i of which it is in charge:
+    The team maximises the area, weighted by the density, that is in view of any robot: within its sensing
+    range and its line of sight. Each robot moves along the gradient of the area of its own cell. Robots that
+    see their whole cells are at rest; path lengths do not matter.
+
+    Notes
+    -----
+    The cell W_i of robot i is the part of its view in which no other robot that sees the point q has a lower
+    power |q - p_i|² - R_i², where R_i is the sensing range. With equal ranges, the nearest robot has the
+    lowest power. The motion is
 
         u_i = k ( ∫ φ n ds over the free arcs of W_i + sum over the windows of ∫ φ (s - ρ)/ρ ds t )
 
-    A free arc is a piece of the circle of radius R_i where the view ends for want of range, with the
-    outward normal n. A window is a free edge that begins at a reflex corner of an obstacle, at the distance
-    ρ; s is the distance along it, and t leads away from the obstacle (see `Windows`). Walls do not move, and
-    what a border between two cells gives to one robot it takes from the other: neither is counted.
+    A free arc is a piece of the circle of radius R_i on the border of W_i, and n is its outward normal. A
+    window is a free edge of the view that begins at a reflex corner of an obstacle, at the distance ρ; s is
+    the distance along the edge, and t is normal to it, away from the obstacle (see `Windows`). Walls do not
+    move, and the gradients of two cells along their common border cancel.
 
-    Arcs and windows are those of the robot's own ray scan; between scans it goes on as it was. Who hears
-    nobody is in charge of all that it sees. How far it is to a place by foot plays no part: robots that see
-    all that they are in charge of rest, wherever they stand.
+    Arcs and windows are found in the robot's own scan; between scans, robots keep their velocities. A robot
+    that hears no others has the whole view as its cell.
 
-    Taken from the paper's abstract (Automatica 53, 195-207) and what is generally known of it, not from its
-    text. There robots tell each other their views; here they tell positions, and a neighbour sees a place for
-    all one knows unless the line between them passes behind something that the own scan has met. That
-    obstacles and robots are kept off by slowing down is decided here.
+    The motion follows the paper's abstract (Automatica 53, 195-207) and what is generally known of it, not
+    its text. In the paper, robots send each other their views. Here they send positions, and a robot assumes
+    that a neighbour sees a point unless its own scan has met an obstacle in front of the line between the
+    two. Avoiding collisions by slowing down is ours as well.
     """
 
     name = "visibility"
@@ -73,73 +86,117 @@ class Visibility(BaseController):
     scanning = Scanning(rays=120, period=0.2)
     memory_type = VisibilityMemory
 
-    k_area: float = gain(0.1, "1/s", "wanted speed per metre by which the area in view grows", high=100.0)
-    jump: float = gain(0.3, "m", "depth of a step in the view that is a window", low=0.01)
+    k_area: float = gain(
+        0.1, "1/s", "desired speed per square metre of area in view and metre of motion", high=100.0
+    )
+    jump: float = gain(0.3, "m", "minimum step of the depth in view at a window", low=0.01)
     clearance: float = gain(0.05, "m", "distance kept from obstacles and robots, rim to rim", high=10.0)
     response_time: float = response_time_gain()
 
     def decide(self, seen: Observations, memory: VisibilityMemory) -> Decision:
-        team, gradient, step = memory.team, memory.gradient, memory.step
+        """Compute the forces that drive each robot along the gradient of its area in view."""
+        team = memory.team
+        gradient = memory.gradient
+        step = memory.step
         reach = np.minimum(team.sensing_range, seen.region.diameter)
         view = compute_view(seen, memory.view, self.scanning, reach)
         if gradient is None or step is None or seen.scans is not None:
-            before, gradient = gradient, self.gradient(seen, view, reach)
-            step = compute_step_fractions(gradient, before, step)
+            gradient = self.compute_gradient(seen, view, reach)
+            step = compute_step_fractions(gradient, memory.gradient, step)
         returns = update_returns(seen, memory.returns)
-        wanted = compute_approach_velocities(gradient, self.k_area, team.max_speed) * step[:, None]
-        keep = team.radius + self.clearance
-        points, apart = collect_obstacle_points(seen, returns), keep + float(team.radius.max())
-        wanted = avoid_collisions(wanted, seen, team, points, Margins(keep, apart, 4.0, 0.5))
-        forces = compute_drive_forces(wanted, seen, team, self.response_time)
-        memory = VisibilityMemory(team, returns, None, view, gradient, step)
-        return Decision(forces, terms={"attraction": forces}, memory=memory)
+        velocities = compute_approach_velocities(gradient, self.k_area, team.max_speed) * step[:, None]
+        clearance = team.radius + self.clearance
+        margins = Margins(
+            clearance=clearance,
+            separation=clearance + float(team.radius.max()),
+            rate=_APPROACH_RATE,
+            braking=_BRAKING_FRACTION,
+        )
+        obstacle_points = collect_obstacle_points(seen, returns)
+        velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
+        forces = compute_drive_forces(velocities, seen, team, self.response_time)
+        return Decision(
+            forces=forces,
+            terms={"attraction": forces},
+            memory=VisibilityMemory(team=team, returns=returns, view=view, gradient=gradient, step=step),
+        )
 
-    def gradient(self, seen: Observations, view: View, reach: Array) -> Array:
-        """Return by how much the area in view grows per metre of each robot's way, (n, 2) m."""
+    def compute_gradient(self, seen: Observations, view: View, reach: Array) -> Array:
+        """Compute the gradient of the area of each robot's cell.
+
+        Parameters
+        ----------
+        seen : Observations
+        view : View
+        reach : (n,) array, m
+            Maximum distance of each robot's view.
+
+        Returns
+        -------
+        (n, 2) array, m
+            Growth of the area, weighted by φ, per metre of the robot's motion.
+        """
         n, rays = view.distances.shape
         directions = compute_headings(rays)
-        along = view.distances[..., None] * _PARTS  # (n, rays, rings + 1) m
+        depths = view.distances[..., None] * _SAMPLE_FRACTIONS
         walls = np.where(view.hit, view.distances, np.inf)
-        robot, other, offset, _ = seen.find_near_neighbours(2.0 * float(reach.max()))
-        places = seen.positions[:, None, None] + along[..., None] * directions[:, None]
-        weight = evaluate_density(seen.density, places)
-        weight = weight * in_charge(along, walls, directions, robot, other, -offset, reach)
+        pairs = seen.find_near_neighbours(2.0 * float(reach.max()))
+        points = seen.positions[:, None, None] + depths[..., None] * directions[:, None]
+        weight = evaluate_density(seen.density, points)
+        weight = weight * find_cells_in_view(depths, walls, directions, pairs, reach)
         arcs = ~view.hit * weight[..., -1] * reach[:, None] * (2.0 * np.pi / rays)
 
-        edges = find_windows(view, directions, reach, self.jump)
-        here = edges.robot, edges.ray
-        past = np.maximum(along[here] - edges.corner[:, None], 0.0)[:, :-1]
-        swept = (weight[here][:, :-1] * past).sum(axis=1) / np.maximum(edges.corner, 1e-3)
-        swept *= view.distances[here] / _RINGS
-        turning = sum_by_robot(edges.robot, swept[:, None] * edges.across, n)
-        return np.asarray((arcs[..., None] * directions).sum(axis=1) + turning)
+        windows = find_windows(view, directions, reach, self.jump)
+        window_depths = depths[windows.robot, windows.ray]
+        window_weight = weight[windows.robot, windows.ray]
+        beyond_corner = np.maximum(window_depths - windows.corner[:, None], 0.0)[:, :-1]
+        swept = (window_weight[:, :-1] * beyond_corner).sum(axis=1)
+        swept /= np.maximum(windows.corner, _MIN_CORNER_DISTANCE_M)
+        swept *= view.distances[windows.robot, windows.ray] / _SAMPLES_PER_RAY
+        window_terms = sum_by_robot(windows.robot, swept[:, None] * windows.across, n)
+        return np.asarray((arcs[..., None] * directions).sum(axis=1) + window_terms)
 
 
 @kernel
-def in_charge(
-    along: Array,
-    walls: Array,
-    directions: Array,
-    robot: IntArray,
-    other: IntArray,
-    towards: Array,
-    reach: Array,
+def find_cells_in_view(
+    depths: Array, walls: Array, directions: Array, pairs: NearNeighbours, reach: Array
 ) -> BoolArray:
-    """Return whether each robot is in charge of what is (n, rays, k) m along each ray, the same shape.
+    """Find which points of each robot's view belong to its cell.
 
-    Pairs, (m,), are of robots and their neighbours, (m, 2) m off, who see as far as they reach, (n,) m, and
-    past the walls that the robot sees, (n, rays) m. Who sees a place with the smallest power is in charge.
+    Parameters
+    ----------
+    depths : (n, rays, k) array, m
+        Distances of the points along each ray.
+    walls : (n, rays) array, m
+        Distances of the walls in view; infinite where there is none.
+    directions : (rays, 2) array
+        Unit vectors along the rays.
+    pairs : NearNeighbours
+        The neighbours that may see points of the view.
+    reach : (n,) array, m
+        Maximum distance of each robot's view.
+
+    Returns
+    -------
+    (n, rays, k) bool array
+        Whether no neighbour that sees the point has a lower power |q - p|² - R² there.
     """
-    mine = np.ones(along.shape, dtype=np.bool_)
-    for m in range(len(robot)):
-        i, far = robot[m], reach[other[m]]
-        if is_behind_wall(towards[m, 0], towards[m, 1], walls[i]):
+    is_own = np.ones(depths.shape, dtype=np.bool_)
+    for m in range(len(pairs.robot)):
+        i = pairs.robot[m]
+        neighbour_x = -pairs.offset[m, 0]
+        neighbour_y = -pairs.offset[m, 1]
+        neighbour_reach = reach[pairs.neighbour[m]]
+        if is_behind_wall(neighbour_x, neighbour_y, walls[i]):
             continue
         for r in range(len(directions)):
-            for c in range(along.shape[2]):
-                x, y = along[i, r, c] * directions[r, 0], along[i, r, c] * directions[r, 1]
-                dx, dy = towards[m, 0] - x, towards[m, 1] - y
-                power = dx * dx + dy * dy - far * far
-                if power <= 0.0 and power < along[i, r, c] ** 2 - reach[i] ** 2 and mine[i, r, c]:
-                    mine[i, r, c] = not is_path_clear(x, y, dx, dy, walls[i])
-    return mine
+            for c in range(depths.shape[2]):
+                x = depths[i, r, c] * directions[r, 0]
+                y = depths[i, r, c] * directions[r, 1]
+                dx = neighbour_x - x
+                dy = neighbour_y - y
+                power = dx * dx + dy * dy - neighbour_reach * neighbour_reach
+                own_power = depths[i, r, c] ** 2 - reach[i] ** 2
+                if power <= 0.0 and power < own_power and is_own[i, r, c]:
+                    is_own[i, r, c] = not is_path_clear(x, y, dx, dy, walls[i])
+    return is_own

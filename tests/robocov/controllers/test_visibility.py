@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from robocov.controllers import Boosting, Visibility
 from robocov.controllers.boosting import Climb, Mode, undetected
-from robocov.controllers.visibility import in_charge
+from robocov.controllers.visibility import find_cells_in_view
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, PolygonObstacle
 from robocov.observation import Observations, compute_headings
@@ -75,7 +75,7 @@ def test_gradients_are_those_of_what_is_in_view(
             for step in (np.array([h, 0.0]), np.array([0.0, h]))
         ]
         if decay is None:
-            found = Visibility(jump=0.1).gradient(seen, view, np.array([reach]))[0]
+            found = Visibility(jump=0.1).compute_gradient(seen, view, np.array([reach]))[0]
         else:
             added, gradient, _ = Boosting(jump=0.1, decay=decay).slopes(seen, view, np.array([reach]))
             assert added[0] == pytest.approx(worth(at, reach, decay, density), rel=0.01)
@@ -85,20 +85,20 @@ def test_gradients_are_those_of_what_is_in_view(
 
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**32), n=st.integers(2, 8))
-def test_who_sees_a_place_with_the_least_power_is_in_charge(seed: int, n: int) -> None:
+def test_who_sees_a_place_with_the_least_power_is_find_cells_in_view(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
     positions, reach = rng.uniform((1, 1), (9, 7), size=(n, 2)), rng.uniform(1.0, 4.0, n)
     directions, walls = compute_headings(16), np.full((n, 16), np.inf)
     along = reach[:, None, None] * np.broadcast_to(rng.uniform(0.0, 1.0, 5), (n, 16, 5))
     robot, other, offset, _ = seen_from(positions).find_near_neighbours(np.inf)
-    mine = in_charge(along, walls, directions, robot, other, -offset, reach)
+    mine = find_cells_in_view(along, walls, directions, robot, other, -offset, reach)
     for i in range(n):
         places = positions[i] + along[i][..., None] * directions[:, None]
         power = ((places[..., None, :] - positions) ** 2).sum(axis=-1) - reach**2
         np.testing.assert_array_equal(mine[i], power.argmin(axis=-1) == i)
     # behind a wall nobody is a rival
     walls = np.full((n, 16), 1e-9)
-    assert in_charge(along, walls, directions, robot, other, -offset, reach).all()
+    assert find_cells_in_view(along, walls, directions, robot, other, -offset, reach).all()
 
 
 def test_a_wall_at_a_low_angle_is_no_window() -> None:
