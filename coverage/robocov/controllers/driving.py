@@ -4,6 +4,8 @@ A controller computes a desired velocity, `avoid_collisions` returns the nearest
 the robot senses and hears, and `compute_drive_forces` the force that tracks it.
 """
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 
@@ -13,6 +15,11 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.observation import Observations
 from robocov.team import Team
+
+_DEFAULT_APPROACH_RATE = 4.0
+"""Rate in 1/s at which the rest of a distance may fall."""
+_DEFAULT_BRAKING_FRACTION = 0.5
+"""Fraction of the maximum acceleration that is counted on for braking."""
 
 
 class Margins(NamedTuple):
@@ -26,6 +33,20 @@ class Margins(NamedTuple):
     """1/s, at which the rest of a distance may fall exponentially."""
     braking: float
     """Fraction of the maximum acceleration that is counted on for braking."""
+
+    @classmethod
+    def build_with_gap(cls, team: Team, gap: float) -> Margins:
+        """Build the margins of robots that keep a gap, m, from obstacles and from each other, rim to rim.
+
+        Each robot assumes that others may be as large as the largest of the team.
+        """
+        clearance = team.radius + gap
+        return cls(
+            clearance=clearance,
+            separation=clearance + float(team.radius.max()),
+            rate=_DEFAULT_APPROACH_RATE,
+            braking=_DEFAULT_BRAKING_FRACTION,
+        )
 
 
 def compute_approach_velocities(offsets: Array, gain: float, max_speed: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Voronoi coverage with TangentBug as local planner: Lloyd's algorithm that goes round obstacles."""
+"""Voronoi coverage with TangentBug as local planner: Lloyd's algorithm for robots that avoid obstacles."""
 
 from __future__ import annotations
 
@@ -25,15 +25,20 @@ from robocov.controllers.known_cells import cells_choice, compute_known_cells
 from robocov.observation import Decision, Observations, Scanning, compute_headings
 from robocov.team import Team
 
-_GRAIN = 0.1  # side in metres of the squares in which a robot remembers what it has met
-_EAGERNESS = 4.0  # speed in 1/s with which the distance to what is close may fall to the clearance
-_BETTER = 0.2  # what counts as nearer to the goal must be so much nearer, m: else the modes take turns
-_BACK = 0.3  # distance in metres at which a robot has come back to a place
-_ARRIVED = 0.05  # distance in metres at which a robot has arrived
-_WALK = 1.0  # way in metres along a boundary that is not worth trying
-_WANES = 0.9  # part of its patience that is left to a robot after every goal that it has kept
-_TOUCHING = 0.95  # a point that is already nearer than the clearance is kept off by this part of its distance
-_DETOUR = "longest way along a boundary, in those to the goal; null: once round"
+_SQUARE_SIDE_M = 0.1
+"""Side of the squares in which a robot remembers that it has met an obstacle."""
+_MIN_IMPROVEMENT_M = 0.2
+"""A point counts as nearer to the goal if it is nearer by this; with less, modes would alternate."""
+_RETURN_RADIUS_M = 0.3
+"""Distance from a point at which a robot is back at it."""
+_ARRIVAL_RADIUS_M = 0.05
+"""Distance from a point at which a robot has arrived."""
+_MIN_BOUNDARY_LENGTH_M = 1.0
+"""Length of a boundary that is worth following."""
+_PATIENCE_DECAY = 0.9
+"""Factor of the length for which boundaries are followed, with each attempt to reach a goal."""
+_CONTACT_FRACTION = 0.95
+"""Fraction of its distance to which a point may be approached that is nearer than the clearance."""
 
 
 class Mode(Enum):
@@ -42,306 +47,510 @@ class Mode(Enum):
     GOAL = "motion to the goal"
     BOUNDARY = "boundary following"
     LEAVING = "leaving the boundary"
-    RETURN = "back to the point of the boundary that is nearest to the goal"
-    PROJECTED = "at that point"
+    RETURN = "return to the point of the boundary that is nearest to the goal"
+    PROJECTED = "arrival at that point"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bug:
-    """Memory of one robot's way; places are (2,) m."""
+class BugState:
+    """Navigation state of one robot; points are (2,) arrays in m. Immutable."""
 
     mode: Mode
-    turn: int  # round which way it looks for the end of what blocks it: 1 counter-clockwise, -1 clockwise
-    way: Array  # where it is heading now
-    passing: bool = False  # whether it goes on from there, and need not slow down
-    aim: Array | None = None  # the goal that it keeps since it met something; None while it moves
-    best: Array | None = None  # of all boundaries followed, and places left for, the nearest to it
-    entered: Array | None = None  # where it met the boundary that it follows
-    last: Array | None = None  # where it was when it looked last
-    followed: float = 0.0  # length of its way along that boundary, m
-    patience: float = math.inf  # the longest that it goes along one, m
-    resting: Array | None = None  # the moving goal when it came to rest at `best`
-    tries: int = 0  # how many goals it has kept so far
+    turn: int
+    """Direction in which it passes obstacles: 1 if they are on its right, counter-clockwise; else -1."""
+    waypoint: Array
+    """Point that it heads for."""
+    is_passing: bool = False
+    """Whether it continues from the way-point, and need not slow down there."""
+    fixed_goal: Array | None = None
+    """Its goal since it met an obstacle; None while the goal is its centroid."""
+    best_point: Array | None = None
+    """The point nearest to the fixed goal of all boundaries that it followed or left."""
+    entry_point: Array | None = None
+    """Where it met the boundary that it follows."""
+    last_position: Array | None = None
+    """Where it was at the last scan."""
+    followed_length: float = 0.0
+    """Length of its path along the boundary, m."""
+    max_followed_length: float = math.inf
+    """Length, m, after which it gives up following the boundary."""
+    resting_centroid: Array | None = None
+    """Its centroid when it came to rest at `best_point`."""
+    attempts: int = 0
+    """Number of goals that it has fixed so far."""
 
-    def before(self, position: Array, goal: Array, moved: float) -> Bug:
-        """Return the bug without the goal that it keeps, when that is done with and there is another one.
+    def release_goal(self, position: Array, centroid: Array, min_move: float) -> BugState:
+        """Return the state without the fixed goal if this is reached, or given up and out of date.
 
-        A robot that rests tries again when its goal has moved by so many metres, and more with every try.
+        Parameters
+        ----------
+        position : (2,) array, m
+        centroid : (2,) array, m
+            The moving goal, the centroid of the robot's cell.
+        min_move : float, m
+            A robot at rest tries again if its centroid has moved by this, times the number of attempts.
         """
-        if self.aim is None:
+        if self.fixed_goal is None:
             return self
-        done = math.dist(position, self.aim) < _ARRIVED
+        is_done = math.dist(position, self.fixed_goal) < _ARRIVAL_RADIUS_M
         if self.mode is Mode.PROJECTED:
-            if self.resting is None and math.dist(position, self.way) < _ARRIVED:
-                return replace(self, resting=freeze(goal))
-            done = done or (self.resting is not None and math.dist(goal, self.resting) > moved * self.tries)
-        return Bug(Mode.GOAL, self.turn, self.way, tries=self.tries) if done else self
+            if self.resting_centroid is None:
+                if math.dist(position, self.waypoint) < _ARRIVAL_RADIUS_M:
+                    return replace(self, resting_centroid=freeze(centroid))
+            elif math.dist(centroid, self.resting_centroid) > min_move * self.attempts:
+                is_done = True
+        if not is_done:
+            return self
+        return BugState(Mode.GOAL, self.turn, self.waypoint, attempts=self.attempts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TangentBugMemory(Memory):
-    """Memory of the robots, with the ways that they are on."""
+    """Memory of the robots, with their navigation states."""
 
-    bugs: tuple[Bug, ...] = ()
-    met: tuple[ComplexArray, ...] = ()  # (w,) squares in which each has met something: column + i row
+    bugs: tuple[BugState, ...] = ()
+    met_squares: tuple[ComplexArray, ...] = ()
+    """(w,) Squares in which each robot has met an obstacle: column + i row."""
 
 
 @dataclass(frozen=True)
 class TangentBug(BaseController):
     """Voronoi coverage of non-convex environments (Breitenmoser et al., ICRA 2010).
 
-    The goal of every robot is the centroid of its Voronoi cell of the convex region, as Lloyd's
-    algorithm has it, and TangentBug (Kamon, Rivlin and Rimon 1996) drives it there by what its scans see:
+    The goal of each robot is the centroid of its Voronoi cell of the convex region, as for `Lloyd`.
+    TangentBug (Kamon, Rivlin and Rimon 1996) drives it there by its scans:
 
-    - *Motion to the goal*: straight there, or, where something blocks the way, to that end of the
-      blocking contour by way of which the goal is nearer, as long as this leads nearer to the goal.
-    - *Boundary following*: where it does not, along the boundary, until some place in view is nearer to
-      the goal than all of the boundary that was followed: d_reach < d_followed.
-    - *Projection*: a robot that has been round in vain cannot reach its goal, which lies in an obstacle.
-      It goes to the point of the boundary that is nearest to the goal, and rests. So it does at once
-      where the goal lies in what it has met so far, or closer to that than a robot can be.
+    - *Motion to the goal*: the robot moves straight to the goal. If an obstacle blocks the path, it moves to
+      the end of the blocking contour with the shorter path to the goal, as long as the distance to the goal
+      decreases.
+    - *Boundary following*: otherwise it follows the boundary until a point in view is nearer to the goal than
+      the boundary followed so far: d_reach < d_followed.
+    - *Projection*: a robot that has followed the whole boundary in vain cannot reach its goal, which is
+      inside an obstacle. It moves to the point of the boundary nearest to the goal, and comes to rest. It
+      does so at once if the goal is in an obstacle that it has met, or closer to one than a robot can be.
 
-    Decided here: a robot's own centroid moves with it, and would pull it back from every detour, so that
-    it keeps the goal from where it meets a boundary until it is there or has given up. It follows a
-    boundary `detour` times as far as the goal is away, and then goes back; a way round a wall may be as
-    long as the building. It tries again when its centroid has moved by `moved`. Scans are of the robot's
-    own sensor; its body is accounted for by widening what they meet by radius and `clearance`.
-    Robots that are near are gone round by sliding along them.
-
-    Taken from the paper's abstract and what is generally known of both papers, not from their text. That
-    others may be as large as the largest of the team is taken for granted.
+    Notes
+    -----
+    The controller follows the paper's abstract and what is generally known of both papers, not their texts.
+    The following choices are ours. Because a robot's centroid moves with it and would draw it back from each
+    detour, the goal is fixed from the time when the robot meets a boundary until it is reached or given up. A
+    path along a wall may be as long as the building: the robot follows a boundary for at most `detour` times
+    the distance to its goal, and then returns. It tries again after its centroid has moved by `moved`.
+    Obstacles in a scan are enlarged by the radius of the robot and `clearance`. Robots slide along each
+    other, and assume that others may be as large as the largest of the team.
     """
 
     name = "tangentbug"
     label = "LA + TangentBug"
-    summary = "Lloyd's algorithm, with TangentBug to go round obstacles (Breitenmoser et al. 2010)"
+    summary = "Lloyd's algorithm, with TangentBug to avoid obstacles (Breitenmoser et al. 2010)"
     scanning = Scanning(rays=120, period=0.1)
     memory_type = TangentBugMemory
 
     clearance: float = gain(0.05, "m", "distance kept from obstacles and robots, rim to rim", high=10.0)
-    jump: float = gain(0.5, "m", "depth of a step in the view that is an end of an obstacle", low=0.01)
-    detour: float | None = gain(4.0, "distances", _DETOUR, optional=True)
-    moved: float = gain(0.25, "m", "way of a goal given up after which it is tried again", high=1e4)
-    k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the goal", high=100.0)
+    jump: float = gain(0.5, "m", "minimum step of the depth in view at the end of an obstacle", low=0.01)
+    detour: float | None = gain(
+        4.0,
+        "distances",
+        "maximum path along a boundary, in distances to the goal; null: once around",
+        optional=True,
+    )
+    moved: float = gain(0.25, "m", "move of a goal given up after which it is tried again", high=1e4)
+    k_prop: float = gain(2.0, "1/s", "desired speed per metre of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
     cells: str = cells_choice()
 
     def decide(self, seen: Observations, memory: TangentBugMemory) -> Decision:
-        team, cells = memory.team, compute_known_cells(seen, self.cells, memory.triangulation)
-        goals, returns, met = cells.centroid, update_returns(seen, memory.returns), memory.met
-        points = collect_obstacle_points(seen, returns)
-        bugs = memory.bugs or tuple(Bug(Mode.GOAL, 1, position) for position in seen.positions)
+        """Compute the forces that drive each robot to its way-point."""
+        team = memory.team
+        cells = compute_known_cells(seen, self.cells, memory.triangulation)
+        returns = update_returns(seen, memory.returns)
+        obstacle_points = collect_obstacle_points(seen, returns)
+        bugs = memory.bugs or tuple(BugState(Mode.GOAL, 1, position) for position in seen.positions)
+        met_squares = memory.met_squares or (np.empty(0, dtype=np.complex128),) * len(team)
+        # Robots navigate after each scan; without any scan, by the closest obstacle points in each step.
         if not memory.bugs or seen.scans is not None or returns is None:
-            met = tuple(_remembered(near, met[i : i + 1]) for i, near in enumerate(points))
-            each = zip(bugs, range(len(bugs)), goals, points, met, strict=True)
-            bugs = tuple(self._after_look(seen, team, *bug) for bug in each)
-        # until the next scan, who has its centroid in view follows it
-        direct = np.array([bug.aim is None and not bug.passing for bug in bugs])
-        passing = np.array([bug.passing for bug in bugs])
-        offset = np.where(direct[:, None], goals, np.array([bug.way for bug in bugs])) - seen.positions
-        # towards the next way-points, slowed before what is close
-        distance = np.hypot(*offset.T)
-        speed = np.where(passing, team.max_speed, np.minimum(self.k_prop * distance, team.max_speed))
-        wanted = compute_approach_velocities(
-            offset, math.inf, np.minimum(speed, distance / self.response_time)
+            met_squares = tuple(
+                _add_squares(squares, points)
+                for squares, points in zip(met_squares, obstacle_points, strict=True)
+            )
+            bugs = self._navigate(seen, team, bugs, cells.centroid, obstacle_points, met_squares)
+        velocities = self._compute_velocities(seen, team, bugs, cells.centroid)
+        margins = Margins.build_with_gap(team, 0.5 * self.clearance)
+        velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
+        forces = compute_drive_forces(velocities, seen, team, self.response_time)
+        goals = [
+            centroid if bug.fixed_goal is None else bug.fixed_goal
+            for bug, centroid in zip(bugs, cells.centroid, strict=True)
+        ]
+        return Decision(
+            forces=forces,
+            goals=np.array(goals),
+            terms={"attraction": forces},
+            cells=cells,
+            memory=TangentBugMemory(
+                team=team,
+                returns=returns,
+                triangulation=cells.triangulation,
+                bugs=bugs,
+                met_squares=met_squares,
+            ),
         )
-        keep = team.radius + 0.5 * self.clearance
-        apart = keep + float(team.radius.max())
-        wanted = avoid_collisions(wanted, seen, team, points, Margins(keep, apart, _EAGERNESS, 0.5))
-        forces = compute_drive_forces(wanted, seen, team, self.response_time)
-        kept = [own if bug.aim is None else bug.aim for bug, own in zip(bugs, goals, strict=True)]
-        memory = TangentBugMemory(team, returns, cells.triangulation, bugs, met)
-        return Decision(forces, np.array(kept), {"attraction": forces}, cells, memory)
 
-    def _after_look(
-        self, seen: Observations, team: Team, bug: Bug, i: int, goal: Array, points: Array, met: ComplexArray
-    ) -> Bug:
-        """Return what robot i does from now on."""
-        position, directions = seen.positions[i], compute_headings(self.scanning.rays)
-        bug = bug.before(position, goal, self.moved)
-        goal = (goal if bug.aim is None else bug.aim) - position
-        reach = min(float(team.sensing_range[i]), seen.region.diameter)
-        keep = float(team.radius[i]) + self.clearance
-        points = points - position
-        free = free_distances(points, directions, keep, reach)
-        walls = (np.column_stack([met.real, met.imag]) + 0.5) * _GRAIN - position
-        return Look(self, position, goal, points, walls, directions, free, keep, reach).next(bug)
+    def _navigate(
+        self,
+        seen: Observations,
+        team: Team,
+        bugs: tuple[BugState, ...],
+        centroids: Array,
+        obstacle_points: Array,
+        met_squares: tuple[ComplexArray, ...],
+    ) -> tuple[BugState, ...]:
+        """Return the navigation states of all robots after a scan."""
+        directions = compute_headings(self.scanning.rays)
+        later = []
+        for i, bug in enumerate(bugs):
+            position = seen.positions[i]
+            bug = bug.release_goal(position, centroids[i], self.moved)
+            goal = centroids[i] if bug.fixed_goal is None else bug.fixed_goal
+            points = obstacle_points[i] - position
+            clearance = float(team.radius[i]) + self.clearance
+            reach = min(float(team.sensing_range[i]), seen.region.diameter)
+            squares = np.column_stack([met_squares[i].real, met_squares[i].imag])
+            navigator = Navigator(
+                jump=self.jump,
+                detour=self.detour,
+                position=position,
+                goal=goal - position,
+                points=points,
+                met_points=(squares + 0.5) * _SQUARE_SIDE_M - position,
+                directions=directions,
+                free_distances=compute_free_distances(points, directions, clearance, reach),
+                clearance=clearance,
+                reach=reach,
+            )
+            later.append(navigator.update(bug))
+        return tuple(later)
+
+    def _compute_velocities(
+        self, seen: Observations, team: Team, bugs: tuple[BugState, ...], centroids: Array
+    ) -> Array:
+        """Return the desired velocities towards the way-points, (n, 2) m/s."""
+        waypoints = np.array([bug.waypoint for bug in bugs])
+        is_passing = np.array([bug.is_passing for bug in bugs])
+        # A robot with its centroid in view follows it until the next scan.
+        follows_centroid = np.array([bug.fixed_goal is None and not bug.is_passing for bug in bugs])
+        waypoints = np.where(follows_centroid[:, None], centroids, waypoints)
+        offsets = waypoints - seen.positions
+        distance = np.hypot(*offsets.T)
+        speed = np.where(is_passing, team.max_speed, np.minimum(self.k_prop * distance, team.max_speed))
+        # A way-point that is close must not be overshot.
+        speed = np.minimum(speed, distance / self.response_time)
+        return compute_approach_velocities(offsets, math.inf, speed)
 
 
-def _remembered(points: Array, met: tuple[ComplexArray, ...]) -> ComplexArray:
-    """Return the squares that a robot has met something in, with those of (k, 2) points; nan for none."""
-    square = np.floor(points[~np.isnan(points[:, 0])] / _GRAIN)
-    return np.unique(np.concatenate([*met, square[:, 0] + 1j * square[:, 1]]))
+def _add_squares(squares: ComplexArray, points: Array) -> ComplexArray:
+    """Return the squares in which a robot has met an obstacle, with those of (k, 2) points; nan for none."""
+    indices = np.floor(points[~np.isnan(points[:, 0])] / _SQUARE_SIDE_M)
+    return np.unique(np.concatenate([squares, indices[:, 0] + 1j * indices[:, 1]]))
 
 
-class Gap(NamedTuple):
-    """An end of the contour that blocks the way: the first ray past it, and a point just past it, m."""
+class ContourEnd(NamedTuple):
+    """End of the contour that blocks the path."""
 
     ray: int
+    """The first ray past it."""
     point: Array
+    """(2,) m, a point just past it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
-    """One robot's scan: all places and distances are from it, in m."""
+class Navigator:
+    """Decisions of one robot by its last scan. Points and distances are relative to it, in m."""
 
-    law: TangentBug
-    position: Array  # (2,), its own
-    goal: Array  # (2,)
-    points: Array  # (m, 2) obstacle points; nan where a ray met nothing
-    walls: Array  # (w, 2), all that it has met so far, to within `_GRAIN`
-    directions: Array  # (k, 2) unit vectors evenly round a full turn
-    free: Array  # (k,), how far the robot can go straight on along each
-    keep: float  # distance that its centre keeps from obstacles
-    reach: float  # range of its sensor
+    jump: float
+    """Minimum step of the depth in view at the end of an obstacle."""
+    detour: float | None
+    """Maximum path along a boundary, in distances to the goal."""
+    position: Array
+    """(2,) Position of the robot in the region."""
+    goal: Array
+    """(2,)"""
+    points: Array
+    """(m, 2) Obstacle points; nan for rays that met nothing."""
+    met_points: Array
+    """(w, 2) Centres of the squares in which it has met an obstacle so far."""
+    directions: Array
+    """(k, 2) Unit vectors of the rays."""
+    free_distances: Array
+    """(k,) How far the robot can move straight along each ray."""
+    clearance: float
+    """Distance that its centre keeps from obstacles."""
+    reach: float
+    """Range of its sensor."""
 
-    def next(self, bug: Bug) -> Bug:
-        """Return what the robot does from now on."""
-        free = self._towards(self.goal) >= self.reach - 1e-9
-        if self._in_view(self.goal) or (bug.mode is Mode.GOAL and free):
-            return self._off(bug, Mode.GOAL, self.position + self.goal)
+    def update(self, bug: BugState) -> BugState:
+        """Return the navigation state after the scan."""
+        is_goal_in_view = self._is_in_view(self.goal)
+        is_free_ahead = self._compute_free_distance(self.goal) >= self.reach - 1e-9
+        if is_goal_in_view or (bug.mode is Mode.GOAL and is_free_ahead):
+            return self._head_for(bug, Mode.GOAL, self.position + self.goal)
         if bug.mode is Mode.PROJECTED:
             return bug
         if bug.mode is Mode.LEAVING:
-            there = bug.way - self.position
-            if math.hypot(*there) > _BACK and self._in_view(there):
+            offset = bug.waypoint - self.position
+            if math.hypot(*offset) > _RETURN_RADIUS_M and self._is_in_view(offset):
                 return bug
-            # as good as reached: the next place to leave for must be nearer
-            bug = replace(bug, mode=Mode.GOAL, best=bug.way)
-        return self._to_goal(bug) if bug.mode is Mode.GOAL else self._along_boundary(bug)
+            # The next point at which it leaves a boundary has to be nearer to the goal.
+            bug = replace(bug, mode=Mode.GOAL, best_point=bug.waypoint)
+        if bug.mode is Mode.GOAL:
+            return self._move_to_goal(bug)
+        return self._follow_boundary(bug)
 
-    def _off(self, bug: Bug, mode: Mode, way: Array, passing: bool = False) -> Bug:
-        """Return the bug on its way through free space."""
-        return replace(bug, mode=mode, way=freeze(way), passing=passing, entered=None, followed=0.0)
+    def _head_for(self, bug: BugState, mode: Mode, waypoint: Array, *, is_passing: bool = False) -> BugState:
+        """Return the state of a robot that moves through free space."""
+        return replace(
+            bug,
+            mode=mode,
+            waypoint=freeze(waypoint),
+            is_passing=is_passing,
+            entry_point=None,
+            followed_length=0.0,
+        )
 
-    def _in_view(self, place: Array) -> bool:
-        """Return whether the robot can go straight to a place."""
-        far = math.hypot(*place)
-        return far < _ARRIVED or self._towards(place) >= far - 1e-9
+    def _is_in_view(self, offset: Array) -> bool:
+        """Return whether the robot can move straight to a point."""
+        distance = math.hypot(*offset)
+        return distance < _ARRIVAL_RADIUS_M or self._compute_free_distance(offset) >= distance - 1e-9
 
-    def _towards(self, place: Array) -> float:
-        """Return how far the robot can go straight on towards a place, m."""
-        direction = place / max(math.hypot(*place), 1e-300)
-        return float(free_distances(self.points, direction[None], self.keep, self.reach)[0])
+    def _compute_free_distance(self, offset: Array) -> float:
+        """Return how far the robot can move straight towards a point, m."""
+        direction = offset / max(math.hypot(*offset), 1e-300)
+        return float(compute_free_distances(self.points, direction[None], self.clearance, self.reach)[0])
 
-    def _ends(self, towards: Array) -> dict[int, Gap]:
-        """Return the ends of the contour that blocks the view in a direction, by the turn to them."""
-        first, at = int((self.directions * towards).sum(axis=1).argmax()), self._towards(towards)
-        known = at, self.law.jump, self.reach
-        ends = {turn: end_of_contour(self.free, self.directions, first, turn, *known) for turn in (1, -1)}
-        return {turn: end for turn, end in ends.items() if end is not None}
+    def _find_contour_ends(self, direction: Array) -> dict[int, ContourEnd]:
+        """Return the ends of the contour that blocks the view in a direction, by the turn towards each."""
+        first_ray = int((self.directions * direction).sum(axis=1).argmax())
+        blocked_distance = self._compute_free_distance(direction)
+        ends = {}
+        for turn in (1, -1):
+            end = find_contour_end(
+                free_distances=self.free_distances,
+                directions=self.directions,
+                first_ray=first_ray,
+                turn=turn,
+                blocked_distance=blocked_distance,
+                jump=self.jump,
+                reach=self.reach,
+            )
+            if end is not None:
+                ends[turn] = end
+        return ends
 
-    def _to_goal(self, bug: Bug) -> Bug:
-        ends = self._ends(self.goal)
-        left = {turn: math.dist(self.goal, end.point) for turn, end in ends.items()}
-        by_way_of = {turn: math.hypot(*end.point) + left[turn] for turn, end in ends.items()}
+    def _move_to_goal(self, bug: BugState) -> BugState:
+        """Return the state of a robot that moves to the goal, past the obstacle that blocks the path."""
+        ends = self._find_contour_ends(self.goal)
+        remaining = {turn: math.dist(self.goal, end.point) for turn, end in ends.items()}
+        path_lengths = {turn: math.hypot(*end.point) + remaining[turn] for turn, end in ends.items()}
         if bug.turn in ends:
-            # of two that are about as good, the one that it was going to
-            by_way_of[bug.turn] -= _BETTER
-        distance = math.hypot(*self.goal)
-        nearer = [turn for turn in ends if left[turn] < distance]
-        turn = min(nearer or ends, key=by_way_of.__getitem__, default=bug.turn)
-        if nearer:
-            way = self.position + ends[turn].point
-            return self._off(replace(bug, turn=turn), Mode.GOAL, way, passing=True)
-        here, goal = freeze(self.position), freeze(self.position + self.goal)
-        tries = bug.tries + (bug.aim is None)
-        patience = np.inf if self.law.detour is None else self.law.detour * distance * _WANES**tries
-        bug = replace(bug, mode=Mode.BOUNDARY, turn=turn, passing=True, aim=goal, tries=tries)
-        bug = replace(bug, entered=here, last=here, followed=0.0, patience=float(patience))
-        inside = len(self.walls) and np.hypot(*(self.goal - self.walls).T).min() < self.keep + _GRAIN
-        if inside or patience < _WALK:
-            # the goal is in what the robot has met, or too close to it for any robot
-            return self._at_best(replace(bug, best=self._best(bug, ends)))
-        return self._along_boundary(bug)
+            # The robot does not alternate between two ends with about the same path length.
+            path_lengths[bug.turn] -= _MIN_IMPROVEMENT_M
+        goal_distance = math.hypot(*self.goal)
+        approaching_turns = [turn for turn in ends if remaining[turn] < goal_distance]
+        turn = min(approaching_turns or ends, key=path_lengths.__getitem__, default=bug.turn)
+        bug = replace(bug, turn=turn)
+        if approaching_turns:
+            return self._head_for(bug, Mode.GOAL, self.position + ends[turn].point, is_passing=True)
+        return self._enter_boundary(bug, ends)
 
-    def _along_boundary(self, bug: Bug) -> Bug:
-        entered = bug.entered
-        assert entered is not None and bug.last is not None
-        bug = replace(bug, followed=bug.followed + math.dist(self.position, bug.last), last=self.position)
+    def _enter_boundary(self, bug: BugState, ends: dict[int, ContourEnd]) -> BugState:
+        """Return the state of a robot that fixes its goal, and begins to follow a boundary."""
+        attempts = bug.attempts
+        if bug.fixed_goal is None:
+            attempts += 1
+        max_followed_length = math.inf
+        if self.detour is not None:
+            max_followed_length = self.detour * math.hypot(*self.goal) * _PATIENCE_DECAY**attempts
+        position = freeze(self.position)
+        bug = replace(
+            bug,
+            mode=Mode.BOUNDARY,
+            is_passing=True,
+            fixed_goal=freeze(self.position + self.goal),
+            attempts=attempts,
+            entry_point=position,
+            last_position=position,
+            followed_length=0.0,
+            max_followed_length=max_followed_length,
+        )
+        if self._is_goal_blocked() or max_followed_length < _MIN_BOUNDARY_LENGTH_M:
+            return self._move_to_best_point(replace(bug, best_point=self._find_best_point(bug, ends)))
+        return self._follow_boundary(bug)
+
+    def _is_goal_blocked(self) -> bool:
+        """Return whether the goal is in an obstacle that the robot has met, or too close to it."""
+        if not len(self.met_points):
+            return False
+        distance = np.hypot(*(self.goal - self.met_points).T).min()
+        return bool(distance < self.clearance + _SQUARE_SIDE_M)
+
+    def _follow_boundary(self, bug: BugState) -> BugState:
+        """Return the state of a robot that follows a boundary."""
+        assert bug.last_position is not None
+        followed_length = bug.followed_length + math.dist(self.position, bug.last_position)
+        bug = replace(bug, followed_length=followed_length, last_position=self.position)
         distances = np.hypot(*self.points.T)
         if np.isnan(distances).all():
-            return self._off(bug, Mode.GOAL, self.position + self.goal)
-        ends = self._ends(self.points[int(np.nanargmin(distances))])
-        # of a closed contour all is in view
-        end = ends[bug.turn].point if bug.turn in ends else np.zeros(2)
-        best = self._best(bug, ends)
-        bug = replace(bug, way=freeze(self.position + end), best=best)
+            return self._head_for(bug, Mode.GOAL, self.position + self.goal)
+        ends = self._find_contour_ends(self.points[int(np.nanargmin(distances))])
+        # Of a closed contour, all is in view.
+        offset = ends[bug.turn].point if bug.turn in ends else np.zeros(2)
+        best_point = self._find_best_point(bug, ends)
+        bug = replace(bug, waypoint=freeze(self.position + offset), best_point=best_point)
         if bug.mode is Mode.RETURN:
-            lost = bug.followed > 3.0 * bug.patience
-            return self._at_best(replace(bug, best=freeze(self.position)) if lost else bug)
-        # every ray where it is nearest to the goal
-        along = np.clip((self.directions * self.goal).sum(axis=1), 0.0, self.free)
-        left = np.hypot(*(self.goal - along[:, None] * self.directions).T)
-        ray = int(left.argmin())
-        if left[ray] < math.dist(self.position + self.goal, best) - _BETTER:
-            there = self.position + along[ray] * self.directions[ray]
-            return self._off(bug, Mode.LEAVING, there, passing=True)
-        round_once = bug.followed > 2.0 * np.pi * _BACK and math.dist(self.position, entered) < _BACK
-        if round_once or not ends or bug.followed > bug.patience:
-            # who has not been round goes back the way that it came
-            turn = bug.turn if round_once else -bug.turn
-            return self._at_best(replace(bug, mode=Mode.RETURN, turn=turn))
+            if bug.followed_length > 3.0 * bug.max_followed_length:
+                # It does not find the best point again.
+                bug = replace(bug, best_point=freeze(self.position))
+            return self._move_to_best_point(bug)
+        leaving_point = self._find_leaving_point(best_point)
+        if leaving_point is not None:
+            return self._head_for(bug, Mode.LEAVING, leaving_point, is_passing=True)
+        is_around = self._is_around(bug)
+        if is_around or not ends or bug.followed_length > bug.max_followed_length:
+            # A robot that has not been around returns the way it came.
+            turn = bug.turn if is_around else -bug.turn
+            return self._move_to_best_point(replace(bug, mode=Mode.RETURN, turn=turn))
         return bug
 
-    def _best(self, bug: Bug, ends: dict[int, Gap]) -> Array:
-        """Return the point of the boundary followed, and in view, that is nearest to the goal, (2,) m."""
-        rays = np.arange(len(self.free))
-        if len(ends) == 2:
-            # from the one end round to the other
-            first = ends[-1].ray + 1
-            rays = np.sort((first + np.arange((ends[1].ray - first) % len(rays))) % len(rays))
-        places = self.free[rays, None] * self.directions[rays]
-        known = np.zeros(2) if bug.best is None else bug.best - self.position
-        places = np.vstack([known, places])
-        return freeze(self.position + places[np.hypot(*(self.goal - places).T).argmin()])
+    def _is_around(self, bug: BugState) -> bool:
+        """Return whether a robot has followed the whole boundary, and is back where it met it."""
+        assert bug.entry_point is not None
+        if bug.followed_length <= 2.0 * math.pi * _RETURN_RADIUS_M:
+            return False
+        return math.dist(self.position, bug.entry_point) < _RETURN_RADIUS_M
 
-    def _at_best(self, bug: Bug) -> Bug:
-        """Return the bug on the last piece of its way to the best point, when that is in view."""
-        assert bug.best is not None
-        there = bug.best - self.position
-        far, free = math.hypot(*there), self._towards(there)
-        # seen from here the boundary may be a little closer than it looked
-        if far < _ARRIVED or free >= far - self.keep:
-            way = freeze(self.position + there * min(1.0, free / max(far, 1e-300)))
-            return replace(bug, mode=Mode.PROJECTED, way=way, passing=False, entered=None, resting=None)
-        return bug if bug.mode is Mode.RETURN else replace(bug, mode=Mode.RETURN)
+    def _find_leaving_point(self, best_point: Array) -> Array | None:
+        """Return the point in view nearest to the goal, (2,) m, if it is nearer than the best point."""
+        # On each ray, the point nearest to the goal.
+        depths = np.clip((self.directions * self.goal).sum(axis=1), 0.0, self.free_distances)
+        remaining = np.hypot(*(self.goal - depths[:, None] * self.directions).T)
+        ray = int(remaining.argmin())
+        if remaining[ray] >= math.dist(self.position + self.goal, best_point) - _MIN_IMPROVEMENT_M:
+            return None
+        return np.asarray(self.position + depths[ray] * self.directions[ray])
+
+    def _find_best_point(self, bug: BugState, ends: dict[int, ContourEnd]) -> Array:
+        """Return the point nearest to the goal of the boundaries followed so far and in view, (2,) m."""
+        rays = np.arange(len(self.free_distances))
+        if len(ends) == 2:
+            # The contour extends counter-clockwise from one end to the other.
+            first = ends[-1].ray + 1
+            count = (ends[1].ray - first) % len(rays)
+            rays = np.sort((first + np.arange(count)) % len(rays))
+        best_so_far = np.zeros(2) if bug.best_point is None else bug.best_point - self.position
+        points = np.vstack([best_so_far, self.free_distances[rays, None] * self.directions[rays]])
+        nearest = np.hypot(*(self.goal - points).T).argmin()
+        return freeze(self.position + points[nearest])
+
+    def _move_to_best_point(self, bug: BugState) -> BugState:
+        """Return the state of a robot that heads for its best point if that is in view, or returns to it."""
+        assert bug.best_point is not None
+        offset = bug.best_point - self.position
+        distance = math.hypot(*offset)
+        free_distance = self._compute_free_distance(offset)
+        # From here, the boundary may be a little closer to the point than it looked before.
+        if distance >= _ARRIVAL_RADIUS_M and free_distance < distance - self.clearance:
+            return replace(bug, mode=Mode.RETURN)
+        fraction = min(1.0, free_distance / max(distance, 1e-300))
+        return replace(
+            bug,
+            mode=Mode.PROJECTED,
+            waypoint=freeze(self.position + offset * fraction),
+            is_passing=False,
+            entry_point=None,
+            resting_centroid=None,
+        )
 
 
 @kernel
-def free_distances(points: Array, directions: Array, clearance: float, reach: float) -> Array:
-    """Return how far a disc can go straight on along each of (k, 2) directions, (k,) m, `reach` at most.
+def compute_free_distances(points: Array, directions: Array, clearance: float, reach: float) -> Array:
+    """Compute how far a disc can move straight in each direction.
 
-    Its centre keeps a clearance (m) from (m, 2) m obstacle points, which are relative to it; nan where none.
+    Parameters
+    ----------
+    points : (m, 2) array, m
+        Obstacle points relative to the centre of the disc; nan for none.
+    directions : (k, 2) array
+        Unit vectors.
+    clearance : float, m
+        Distance that the centre keeps from the points. Points that are already nearer may be approached to
+        95 % of their distance.
+    reach : float, m
+        Maximum result.
+
+    Returns
+    -------
+    (k,) array, m
+
+    Examples
+    --------
+    >>> compute_free_distances(np.array([[1.0, 0.0]]), np.array([[1.0, 0.0], [0.0, 1.0]]), 0.25, 2.0)
+    array([0.75, 2.  ])
     """
-    result = np.empty(len(directions))
+    free_distances = np.empty(len(directions))
     for k in range(len(directions)):
-        ahead_x, ahead_y = directions[k]
-        result[k] = reach
+        direction_x, direction_y = directions[k]
+        free_distances[k] = reach
         for x, y in points:
-            along = ahead_x * x + ahead_y * y
-            across = ahead_x * y - ahead_y * x
-            keep = min(clearance, _TOUCHING * math.sqrt(x * x + y * y))
-            depth2 = keep * keep - across * across
-            # nan is not above 0
-            if along > 0.0 and depth2 > 0.0:
-                result[k] = min(result[k], max(along - math.sqrt(depth2), 0.0))
-    return result
+            along = direction_x * x + direction_y * y
+            across = direction_x * y - direction_y * x
+            min_distance = min(clearance, _CONTACT_FRACTION * math.sqrt(x * x + y * y))
+            squared_depth = min_distance * min_distance - across * across
+            # Comparisons with nan are false: there is no point.
+            if along > 0.0 and squared_depth > 0.0:
+                free_distance = max(along - math.sqrt(squared_depth), 0.0)
+                free_distances[k] = min(free_distances[k], free_distance)
+    return free_distances
 
 
-def end_of_contour(
-    free: Array, directions: Array, first: int, turn: int, blocked_at: float, jump: float, reach: float
-) -> Gap | None:
-    """Return where the contour ends that blocks a ray, going round by `turn`; None when it is closed.
+def find_contour_end(
+    free_distances: Array,
+    directions: Array,
+    first_ray: int,
+    turn: int,
+    blocked_distance: float,
+    jump: float,
+    reach: float,
+) -> ContourEnd | None:
+    """Find where the contour ends that blocks a ray.
 
-    The `first` ray, of the (k,) m free ones in (k, 2) directions, is the nearest to the direction that is
-    blocked, `blocked_at` so many metres. The contour ends where the next ray is free for longer by `jump`,
-    or so far that it meets nothing, `reach`.
+    Parameters
+    ----------
+    free_distances : (k,) array, m
+        How far the robot can move along each ray.
+    directions : (k, 2) array
+        Unit vectors of the rays.
+    first_ray : int
+        The ray nearest to the blocked direction.
+    turn : int
+        1 to search counter-clockwise, -1 clockwise.
+    blocked_distance : float, m
+        Free distance in the blocked direction.
+    jump : float, m
+        The contour ends before a ray that is free for longer than the one before by this,
+    reach : float, m
+        or for this distance.
+
+    Returns
+    -------
+    ContourEnd or None
+        None if the contour is closed.
     """
-    rays = (first + turn * np.arange(len(free))) % len(free)
-    ahead, before = free[rays], np.append(blocked_at, free[rays[:-1]])
-    ends = np.flatnonzero((ahead > before + jump) | (ahead >= reach))
-    if not len(ends):
+    rays = (first_ray + turn * np.arange(len(free_distances))) % len(free_distances)
+    distances = free_distances[rays]
+    previous = np.append(blocked_distance, distances[:-1])
+    is_past_end = (distances > previous + jump) | (distances >= reach)
+    if not is_past_end.any():
         return None
-    k = ends[0]
-    return Gap(int(rays[k]), directions[rays[k]] * min(ahead[k], before[k] + jump))
+    k = int(is_past_end.argmax())
+    point = directions[rays[k]] * min(distances[k], previous[k] + jump)
+    return ContourEnd(ray=int(rays[k]), point=point)

@@ -33,10 +33,6 @@ _SAMPLES_PER_RAY = 12
 _SAMPLE_FRACTIONS = np.append((np.arange(_SAMPLES_PER_RAY) + 0.5) / _SAMPLES_PER_RAY, 1.0)
 """Points of each ray, as fractions of its length: samples of the integrals over edges, and the end."""
 _MIN_CORNER_DISTANCE_M = 1e-3
-_APPROACH_RATE = 4.0
-"""Maximum rate in 1/s at which the distance to others decreases to the clearance."""
-_BRAKING_FRACTION = 0.5
-"""Fraction of the maximum acceleration that is counted on to avoid collisions."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,13 +101,7 @@ class Visibility(BaseController):
             step = compute_step_fractions(gradient, memory.gradient, step)
         returns = update_returns(seen, memory.returns)
         velocities = compute_approach_velocities(gradient, self.k_area, team.max_speed) * step[:, None]
-        clearance = team.radius + self.clearance
-        margins = Margins(
-            clearance=clearance,
-            separation=clearance + float(team.radius.max()),
-            rate=_APPROACH_RATE,
-            braking=_BRAKING_FRACTION,
-        )
+        margins = Margins.build_with_gap(team, self.clearance)
         obstacle_points = collect_obstacle_points(seen, returns)
         velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
         forces = compute_drive_forces(velocities, seen, team, self.response_time)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.controllers import Lloyd, TangentBug
-from robocov.controllers.tangentbug import Mode, end_of_contour, free_distances
+from robocov.controllers.tangentbug import Mode, compute_free_distances, find_contour_end
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
@@ -93,7 +93,7 @@ def test_a_disc_that_goes_as_far_as_it_may_touches_and_no_more(seed: int, keep: 
     points = rng.uniform(-3, 3, size=(40, 2))
     points = points[np.hypot(*points.T) > keep / 0.95]
     directions = compute_headings(24)
-    free = free_distances(points, directions, keep, 2.5)
+    free = compute_free_distances(points, directions, keep, 2.5)
     for direction, far in zip(directions, free, strict=True):
         way = np.linspace(0.0, far, 200)[:, None] * direction
         nearest = np.hypot(*(way[:, None] - points).T).min()
@@ -103,11 +103,13 @@ def test_a_disc_that_goes_as_far_as_it_may_touches_and_no_more(seed: int, keep: 
 
 
 def test_nothing_around_is_free_as_far_as_one_sees() -> None:
-    np.testing.assert_array_equal(free_distances(np.full((3, 2), np.nan), compute_headings(4), 0.1, 2.0), 2.0)
+    np.testing.assert_array_equal(
+        compute_free_distances(np.full((3, 2), np.nan), compute_headings(4), 0.1, 2.0), 2.0
+    )
 
 
 def test_who_is_too_near_may_go_away_and_along() -> None:
-    free = free_distances(np.array([[0.05, 0.0]]), compute_headings(4), 0.15, 2.0)
+    free = compute_free_distances(np.array([[0.05, 0.0]]), compute_headings(4), 0.15, 2.0)
     assert free[0] < 0.05
     np.testing.assert_array_equal(free[1:], 2.0)
 
@@ -116,13 +118,13 @@ def test_ends_of_a_wall() -> None:
     """A wall across from (1, -1) to (1, 0.5): its ends are about there, seen from the origin."""
     wall = np.column_stack([np.ones(60), np.linspace(-1.0, 0.5, 60)])
     directions = compute_headings(360)
-    free = free_distances(wall, directions, 0.1, 3.0)
-    ends = {turn: end_of_contour(free, directions, 0, turn, 0.9, 0.5, 3.0) for turn in (1, -1)}
+    free = compute_free_distances(wall, directions, 0.1, 3.0)
+    ends = {turn: find_contour_end(free, directions, 0, turn, 0.9, 0.5, 3.0) for turn in (1, -1)}
     assert ends[1] is not None and ends[-1] is not None
     assert np.degrees(np.arctan2(0.5, 1)) < ends[1].ray < np.degrees(np.arctan2(0.7, 1))
     assert 360 - np.degrees(np.arctan2(1.2, 1)) < ends[-1].ray < 360 - np.degrees(np.arctan2(1.0, 1))
     closed = np.full(360, 1.0)
-    assert end_of_contour(closed, directions, 7, 1, 1.0, 0.5, 3.0) is None
+    assert find_contour_end(closed, directions, 7, 1, 1.0, 0.5, 3.0) is None
 
 
 def test_it_remembers_the_goal_that_it_goes_round_for() -> None:
@@ -133,7 +135,7 @@ def test_it_remembers_the_goal_that_it_goes_round_for() -> None:
         bug = simulation.memory.bugs[0]
         modes.add(bug.mode)
         if bug.mode is Mode.BOUNDARY:
-            np.testing.assert_allclose(bug.aim, [5.0, 5.0], atol=1e-9)
+            np.testing.assert_allclose(bug.fixed_goal, [5.0, 5.0], atol=1e-9)
     assert modes >= {Mode.GOAL, Mode.BOUNDARY}
 
 
