@@ -17,7 +17,7 @@ from robocov.arrays import Array, IntArray
 from robocov.controllers.base import BaseController
 from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.controllers.geodesic_lloyd import Plan
+from robocov.controllers.geodesic_lloyd import GeodesicPlanner
 from robocov.controllers.route_following import follow_routes
 from robocov.environment import Environment
 from robocov.errors import ParameterError
@@ -84,8 +84,8 @@ class Oracle(BaseController):
         if stage != memory.stage or seen.time >= memory.planned + self.period - 1e-9:
             # also for robots on their way: who stands in another one's takes over its goal
             robots = np.array(stages[stage][1], dtype=np.intp)
-            inside = find_nearest_inside(plan.room, seen.positions)
-            goals = find_nearest_inside(plan.room, np.array(stages[stage][2], dtype=float))
+            inside = find_nearest_inside(plan.configuration_space, seen.positions)
+            goals = find_nearest_inside(plan.configuration_space, np.array(stages[stage][2], dtype=float))
             places = inside.copy()
             places[robots] = goals[assigned(plan, inside[robots], goals)]
             routes = tuple(way(plan, at, goal) for at, goal in zip(inside, places, strict=True))
@@ -98,19 +98,19 @@ class Oracle(BaseController):
         )
 
 
-def assigned(plan: Plan, places: Array, goals: Array) -> IntArray:
+def assigned(plan: GeodesicPlanner, places: Array, goals: Array) -> IntArray:
     """Return which goal each robot at (n, 2) places walks to: the sum of the squared ways is least."""
     ways = plan.paths.compute_distances(places, goals)
     ways = np.where(np.isfinite(ways), ways, 1e6)
     return np.asarray(linear_sum_assignment(ways**2)[1])
 
 
-def way(plan: Plan, place: Array, goal: Array) -> Array:
+def way(plan: GeodesicPlanner, place: Array, goal: Array) -> Array:
     """Return the way-points to a goal, (w, 2) m; the place alone where no way leads."""
     path = plan.paths.find_path(place, goal)
     return path[1:] if len(path) > 1 else place[None]
 
 
 @lru_cache(maxsize=4)
-def _plan(environment: Environment, clearance: float) -> Plan:
-    return Plan(environment, clearance, _COARSE)
+def _plan(environment: Environment, clearance: float) -> GeodesicPlanner:
+    return GeodesicPlanner(environment, clearance, _COARSE)

@@ -1,169 +1,211 @@
-"""Lloyd's algorithm on geodesic cells, by robots that know the whole map: the informed upper bound."""
+"""Lloyd's algorithm on geodesic cells, by robots that know the whole map: an upper bound for the others."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array
-from robocov.controllers.base import BaseController
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import gain, response_time_gain
+from robocov.controllers.known_map import WholeMapController, build_configuration_space, is_plan_due
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
-from robocov.errors import ParameterError
 from robocov.geodesic import Geodesics
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.optimum import find_nearest_inside
 from robocov.team import Team
 
-_SEGMENTS = 2  # edges of a quarter circle around corners of walls: they cut 8 % of the clearance off it
-_SIMPLER = 0.005  # metres by which the walls of the room may be simplified: every corner costs time
+_MIN_STEP_FRACTION = 0.25
+"""Minimum distance to a first way-point, as a fraction of the spacing of sites: a site at the position of a
+robot would have an infinite weight."""
+
+
+class GeodesicPlan(NamedTuple):
+    """Goals of n robots, and the shortest paths to them."""
+
+    goals: Array
+    """(n, 2) m"""
+    waypoints: Array
+    """(n, 2) m, the first way-point of each path."""
+    remaining_lengths: Array
+    """(n,) m, lengths of the paths from there to the goals."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeodesicMemory:
-    """Memory of the last planning."""
+    """Memory of the last plan."""
 
     team: Team
-    goals: Array | None = None  # (n, 2) m
-    way: Array | None = None  # (n, 2) m, the first way-points to them
-    beyond: Array | None = None  # (n,) m, lengths of the ways from there
-    planned: float = -np.inf  # s
+    plan: GeodesicPlan | None = None
+    plan_time: float = -np.inf
+    """s"""
 
 
 @dataclass(frozen=True)
-class GeodesicLloyd(BaseController):
+class GeodesicLloyd(WholeMapController):
     """Lloyd's algorithm with geodesic Voronoi cells of the known map.
 
-    Pimenta et al. (CDC 2008) and Bhattacharya, Ghrist and Kumar (IJRR 33, 2014) descend the cost with the
-    length d of the shortest way in place of the straight distance: the gradient for f(d) points, for
-    each place q of the robot's geodesic cell, along the first piece of the way to it, by f'(d). For
-    f = d^s with 1 <= s <= 2 the function of the robot's place is bounded from above by a paraboloid
-    around the first way-point c of q, with weight d^(s-1) / |c - p|. The goal is the lowest point of the
-    sum of these: the weighted mean of the first way-points, which never raises the cost, and is the
-    centroid where s = 2 and nothing is in the way, a step of Weiszfeld's for s = 1, the cost (22). A
-    density of the map weighs the places.
+    Pimenta et al. (CDC 2008) and Bhattacharya, Ghrist and Kumar (IJRR 33, 2014) replace the straight distance
+    in the locational cost by the length d of the shortest path. Each robot moves along the shortest path to
+    the goal that minimises an upper bound of the cost of its cell. No other controller knows the whole map:
+    this one is a bound for the others.
 
-    Distances are exact, the cell is sampled on a lattice. A goal is moved into the room that walls
-    widened by radius and `clearance` leave, and the robots go there by its shortest ways.
+    Notes
+    -----
+    For each point q of the geodesic cell, the gradient of the cost with f(d) points along the first straight
+    piece of the path to q, with the magnitude f'(d). For f = d^s with 1 <= s <= 2, the cost as a function of
+    the robot's position p is bounded from above by a paraboloid around the first way-point c of q, with the
+    weight d^(s-1) / |c - p|. The goal minimises the sum of these paraboloids: it is the weighted mean of the
+    first way-points. The cost never rises on a step to the goal, which is the centroid for s = 2 without
+    obstacles, and a step of Weiszfeld's algorithm for s = 1, the cost (22). Points are weighted by the
+    density of the map.
 
-    It knows the whole map from the beginning, which no other law does: a bound, not a rival. Taken from
-    what is generally known of the two papers, not from their text; the papers' cells are those of a grid.
+    Distances are exact, and cells are sampled on a lattice. Walls are enlarged by the radius of the robot and
+    `clearance`; goals are moved into the remaining space, in which robots follow shortest paths.
+
+    The controller follows what is generally known of the two papers, not their texts; cells of the papers
+    consist of grid cells.
     """
 
     name = "geodesic-lloyd"
     label = "Geodesic Lloyd"
     summary = "Lloyd's algorithm with geodesic cells, knowing the whole map (Pimenta 2008, Bhattacharya 2014)"
-    information = "whole map"
 
-    exponent: float = gain(2.0, "1", "s: f = d^s; 2 as in the papers, 1 the cost (22)", low=1.0, high=2.0)
+    exponent: float = gain(2.0, "1", "s in f = d^s; 2 as in the papers, 1 the cost (22)", low=1.0, high=2.0)
     lattice: float = gain(48.0, "cells", "of the lattice along a side", low=4.0, high=512.0, whole=True)
-    clearance: float = gain(0.03, "m", "distance that ways keep from walls, beyond the radius", high=10.0)
-    period: float = gain(0.2, "s", "time from one planning to the next", high=60.0)
-    k_prop: float = gain(2.0, "1/s", "wanted speed per metre of way to the goal", high=100.0)
+    clearance: float = gain(0.03, "m", "that paths keep between rim and walls", high=10.0)
+    period: float = gain(0.2, "s", "between two plans", high=60.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per metre of path to the goal", high=100.0)
     response_time: float = response_time_gain()
-    environment: Environment | None = field(default=None, repr=False, compare=False)
-
-    def inform(self, environment: Environment) -> GeodesicLloyd:
-        """Return the same law with the map."""
-        return replace(self, environment=environment)
 
     def begin(self, region: Region, team: Team) -> GeodesicMemory:
-        """Return what the robots know of themselves; a ParameterError when no robot fits into the map."""
-        self._plan(team)
+        """Return the memory before the first plan; raise ParameterError if no robot fits into the map."""
+        self._get_planner(team)
         return GeodesicMemory(team)
 
     def decide(self, seen: Observations, memory: GeodesicMemory) -> Decision:
+        """Compute the forces that drive each robot along the shortest path to its goal."""
         team = memory.team
-        if memory.way is None or not memory.planned <= seen.time < memory.planned + self.period - 1e-9:
-            goals, way, beyond = self._plan(team).ways(seen, self.exponent)
-            memory = GeodesicMemory(team, goals, way, beyond, seen.time)
-        assert memory.way is not None and memory.beyond is not None
-        offset = memory.way - seen.positions
-        distance = np.hypot(*offset.T)
-        speed = np.minimum(self.k_prop * (distance + memory.beyond), team.max_speed)
-        # the last metre before a way-point that is not the goal is not slower than the others
+        plan = memory.plan
+        if plan is None or is_plan_due(memory.plan_time, self.period, seen.time):
+            plan = self._get_planner(team).plan(seen, self.exponent)
+            memory = GeodesicMemory(team=team, plan=plan, plan_time=seen.time)
+        offsets = plan.waypoints - seen.positions
+        distance = np.hypot(*offsets.T)
+        speed = np.minimum(self.k_prop * (distance + plan.remaining_lengths), team.max_speed)
+        # A robot does not slow down before a way-point, but must not overshoot it.
         speed = np.minimum(speed, distance / self.response_time)
-        forces = compute_drive_forces(
-            compute_approach_velocities(offset, np.inf, speed), seen, team, self.response_time
-        )
-        return Decision(forces, memory.goals, {"attraction": forces}, memory=memory)
+        velocities = compute_approach_velocities(offsets, np.inf, speed)
+        forces = compute_drive_forces(velocities, seen, team, self.response_time)
+        return Decision(forces=forces, goals=plan.goals, terms={"attraction": forces}, memory=memory)
 
-    def _plan(self, team: Team) -> Plan:
-        if self.environment is None:
-            told = "it has not been told the map; inform(environment) was wanted"
-            raise ParameterError(f"controller {self.name!r}: {told}")
-        return _cached(self.environment, float(team.radius.max()) + self.clearance, int(self.lattice))
+    def _get_planner(self, team: Team) -> GeodesicPlanner:
+        """Return the planner for the largest robot of the team."""
+        clearance = float(team.radius.max()) + self.clearance
+        return _get_planner(self.get_environment(), clearance, int(self.lattice))
 
 
-class Plan:
-    """The map as robots see it whose centres keep a clearance (m) from the walls; immutable.
+class GeodesicPlanner:
+    """Planner of goals and shortest paths on a known map. Immutable.
 
-    It has the `cost` that is descended, the `room` where centres may be, and the shortest `paths` in there.
+    Parameters
+    ----------
+    environment : Environment
+    clearance : float, m
+        Distance that the centres of robots keep from walls.
+    lattice : int
+        Number of cells of the lattice of the cost along a side of the region.
+
+    Attributes
+    ----------
+    cost : CoverageCost
+        The cost that is minimised.
+    configuration_space : shapely.MultiPolygon
+        Space where the centres of robots may be.
+    paths : Geodesics
+        Shortest paths in that space.
     """
 
     def __init__(self, environment: Environment, clearance: float, lattice: int) -> None:
-        room = environment.free.buffer(-clearance, quad_segs=_SEGMENTS).simplify(_SIMPLER)
-        if room.is_empty:
-            told = f"no room for robots that keep {clearance:g} m from its walls"
-            raise ParameterError(f"map {environment.name!r} has {told}")
-        walls = environment.region.polygon.difference(room)
-        solid = tuple(_obstacle(part) for part in shapely.get_parts(walls) if isinstance(part, Polygon))
-        ring = tuple((x, y) for x, y in environment.region.vertices.tolist())
-        inner = Environment(environment.name, ring, solid)
-        self.cost, self.paths = CoverageCost(environment, lattice), Geodesics(inner)
-        self.room: MultiPolygon = inner.free
-        shapely.prepare(self.room)
+        configuration_space = build_configuration_space(environment, clearance)
+        walls = environment.region.polygon.difference(configuration_space)
+        obstacles = tuple(
+            _build_obstacle(polygon) for polygon in shapely.get_parts(walls) if isinstance(polygon, Polygon)
+        )
+        boundary = tuple((x, y) for x, y in environment.region.vertices.tolist())
+        enlarged = Environment(environment.name, boundary, obstacles)
+        self.cost = CoverageCost(environment, lattice)
+        self.paths = Geodesics(enlarged)
+        self.configuration_space: MultiPolygon = enlarged.free
+        shapely.prepare(self.configuration_space)
 
-    def ways(self, seen: Observations, exponent: float) -> tuple[Array, Array, Array]:
-        """Return each robot's goal and the first way-point to it, (n, 2) m, and the way left, (n,) m."""
-        places = find_nearest_inside(self.room, seen.positions)
+    def plan(self, seen: Observations, exponent: float) -> GeodesicPlan:
+        """Plan the goals of all robots, each by the robots that it hears.
+
+        Parameters
+        ----------
+        seen : Observations
+        exponent : float
+            s in f = d^s.
+        """
+        positions = find_nearest_inside(self.configuration_space, seen.positions)
         if seen.neighbours.is_complete:
-            goals = self._goals(places, exponent)
+            goals = self._compute_goals(positions, exponent)
         else:
-            goals = np.empty_like(places)
-            for i in range(len(places)):
-                heard = find_nearest_inside(self.room, seen.get_neighbour_positions(i))
-                goals[i] = self._goals(np.vstack([places[i], heard]), exponent)[0]
-        way, beyond = goals.copy(), np.zeros(len(goals))
-        lines = shapely.linestrings(np.stack([places, goals], axis=1))
-        for i in np.flatnonzero(~shapely.covers(self.room, lines)).tolist():
-            path = self.paths.find_path(places[i], goals[i])
+            goals = np.empty_like(positions)
+            for i in range(len(positions)):
+                neighbours = find_nearest_inside(self.configuration_space, seen.get_neighbour_positions(i))
+                goals[i] = self._compute_goals(np.vstack([positions[i], neighbours]), exponent)[0]
+        waypoints = goals.copy()
+        remaining_lengths = np.zeros(len(goals))
+        lines = shapely.linestrings(np.stack([positions, goals], axis=1))
+        is_blocked = ~shapely.covers(self.configuration_space, lines)
+        for i in np.flatnonzero(is_blocked).tolist():
+            path = self.paths.find_path(positions[i], goals[i])
             if len(path) < 2:
-                goals[i] = way[i] = places[i]  # in another room
+                # The goal is in another room, without any path to it.
+                goals[i] = positions[i]
+                waypoints[i] = positions[i]
                 continue
-            way[i] = path[1]
-            beyond[i] = np.hypot(*np.diff(path[1:], axis=0).T).sum()
-        return goals, way, beyond
+            waypoints[i] = path[1]
+            remaining_lengths[i] = np.hypot(*np.diff(path[1:], axis=0).T).sum()
+        return GeodesicPlan(goals=goals, waypoints=waypoints, remaining_lengths=remaining_lengths)
 
-    def _goals(self, places: Array, exponent: float) -> Array:
-        """Return the goals of robots at (k, 2) places."""
-        result = self.cost(places)
-        site = np.flatnonzero(result.owner >= 0)
-        owner, first, distance = result.owner[site], result.first_waypoints[site], result.distances[site]
-        # a site under the robot would hold it fast
-        step = np.maximum(np.hypot(*(first - places[owner]).T), 0.25 * self.cost.spacing)
-        weight = np.maximum(distance, step) ** (exponent - 1.0) / step
+    def _compute_goals(self, positions: Array, exponent: float) -> Array:
+        """Return the goals, (k, 2) m, of robots at (k, 2) positions, by their geodesic cells."""
+        result = self.cost(positions)
+        sites = np.flatnonzero(result.owner >= 0)
+        owner = result.owner[sites]
+        first_waypoints = result.first_waypoints[sites]
+        distances = result.distances[sites]
+        steps = np.hypot(*(first_waypoints - positions[owner]).T)
+        steps = np.maximum(steps, _MIN_STEP_FRACTION * self.cost.spacing)
+        weights = np.maximum(distances, steps) ** (exponent - 1.0) / steps
         if result.weights is not None:
-            weight *= result.weights[site]
-        n = len(places)
-        total = np.bincount(owner, weight, minlength=n)
-        goals = np.column_stack([np.bincount(owner, weight * part, minlength=n) for part in first.T])
-        held = total > 0.0
-        goals = np.where(held[:, None], goals / np.where(held, total, 1.0)[:, None], places)
-        return find_nearest_inside(self.room, np.asarray(goals))
+            weights *= result.weights[sites]
+        n = len(positions)
+        total = np.bincount(owner, weights, minlength=n)
+        x = np.bincount(owner, weights * first_waypoints[:, 0], minlength=n)
+        y = np.bincount(owner, weights * first_waypoints[:, 1], minlength=n)
+        has_cell = total > 0.0
+        means = np.column_stack([x, y]) / np.where(has_cell, total, 1.0)[:, None]
+        goals = np.where(has_cell[:, None], means, positions)
+        return find_nearest_inside(self.configuration_space, goals)
 
 
-def _obstacle(part: Polygon) -> PolygonObstacle:
-    outer, *holes = (tuple(map(tuple, ring.coords[:-1])) for ring in (part.exterior, *part.interiors))
+def _build_obstacle(polygon: Polygon) -> PolygonObstacle:
+    """Return the obstacle with the shape of a polygon, with its holes."""
+    rings = [polygon.exterior, *polygon.interiors]
+    outer, *holes = [tuple(map(tuple, ring.coords[:-1])) for ring in rings]
     return PolygonObstacle(outer, tuple(holes))
 
 
-# a plan takes long, and memories of robots must not hold it
-_cached = lru_cache(maxsize=8)(Plan)
+# Planners take long to build, and must not be copied with the memories of robots.
+_get_planner = lru_cache(maxsize=8)(GeodesicPlanner)

@@ -1,0 +1,312 @@
+"""Diffeomorphisms of a convex region that shrink the obstacles of a known map to points."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from scipy.sparse import csr_array, diags_array
+from scipy.spatial import Delaunay
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import kernel
+from robocov.controllers.known_map import build_configuration_space
+from robocov.environment import Environment
+from robocov.observation.region import Region
+from robocov.optimum import find_nearest_inside
+
+_MAX_REFINEMENTS = 12
+"""Number of times that pieces of walls are halved that are not edges of the mesh yet."""
+_ROUNDING_M = 1e-6
+"""Length to which vertices of the mesh are rounded."""
+
+
+class ConvexChart:
+    """Diffeomorphism F from a convex region to itself that shrinks obstacles to points. Immutable.
+
+    Parameters
+    ----------
+    environment : Environment
+    clearance : float, m
+        Distance that the centres of robots keep from walls.
+    lattice : int
+        Number of cells of the mesh along a side of the region.
+    shrink : float
+        Stiffness of obstacles relative to the free space: the larger, the smaller they become.
+
+    Attributes
+    ----------
+    configuration_space : shapely.Geometry
+        Space where the centres of robots may be.
+    points : (v, 2) array, m
+        Vertices of a mesh of the region.
+    triangles : (t, 3) int array
+        Its triangles, counter-clockwise.
+    images : (v, 2) array, m
+        F at the vertices; it is affine on each triangle.
+    samples : (k, 2) array, m
+        Images of sample points of the free space.
+    mass : (k,) array, m²
+        Mass of each sample in the map.
+
+    Notes
+    -----
+    F is a discrete harmonic map of a mesh of the whole region, obstacles included. Vertices on the boundary
+    are fixed; each other vertex is the weighted mean of its neighbours, with Floater's mean value weights
+    (2003), multiplied by `shrink` in obstacles. With positive weights and a convex boundary F is one-to-one
+    (Tutte 1963, Floater 1997), for any `shrink`. An obstacle connected with the boundary shrinks to where it
+    is connected, and a wall between two rooms becomes a slit. Without obstacles, or for a `shrink` of 1, F
+    is the identity.
+    """
+
+    def __init__(self, environment: Environment, clearance: float, lattice: int, shrink: float) -> None:
+        self.configuration_space = build_configuration_space(environment, clearance)
+        shapely.prepare(self.configuration_space)
+        mesh = _build_mesh(environment.region, self.configuration_space, lattice)
+        self.points = mesh.points
+        self.triangles = mesh.triangles
+        corners = mesh.points[mesh.triangles]
+        centers = corners.mean(axis=1)
+        is_obstacle = ~shapely.contains_xy(self.configuration_space, centers)
+        self.images = _compute_harmonic_images(mesh, stiffness=np.where(is_obstacle, shrink, 1.0))
+        image_corners = self.images[mesh.triangles]
+        self._to_chart = _PiecewiseAffineMap.build(corners, image_corners)
+        self._to_region = _PiecewiseAffineMap.build(image_corners, corners)
+
+        mass = _compute_areas(corners)
+        # The margin that walls are enlarged by belongs to the free space.
+        mass[is_obstacle] = shapely.area(
+            shapely.intersection(environment.free, shapely.polygons(corners[is_obstacle]))
+        )
+        has_mass = mass > 0.0
+        self.samples = image_corners[has_mass].mean(axis=1)
+        self.mass = mass[has_mass]
+        if environment.density is not None:
+            self.mass *= environment.density.evaluate(centers[has_mass])
+
+    def map_to_chart(self, positions: Array) -> tuple[Array, Array]:
+        """Compute F at the nearest points of the configuration space.
+
+        Parameters
+        ----------
+        positions : (n, 2) array, m
+
+        Returns
+        -------
+        images : (n, 2) array, m
+        jacobians : (n, 2, 2) array
+        """
+        return self._to_chart.evaluate(find_nearest_inside(self.configuration_space, positions))
+
+    def map_to_region(self, images: Array) -> Array:
+        """Compute the points with given images, F⁻¹, (n, 2) m."""
+        points, _ = self._to_region.evaluate(images)
+        return points
+
+
+def _compute_areas(triangles: Array) -> Array:
+    """Return the areas of counter-clockwise triangles, (t, 3, 2)."""
+    x, y = (triangles[:, 1] - triangles[:, 0]).T
+    u, v = (triangles[:, 2] - triangles[:, 0]).T
+    return np.asarray(0.5 * (x * v - y * u))
+
+
+class _PiecewiseAffineMap(NamedTuple):
+    """Map that is affine on each of t triangles."""
+
+    origins: Array
+    """(t, 2) Third corners of the triangles."""
+    inverses: Array
+    """(t, 2, 2) Matrices from the offset from the origin to the first two barycentric coordinates."""
+    images: Array
+    """(t, 3, 2) Images of the corners."""
+    jacobians: Array
+    """(t, 2, 2)"""
+
+    @classmethod
+    def build(cls, corners: Array, images: Array) -> _PiecewiseAffineMap:
+        """Build the map from triangles, (t, 3, 2), to their images, (t, 3, 2)."""
+        first = corners[:, 0] - corners[:, 2]
+        second = corners[:, 1] - corners[:, 2]
+        determinant = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+        inverses = np.stack([second[:, ::-1] * [1.0, -1.0], first[:, ::-1] * [-1.0, 1.0]], axis=1)
+        inverses /= determinant[:, None, None]
+        image_sides = images[:, :2] - images[:, 2:]
+        jacobians = (image_sides[..., None] * inverses[:, :, None]).sum(axis=1)
+        return cls(origins=corners[:, 2], inverses=inverses, images=images, jacobians=jacobians)
+
+    def evaluate(self, points: Array) -> tuple[Array, Array]:
+        """Return the images of (n, 2) points, (n, 2), and the Jacobians there, (n, 2, 2)."""
+        triangle = _find_triangles(points, self.inverses, self.origins)
+        offsets = points - self.origins[triangle]
+        first_two = (self.inverses[triangle] * offsets[:, None]).sum(axis=2)
+        weights = np.column_stack([first_two, 1.0 - first_two.sum(axis=1)])
+        images = (weights[..., None] * self.images[triangle]).sum(axis=1)
+        return images, self.jacobians[triangle]
+
+
+@kernel
+def _find_triangles(points: Array, inverses: Array, origins: Array) -> IntArray:
+    """Return the triangle of each of (n, 2) points, (n,): for a point outside of all, the nearest one.
+
+    The nearest triangle is the one whose smallest barycentric coordinate is the largest.
+    """
+    triangles = np.zeros(len(points), dtype=np.intp)
+    for i in range(len(points)):
+        best = -np.inf
+        for t in range(len(origins)):
+            x = points[i, 0] - origins[t, 0]
+            y = points[i, 1] - origins[t, 1]
+            first = inverses[t, 0, 0] * x + inverses[t, 0, 1] * y
+            second = inverses[t, 1, 0] * x + inverses[t, 1, 1] * y
+            smallest = min(first, second, 1.0 - first - second)
+            if smallest > best:
+                triangles[i] = t
+                best = smallest
+            if best >= 0.0:
+                break
+    return triangles
+
+
+class _Mesh(NamedTuple):
+    """Triangulation of a region with the walls as edges."""
+
+    points: Array
+    """(v, 2) m, sorted vertices."""
+    triangles: IntArray
+    """(t, 3) Counter-clockwise."""
+    is_fixed: BoolArray
+    """(v,) Whether each vertex is on the boundary of the region."""
+
+
+def _build_mesh(region: Region, configuration_space: shapely.Geometry, lattice: int) -> _Mesh:
+    """Return a mesh of the region with the boundary of the configuration space as edges."""
+    low_x, low_y, high_x, high_y = region.bounds
+    spacing = max(high_x - low_x, high_y - low_y) / lattice
+    boundary = shapely.union(configuration_space.boundary, region.polygon.boundary)
+    walls = shapely.segmentize(boundary, spacing)
+    coordinates, line = shapely.get_coordinates(shapely.get_parts(walls), return_index=True)
+    is_segment = line[1:] == line[:-1]
+    starts = coordinates[:-1][is_segment]
+    ends = coordinates[1:][is_segment]
+    inner = _build_inner_points(region, walls, spacing)
+    for _ in range(_MAX_REFINEMENTS):
+        vertices = np.concatenate([starts, ends, inner])
+        points = np.unique(np.round(vertices / _ROUNDING_M) * _ROUNDING_M, axis=0)
+        triangles = Delaunay(points).simplices
+        is_edge = _find_edges(points, triangles, starts, ends)
+        if is_edge.all():
+            break
+        middles = 0.5 * (starts + ends)[~is_edge]
+        halved_starts = [starts[is_edge], starts[~is_edge], middles]
+        halved_ends = [ends[is_edge], middles, ends[~is_edge]]
+        starts = np.concatenate(halved_starts)
+        ends = np.concatenate(halved_ends)
+    is_fixed = ~region.contains(points, -2.0 * _ROUNDING_M)
+    triangles = triangles.astype(np.intp)
+    # Triangles on the boundary alone have no area, except for rounding.
+    is_flat = is_fixed[triangles].all(axis=1)
+    return _Mesh(points=points, triangles=triangles[~is_flat], is_fixed=is_fixed)
+
+
+def _build_inner_points(region: Region, walls: shapely.Geometry, spacing: float) -> Array:
+    """Return the points of a lattice, (k, 2) m, in the region and not close to walls."""
+    low_x, low_y, high_x, high_y = region.bounds
+    x, y = np.meshgrid(np.arange(low_x, high_x, spacing), np.arange(low_y, high_y, spacing))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    points = points[region.contains(points)]
+    return np.asarray(points[shapely.distance(walls, shapely.points(points)) > 0.5 * spacing])
+
+
+def _find_edges(points: Array, triangles: IntArray, starts: Array, ends: Array) -> BoolArray:
+    """Return whether segments, from (k, 2) to (k, 2) m, are edges of triangles, (k,)."""
+    first = _find_indices(points, starts)
+    second = _find_indices(points, ends)
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    # An edge is one number: the lower index times the number of points, plus the higher index.
+    numbers = edges @ [len(points), 1]
+    return np.isin(np.minimum(first, second) * len(points) + np.maximum(first, second), numbers)
+
+
+def _find_indices(points: Array, selected: Array) -> IntArray:
+    """Return the indices of selected points, (m, 2) m, among (k, 2) m sorted ones."""
+    rounded = np.round(selected / _ROUNDING_M) * _ROUNDING_M
+    _, indices = np.unique(np.concatenate([points, rounded]), axis=0, return_inverse=True)
+    return np.asarray(indices.ravel()[len(points) :])
+
+
+def _compute_harmonic_images(mesh: _Mesh, stiffness: Array) -> Array:
+    """Return the images of the vertices, (v, 2) m, by the stiffness of each triangle, (t,).
+
+    Each vertex that is not fixed is the weighted mean of its neighbours. The weight of an edge is, by
+    Floater's mean value coordinates, (tan(α/2) + tan(β/2)) / length with the two adjacent angles, each
+    multiplied by the stiffness of its triangle.
+    """
+    weights = _build_weights(mesh, stiffness)
+    inner = np.flatnonzero(~mesh.is_fixed)
+    fixed = np.flatnonzero(mesh.is_fixed)
+    right = weights[inner][:, fixed] @ mesh.points[fixed]
+    laplacian = diags_array(weights.sum(axis=1)) - weights
+    system = laplacian.tocsr()[inner][:, inner].tocoo()
+    # Vertices are sorted: the indices of neighbours are close, and the matrix has a narrow band.
+    bandwidth = int(np.abs(system.row - system.col).max(initial=0))
+    band = np.zeros((len(inner), 2 * bandwidth + 1))
+    band[system.row, system.col - system.row + bandwidth] = system.data
+    images = mesh.points.copy()
+    images[inner] = _solve_banded_system(band, right)
+    return images
+
+
+def _build_weights(mesh: _Mesh, stiffness: Array) -> csr_array:
+    """Return the (v, v) weights of neighbours in the mean."""
+    rows = []
+    columns = []
+    weights = []
+    for k in range(3):
+        here = mesh.triangles[:, k]
+        left = mesh.triangles[:, (k + 1) % 3]
+        right = mesh.triangles[:, (k + 2) % 3]
+        u = mesh.points[left] - mesh.points[here]
+        v = mesh.points[right] - mesh.points[here]
+        u_length = np.hypot(*u.T)
+        v_length = np.hypot(*v.T)
+        cross = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+        tangent_of_half_angle = cross / (u_length * v_length + (u * v).sum(axis=1))
+        rows += [here, here]
+        columns += [left, right]
+        weights += [
+            stiffness * tangent_of_half_angle / u_length,
+            stiffness * tangent_of_half_angle / v_length,
+        ]
+    indices = (np.concatenate(rows), np.concatenate(columns))
+    size = len(mesh.points)
+    return csr_array((np.concatenate(weights), indices), shape=(size, size))
+
+
+@kernel
+def _solve_banded_system(band: Array, right: Array) -> Array:
+    """Solve a diagonally dominant system with 2 b + 1 diagonals, in place.
+
+    Parameters
+    ----------
+    band : (v, 2 b + 1) array
+        Element (i, j) of the matrix is at (i, j - i + b). It is overwritten.
+    right : (v, 2) array
+        Right-hand side, which is overwritten by the solution.
+    """
+    size = len(band)
+    b = band.shape[1] // 2
+    for k in range(size):
+        end = min(size, k + b + 1)
+        for row in range(k + 1, end):
+            factor = band[row, k - row + b] / band[k, b]
+            if factor != 0.0:
+                right[row] -= factor * right[k]
+                for column in range(k, end):
+                    band[row, column - row + b] -= factor * band[k, column - k + b]
+    for k in range(size - 1, -1, -1):
+        for column in range(k + 1, min(size, k + b + 1)):
+            right[k] -= band[k, column - k + b] * right[column]
+        right[k] /= band[k, b]
+    return right
