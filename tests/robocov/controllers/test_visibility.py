@@ -1,4 +1,4 @@
-"""Coverage of what is in view: the geometry of views, and the laws that climb it, Visibility and Boosting."""
+"""Views, and the controllers Visibility and Boosting that maximise what is in view."""
 
 from __future__ import annotations
 
@@ -28,96 +28,133 @@ REGION = Region(np.array(ROOM.exterior.coords[:-1]))
 HOT = Gaussians((Gaussian((7.0, 3.0), weight=4.0, sigma=1.5),), floor=0.5)
 
 
-def scanned(place: np.ndarray, rays: int, reach: float) -> View:
-    """A scan: how far along each ray the first wall is."""
-    begin, end = (
-        np.concatenate([np.array(ring.coords)[part] for ring in (ROOM.exterior, *ROOM.interiors)])
-        for part in (slice(None, -1), slice(1, None))
-    )
-    along, across, to = compute_headings(rays)[:, None], end - begin, begin - place
-    turn = along[..., 0] * across[:, 1] - along[..., 1] * across[:, 0]
+def scan_room(position: np.ndarray, rays: int, reach: float) -> View:
+    """Return the view from a position, by the intersections of all rays with all walls."""
+    rings = [np.array(ring.coords) for ring in (ROOM.exterior, *ROOM.interiors)]
+    starts = np.concatenate([ring[:-1] for ring in rings])
+    walls = np.concatenate([np.diff(ring, axis=0) for ring in rings])
+    directions = compute_headings(rays)[:, None]
+    offsets = starts - position
+    cross = directions[..., 0] * walls[:, 1] - directions[..., 1] * walls[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        far = (to[:, 0] * across[:, 1] - to[:, 1] * across[:, 0]) / turn
-        part = (to[:, 0] * along[..., 1] - to[:, 1] * along[..., 0]) / turn
-    met = np.where((far > 0.0) & (part >= 0.0) & (part <= 1.0), far, np.inf).min(axis=1)
-    return View(np.minimum(met, reach)[None], (met < reach)[None])
+        distance = (offsets[:, 0] * walls[:, 1] - offsets[:, 1] * walls[:, 0]) / cross
+        fraction = (offsets[:, 0] * directions[..., 1] - offsets[:, 1] * directions[..., 0]) / cross
+    is_hit = (distance > 0.0) & (fraction >= 0.0) & (fraction <= 1.0)
+    nearest = np.where(is_hit, distance, np.inf).min(axis=1)
+    return View(distances=np.minimum(nearest, reach)[None], hit=(nearest < reach)[None])
 
 
-def seen_from(positions: np.ndarray, **more: object) -> Observations:
+def observe(positions: np.ndarray, density: Gaussians | None = None) -> Observations:
+    """Return the observations of robots at rest that hear each other, without obstacle points."""
     n = len(positions)
-    nothing = np.full((n, 2), np.nan)
-    return Observations(positions, np.zeros((n, 2)), Neighbours(n), nothing, REGION, **more)  # type: ignore[arg-type]
+    return Observations(
+        positions, np.zeros((n, 2)), Neighbours(n), np.full((n, 2), np.nan), REGION, density=density
+    )
 
 
-def worth(place: np.ndarray, reach: float, decay: float | None, density: Gaussians | None) -> float:
-    """What is in view, weighted by φ and by how likely it is detected, by a fine polar sum."""
-    rays, rings = 10000, 30
-    distances = scanned(place, rays, reach).distances[0]
-    along = distances[:, None] * (np.arange(rings) + 0.5) / rings
-    values = np.ones_like(along) if decay is None else np.exp(-decay * along)
+def integrate_view(
+    position: np.ndarray, reach: float, decay: float | None, density: Gaussians | None
+) -> float:
+    """Integrate φ times the probability of detection over the view, by a fine polar grid.
+
+    Without decay, each point in view is detected.
+    """
+    rays = 10000
+    rings = 30
+    distances = scan_room(position, rays, reach).distances[0]
+    depths = distances[:, None] * (np.arange(rings) + 0.5) / rings
+    values = np.ones_like(depths) if decay is None else np.exp(-decay * depths)
     if density is not None:
-        points = place + along[..., None] * compute_headings(rays)[:, None]
-        values = values * density.evaluate(points.reshape(-1, 2)).reshape(along.shape)
-    return float((values * along * distances[:, None]).sum() / rings * 2.0 * np.pi / rays)
+        points = position + depths[..., None] * compute_headings(rays)[:, None]
+        values = values * density.evaluate(points.reshape(-1, 2)).reshape(depths.shape)
+    return float((values * depths * distances[:, None]).sum() / rings * 2.0 * np.pi / rays)
 
 
-@pytest.mark.parametrize("place", [(2.1, 4.3), (3.2, 6.1), (6.2, 6.4)])
+def differentiate_view(
+    position: np.ndarray, reach: float, decay: float | None, density: Gaussians | None
+) -> np.ndarray:
+    """Return the gradient of `integrate_view` by central differences, (2,)."""
+    h = 0.05
+    gradient = []
+    for step in (np.array([h, 0.0]), np.array([0.0, h])):
+        after = integrate_view(position + step, reach, decay, density)
+        before = integrate_view(position - step, reach, decay, density)
+        gradient.append((after - before) / (2.0 * h))
+    return np.array(gradient)
+
+
+@pytest.mark.parametrize("position", [(2.1, 4.3), (3.2, 6.1), (6.2, 6.4)])
 @pytest.mark.parametrize("density", [None, HOT], ids=["uniform", "hot"])
-def test_gradients_are_those_of_what_is_in_view(
-    place: tuple[float, float], density: Gaussians | None
+def test_the_gradient_is_that_of_the_area_in_view(
+    position: tuple[float, float], density: Gaussians | None
 ) -> None:
-    """Arcs and windows against finite differences of the area, and of the probability of detection."""
-    at, h, reach = np.array(place), 0.05, 3.0
-    seen, view = seen_from(at[None], density=density), scanned(at, 1440, reach)
-    for decay in (None, 0.5):
-        slope = [
-            (worth(at + step, reach, decay, density) - worth(at - step, reach, decay, density)) / (2.0 * h)
-            for step in (np.array([h, 0.0]), np.array([0.0, h]))
-        ]
-        if decay is None:
-            found = Visibility(jump=0.1).compute_gradient(seen, view, np.array([reach]))[0]
-        else:
-            added, gradient, _ = Boosting(jump=0.1, decay=decay).slopes(seen, view, np.array([reach]))
-            assert added[0] == pytest.approx(worth(at, reach, decay, density), rel=0.01)
-            found = gradient[0]
-        np.testing.assert_allclose(found, slope, atol=0.06 * np.hypot(*slope) + 0.05)
+    seen = observe(np.array([position]), density)
+    view = scan_room(seen.positions[0], 1440, 3.0)
+    gradient = Visibility(jump=0.1).compute_gradient(seen, view, np.array([3.0]))[0]
+    expected = differentiate_view(seen.positions[0], 3.0, None, density)
+    np.testing.assert_allclose(gradient, expected, atol=0.06 * np.hypot(*expected) + 0.05)
+
+
+@pytest.mark.parametrize("position", [(2.1, 4.3), (3.2, 6.1), (6.2, 6.4)])
+@pytest.mark.parametrize("density", [None, HOT], ids=["uniform", "hot"])
+def test_the_gradient_is_that_of_the_probability_of_detection(
+    position: tuple[float, float], density: Gaussians | None
+) -> None:
+    seen = observe(np.array([position]), density)
+    view = scan_room(seen.positions[0], 1440, 3.0)
+    added, gradient, _ = Boosting(jump=0.1, decay=0.5).slopes(seen, view, np.array([3.0]))
+    assert added[0] == pytest.approx(integrate_view(seen.positions[0], 3.0, 0.5, density), rel=0.01)
+    expected = differentiate_view(seen.positions[0], 3.0, 0.5, density)
+    np.testing.assert_allclose(gradient[0], expected, atol=0.06 * np.hypot(*expected) + 0.05)
 
 
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**32), n=st.integers(2, 8))
-def test_who_sees_a_place_with_the_least_power_is_find_cells_in_view(seed: int, n: int) -> None:
+def test_a_point_belongs_to_the_robot_with_the_lowest_power(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
-    positions, reach = rng.uniform((1, 1), (9, 7), size=(n, 2)), rng.uniform(1.0, 4.0, n)
-    directions, walls = compute_headings(16), np.full((n, 16), np.inf)
-    along = reach[:, None, None] * np.broadcast_to(rng.uniform(0.0, 1.0, 5), (n, 16, 5))
-    robot, other, offset, _ = seen_from(positions).find_near_neighbours(np.inf)
-    mine = find_cells_in_view(along, walls, directions, robot, other, -offset, reach)
+    positions = rng.uniform((1, 1), (9, 7), size=(n, 2))
+    reach = rng.uniform(1.0, 4.0, n)
+    directions = compute_headings(16)
+    depths = reach[:, None, None] * np.broadcast_to(rng.uniform(0.0, 1.0, 5), (n, 16, 5))
+    pairs = observe(positions).find_near_neighbours(np.inf)
+    is_own = find_cells_in_view(depths, np.full((n, 16), np.inf), directions, pairs, reach)
     for i in range(n):
-        places = positions[i] + along[i][..., None] * directions[:, None]
-        power = ((places[..., None, :] - positions) ** 2).sum(axis=-1) - reach**2
-        np.testing.assert_array_equal(mine[i], power.argmin(axis=-1) == i)
-    # behind a wall nobody is a rival
-    walls = np.full((n, 16), 1e-9)
-    assert find_cells_in_view(along, walls, directions, robot, other, -offset, reach).all()
+        points = positions[i] + depths[i][..., None] * directions[:, None]
+        power = ((points[..., None, :] - positions) ** 2).sum(axis=-1) - reach**2
+        np.testing.assert_array_equal(is_own[i], power.argmin(axis=-1) == i)
+
+
+def test_neighbours_behind_walls_do_not_share_the_view() -> None:
+    positions = np.random.default_rng(0).uniform((1, 1), (9, 7), size=(4, 2))
+    pairs = observe(positions).find_near_neighbours(np.inf)
+    walls = np.full((4, 16), 1e-9)
+    is_own = find_cells_in_view(np.ones((4, 16, 5)), walls, compute_headings(16), pairs, np.full(4, 3.0))
+    assert is_own.all()
 
 
 def test_a_wall_at_a_low_angle_is_no_window() -> None:
-    """Along a straight wall the distance leaps from ray to ray, and nothing is hidden."""
+    """Along a straight wall the distance jumps from ray to ray, but nothing is hidden."""
     directions = compute_headings(180)
     with np.errstate(divide="ignore"):
         wall = np.where(directions[:, 1] < 0.0, -0.3 / directions[:, 1], np.inf)
-    view = View(np.minimum(wall, 20.0)[None], (wall < 20.0)[None])
+    view = View(distances=np.minimum(wall, 20.0)[None], hit=(wall < 20.0)[None])
     assert len(find_windows(view, directions, np.array([20.0]), 0.3).robot) == 0
-    # it ends at x = 1
-    shorter = np.where(directions[:, 0] * wall > 1.0, np.inf, wall)
-    view = View(np.minimum(shorter, 20.0)[None], (shorter < 20.0)[None])
-    found = find_windows(view, directions, np.array([20.0]), 0.3)
-    assert len(found.robot) == 1
-    assert found.corner[0] == pytest.approx(np.hypot(1.0, 0.3), rel=0.1)
-    assert found.across[0] @ [0.3, 1.0] > 0.0  # up, off the wall
 
 
-def test_who_sees_all_of_its_cell_rests() -> None:
+def test_the_end_of_a_wall_is_a_window() -> None:
+    """A wall at y = -0.3 ends at x = 1: a robot that moves up sees more behind it."""
+    directions = compute_headings(180)
+    with np.errstate(divide="ignore"):
+        wall = np.where(directions[:, 1] < 0.0, -0.3 / directions[:, 1], np.inf)
+    wall = np.where(directions[:, 0] * wall > 1.0, np.inf, wall)
+    view = View(distances=np.minimum(wall, 20.0)[None], hit=(wall < 20.0)[None])
+    windows = find_windows(view, directions, np.array([20.0]), 0.3)
+    assert len(windows.robot) == 1
+    assert windows.corner[0] == pytest.approx(np.hypot(1.0, 0.3), rel=0.1)
+    assert windows.across[0] @ [0.3, 1.0] > 0.0
+
+
+def test_robots_that_see_their_whole_cells_are_at_rest() -> None:
     square = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
     team = Team.homogeneous(2, sensing_range=20.0)
     simulation = Simulation(square, Visibility(), [[2.0, 2.0], [3.0, 3.0]], team)
@@ -127,25 +164,27 @@ def test_who_sees_all_of_its_cell_rests() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", [Visibility(), Boosting()])
-def test_robots_spread_until_their_views_are_apart_and_touch_nothing(law: Visibility | Boosting) -> None:
+@pytest.mark.parametrize("controller", [Visibility(), Boosting()])
+def test_robots_spread_their_views_without_collisions(controller: Visibility | Boosting) -> None:
     table = PolygonObstacle(((4, 4), (5, 4), (5, 5), (4, 5)))
     hall = Environment("hall", ((0, 0), (12, 0), (12, 12), (0, 12)), (table,))
     starts = np.array([[2.0, 2.0], [2.5, 2.0], [2.0, 2.6]])
-    simulation = Simulation(hall, law, starts, Team.homogeneous(3, sensing_range=2.0))
+    simulation = Simulation(hall, controller, starts, Team.homogeneous(3, sensing_range=2.0))
     record = simulation.run(20.0)
-    apart = shapely.union_all([shapely.Point(*place).buffer(2.0) for place in record.positions[-1]])
-    before = shapely.union_all([shapely.Point(*place).buffer(2.0) for place in starts])
-    room = hall.free
-    assert apart.intersection(room).area > 1.8 * before.intersection(room).area
-    assert shapely.distance(room.boundary, shapely.points(record.positions)).min() > 0.1
+    areas = []
+    for positions in (starts, record.positions[-1]):
+        views = shapely.union_all([shapely.Point(*position).buffer(2.0) for position in positions])
+        areas.append(views.intersection(hall.free).area)
+    assert areas[1] > 1.8 * areas[0]
+    assert shapely.distance(hall.free.boundary, shapely.points(record.positions)).min() > 0.1
 
 
-def test_steps_are_halved_where_gradients_turn_back() -> None:
-    one, back = np.array([[1.0, 0.0]]), np.array([[-1.0, 0.1]])
-    assert compute_step_fractions(one, None, None) == 1.0
-    assert compute_step_fractions(back, one, np.array([0.8])) == 0.4
-    assert compute_step_fractions(one, one, np.array([0.5])) == pytest.approx(0.6)
+def test_steps_are_halved_when_the_gradient_turns_back() -> None:
+    forward = np.array([[1.0, 0.0]])
+    backward = np.array([[-1.0, 0.1]])
+    assert compute_step_fractions(forward, None, None) == 1.0
+    assert compute_step_fractions(backward, forward, np.array([0.8])) == 0.4
+    assert compute_step_fractions(forward, forward, np.array([0.5])) == pytest.approx(0.6)
 
 
 def test_a_neighbour_behind_a_wall_detects_nothing_here() -> None:
@@ -165,7 +204,7 @@ def test_a_neighbour_behind_a_wall_detects_nothing_here() -> None:
 
 def test_boosts_push_to_where_nobody_detects() -> None:
     """Two robots side by side: either is boosted away from the other."""
-    seen = seen_from(np.array([[4.0, 4.0], [4.8, 4.0]]))
+    seen = observe(np.array([[4.0, 4.0], [4.8, 4.0]]))
     view = View(np.full((2, 72), 3.0), np.zeros((2, 72), dtype=bool))
     for word in ("phi", "p", "neighbours"):
         _, plain, boosted = Boosting(boost=word).slopes(seen, view, np.full(2, 3.0))
