@@ -194,7 +194,7 @@ def _build_mesh(region: Region, configuration_space: shapely.Geometry, lattice: 
     for _ in range(_MAX_REFINEMENTS):
         vertices = np.concatenate([starts, ends, inner])
         points = np.unique(np.round(vertices / _ROUNDING_M) * _ROUNDING_M, axis=0)
-        triangles = Delaunay(points).simplices
+        triangles = Delaunay(points).simplices.astype(np.intp)
         is_edge = _find_edges(points, triangles, starts, ends)
         if is_edge.all():
             break
@@ -204,7 +204,6 @@ def _build_mesh(region: Region, configuration_space: shapely.Geometry, lattice: 
         starts = np.concatenate(halved_starts)
         ends = np.concatenate(halved_ends)
     is_fixed = ~region.contains(points, -2.0 * _ROUNDING_M)
-    triangles = triangles.astype(np.intp)
     # Triangles on the boundary alone have no area, except for rounding.
     is_flat = is_fixed[triangles].all(axis=1)
     return _Mesh(points=points, triangles=triangles[~is_flat], is_fixed=is_fixed)
