@@ -1,4 +1,8 @@
+"""Robots that fail and join during a run."""
+
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,16 +23,15 @@ HALL = Environment("hall", ((0, 0), (10, 0), (10, 8), (0, 8)))
 STARTS = np.array([[1.0, 1.0], [2.0, 1.5], [1.0, 3.0], [3.0, 2.5]])
 
 
-def world(conditions: Conditions, positions: np.ndarray = STARTS, **team: float) -> ChangingWorld:
-    made = Team.homogeneous(len(positions), **team)
-    return ChangingWorld(conditions, HALL, made, positions)
+def build_world(conditions: Conditions, positions: np.ndarray = STARTS) -> ChangingWorld:
+    return ChangingWorld(conditions, HALL, Team.homogeneous(len(positions)), positions)
 
 
-def test_as_long_as_all_work_it_is_a_world() -> None:
-    """Bit for bit, with robots that touch."""
-    places = np.array([[1.0, 1.0], [1.3, 1.0], [1.6, 1.05]])
-    changing = world(Conditions(failures=((1, 100.0),)), places)
-    plain = World(build_solid_pieces(HALL), Team.homogeneous(3), places)
+def test_a_changing_world_equals_a_world_while_all_robots_work() -> None:
+    """The robots touch each other; positions and velocities are the same bit for bit."""
+    starts = np.array([[1.0, 1.0], [1.3, 1.0], [1.6, 1.05]])
+    changing = build_world(Conditions(failures=((1, 100.0),)), starts)
+    plain = World(build_solid_pieces(HALL), Team.homogeneous(3), starts)
     forces = np.array([[3.0, 0.0], [0.0, 0.1], [-3.0, 0.0]])
     for step in range(60):
         changing.step(forces, 0.05, time=step * 0.05)
@@ -37,29 +40,28 @@ def test_as_long_as_all_work_it_is_a_world() -> None:
         assert changing.velocities.tobytes() == plain.velocities.tobytes()
 
 
-def test_who_failed_stands_still_and_is_in_the_way() -> None:
-    places = np.array([[1.0, 4.0], [5.0, 4.0]])
-    changing = world(Conditions(failures=((2, 0.5),)), places)
+def test_failed_robots_stand_still_and_are_obstacles() -> None:
+    changing = build_world(Conditions(failures=((2, 0.5),)), np.array([[1.0, 4.0], [5.0, 4.0]]))
     forces = np.array([[4.0, 0.0], [4.0, 0.0]])
     for step in range(200):
         changing.step(forces, 0.05, time=step * 0.05)
         assert changing.working[1] == bool(changing.velocities[1].any())
-    moved = changing.positions[1, 0] - 5.0
-    assert 0.1 < moved < 0.5
+    distance = changing.positions[1, 0] - 5.0
+    assert 0.1 < distance < 0.5
     assert (changing.velocities[1] == 0.0).all()
     assert changing.working.tolist() == [True, False]
     assert changing.failed_robots.tolist() == [[*changing.positions[1].tolist(), 0.1]]
-    # the other leans on it, and does not get past
+    # The other robot leans on it, and does not get past.
     assert changing.positions[0, 0] == pytest.approx(changing.positions[1, 0] - 0.2, abs=2e-3)
 
 
-def test_who_has_not_joined_is_nowhere() -> None:
-    places = np.array([[1.0, 4.0], [3.0, 4.0]])
-    changing = world(Conditions(joins=((2, 4.0),)), places)
+def test_robots_that_have_not_joined_are_absent() -> None:
+    changing = build_world(Conditions(joins=((2, 4.0),)), np.array([[1.0, 4.0], [3.0, 4.0]]))
     forces = np.array([[4.0, 0.0], [0.0, 0.0]])
     for step in range(60):
         changing.step(forces, 0.05, time=step * 0.05)
-    assert changing.positions[0, 0] > 3.5  # it went through where the other will be
+    # Robot 1 has passed the position at which robot 2 will join.
+    assert changing.positions[0, 0] > 3.5
     assert changing.working.tolist() == [True, False]
     for step in range(60, 90):
         changing.step(forces, 0.05, time=step * 0.05)
@@ -67,24 +69,24 @@ def test_who_has_not_joined_is_nowhere() -> None:
     assert changing.positions[1].tolist() == [3.0, 4.0]
 
 
-def test_who_joins_where_another_stands_appears_beside_it() -> None:
-    places = np.array([[5.0, 4.0], [1.0, 1.0]])
-    changing = world(Conditions(joins=((2, 1.0, (5.05, 4.0)),)), places)
+def test_a_robot_joins_next_to_one_that_occupies_its_position() -> None:
+    starts = np.array([[5.0, 4.0], [1.0, 1.0]])
+    changing = build_world(Conditions(joins=((2, 1.0, (5.05, 4.0)),)), starts)
     for step in range(25):
         changing.step(np.zeros((2, 2)), 0.05, time=step * 0.05)
-    apart = np.hypot(*(changing.positions[1] - changing.positions[0]))
-    assert 0.2 <= apart < 0.21
+    distance = np.hypot(*(changing.positions[1] - changing.positions[0]))
+    assert 0.2 <= distance < 0.21
     assert changing.positions[1, 0] > 5.1
 
 
-def test_a_robot_that_has_no_room_to_join_is_named() -> None:
+def test_errors_name_a_robot_without_room_to_join() -> None:
     cell = Environment("cell", ((0, 0), (0.3, 0), (0.3, 0.3), (0, 0.3)))
     starts = np.array([[0.15, 0.15], [0.15, 0.15]])
     with pytest.raises(StartError, match=r"robot 2 joins at 0.1\d* s at .*, but there is no room"):
         Simulation(cell, Rapf(), starts, conditions=Conditions(joins=((2, 0.1),))).run(0.2)
 
 
-def test_when_all_have_failed_the_run_goes_on() -> None:
+def test_a_run_continues_after_all_robots_have_failed() -> None:
     conditions = Conditions(failures=tuple((k + 1, 0.2) for k in range(4)))
     record = Simulation(HALL, Rapf(), STARTS, conditions=conditions).run(6.0)
     assert not record.working[-1].any()
@@ -95,100 +97,102 @@ def test_when_all_have_failed_the_run_goes_on() -> None:
     assert summarise(record, history)["stuck_robots"] is None
 
 
-def test_cost_counts_who_works() -> None:
+def test_only_working_robots_count_in_the_coverage_cost() -> None:
     conditions = Conditions(failures=((1, 0.3), (2, 0.3)), joins=((3, 0.3),))
     record = Simulation(HALL, Rapf(), STARTS, conditions=conditions).run(0.5)
     cost = CoverageCost(HALL, 32)
     history = compute_cost_history(record, cost, 60.0)
-    for k in (0, 10, 20, 30):
-        counted = record.working[k]
-        assert history.mean_distance[k] == cost(record.positions[k][counted]).mean_distance
+    for moment in (0, 10, 20, 30):
+        working_positions = record.positions[moment][record.working[moment]]
+        assert history.mean_distance[moment] == cost(working_positions).mean_distance
     assert record.working[0].tolist() == [True, True, False, True]
     assert record.working[-1].tolist() == [False, False, True, True]
     assert record.present[0].tolist() == [True, True, False, True]
     assert record.present[-1].all()
 
 
-def test_clearance_is_to_walls_and_to_robots_that_failed() -> None:
-    places = np.array([[2.0, 4.0], [6.0, 4.0]])
+def test_clearance_is_measured_to_walls_and_failed_robots() -> None:
+    starts = np.array([[2.0, 4.0], [6.0, 4.0]])
     conditions = Conditions(failures=((2, 0.0),), position_noise=0.3, sensing_noise=0.3)
-    record = Simulation(HALL, Rapf(), places, conditions=conditions).run(0.1)
-    gap = compute_clearances(record)
-    assert gap[0, 0] == pytest.approx(2.0 - 0.1, abs=1e-6)  # the left wall, whatever the sensor said
-    assert np.isinf(gap[:, 1]).all()
-    near = np.array([[5.79, 4.0], [6.0, 4.0]])
-    touching = Simulation(HALL, Rapf(), near, conditions=Conditions(failures=((2, 0.0),))).run(0.0)
-    assert compute_clearances(touching)[0, 0] == pytest.approx(0.01, abs=1e-6)
-    assert count_contacts(touching, compute_clearances(touching) - 0.01) == 1
+    clearances = compute_clearances(Simulation(HALL, Rapf(), starts, conditions=conditions).run(0.1))
+    # The left wall is closest, whatever the sensor has measured.
+    assert clearances[0, 0] == pytest.approx(2.0 - 0.1, abs=1e-6)
+    assert np.isinf(clearances[:, 1]).all()
 
 
-def test_others_sense_who_failed() -> None:
-    places = np.array([[4.0, 4.0], [6.0, 4.0]])
-    one = Simulation(HALL, Rapf(), places, conditions=Conditions(failures=((2, 0.1),)))
-    assert np.isnan(one.observe().obstacle_points[0]).all()
+def test_contacts_with_failed_robots_are_counted() -> None:
+    starts = np.array([[5.79, 4.0], [6.0, 4.0]])
+    record = Simulation(HALL, Rapf(), starts, conditions=Conditions(failures=((2, 0.0),))).run(0.0)
+    clearances = compute_clearances(record)
+    assert clearances[0, 0] == pytest.approx(0.01, abs=1e-6)
+    assert count_contacts(record, clearances) == 0
+    assert count_contacts(record, clearances - 0.01) == 1
+
+
+def test_robots_sense_failed_robots() -> None:
+    starts = np.array([[4.0, 4.0], [6.0, 4.0]])
+    simulation = Simulation(HALL, Rapf(), starts, conditions=Conditions(failures=((2, 0.1),)))
+    assert np.isnan(simulation.observe().obstacle_points[0]).all()
     for _ in range(8):
-        one.step()
-    point = one.observe().obstacle_points[0]
-    expected = one.positions[1] + 0.1 * (one.positions[0] - one.positions[1]) / np.hypot(
-        *(one.positions[0] - one.positions[1])
-    )
-    np.testing.assert_allclose(point, expected, atol=1e-9)
-    assert np.isnan(one.observe().obstacle_points[1]).all()
-    twin = one.copy()
-    one.step()
-    assert (twin.observe().obstacle_points[0] == point).all()
+        simulation.step()
+    obstacle_point = simulation.observe().obstacle_points[0]
+    offset = simulation.positions[0] - simulation.positions[1]
+    expected = simulation.positions[1] + 0.1 * offset / np.hypot(*offset)
+    np.testing.assert_allclose(obstacle_point, expected, atol=1e-9)
+    assert np.isnan(simulation.observe().obstacle_points[1]).all()
+    twin = simulation.copy()
+    simulation.step()
+    np.testing.assert_array_equal(twin.observe().obstacle_points[0], obstacle_point)
 
 
-def test_many_robots_touch_only_while_they_work() -> None:
-    grid = np.stack(np.meshgrid(np.arange(12) * 0.6 + 1, np.arange(10) * 0.6 + 1), axis=-1).reshape(-1, 2)
-    team = Team.homogeneous(len(grid), radius=0.1)
+def test_robots_that_have_not_joined_touch_nothing() -> None:
+    """Until they join, all of them are at one position."""
+    x, y = np.meshgrid(np.arange(12) * 0.6 + 1, np.arange(10) * 0.6 + 1)
+    starts = np.column_stack([x.ravel(), y.ravel()])
     conditions = Conditions(joins=tuple((k + 1, 5.0, (0.5, 0.5)) for k in range(1, 60)))
-    record = Simulation(HALL, Rapf(), grid, team, conditions=conditions).run(0.1)
-    assert (
-        count_contacts(record, compute_clearances(record)) == 0
-    )  # those that will join are all in one place until then
+    record = Simulation(HALL, Rapf(), starts, conditions=conditions).run(0.1)
+    assert count_contacts(record, compute_clearances(record)) == 0
 
 
-def test_a_run_under_conditions_is_saved_and_read(tmp_path: object) -> None:
+def test_records_under_conditions_are_saved_and_loaded(tmp_path: Path) -> None:
     conditions = Conditions(loss=0.2, failures=((1, 0.3),), joins=((3, 0.2, (6.0, 6.0)),), seed=5)
     record = Simulation(HALL, Rapf(), STARTS, conditions=conditions).run(0.5)
-    folder = tmp_path  # type: ignore[assignment]
-    record.save(folder)  # type: ignore[arg-type]
-    again = Record.load(folder)  # type: ignore[arg-type]
-    assert again.conditions == conditions
-    assert (again.working == record.working).all()
-    assert again.snapshot(30).working is not None
-    repeated = Simulation(again.environment, Rapf(), again.positions[0], conditions=again.conditions).run(0.5)
-    assert repeated.positions.tobytes() == record.positions.tobytes()
+    record.save(tmp_path)
+    loaded = Record.load(tmp_path)
+    assert loaded.conditions == conditions
+    np.testing.assert_array_equal(loaded.working, record.working)
+    assert loaded.snapshot(30).working is not None
+    simulation = Simulation(loaded.environment, Rapf(), loaded.positions[0], conditions=loaded.conditions)
+    assert simulation.run(0.5).positions.tobytes() == record.positions.tobytes()
 
 
-def test_starts_that_are_not_taken_yet_may_overlap() -> None:
-    places = np.array([[1.0, 1.0], [1.0, 1.0], [2.0, 2.0]])
+def test_starts_of_robots_that_join_later_may_overlap() -> None:
+    starts = np.array([[1.0, 1.0], [1.0, 1.0], [2.0, 2.0]])
     with pytest.raises(StartError, match="overlap"):
-        Simulation(HALL, Rapf(), places)
-    record = Simulation(HALL, Rapf(), places, conditions=Conditions(joins=((2, 1.0),))).run(2.0)
+        Simulation(HALL, Rapf(), starts)
+    record = Simulation(HALL, Rapf(), starts, conditions=Conditions(joins=((2, 1.0),))).run(2.0)
     assert record.working[-1].all()
     with pytest.raises(ParameterError, match="expected a robot from 1 to 3, got robot 4"):
-        Simulation(HALL, Rapf(), places, conditions=Conditions(joins=((4, 1.0),)))
+        Simulation(HALL, Rapf(), starts, conditions=Conditions(joins=((4, 1.0),)))
 
 
-def test_a_failure_beside_a_wall_changes_nothing_for_others() -> None:
-    """The world is made anew when a robot fails; one that leans on a wall elsewhere goes on as it did."""
+def test_a_failure_does_not_affect_robots_elsewhere() -> None:
+    """The world is rebuilt when robot 2 fails; robot 1, which leans on a wall, continues as before."""
     walled = Environment("walled", HALL.boundary, (WallObstacle(((5, 0), (5, 8)), 0.1),))
-    places = np.array([[4.0, 4.0], [8.0, 4.0]])
+    starts = np.array([[4.0, 4.0], [8.0, 4.0]])
     forces = np.array([[3.0, 1.0], [0.0, 0.0]])
-    made = [
-        ChangingWorld(each, walled, Team.homogeneous(2), places)
-        for each in (Conditions(failures=((2, 3.0),)), Conditions(failures=((2, 1e3),)))
-    ]
-    for step in range(120):
-        for each in made:
-            each.step(forces, 0.05, time=step * 0.05)
-    assert made[0].positions[0].tobytes() == made[1].positions[0].tobytes()
+    final_positions = []
+    for failure_time in (3.0, 1000.0):
+        conditions = Conditions(failures=((2, failure_time),))
+        changing = ChangingWorld(conditions, walled, Team.homogeneous(2), starts)
+        for step in range(120):
+            changing.step(forces, 0.05, time=step * 0.05)
+        final_positions.append(changing.positions[0].tobytes())
+    assert final_positions[0] == final_positions[1]
 
 
-def test_who_failed_earlier_stays_in_the_way_when_another_one_fails() -> None:
-    changing = world(Conditions(failures=((1, 0.2), (3, 0.4))))
+def test_robots_that_failed_earlier_remain_obstacles() -> None:
+    changing = build_world(Conditions(failures=((1, 0.2), (3, 0.4))))
     for step in range(12):
         changing.step(np.zeros((4, 2)), 0.05, time=step * 0.05)
     assert changing.failed_robots[:, :2].tolist() == STARTS[[0, 2]].tolist()
@@ -197,17 +201,18 @@ def test_who_failed_earlier_stays_in_the_way_when_another_one_fails() -> None:
         changing.working[...] = True
 
 
-def test_two_that_join_in_one_place_stand_beside_each_other() -> None:
-    places = np.array([[1.0, 1.0], [2.0, 1.0], [3.0, 1.0]])
-    changing = world(Conditions(joins=((2, 0.2, (5.0, 4.0)), (3, 0.2, (5.0, 4.0)))), places)
+def test_robots_that_join_at_one_position_stand_next_to_each_other() -> None:
+    starts = np.array([[1.0, 1.0], [2.0, 1.0], [3.0, 1.0]])
+    conditions = Conditions(joins=((2, 0.2, (5.0, 4.0)), (3, 0.2, (5.0, 4.0))))
+    changing = build_world(conditions, starts)
     for step in range(6):
         changing.step(np.zeros((3, 2)), 0.05, time=step * 0.05)
     assert changing.positions[1].tolist() == [5.0, 4.0]
     assert 0.2 <= np.hypot(*(changing.positions[2] - [5.0, 4.0])) < 0.21
 
 
-def test_who_joins_and_fails_within_a_step_was_never_there() -> None:
-    changing = world(Conditions(joins=((2, 0.21),), failures=((2, 0.22),)))
+def test_a_robot_that_joins_and_fails_within_a_step_is_never_present() -> None:
+    changing = build_world(Conditions(joins=((2, 0.21),), failures=((2, 0.22),)))
     for step in range(8):
         changing.step(np.zeros((4, 2)), 0.05, time=step * 0.05)
         assert changing.working.tolist() == [True, False, True, True]

@@ -1,4 +1,4 @@
-"""Robots in contact are moved on their own, and whoever they are moved against with them."""
+"""Robots in contact are moved again, and with them all robots that they are moved against."""
 
 from __future__ import annotations
 
@@ -10,38 +10,39 @@ from robocov.team import Team
 from robocov.world import MAX_PENETRATION, World
 
 DT = 1 / 60
-FAR = np.array([[90.0, 90.0], [91.0, 90.0], [91.0, 91.0]])
+DISTANT_WALL = np.array([[90.0, 90.0], [91.0, 90.0], [91.0, 91.0]])
 WALL = np.array([[1.0, -5.0], [1.5, -5.0], [1.5, 5.0], [1.0, 5.0]])
 
 
-def test_who_touches_nothing_moves_as_if_nobody_did() -> None:
-    """Bit for bit, in the middle between two that lean on each other and one that leans on a wall."""
-    places = np.array([[0.0, 3.0], [0.0, 0.0], [0.21, 3.0], [0.89, -3.0]])
+def test_robots_without_contact_move_as_if_they_were_alone() -> None:
+    """Robot 1 is between two robots that lean on each other and one that leans on a wall."""
+    starts = np.array([[0.0, 3.0], [0.0, 0.0], [0.21, 3.0], [0.89, -3.0]])
     forces = np.array([[2.0, 0.0], [0.3, 0.1], [-2.0, 0.0], [2.0, 1.0]])
-    together = World((WALL,), Team.homogeneous(4), places)
-    alone = World((WALL,), Team.homogeneous(1), places[1:2])
+    team = World((WALL,), Team.homogeneous(4), starts)
+    alone = World((WALL,), Team.homogeneous(1), starts[1:2])
     for _ in range(60):
-        together.step(forces, DT)
+        team.step(forces, DT)
         alone.step(forces[1:2], DT)
-        assert together.positions[1].tobytes() == alone.positions[0].tobytes()
-        assert together.velocities[1].tobytes() == alone.velocities[0].tobytes()
-    assert together._list_touching() == [0, 2, 3]
+        assert team.positions[1].tobytes() == alone.positions[0].tobytes()
+        assert team.velocities[1].tobytes() == alone.velocities[0].tobytes()
+    assert team._list_touching() == [0, 2, 3]
 
 
-def test_whoever_is_pushed_on_pushes_on() -> None:
-    """A heavy robot runs into a row of slow ones: in the free step only the first of them is touched."""
+def test_pushes_are_passed_on_along_a_row_of_robots() -> None:
+    """A heavy robot runs into a row of slow ones: in the free step it touches only the first of them."""
     n = 6
-    row = Team.homogeneous(n, max_speed=0.4)
-    mass, limit = np.r_[100.0, np.ones(n - 1)], np.r_[2.0, row.max_speed[1:]]
-    gaps = np.r_[0.0, 0.21, np.full(n - 2, 0.2002)]
-    places = np.column_stack([np.cumsum(gaps), np.zeros(n)])
+    row = Team.homogeneous(n, viscosity=0.0)
+    mass = np.array([100.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    max_speed = np.array([2.0, 0.4, 0.4, 0.4, 0.4, 0.4])
+    gaps = np.array([0.0, 0.21, 0.2002, 0.2002, 0.2002, 0.2002])
+    starts = np.column_stack([np.cumsum(gaps), np.zeros(n)])
     velocities = np.zeros((n, 2))
     velocities[0, 0] = 2.0
-    world = World((FAR,), replace(row, mass=mass, max_speed=limit, viscosity=0.0 * mass), places, velocities)
+    world = World((DISTANT_WALL,), replace(row, mass=mass, max_speed=max_speed), starts, velocities)
     world.step(np.zeros((n, 2)), DT)
     assert world._list_touching() == [0, 1]
-    assert (world.positions[1:, 0] > places[1:, 0] + 0.01).all()
+    assert (world.positions[1:, 0] > starts[1:, 0] + 0.01).all()
     for _ in range(30):
         assert np.diff(world.positions[:, 0]).min() >= 0.2 - MAX_PENETRATION
-        assert (np.hypot(*world.velocities.T) <= limit * (1 + 1e-12)).all()
+        assert (np.hypot(*world.velocities.T) <= max_speed * (1 + 1e-12)).all()
         world.step(np.zeros((n, 2)), DT)

@@ -1,4 +1,8 @@
+"""Free positions of robots: in changed maps, and for robots that join."""
+
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,54 +22,63 @@ SQUARE = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
 EMPTY = Environment("empty", SQUARE)
 
 
+def compute_distances(positions):
+    """Return the distances between robots, (n, n) m; infinite from a robot to itself."""
+    offsets = positions[:, None] - positions
+    distances = np.hypot(offsets[:, :, 0], offsets[:, :, 1])
+    np.fill_diagonal(distances, np.inf)
+    return distances
+
+
 @settings(max_examples=80)
 @given(
-    st.sampled_from(sorted(KINDS)),
-    st.integers(1, 12),
-    st.integers(0, 2**32),
-    st.integers(1, 15),
-    st.booleans(),
+    kind=st.sampled_from(sorted(KINDS)),
+    obstacles=st.integers(1, 12),
+    seed=st.integers(0, 2**32),
+    robots=st.integers(1, 15),
+    is_crowded=st.booleans(),
 )
-def test_all_robots_fit_and_whoever_did_stays(kind, count, seed, robots, crowded):
-    environment = drawn_map(kind, count, seed)
+def test_all_robots_fit_and_those_that_did_before_stay(kind, obstacles, seed, robots, is_crowded):
+    environment = drawn_map(kind, obstacles, seed)
     assume(environment is not None)
-    rng = np.random.default_rng(seed)
-    places = rng.uniform(0.0, 8.0, (robots, 2)) * (0.1 if crowded else 1.0) + (4.0 if crowded else 0.0)
+    positions = np.random.default_rng(seed).uniform(0.0, 8.0, (robots, 2))
+    if is_crowded:
+        positions = 4.0 + 0.1 * positions
     team = Team.homogeneous(robots, radius=0.05)
-    moved = relocate_robots(environment, places, team)
-    # the simulation takes them as they are
-    Simulation(environment, Rapf(), moved, team)
-    wall = shapely.distance(environment.free.boundary, shapely.points(places))
-    inside = shapely.contains_properly(environment.free, shapely.points(places))
-    table = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)) + 10.0 * np.eye(robots)
-    alone = inside & (wall >= 0.05) & (table.min(axis=1) > 2.0)
-    np.testing.assert_array_equal(moved[alone], places[alone])
+    relocated = relocate_robots(environment, positions, team)
+    # The simulation accepts them as starts.
+    Simulation(environment, Rapf(), relocated, team)
+    wall_distances = shapely.distance(environment.free.boundary, shapely.points(positions))
+    is_inside = shapely.contains_properly(environment.free, shapely.points(positions))
+    is_far_from_others = compute_distances(positions).min(axis=1) > 2.0
+    stays = is_inside & (wall_distances >= 0.05) & is_far_from_others
+    np.testing.assert_array_equal(relocated[stays], positions[stays])
 
 
-def test_a_robot_leaves_an_obstacle_by_the_shortest_way():
-    where = Environment("pillar", SQUARE, (CircleObstacle((4.0, 4.0), 1.0),))
+def test_a_robot_leaves_an_obstacle_by_the_shortest_path():
+    pillar = Environment("pillar", SQUARE, (CircleObstacle((4.0, 4.0), 1.0),))
     team = Team.homogeneous(1, radius=0.1)
     for angle in np.linspace(0.0, 6.0, 7):
-        along = np.array([np.cos(angle), np.sin(angle)])
-        (moved,) = relocate_robots(where, (4.0 + 0.7 * along)[None], team)
-        np.testing.assert_allclose(moved, 4.0 + 1.1 * along, atol=0.03)
+        direction = np.array([[np.cos(angle), np.sin(angle)]])
+        relocated = relocate_robots(pillar, 4.0 + 0.7 * direction, team)
+        np.testing.assert_allclose(relocated, 4.0 + 1.1 * direction, atol=0.03)
 
 
-def test_robots_in_one_place_make_room_for_each_other():
-    moved = relocate_robots(EMPTY, np.full((12, 2), 4.0), Team.homogeneous(12, radius=0.2))
-    table = np.hypot(*(moved[:, None] - moved).transpose(2, 0, 1)) + 10.0 * np.eye(12)
-    assert table.min() >= 0.4
-    assert np.hypot(*(moved - 4.0).T).max() < 2.0
+def test_robots_at_one_position_make_room_for_each_other():
+    relocated = relocate_robots(EMPTY, np.full((12, 2), 4.0), Team.homogeneous(12, radius=0.2))
+    assert compute_distances(relocated).min() >= 0.4
+    assert np.hypot(*(relocated - 4.0).T).max() < 2.0
 
 
-def test_robots_outside_come_in():
-    moved = relocate_robots(EMPTY, np.array([[-5.0, 4.0], [20.0, 20.0]]), Team.homogeneous(2))
-    np.testing.assert_allclose(moved, [[0.1, 4.0], [7.9, 7.9]], atol=0.01)
+def test_robots_outside_the_map_move_inside():
+    relocated = relocate_robots(EMPTY, np.array([[-5.0, 4.0], [20.0, 20.0]]), Team.homogeneous(2))
+    np.testing.assert_allclose(relocated, [[0.1, 4.0], [7.9, 7.9]], atol=0.01)
 
 
-def test_where_there_is_no_room_a_robot_is_named():
+def test_errors_name_a_robot_without_room():
+    team = replace(Team.homogeneous(2), radius=np.array([0.1, 5.0]))
     with pytest.raises(StartError, match=r"robot 2 of radius 5 m fits nowhere in map 'empty'"):
-        relocate_robots(EMPTY, np.ones((2, 2)), Team(**_radii([0.1, 5.0])))
+        relocate_robots(EMPTY, np.ones((2, 2)), team)
     with pytest.raises(StartError, match="have no room next to each other"):
         relocate_robots(EMPTY, np.full((40, 2), 4.0), Team.homogeneous(40, radius=1.0))
 
@@ -74,14 +87,9 @@ def test_where_there_is_no_room_a_robot_is_named():
 def test_a_robot_that_joins_keeps_clear_of_robots_of_another_size(radius, other_radius):
     others = np.array([[4.0, 4.0]])
     radii = np.array([other_radius])
-    expected_distance = radius + other_radius
-    too_close = (4.0 + expected_distance - 0.05, 4.0)
+    min_distance = radius + other_radius
+    too_close = (4.0 + min_distance - 0.05, 4.0)
     x, y = find_free_position(EMPTY, radius, others, too_close, radii)
-    assert expected_distance <= np.hypot(x - 4.0, y - 4.0) < expected_distance + 0.01
-    far_enough = (4.0 + expected_distance + 0.01, 4.0)
+    assert min_distance <= np.hypot(x - 4.0, y - 4.0) < min_distance + 0.01
+    far_enough = (4.0 + min_distance + 0.01, 4.0)
     assert find_free_position(EMPTY, radius, others, far_enough, radii) == far_enough
-
-
-def _radii(radii):
-    team = Team.homogeneous(len(radii))
-    return {**{name: getattr(team, name) for name in team.__dataclass_fields__}, "radius": np.array(radii)}

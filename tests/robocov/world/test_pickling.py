@@ -26,75 +26,79 @@ MOVING = Environment("moving", HALL.boundary, (WALL, PolygonObstacle(((1, 6), (2
 STARTS = np.array([[1.0, 1.0], [1.21, 1.0], [3.8, 4.0], [3.0, 2.5]])
 
 
-def pickled(simulation: Any) -> Any:
+def pickle_and_load(simulation: Any) -> Any:
     return pickle.loads(pickle.dumps(simulation))
 
 
-WAYS: dict[str, Callable[[Any], Any]] = {"pickle": pickled, "deepcopy": copy.deepcopy}
+COPY_METHODS: dict[str, Callable[[Any], Any]] = {"pickle": pickle_and_load, "deepcopy": copy.deepcopy}
 
 
-def ideal() -> Simulation:
+def build_ideal() -> Simulation:
     return Simulation(HALL, Rapf(), STARTS)
 
 
-def moving() -> Simulation:
+def build_with_moving_obstacle() -> Simulation:
     return Simulation(MOVING, Rapf(), STARTS)
 
 
-def unicycles() -> Simulation:
+def build_unicycles() -> Simulation:
     return Simulation(HALL, Rapf(), STARTS, Team.homogeneous(4, kinematics="unicycle"))
 
 
-def changing() -> Simulation:
+def build_with_conditions() -> Simulation:
     events = {"failures": [(2, 0.2)], "joins": [(3, 0.5, (8.0, 6.0))]}
     conditions = Conditions(loss=0.2, delay=0.1, position_noise=0.02, seed=3, **events)
     return Simulation(MOVING, Rapf(), STARTS, conditions=conditions)
 
 
-def steps_of(simulation: Simulation | SimulationBatch, count: int) -> bytes:
-    found = []
-    for _ in range(count):
+def simulate(simulation: Simulation | SimulationBatch, steps: int) -> bytes:
+    """Simulate some steps, and return the bytes of all positions and velocities."""
+    states = []
+    for _ in range(steps):
         simulation.step()
-        found.append(np.concatenate([simulation.positions, simulation.velocities]))
-    return np.array(found).tobytes()
+        states.append(np.concatenate([simulation.positions, simulation.velocities]))
+    return np.array(states).tobytes()
 
 
-@pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("make", [ideal, moving, unicycles, changing])
-def test_it_goes_on_bit_for_bit_and_by_itself(make: Callable[[], Simulation], way: str) -> None:
-    simulation = make()
-    steps_of(simulation, 20)
-    _ = simulation.observe_and_decide()
-    twin = WAYS[way](simulation)
-    assert twin.time == simulation.time and twin.joined == simulation.joined
+@pytest.mark.parametrize("method", COPY_METHODS)
+@pytest.mark.parametrize(
+    "build", [build_ideal, build_with_moving_obstacle, build_unicycles, build_with_conditions]
+)
+def test_copies_continue_bit_for_bit_and_independently(build: Callable[[], Simulation], method: str) -> None:
+    simulation = build()
+    simulate(simulation, 20)
+    simulation.observe_and_decide()
+    twin = COPY_METHODS[method](simulation)
+    assert twin.time == simulation.time
+    assert twin.joined == simulation.joined
     for array in (twin.positions, twin.velocities, twin.team.radius):
         assert not array.flags.writeable
-    expected = steps_of(simulation, 25)
-    assert steps_of(twin, 25) == expected
+    expected = simulate(simulation, 25)
+    assert simulate(twin, 25) == expected
     assert twin.joined == simulation.joined
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_a_batch_continues_bit_for_bit(way: str) -> None:
+@pytest.mark.parametrize("method", COPY_METHODS)
+def test_copies_of_batches_continue_bit_for_bit(method: str) -> None:
     batch = SimulationBatch(HALL, Rapf(), [STARTS, STARTS - 0.3])
-    steps_of(batch, 20)
+    simulate(batch, 20)
     batch.observe()
-    twin = WAYS[way](batch)
+    twin = COPY_METHODS[method](batch)
     assert twin.time == batch.time
-    assert steps_of(twin, 25) == steps_of(batch, 25)
+    assert simulate(twin, 25) == simulate(batch, 25)
 
 
 @pytest.mark.parametrize("name", sorted(CONTROLLERS))
-def test_under_every_controller(name: str) -> None:
+def test_pickled_simulations_continue_under_every_controller(name: str) -> None:
     simulation = Simulation(HALL, CONTROLLERS[name](), STARTS)
-    steps_of(simulation, 3)
-    twin = pickled(simulation)
-    assert steps_of(twin, 3) == steps_of(simulation, 3)
+    simulate(simulation, 3)
+    twin = pickle_and_load(simulation)
+    assert simulate(twin, 3) == simulate(simulation, 3)
 
 
-def test_it_goes_on_in_another_process(tmp_path: Path) -> None:
-    simulation = changing()
-    steps_of(simulation, 20)
+def test_pickled_simulations_continue_in_another_process(tmp_path: Path) -> None:
+    simulation = build_with_conditions()
+    simulate(simulation, 20)
     (tmp_path / "simulation.pickle").write_bytes(pickle.dumps(simulation))
     script = (
         "import pickle, sys; from pathlib import Path; folder = Path(sys.argv[1])\n"
@@ -103,12 +107,12 @@ def test_it_goes_on_in_another_process(tmp_path: Path) -> None:
         "(folder / 'positions').write_bytes(simulation.positions.tobytes())\n"
     )
     subprocess.run([sys.executable, "-c", script, str(tmp_path)], check=True, timeout=120)
-    steps_of(simulation, 20)
+    simulate(simulation, 20)
     assert (tmp_path / "positions").read_bytes() == simulation.positions.tobytes()
 
 
-def test_a_pickle_holds_the_state_and_not_the_engine() -> None:
-    simulation = ideal()
-    before = len(pickle.dumps(simulation))
-    steps_of(simulation, 50)
-    assert len(pickle.dumps(simulation)) < 2 * before < 100_000
+def test_pickles_contain_the_state_and_no_pymunk_objects() -> None:
+    simulation = build_ideal()
+    initial_size = len(pickle.dumps(simulation))
+    simulate(simulation, 50)
+    assert len(pickle.dumps(simulation)) < 2 * initial_size < 100_000

@@ -181,15 +181,50 @@ def test_points_next_to_unicycles_move_as_among_points(empty: Environment) -> No
     assert (world_of_points.positions[1::2] != mixed_world.positions[1::2]).any(axis=1).all()
 
 
-def test_external_forces_carry_a_unicycle_sideways(empty: Environment) -> None:
+@pytest.mark.parametrize("force", [[0.0, 2.0], [-2.0, 0.0]], ids=["sideways", "backwards"])
+def test_a_unicycle_that_was_carried_stops_when_it_is_released(
+    empty: Environment, force: list[float]
+) -> None:
     world = build_world(empty, np.array([[5.0, 5.0]]))
     for _ in range(30):
-        world.step(np.zeros((1, 2)), DT, np.array([[0.0, 2.0]]))
-    assert world.positions[0, 1] > 5.1
+        world.step(np.zeros((1, 2)), DT, np.array([force]))
+    assert (world.positions[0] - 5.0) @ force > 0.1
     assert world.steering is not None
     assert not world.steering.any()
     world.step(np.zeros((1, 2)), DT)
     assert not world.velocities.any()
+
+
+@pytest.mark.parametrize("angular_speed", [0.5, 2.0, 5.0])
+def test_wheels_keep_their_speed_limit_in_curves(empty: Environment, angular_speed: float) -> None:
+    """Strong forces, whose direction rotates now and then, ask for full speed and for turns at once."""
+    world = build_world(empty, np.array([[5.0, 5.0]]), max_speed=0.3, turning_rate=10.0)
+    for step in range(300):
+        angle = angular_speed * max(0.0, step * DT % 2.0 - 1.0)
+        world.step(20.0 * np.array([[np.cos(angle), np.sin(angle)]]), DT)
+        assert world.steering is not None
+        speed = np.hypot(*world.velocities[0])
+        wheel_speed = abs(world.steering[0, 1]) * world.team.track_width[0] / 2
+        assert speed + wheel_speed <= 0.3 + 1e-9
+
+
+def test_faint_forces_turn_a_robot_at_rest_slowly(empty: Environment) -> None:
+    """Otherwise noise would turn robots at rest about."""
+    rates = {}
+    for force in (1e-4, 1.0):
+        world = build_world(empty, np.array([[5.0, 5.0]]))
+        for _ in range(20):
+            world.step(np.array([[-force, 0.1 * force]]), DT)
+        assert world.steering is not None
+        rates[force] = world.steering[0, 1]
+    assert 0.0 < rates[1e-4] < 0.1 * rates[1.0]
+
+
+def test_unicycles_brake_for_lateral_acceleration_that_turning_does_not_provide(empty: Environment) -> None:
+    team = Team.homogeneous(1, kinematics="unicycle", viscosity=0.0, max_speed=3.0)
+    world = World(build_solid_pieces(empty), team, np.array([[2.0, 5.0]]), np.array([[0.8, 0.0]]))
+    world.step(np.array([[0.0, 50.0]]), DT)
+    assert np.hypot(*world.velocities[0]) == pytest.approx(0.8 - team.max_acceleration[0] * DT)
 
 
 def test_unicycles_that_are_placed_anew_face_along_x(empty: Environment) -> None:
