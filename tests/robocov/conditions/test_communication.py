@@ -80,7 +80,7 @@ def told_one_by_one(
     st.sampled_from([2.0, np.inf]),
     st.integers(0, 2**20),
 )
-def test_what_is_heard_equals_what_was_told_one_by_one(
+def test_messages_agree_with_a_simulation_of_each_message(
     n: int, loss: float, delay: float, rate: float | None, forget: float, reach: float, seed: int
 ) -> None:
     conditions = Conditions(loss=loss, delay=delay, message_rate=rate, forget_after=forget, seed=seed)
@@ -102,7 +102,7 @@ def test_what_is_heard_equals_what_was_told_one_by_one(
 
 
 @pytest.mark.parametrize(("delay", "dt", "steps"), [(0.14, 0.02, 7), (0.7, DT, 7), (0.71, DT, 8)])
-def test_a_delay_of_whole_steps_is_that_many_and_silence_as_well(delay: float, dt: float, steps: int) -> None:
+def test_latency_and_silence_of_whole_steps_are_exact(delay: float, dt: float, steps: int) -> None:
     """Also where 0.14 / 0.02 is more than 7, and 3 x 0.1 more than 0.3."""
     radio = build_radio(Conditions(delay=delay, forget_after=round(3 * dt, 2)), np.ones(2), dt)
     inbox, working, heard = Inbox.create_empty(2), np.ones(2, dtype=bool), []
@@ -129,7 +129,7 @@ def test_messages_are_sent_whenever_a_period_has_passed(dt: str, rate: int) -> N
     assert sent_steps == [step for step in range(100) if messages[step + 1] > messages[step]]
 
 
-def test_an_inbox_is_replaced_and_never_changed() -> None:
+def test_inboxes_are_immutable() -> None:
     """So that a copy of a run can hold the same one."""
     radio = build_radio(Conditions(delay=0.2, loss=0.2), np.full(3, np.inf), DT)
     inbox, working = Inbox.create_empty(3), np.ones(3, dtype=bool)
@@ -152,7 +152,7 @@ def test_an_inbox_is_replaced_and_never_changed() -> None:
         inbox = once
 
 
-def test_loss_is_as_often_as_it_says() -> None:
+def test_messages_are_lost_with_the_given_probability() -> None:
     n, steps = 40, 30
     radio = build_radio(Conditions(loss=0.3, forget_after=0.01, seed=1), np.full(n, np.inf), DT)
     inbox, working, got = Inbox.create_empty(n), np.ones(n, dtype=bool), 0
@@ -205,7 +205,7 @@ LIGHT = tuple(kind for kind in CONTROLLERS.values() if kind.name not in PLANNING
 @pytest.mark.parametrize("kind", LIGHT, ids=lambda kind: str(kind.name))
 @settings(max_examples=15)
 @given(n=st.integers(2, 14), seed=st.integers(0, 2**32), reach=st.floats(2.0, 12.0))
-def test_what_was_heard_as_it_is_changes_nothing(kind: type, n: int, seed: int, reach: float) -> None:
+def test_reports_of_true_positions_change_no_decision(kind: type, n: int, seed: int, reach: float) -> None:
     """Bit for bit: where messages say what is, the decisions are those without messages."""
     places = np.random.default_rng(seed).uniform(1, 9, size=(n, 2))
     neighbours = Neighbours.from_ranges(places, np.full(n, reach))
@@ -222,7 +222,7 @@ def test_what_was_heard_as_it_is_changes_nothing(kind: type, n: int, seed: int, 
 @pytest.mark.parametrize("kind", LIGHT, ids=lambda kind: str(kind.name))
 @settings(max_examples=15)
 @given(n=st.integers(2, 14), seed=st.integers(0, 2**32))
-def test_a_robot_goes_by_what_it_heard_not_by_where_others_are(kind: type, n: int, seed: int) -> None:
+def test_robots_decide_by_reports_and_not_by_true_positions(kind: type, n: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     places = rng.uniform(1, 9, size=(n, 2))
     pairs = [(i, j) for i in range(n) for j in range(n) if i != j and rng.random() < 0.7]
@@ -243,7 +243,7 @@ def test_a_robot_goes_by_what_it_heard_not_by_where_others_are(kind: type, n: in
 
 
 @pytest.mark.parametrize("kind", CONTROLLERS.values(), ids=lambda kind: str(kind.name))
-def test_what_was_heard_matters(kind: type) -> None:
+def test_reports_affect_decisions(kind: type) -> None:
     """The property above is not empty: what robot 1 is told is near makes a difference to it."""
     places = np.array([[4.0, 4.0], [5.0, 4.5], [8.0, 6.0]])
     neighbours = Neighbours.from_ranges(places, np.full(3, 20.0))
@@ -262,7 +262,7 @@ def test_what_was_heard_matters(kind: type) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PLANNING)
-def test_those_that_plan_go_by_what_they_heard_too(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_planning_controllers_decide_by_reports(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(atlas, "_LISTENING_S", 0.0)
     kind, team = CONTROLLERS[name], Team.homogeneous(4)
     places = np.random.default_rng(5).uniform(1, 9, size=(4, 2))
@@ -282,7 +282,7 @@ def test_those_that_plan_go_by_what_they_heard_too(name: str, monkeypatch: pytes
 
 
 @given(st.integers(1, 20), st.integers(0, 2**32))
-def test_cells_of_what_is_heard_are_those_of_each_robots_own_picture(n: int, seed: int) -> None:
+def test_cells_by_reports_agree_with_a_partition_for_each_robot(n: int, seed: int) -> None:
     """Row by row against a partition of that robot and the others where it believes them to be."""
     rng = np.random.default_rng(seed)
     places = rng.uniform(0.5, 9.5, size=(n, 2))
@@ -298,7 +298,7 @@ def test_cells_of_what_is_heard_are_those_of_each_robots_own_picture(n: int, see
 
 
 @pytest.mark.parametrize("n", [3, 63, 66, 120])
-def test_cells_of_many_that_hear_the_truth_are_the_plain_ones(n: int) -> None:
+def test_cells_by_true_reports_equal_ordinary_cells(n: int) -> None:
     """Bit for bit, also where only the nearest of those that a robot hears are sorted at first."""
     places = np.random.default_rng(n).uniform(0.5, 9.5, size=(n, 2))
     places[: n // 2] *= 0.05  # a crowd, whose far neighbours matter
@@ -314,7 +314,7 @@ def test_reported_positions_without_neighbours_are_rejected() -> None:
         partition(np.ones((2, 2)), SQUARE, reported_positions=np.ones((2, 2)))
 
 
-def test_an_inbox_follows_robots_that_come_and_go() -> None:
+def test_inboxes_can_be_selected_for_another_team() -> None:
     radio, inbox = build_radio(Conditions(delay=0.2), np.full(3, np.inf), DT), Inbox.create_empty(3)
     working = np.ones(3, dtype=bool)
     for step, now in enumerate(walks(3, 6, 2)):

@@ -12,7 +12,7 @@ from robocov.conditions import Conditions, Failure, Join, parse_event
 from robocov.errors import ParameterError
 
 
-def test_without_anything_they_are_ideal() -> None:
+def test_conditions_are_ideal_by_default() -> None:
     assert Conditions().is_ideal
     assert Conditions(seed=4, forget_after=1.0).is_ideal
     for given_ in ({"loss": 0.1}, {"delay": 0.1}, {"message_rate": 2.0}, {"position_noise": 0.1}):
@@ -66,13 +66,13 @@ def test_without_anything_they_are_ideal() -> None:
         ({"seed": -1}, "conditions.seed: expected a whole number from 0, got -1"),
     ],
 )
-def test_what_cannot_be_is_named(given_: dict[str, object], message: str) -> None:
+def test_invalid_conditions_are_rejected(given_: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError, match=message) as caught:
         Conditions(**given_)  # type: ignore[arg-type]
     assert "\n" not in str(caught.value)
 
 
-def test_a_team_must_have_the_robots_and_one_from_the_start() -> None:
+def test_a_team_must_contain_the_robots_of_all_events() -> None:
     Conditions(failures=((3, 1),)).check_team(3)
     with pytest.raises(
         ParameterError, match=r"conditions.failures\[0\]: expected a robot from 1 to 2, got robot 3"
@@ -83,7 +83,7 @@ def test_a_team_must_have_the_robots_and_one_from_the_start() -> None:
     Conditions(joins=((1, 0), (2, 2))).check_team(2)
 
 
-def test_who_works_when() -> None:
+def test_robots_work_from_joining_to_failing() -> None:
     conditions = Conditions(failures=((1, 5.0), (3, 7.0)), joins=((2, 4.0), (3, 6.0)))
     found = conditions.find_working(np.array([0.0, 3.99, 4.0, 5.0, 6.5, 7.0]), 4)
     assert found.astype(int).tolist() == [
@@ -98,7 +98,7 @@ def test_who_works_when() -> None:
     assert conditions.find_present(5.0, 4).tolist() == [True, True, False, True]
 
 
-def test_a_moment_is_the_same_whatever_steps_lead_there() -> None:
+def test_rounding_of_time_does_not_shift_events_by_a_step() -> None:
     """Sums of steps miss a time by rounding; that must not shift a failure by a step."""
     conditions = Conditions(failures=((1, 0.8),))
     steps = np.add.accumulate(np.full(8, 0.1))
@@ -134,7 +134,7 @@ times = st.floats(0, 1e5, allow_nan=False)
     st.dictionaries(st.integers(10, 19), st.tuples(times, st.one_of(st.none(), st.tuples(times, times)))),
     st.integers(0, 2**62),
 )
-def test_json_keeps_all_of_it(
+def test_conditions_are_unchanged_by_json(
     loss: float,
     rate: float | None,
     fails: dict[int, float],
@@ -151,7 +151,7 @@ def test_json_keeps_all_of_it(
     assert Conditions.from_dict(json.loads(json.dumps(conditions.to_dict(), allow_nan=False))) == conditions
 
 
-def test_what_is_not_conditions_is_refused() -> None:
+def test_unreadable_conditions_are_rejected() -> None:
     with pytest.raises(ParameterError, match="conditions: cannot be read"):
         Conditions.from_dict({"loss": 0.5})
     broken = Conditions().to_dict() | {"failures": [{"robot": 1}]}
@@ -159,7 +159,7 @@ def test_what_is_not_conditions_is_refused() -> None:
         Conditions.from_dict(broken)
 
 
-def test_failures_and_joins_can_be_typed() -> None:
+def test_events_are_parsed_from_text() -> None:
     assert parse_event(Failure, "3@20") == (3, 20.0)
     assert parse_event(Join, "5@30") == (5, 30.0, None)
     assert parse_event(Join, "5@1.5:2.5,-1") == (5, 1.5, (2.5, -1.0))
@@ -172,7 +172,7 @@ def test_failures_and_joins_can_be_typed() -> None:
 
 
 @given(st.text("0123456789@:,.-+e x", max_size=12))
-def test_any_text_is_a_join_or_one_clear_line(text: str) -> None:
+def test_any_text_is_a_join_or_gives_a_message_of_one_line(text: str) -> None:
     try:
         join = parse_event(Join, text)
     except ParameterError as error:
@@ -181,7 +181,7 @@ def test_any_text_is_a_join_or_one_clear_line(text: str) -> None:
         assert parse_event(Join, text) == join
 
 
-def test_a_repr_says_what_differs() -> None:
+def test_reprs_contain_what_differs_from_the_defaults() -> None:
     assert repr(Conditions(loss=0.2)) == "Conditions(loss=0.2)"
     assert eval(repr(Conditions(loss=0.2, failures=((1, 2),)))) == Conditions(loss=0.2, failures=((1, 2),))
 

@@ -53,13 +53,13 @@ def bits(one: Simulation, steps: int) -> list[bytes]:
     return found
 
 
-def test_ideal_conditions_are_no_conditions() -> None:
+def test_ideal_conditions_equal_no_conditions() -> None:
     assert bits(simulation(Conditions(seed=3)), 30) == bits(simulation(None), 30)
     assert simulation(Conditions(seed=3)).conditions is None
 
 
 @pytest.mark.parametrize("reach", [np.inf, 4.0])
-def test_messages_that_all_arrive_at_once_are_as_good_as_none(reach: float) -> None:
+def test_perfect_messages_equal_ideal_communication(reach: float) -> None:
     """Bit for bit where everybody is in range; who comes out of range is remembered for a step."""
     plain = simulation(None, reach).run(2.0)
     told = simulation(Conditions(message_rate=20.0, forget_after=0.05), reach).run(2.0)
@@ -70,7 +70,7 @@ def test_messages_that_all_arrive_at_once_are_as_good_as_none(reach: float) -> N
 
 @settings(max_examples=8)
 @given(st.integers(0, 40), st.integers(0, 2**40))
-def test_a_copy_goes_on_identically(steps: int, seed: int) -> None:
+def test_copies_continue_identically(steps: int, seed: int) -> None:
     one = simulation(Conditions(**{**BAD.__dict__, "seed": seed}))
     for _ in range(steps):
         one.step()
@@ -80,7 +80,7 @@ def test_a_copy_goes_on_identically(steps: int, seed: int) -> None:
     assert bits(twin, 15) == expected
 
 
-def test_rewinding_gives_the_same_again() -> None:
+def test_a_simulation_rebuilt_at_an_earlier_state_repeats_the_run() -> None:
     """As the window does it: a simulation made anew at an earlier state, with memory and messages of then."""
     one = simulation(BAD)
     for _ in range(17):
@@ -93,7 +93,7 @@ def test_rewinding_gives_the_same_again() -> None:
     assert bits(again, 12) == expected
 
 
-def test_looking_twice_is_looking_once() -> None:
+def test_observing_twice_gives_the_same_observations() -> None:
     one = simulation(BAD)
     for _ in range(6):
         first, second = one.observe(), one.observe()
@@ -104,14 +104,14 @@ def test_looking_twice_is_looking_once() -> None:
         one.step()
 
 
-def test_the_seed_of_the_conditions_is_all_their_chance() -> None:
+def test_the_seed_determines_all_random_effects() -> None:
     one, same = simulation(BAD).run(1.0), simulation(BAD).run(1.0)
     other = simulation(Conditions(**{**BAD.__dict__, "seed": 12})).run(1.0)
     assert one.positions.tobytes() == same.positions.tobytes()
     assert one.positions.tobytes() != other.positions.tobytes()
 
 
-def test_a_distance_is_never_measured_as_none_and_always_towards_the_point() -> None:
+def test_noisy_distances_are_positive_and_keep_their_direction() -> None:
     ideal, noisy = simulation(None).observe(), simulation(Conditions(sensing_noise=50.0)).observe()
     true, found = (each.obstacle_points - STARTS for each in (ideal, noisy))
     lengths = np.hypot(*found.T)
@@ -119,13 +119,13 @@ def test_a_distance_is_never_measured_as_none_and_always_towards_the_point() -> 
     np.testing.assert_allclose(found / lengths[:, None], true / np.hypot(*true.T)[:, None], atol=1e-9)
 
 
-def test_who_is_heard_is_said_by_where_robots_are_not_by_where_they_think_they_are() -> None:
+def test_true_positions_decide_which_robots_are_in_range() -> None:
     lost = simulation(Conditions(position_noise=100.0), reach=2.5).observe()
     ideal = simulation(None, reach=2.5).observe()
     assert lost.neighbours.list_pairs()[0].tolist() == ideal.neighbours.list_pairs()[0].tolist() != []
 
 
-def test_streams_are_independent() -> None:
+def test_kinds_of_noise_are_independent() -> None:
     """That messages are lost does not change what a sensor measures at the first step."""
     where, what = (simulation(Conditions(**{name: 0.1}, seed=2)).observe() for name in NOISE)
     away = np.hypot(*(what.obstacle_points - STARTS).T)
@@ -138,7 +138,7 @@ def test_streams_are_independent() -> None:
     assert one.obstacle_points.tobytes() == other.obstacle_points.tobytes()
 
 
-def test_noise_is_as_large_as_it_says() -> None:
+def test_noise_has_the_given_standard_deviation() -> None:
     one = simulation(Conditions(position_noise=0.2, sensing_noise=0.05, seed=1))
     errors, ranges = [], []
     still = np.zeros_like(STARTS)
@@ -157,7 +157,7 @@ def test_noise_is_as_large_as_it_says() -> None:
     assert abs(off.std() / 0.05 - 1.0) < 5 / np.sqrt(2 * off.size)
 
 
-def test_a_sensed_point_keeps_its_bearing_and_goes_along_with_the_belief() -> None:
+def test_sensed_points_are_relative_to_the_believed_position() -> None:
     one = simulation(Conditions(position_noise=0.3, sensing_noise=0.5, seed=4))
     seen, true = one.observe(), one.sensor.find_nearest_points(one.positions, one.team.sensing_range)
     felt, there = seen.obstacle_points - seen.positions, true - one.positions
@@ -166,7 +166,7 @@ def test_a_sensed_point_keeps_its_bearing_and_goes_along_with_the_belief() -> No
     assert (np.hypot(*felt.T) >= MIN_MEASURED_DISTANCE_M - 1e-12).all()
 
 
-def test_scans_are_noisy_where_they_meet_something() -> None:
+def test_scans_are_noisy_where_they_hit_an_obstacle() -> None:
     team = Team.homogeneous(len(STARTS), sensing_range=2.5)
     plain, noisy = (
         Simulation(HALL, TangentBug(), STARTS, team, 0.05, conditions=each).observe().scans
@@ -182,7 +182,7 @@ def test_scans_are_noisy_where_they_meet_something() -> None:
     assert abs(off.std() / 0.04 - 1.0) < 5 / np.sqrt(2 * len(off))
 
 
-def test_the_record_holds_the_truth() -> None:
+def test_records_contain_true_positions() -> None:
     one = simulation(Conditions(position_noise=0.5, seed=4))
     record = one.run(0.5)
     assert (np.abs(np.diff(record.positions, axis=0)) < 0.06).all()  # 1 m/s, and no jumps
@@ -192,7 +192,7 @@ def test_the_record_holds_the_truth() -> None:
     assert not np.array_equal(one.observe_and_decide().seen.positions, one.positions)
 
 
-def test_what_is_told_is_what_is_believed() -> None:
+def test_robots_report_the_positions_that_they_believe() -> None:
     one = simulation(Conditions(position_noise=0.3, seed=9))
     seen = one.observe()
     assert seen.reported_positions is not None
@@ -201,7 +201,7 @@ def test_what_is_told_is_what_is_believed() -> None:
     assert not seen.report_ages.any()
 
 
-def test_delay_is_age() -> None:
+def test_reports_are_as_old_as_the_latency() -> None:
     one = simulation(Conditions(delay=0.2))
     for step in range(12):
         seen = one.observe()
@@ -213,7 +213,7 @@ def test_delay_is_age() -> None:
         one.step()
 
 
-def test_who_fails_is_forgotten_after_a_while_where_messages_are_not_ideal() -> None:
+def test_failed_robots_are_forgotten_after_a_while_without_messages() -> None:
     one = simulation(Conditions(message_rate=20.0, forget_after=0.5, failures=((2, 0.3),)))
     heard = []
     for _ in range(24):
@@ -229,7 +229,7 @@ def test_who_fails_is_forgotten_after_a_while_where_messages_are_not_ideal() -> 
     assert ideal_heard == [True] * 6 + [False] * 4
 
 
-def test_who_does_not_work_wants_nothing() -> None:
+def test_idle_robots_have_neither_forces_nor_goals() -> None:
     decision = Decision(np.ones((3, 2)), np.ones((3, 2)), {"attraction": np.ones((3, 2))})
     found = ignore_idle_robots(decision, np.array([True, False, True]))
     assert found.goals is not None
@@ -239,7 +239,7 @@ def test_who_does_not_work_wants_nothing() -> None:
     assert ignore_idle_robots(decision, np.ones(3, dtype=bool)) is decision
 
 
-def test_a_change_in_the_window_keeps_the_messages() -> None:
+def test_changes_keep_messages_unless_the_conditions_change() -> None:
     one = simulation(BAD)
     for _ in range(8):
         one.step()

@@ -16,7 +16,7 @@ from robocov.conditions.random_streams import RandomStream, compute_philox
         ("243f6a88 85a308d3 13198a2e 03707344", "a4093822 299f31d0", "d16cfe09 94fdcceb 5001e420 24126ea1"),
     ],
 )
-def test_philox_gives_the_known_answers(counter: str, key: str, answer: str) -> None:
+def test_philox_agrees_with_the_reference_implementation(counter: str, key: str, answer: str) -> None:
     """The known-answer vectors that come with Random123, the reference implementation."""
     words = np.array([int(word, 16) for word in counter.split()], dtype=np.uint64)
     first, second = (int(word, 16) for word in key.split())
@@ -24,7 +24,7 @@ def test_philox_gives_the_known_answers(counter: str, key: str, answer: str) -> 
 
 
 @given(st.integers(0, 2**63), st.integers(0, 2**40), st.lists(st.integers(0, 2**20), min_size=1, max_size=9))
-def test_a_number_depends_on_what_it_is_for_alone(seed: int, step: int, who: list[int]) -> None:
+def test_each_number_depends_on_its_robot_and_step_alone(seed: int, step: int, who: list[int]) -> None:
     draws, rows = RandomStream(seed, 1), np.array(who)
     together = draws.draw_uniform(step, rows, 5)
     assert ((together > 0.0) & (together < 1.0)).all()

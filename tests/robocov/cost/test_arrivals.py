@@ -20,7 +20,7 @@ def somewhere(n: int, rng: np.random.Generator) -> np.ndarray:
 
 @settings(max_examples=25)
 @given(seeds, st.integers(1, 7), st.sampled_from([(1.0, 0.4), (1.0,), (0.3, 0.5, 0.9, 1.1)]))
-def test_times_are_the_least_over_all_robots_of_way_over_speed(seed: int, n: int, speeds: tuple) -> None:
+def test_times_are_the_minimum_of_path_length_over_speed(seed: int, n: int, speeds: tuple) -> None:
     """The ways come from the point-to-point search here, which shares no code with the sites' one."""
     rng = np.random.default_rng(seed)
     robots, speed = somewhere(n, rng), rng.choice(speeds, n)
@@ -71,7 +71,7 @@ def test_of_robots_that_arrive_together_the_fastest_owns_the_site() -> None:
     assert result.times[16 * 32 + 12] == 0.5
 
 
-def test_a_fast_robot_takes_over_what_is_nearer_to_a_slow_one() -> None:
+def test_a_fast_robot_owns_sites_that_are_nearer_to_a_slow_one() -> None:
     robots = np.array([[0.4, 0.5], [0.6, 0.5]])
     result = ROOM(robots, speeds=np.array([0.1, 1.0]))
     assert (result.owner == 0).mean() < 0.05
@@ -98,6 +98,6 @@ def test_rooms_without_a_robot_are_uncovered_whatever_the_speed() -> None:
         (["fast", 1.0], "a number for each of 2 robots"),
     ],
 )
-def test_what_are_no_speeds_is_told(speeds: list, message: str) -> None:
+def test_invalid_speeds_are_rejected(speeds: list, message: str) -> None:
     with pytest.raises(InputError, match=message):
         ROOM([[0.2, 0.5], [0.3, 0.5]], speeds=speeds)

@@ -24,7 +24,7 @@ seeds = st.integers(0, 2**32)
 
 @settings(max_examples=120)
 @given(kinds, st.integers(1, 40), seeds, st.integers(1, 24), st.integers(1, 60))
-def test_distances_and_owners(kind, count, seed, lattice, robots):
+def test_distances_and_owners_agree_with_distances_from_point_to_point(kind, count, seed, lattice, robots):
     environment = drawn_map(kind, count, seed)
     assume(environment is not None)
     try:
@@ -43,7 +43,7 @@ def test_distances_and_owners(kind, count, seed, lattice, robots):
     st.sampled_from([1e-2, 0.37, 50.0, 1e3]),
     st.sampled_from([0.0, 1e3, -4e5]),
 )
-def test_maps_of_any_size_and_place(kind, count, seed, scale, shift):
+def test_distances_are_exact_for_maps_of_any_size_and_position(kind, count, seed, scale, shift):
     environment = drawn_map(kind, count, seed, scale, (shift, -2.0 * shift))
     assume(environment is not None and environment.free_area > 0.0)
     robots = drawn_places(environment, 12, seed)
@@ -80,7 +80,7 @@ def _well(environment, point):
 
 @settings(max_examples=40)
 @given(kinds, st.integers(1, 30), seeds)
-def test_more_robots_are_never_farther_and_more_obstacles_never_nearer(kind, count, seed):
+def test_robots_never_lengthen_distances_and_obstacles_never_shorten_them(kind, count, seed):
     environment = drawn_map(kind, count, seed)
     assume(environment is not None)
     robots = drawn_places(environment, 9, seed)
@@ -98,7 +98,7 @@ def test_more_robots_are_never_farther_and_more_obstacles_never_nearer(kind, cou
 
 @settings(max_examples=25)
 @given(kinds, st.integers(1, 30), seeds)
-def test_the_order_of_calls_and_of_robots_changes_no_bit(kind, count, seed):
+def test_results_do_not_depend_on_the_order_of_calls_and_robots(kind, count, seed):
     environment = drawn_map(kind, count, seed)
     assume(environment is not None)
     robots, others = drawn_places(environment, 14, seed), drawn_places(environment, 5, seed + 1)
@@ -147,7 +147,7 @@ def test_the_gradient_is_the_slope_of_the_value(kind, count, seed):
 
 
 @pytest.mark.parametrize("name", list_bundled_maps())
-def test_every_bundled_map(name):
+def test_bundled_maps_agree_with_distances_from_point_to_point(name):
     environment = load_map(name)
     robots = environment.start("uniform").sample(30, seed=1)
     assert compared(environment, 32, robots) < 1e-12
@@ -196,7 +196,7 @@ print(len(cost.corners), int(most) / 1e6)
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is measured otherwise")
-def test_a_large_map_takes_less_than_a_gigabyte():
+def test_a_large_map_takes_less_than_half_a_gigabyte():
     folder = str(Path(__file__).parents[1])
     done = subprocess.run(
         [sys.executable, "-c", LARGE.format(folder=folder)], capture_output=True, text=True, check=True
@@ -207,7 +207,7 @@ def test_a_large_map_takes_less_than_a_gigabyte():
 
 
 @pytest.mark.parametrize("name", ["museum", "city", "hospital", "warehouse", "office"])
-def test_a_clump_sees_beyond_the_walls_that_it_looks_at_first(name):
+def test_crowded_robots_see_corners_beyond_the_reach_of_their_sites(name):
     """Those in its midst are nearest to few sites, and yet to corners far away that others do not see."""
     environment = load_map(name)
     many = environment.start("uniform").sample(60, seed=3)

@@ -45,14 +45,14 @@ def test_tiles_are_squares_of_cells(side):
         assert (boxes[:, :2] <= places).all() and (places <= boxes[:, 2:]).all()
 
 
-def test_a_lattice_without_a_free_cell_is_refused():
+def test_a_lattice_without_a_free_cell_is_rejected():
     with pytest.raises(
         ParameterError, match="lattice: expected at least one site in the free space, got none with 1 cells"
     ):
         lattice(1, CircleObstacle((4.0, 3.0), 0.5))
 
 
-def test_a_picture_of_the_whole_lattice():
+def test_values_of_sites_are_arranged_as_an_image_of_the_lattice():
     cost = CoverageCost(lattice(4, CircleObstacle((4.5, 1.5), 0.4))[0], 4)
     picture = cost.to_grid(cost([[2.5, 1.5]]).owner)
     assert picture.tolist() == [[0, 0, -1, 0], [0] * 4, [0] * 4, [-1] * 4]

@@ -35,7 +35,7 @@ crowd = st.tuples(st.floats(0, 1e-9), st.floats(0, 1e-9)).map(lambda place: np.a
 
 @settings(max_examples=250)
 @given(st.integers(1, 33), st.lists(st.one_of(coarse, fine, crowd), min_size=1, max_size=30))
-def test_each_site_is_given_to_the_first_of_the_nearest_robots(side, places):
+def test_the_first_of_the_nearest_robots_owns_a_site(side, places):
     checked_owners(side, places)
 
 
@@ -44,14 +44,14 @@ def test_each_site_is_given_to_the_first_of_the_nearest_robots(side, places):
     st.integers(2, 24), st.lists(st.tuples(st.integers(0, 23), st.integers(0, 23)), min_size=1, max_size=20)
 )
 @example(15, [(1, 3), (4, 7), (9, 2), (4, 8), (1, 14)])
-def test_robots_on_sites_in_rows_and_columns(side, cells):
+def test_owners_are_exact_for_robots_at_sites(side, cells):
     places = (np.array(cells) % side + 0.5) / side
     checked_owners(side, places)
 
 
 @pytest.mark.parametrize("count", [2, 8, 9, 30])
 @pytest.mark.parametrize("shape", ["row", "column", "slant", "circle", "one place", "two places"])
-def test_degenerate_teams(count, shape):
+def test_owners_are_exact_for_degenerate_teams(count, shape):
     turn = 2.0 * np.pi * np.arange(count) / count
     step = np.arange(count) / count
     places = {
@@ -66,7 +66,7 @@ def test_degenerate_teams(count, shape):
 
 
 @pytest.mark.parametrize("count", [1, 4, 12])
-def test_coinciding_robots_share_as_the_first_of_them(count):
+def test_the_first_of_coincident_robots_owns_their_sites(count):
     places = np.random.default_rng(3).random((count, 2))
     alone = checked_owners(16, places)
     doubled = checked_owners(16, np.concatenate([places, places]))
@@ -74,12 +74,12 @@ def test_coinciding_robots_share_as_the_first_of_them(count):
 
 
 @pytest.mark.parametrize("count", [50, 1000])
-def test_many_robots(count):
+def test_owners_are_exact_for_many_robots(count):
     rng = np.random.default_rng(count)
     checked_owners(60, rng.random((count, 2)))
 
 
-def test_round_corners_too_the_first_of_equal_robots_counts():
+def test_the_first_of_coincident_robots_owns_sites_around_corners():
     cost = CoverageCost(OFFICE, 24)
     places = cost.points[np.random.default_rng(3).choice(len(cost.points), 5)]
     alone, doubled = cost(places), cost(np.concatenate([places, places]))
@@ -107,7 +107,7 @@ for speeds in (None, np.array([0.3, 0.7, 0.3])):
 
 
 @pytest.mark.slow
-def test_as_python_and_on_any_processor_the_bits_are_the_same():
+def test_bits_are_the_same_without_the_compiler_and_on_any_processor():
     script = SAME_BITS.format(folder=str(Path(__file__).parents[1]))
     settings = (
         {},

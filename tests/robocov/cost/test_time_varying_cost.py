@@ -16,7 +16,7 @@ CROSSED = Environment(
 ROBOTS = np.array([[1.0, 1.0], [5.0, 3.0], [3.0, 1.0]])
 
 
-def test_where_nothing_moves_it_is_the_given_cost() -> None:
+def test_without_moving_obstacles_the_given_cost_is_used() -> None:
     cost = CoverageCost(STANDING, 24)
     momentary = TimeVaryingCost(cost)
     assert momentary.get_cost(7.0) is cost
@@ -26,7 +26,7 @@ def test_where_nothing_moves_it_is_the_given_cost() -> None:
     assert momentary.evaluate_all_robots(0.0, ROBOTS[:0]) is None
 
 
-def test_every_robot_has_a_row_whether_it_counts_or_not() -> None:
+def test_results_have_a_row_for_each_robot_whether_it_counts_or_not() -> None:
     cost = CoverageCost(CROSSED, 24)
     momentary = TimeVaryingCost(cost)
     working = np.array([True, True, False])
@@ -46,7 +46,7 @@ def test_every_robot_has_a_row_whether_it_counts_or_not() -> None:
     assert momentary.evaluate_all_robots(0.0, ROBOTS[:1]) is None
 
 
-def test_a_map_of_a_moment_can_be_given_up() -> None:
+def test_building_the_cost_of_another_time_can_be_cancelled() -> None:
     def stop(done: float) -> None:
         raise InterruptedError
 

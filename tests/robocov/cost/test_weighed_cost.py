@@ -24,7 +24,7 @@ HALVES = Environment("halves", RING, (WallObstacle(((4.0, -1.0), (4.0, 9.0)), 0.
 
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
-def test_it_is_the_mean_with_the_weights_of_the_sites(density):
+def test_the_mean_distance_is_weighted_by_the_density(density):
     cost = CoverageCost(ROOMS.with_density(density), 40)
     result = cost(ROBOTS)
     weights = compute_square_means(density, cost.points, cost.spacing)
@@ -37,7 +37,7 @@ def test_it_is_the_mean_with_the_weights_of_the_sites(density):
         assert_allclose(result.weights, weights)
 
 
-def test_one_everywhere_changes_nothing_to_the_last_bit():
+def test_a_density_of_one_changes_nothing_to_the_last_bit():
     plain, one = CoverageCost(ROOMS, 32)(ROBOTS), CoverageCost(ROOMS.with_density(Uniform()), 32)(ROBOTS)
     assert (plain.mean_distance, plain.value) == (one.mean_distance, one.value)
     assert np.array_equal(plain.gradient, one.gradient)
@@ -47,7 +47,7 @@ def test_one_everywhere_changes_nothing_to_the_last_bit():
 
 
 @pytest.mark.parametrize("density", [GAUSSIANS["two"], POLYGONS["rooms"]])
-def test_the_gradient_by_finite_differences(density):
+def test_the_gradient_agrees_with_finite_differences(density):
     cost, step = CoverageCost(ROOMS.with_density(density), 24), 1e-6
     slope = cost(ROBOTS).gradient
     for i in range(len(ROBOTS)):
@@ -60,7 +60,7 @@ def test_the_gradient_by_finite_differences(density):
             assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(slope[i, axis], rel=1e-4, abs=1e-4)
 
 
-def test_another_density_needs_no_new_tables():
+def test_another_density_shares_the_geodesics():
     cost = CoverageCost(ROOMS, 24)
     other = ROOMS.with_density(GAUSSIANS["two"])
     quick, slow = cost.with_density(other), CoverageCost(other, 24)
@@ -79,14 +79,14 @@ def test_only_covered_components_count():
     assert result.uncovered_area == plain.uncovered_area
 
 
-def test_where_all_that_is_covered_counts_nothing_there_is_no_mean():
+def test_there_is_no_mean_distance_if_the_covered_components_have_no_mass():
     left = WeightedArea(((0.0, 0.0), (4.0, 0.0), (4.0, 8.0), (0.0, 8.0)), 5.0)
     result = CoverageCost(HALVES.with_density(WeightedPolygons((left,), 0.0)), 40)(np.array([[6.0, 4.0]]))
     assert np.isnan(result.mean_distance)
     assert not result.gradient.any()
 
 
-def test_the_optimum_goes_where_it_counts():
+def test_the_optimum_is_where_the_density_is_high():
     spot = (6.2, 2.0)
     heavy = ROOMS.with_density(Gaussians((Gaussian(spot, 50.0, sigma=0.6),), 0.1))
     best = find_optimum(heavy, 1, lattice=32, restarts=4)
@@ -99,7 +99,7 @@ def test_the_optimum_goes_where_it_counts():
 
 
 @pytest.mark.parametrize("controller", [Rapf(), Lloyd()])
-def test_robots_go_where_it_counts(controller):
+def test_robots_move_to_where_the_density_is_high(controller):
     square = Environment("square", RING)
     heavy = square.with_density(Gaussians((Gaussian((6.5, 6.5), 20.0, sigma=0.8),), 0.1))
     starts = np.array([[1.0, 1.0], [1.5, 1.0], [1.0, 1.5], [2.0, 2.0]])
@@ -110,7 +110,7 @@ def test_robots_go_where_it_counts(controller):
     assert np.array_equal(again, ends[0])
 
 
-def test_a_run_by_another_density_from_now_on():
+def test_a_simulation_continues_with_another_density():
     square = Environment("square", RING)
     heavy = square.with_density(GAUSSIANS["two"])
     simulation = Simulation(square, Rapf(), ROBOTS)

@@ -73,7 +73,7 @@ def test_distances_known_in_closed_form(where, source, target, expected):
     assert distances.compute_distances([target], [source])[0, 0] == pytest.approx(expected, abs=1e-12)
 
 
-def test_a_wall_with_a_touching_obstacle_in_line_is_passed():
+def test_paths_pass_collinear_walls_that_touch_in_a_point():
     # the bottoms of both obstacles lie on one line and touch in a point; below it the way is free
     where = environment([(1, 1), (3, 1), (2, 3)], box(3, 1, 6, 4), boundary=((0, 0), (8, 0), (8, 8), (0, 8)))
     assert Geodesics(where).compute_distances([[0.5, 1]], [[7, 1]])[0, 0] == pytest.approx(6.5, abs=1e-12)
@@ -126,7 +126,7 @@ def draw_points(data, where, count):
 
 @settings(max_examples=250, deadline=None)
 @given(maps, st.data())
-def test_distances_agree_with_the_brute_force(where, data):
+def test_distances_agree_with_brute_force(where, data):
     sources, targets = draw_points(data, where, 2), draw_points(data, where, 3)
     expected = brute.distances(where.free, sources, targets)
     np.testing.assert_allclose(
@@ -136,7 +136,7 @@ def test_distances_agree_with_the_brute_force(where, data):
 
 @settings(max_examples=150, deadline=None)
 @given(maps, st.data())
-def test_cost_agrees_with_the_brute_force(where, data):
+def test_the_cost_agrees_with_brute_force(where, data):
     robots = draw_points(data, where, 3)
     cost = CoverageCost(where, lattice=7)
     result = cost(robots)
@@ -148,7 +148,7 @@ def test_cost_agrees_with_the_brute_force(where, data):
 
 @settings(max_examples=60, deadline=None)
 @given(maps, st.data())
-def test_paths_are_as_long_as_the_distance_and_keep_to_free_space(where, data):
+def test_paths_are_as_long_as_the_distance_and_stay_in_the_free_space(where, data):
     source, *others = draw_points(data, where, 4)
     geodesics = Geodesics(where)
     for target in others:
@@ -192,7 +192,7 @@ SLANTED = environment([(0.2, 0.31), (0.7, 0.17), (0.83, 0.59), (0.4, 0.77)])
 
 
 @pytest.mark.parametrize("depth", [-1e-9, -1e-15, 0.0, 1e-15, 1e-9, 1e-6])
-def test_points_a_hair_inside_an_obstacle_are_on_its_wall(depth):
+def test_points_barely_inside_an_obstacle_are_moved_to_its_wall(depth):
     geodesics = Geodesics(SLANTED)
     a, b = np.array([0.2, 0.31]), np.array([0.7, 0.17])
     inward = np.array([a[1] - b[1], b[0] - a[0]]) / np.hypot(*(b - a))
@@ -206,7 +206,7 @@ def test_points_a_hair_inside_an_obstacle_are_on_its_wall(depth):
 
 
 @pytest.mark.parametrize("point", [(0.5, 0.4), (1.1, 0.5), (-1e-3, 0.2), (1e9, 0.0)])
-def test_points_outside_the_free_space_are_named(point):
+def test_errors_name_points_outside_the_free_space(point):
     with pytest.raises(
         InputError,
         match=r"positions\[1\]: expected a point .* of map 'test', got \[.*\], .* m outside the free space",
@@ -214,7 +214,7 @@ def test_points_outside_the_free_space_are_named(point):
         Geodesics(SLANTED).snap_to_free_space([[0.1, 0.1], point])
 
 
-def test_points_that_are_no_numbers_are_named():
+def test_errors_name_points_that_are_not_finite():
     with pytest.raises(InputError, match=r"positions\[0\]: expected finite numbers, got \[nan, 1\]"):
         Geodesics(SLANTED).snap_to_free_space([[np.nan, 1.0]])
     with pytest.raises(
@@ -224,7 +224,7 @@ def test_points_that_are_no_numbers_are_named():
 
 
 @pytest.mark.slow
-def test_a_large_map_agrees_with_the_brute_force():
+def test_a_large_map_agrees_with_brute_force():
     rng = np.random.default_rng(11)
     turn = np.array([[1, 0.2], [-0.3, 1], [-1, -0.4], [0.1, -0.9]])
     rings = [rng.uniform(0.05, 0.95, 2) + rng.uniform(0.02, 0.07) * turn for _ in range(24)]

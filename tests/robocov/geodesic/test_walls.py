@@ -33,13 +33,13 @@ def hiding(walls):
     return int(walls.hides.sum())
 
 
-def test_an_empty_square_has_neither_corners_nor_walls_that_hide():
+def test_an_empty_square_has_neither_corners_nor_hiding_walls():
     empty = walls()
     assert len(empty.corners) == hiding(empty) == 0
     assert len(empty.sector_walls) == len(empty.ends) == 4
 
 
-def test_corners_are_where_free_space_turns_round_an_obstacle():
+def test_corners_are_where_the_free_space_is_not_convex():
     pillar = walls(box(3, 3, 5, 5))
     assert corners(pillar) == [(3, 3), (3, 5), (5, 3), (5, 5)]
     assert hiding(pillar) == 4
@@ -48,7 +48,7 @@ def test_corners_are_where_free_space_turns_round_an_obstacle():
     assert hiding(room) == 2
 
 
-def test_vertices_in_line_are_no_corners():
+def test_collinear_vertices_are_no_corners():
     pillar = walls(((3, 3), (4, 3), (5, 3), (5, 5), (3, 5)))
     assert corners(pillar) == [(3, 3), (3, 5), (5, 3), (5, 5)]
 
@@ -68,7 +68,7 @@ def test_a_straight_wall_past_a_pinch_is_a_corner():
     assert (3.0, 1.0) in corners(line)
 
 
-def test_useful_points_of_a_corner_are_those_beside_its_walls():
+def test_paths_bend_at_a_corner_only_from_points_next_to_its_walls():
     room = walls(boundary=((0, 0), (8, 0), (8, 4), (4, 4), (4, 8), (0, 8)))
     points = {
         (6, 2): True,
@@ -90,7 +90,7 @@ def test_useful_points_of_a_corner_are_those_beside_its_walls():
     assert found == list(points.values())
 
 
-def test_vertices_are_found_by_their_place():
+def test_vertices_are_found_by_their_position():
     pillar = walls(box(3, 3, 5, 5))
     for number, (x, y) in enumerate(pillar.vertices):
         assert find_vertex(pillar.vertices, x, y) == number

@@ -39,14 +39,14 @@ def notes_on(record: Record) -> list[str]:
     return advise(record, compute_clearances(record))
 
 
-def test_a_control_period_that_is_too_long_is_told() -> None:
+def test_too_long_control_periods_are_reported() -> None:
     (note,) = notes_on(rooms_at(0.25))
     assert "The team trembles: " in note and "cm a step" in note
     assert "the control period of 0.25 s is too long" in note and "--dt" in note
     assert notes_on(rooms_at(0.05)) == []
 
 
-def test_zigzag_in_a_corridor_is_told_and_ends_with_more_acceleration() -> None:
+def test_zigzag_in_a_corridor_is_reported_and_ends_with_more_acceleration() -> None:
     record = run_in(CORRIDORS, Rapf(), 1 / 60, 20.0)
     (note,) = notes_on(record)
     assert note.startswith("Zigzag in a narrow passage: ") and "than 2 m/s²" in note

@@ -49,20 +49,20 @@ def test_a_robot_that_stops_settles_when_it_stops() -> None:
     assert find_settling_time(time, moving) == pytest.approx(5.9, abs=0.11)
 
 
-def test_a_robot_that_trembles_has_settled_and_one_that_creeps_has_not() -> None:
+def test_trembling_robots_have_settled_and_creeping_ones_have_not() -> None:
     time = times(30)
     assert find_settling_time(time, track(0.01 * np.sin(40 * time))) == 0.0
     assert find_settling_time(time, track(0.02 * time)) is None
 
 
-def test_a_late_move_counts() -> None:
+def test_robots_that_move_late_settle_late() -> None:
     time = times(30)
     late = track(np.where(time > 15, np.minimum(time - 15, 1.0), 0.0))
     assert find_settling_time(time, late) == pytest.approx(16.0, abs=0.11)
     assert find_settling_time(time, track(np.where(time > 29, 1.0, 0.0))) is None
 
 
-def test_who_gets_as_far_as_the_limit_has_not_settled_and_one_of_the_team_is_enough() -> None:
+def test_one_robot_that_moves_by_the_limit_keeps_the_team_from_settling() -> None:
     time = np.arange(9) * 0.25
     jump = track(np.where(time >= 1.0, 0.5, 0.0))
     assert find_settling_time(time, jump, window=1.0, distance=0.5) == 1.0
@@ -75,7 +75,7 @@ def test_a_run_shorter_than_the_window_cannot_settle() -> None:
     assert find_settling_time(np.array([0.0]), np.zeros((1, 1, 2))) is None
 
 
-def test_path_length_of_a_known_path() -> None:
+def test_path_length_of_a_circle() -> None:
     angle = np.linspace(0, 2 * np.pi, 2001)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[:, None, :]
     np.testing.assert_allclose(compute_path_lengths(circle), [2 * np.pi], rtol=1e-5)
@@ -102,7 +102,7 @@ def test_contacts_are_counted_when_they_begin(record: Record) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robots", [1, 2, 7, 130])
-def test_meetings_are_those_that_are_seen_pair_by_pair(record: Record, robots: int) -> None:
+def test_contacts_of_robots_agree_with_a_check_of_all_pairs(record: Record, robots: int) -> None:
     """Of few robots all pairs are looked at at once, of many only the close ones."""
     rng = np.random.default_rng(robots)
     steps, size = 40, 0.2 * (robots - 1) ** 0.5
@@ -141,7 +141,7 @@ def changing(record: Record) -> Record:
     )
 
 
-def test_who_has_failed_is_a_wall_and_who_has_not_joined_is_not_there(changing: Record) -> None:
+def test_failed_robots_are_walls_and_robots_that_have_not_joined_are_absent(changing: Record) -> None:
     gap = compute_clearances(changing)
     assert np.isinf(gap).tolist() == [[False, False, True], [False, True, True], [False, True, False]]
     assert gap[:, 0] == pytest.approx([0.9, 0.8, 0.0], abs=1e-9)
@@ -152,7 +152,7 @@ def test_who_has_failed_is_a_wall_and_who_has_not_joined_is_not_there(changing: 
         assert history.mean_distance[k] == cost(changing.positions[k, rows]).mean_distance
 
 
-def test_only_who_works_counts_for_the_metrics(changing: Record) -> None:
+def test_only_working_robots_count_in_run_metrics(changing: Record) -> None:
     metrics = compute_run_metrics(changing, 1.0)
     assert metrics.work == pytest.approx([0.0, 3.0, 6.0])  # |F v| is 2: of two robots, one, two
     assert metrics.effort == pytest.approx([0.0, 4.0, 6.0])
@@ -160,7 +160,7 @@ def test_only_who_works_counts_for_the_metrics(changing: Record) -> None:
     assert metrics.components.tolist() == [1, 1, 1]
 
 
-def test_where_obstacles_move_each_moment_has_its_own_map() -> None:
+def test_metrics_use_the_map_of_each_moment() -> None:
     path = ObstaclePath(((0.0, 0.0), (4.0, 0.0)), 2.0)
     wall = PolygonObstacle(((3.0, 0.0), (3.5, 0.0), (3.5, 4.0), (3.0, 4.0)), path=path)
     hall = Environment("hall", ((0.0, 0.0), (8.0, 0.0), (8.0, 4.0), (0.0, 4.0)), (wall,))
@@ -169,7 +169,7 @@ def test_where_obstacles_move_each_moment_has_its_own_map() -> None:
     assert compute_run_metrics(some, 10.0).visible_area[[0, -1]] == pytest.approx([12.0, 20.0])
 
 
-def test_the_mean_over_a_run_is_that_over_time() -> None:
+def test_the_mean_over_a_run_is_weighted_by_time() -> None:
     time = np.array([0.0, 1.0, 1.5, 4.0])
     assert compute_mean_over_run(time, 3.0 - 0.5 * time) == pytest.approx(2.0)
     assert compute_mean_over_run(time, np.full(4, 7.25)) == 7.25
@@ -191,7 +191,7 @@ def test_a_robot_at_rest_away_from_its_goal_is_stuck() -> None:
     assert count_stuck_robots(time, trembling, goals(9.0, 201)) == 1, "net displacement counts"
 
 
-def test_the_window_of_a_stuck_robot_begins_with_the_moment_at_its_beginning() -> None:
+def test_the_window_of_a_stuck_robot_contains_its_first_moment() -> None:
     time = np.arange(41) * 0.25
     assert count_stuck_robots(time, track(np.where(time > 5.0, 1.0, 0.0)), goals(9.0, 41)) == 0
     assert count_stuck_robots(time, track(np.where(time >= 5.0, 1.0, 0.0)), goals(9.0, 41)) == 1
@@ -205,7 +205,7 @@ def test_robots_are_counted_and_those_without_goals_are_not_stuck() -> None:
     assert count_stuck_robots(time, positions, np.full_like(positions, np.nan)) is None
 
 
-def test_in_a_run_that_is_shorter_than_the_window_nobody_is_known_to_be_stuck() -> None:
+def test_runs_shorter_than_the_window_have_no_stuck_robots() -> None:
     assert count_stuck_robots(times(4), np.zeros((41, 1, 2)), goals(9.0, 41)) is None
     assert count_stuck_robots(times(5), np.zeros((51, 1, 2)), goals(9.0, 51)) == 1
     assert count_stuck_robots(np.array([0.0]), np.zeros((1, 1, 2)), goals(9.0, 1)) is None
@@ -220,7 +220,7 @@ def test_cost_history_samples_at_the_rate_and_at_the_end(record: Record) -> None
     assert select_sampled_moments(odd, 10.0)[-1] == len(odd) - 1
 
 
-def test_summary_says_what_happened(record: Record) -> None:
+def test_summaries_contain_the_figures_of_a_run(record: Record) -> None:
     history = compute_cost_history(record, CoverageCost(record.environment, lattice=24))
     summary = summarise(record, history)
     assert set(summary) == {
@@ -243,12 +243,12 @@ def test_summary_says_what_happened(record: Record) -> None:
     assert summary["uncovered_area_m2"] == 0.0
 
 
-def test_rapf_keeps_clear(cluttered: Environment) -> None:
+def test_rapf_touches_nothing(cluttered: Environment) -> None:
     quiet = Simulation(cluttered, Rapf(), cluttered.start().sample(6), dt=0.02).run(12.0)
     assert count_contacts(quiet, compute_clearances(quiet)) == 0
 
 
-def test_a_history_is_short_in_words(record: Record) -> None:
+def test_histories_have_a_short_repr(record: Record) -> None:
     history = compute_cost_history(record, CoverageCost(record.environment, 16), 1.0)
     first, last = history.mean_distance[[0, -1]]
     assert repr(history) == f"<CostHistory 13 moments, 12.0 s, mean distance {first:.3f} to {last:.3f} m>"

@@ -73,7 +73,7 @@ def folder(tmp_path: Path, cluttered: rc.Environment) -> Path:
     return tmp_path
 
 
-def test_a_table_is_read(folder: Path) -> None:
+def test_tables_are_read(folder: Path) -> None:
     results = rc.read_results(str(folder))
     assert isinstance(results, rc.Results)
     assert len(results) == 2
@@ -83,7 +83,7 @@ def test_a_table_is_read(folder: Path) -> None:
     assert repr(results) == f"<Results {folder}, 2 runs>"
 
 
-def test_columns_can_be_chosen(folder: Path) -> None:
+def test_columns_can_be_selected(folder: Path) -> None:
     results = read_results(folder)
     assert list(results.rows(["seed", "map"])) == [{"seed": row["seed"], "map": row["map"]} for row in ROWS]
     assert [list(row) for row in results.rows(["seed", "map"])] == [["seed", "map"]] * 2
@@ -128,7 +128,7 @@ def test_runs_are_found_by_name_by_number_and_by_row(folder: Path) -> None:
         ("a-failure", "a-failure: the run failed: no room"),
     ],
 )
-def test_runs_that_are_not_there_are_named(folder: Path, run: Any, message: str) -> None:
+def test_errors_name_missing_runs(folder: Path, run: Any, message: str) -> None:
     results = read_results(folder)
     for read in (results.record, results.history):
         with pytest.raises(InputError) as caught:
@@ -146,19 +146,19 @@ def test_a_table_without_its_study_is_read_by_its_values(folder: Path, study: st
     assert next(read_results(folder).rows())["k_rep"] == "soft"
 
 
-def test_a_number_that_is_none_is_told_with_its_row(folder: Path) -> None:
+def test_errors_name_the_row_of_an_invalid_number(folder: Path) -> None:
     for change in ({"k_rep": "soft"}, {"seed": "1.5"}):
         write_table(folder, [ROWS[0], ROWS[0] | change])
         with pytest.raises(InputError, match=r"results.csv: row 1: cannot be read: "):
             list(read_results(folder).rows())
 
 
-def test_a_gain_that_is_a_word_here_and_a_number_there_is_a_word(folder: Path) -> None:
+def test_a_gain_declared_as_a_string_stays_a_string(folder: Path) -> None:
     (folder / "study.json").write_text('{"columns": [{"name": "k_rep", "kind": "string"}]}')
     assert [row["k_rep"] for row in read_results(folder).rows()] == ["0.30000000000000004", None]
 
 
-def test_rows_come_one_by_one_and_only_when_they_are_wanted(tmp_path: Path) -> None:
+def test_rows_are_read_one_by_one(tmp_path: Path) -> None:
     write_table(tmp_path, ROWS * 10_000)
     tracemalloc.start()
     results = read_results(tmp_path)
@@ -194,20 +194,22 @@ def test_notebooks_show_the_first_rows(folder: Path, tmp_path: Path) -> None:
         ("results.csv", b"\xff\xfe", "results.csv: cannot be read: "),
     ],
 )
-def test_what_is_no_table_is_named(tmp_path: Path, name: str, content: bytes, message: str) -> None:
+def test_errors_name_files_that_are_no_tables(
+    tmp_path: Path, name: str, content: bytes, message: str
+) -> None:
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError) as caught:
         read_results(tmp_path)
     assert str(caught.value).startswith(str(tmp_path)) and message in str(caught.value)
 
 
-def test_a_study_that_cannot_be_read_is_named(folder: Path) -> None:
+def test_errors_name_an_unreadable_study(folder: Path) -> None:
     (folder / "study.json").write_text("{")
     with pytest.raises(InputError, match=r"study.json: cannot be read"):
         _ = read_results(folder).study
 
 
-def test_without_pandas_the_extra_is_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_errors_name_the_extra_that_installs_pandas(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def missing(name: str) -> None:
         raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
@@ -231,7 +233,7 @@ def test_without_pandas_the_extra_is_named(folder: Path, monkeypatch: pytest.Mon
         ),
     ],
 )
-def test_a_file_that_is_no_history_is_named_with_its_line(tmp_path: Path, text: str, message: str) -> None:
+def test_errors_name_the_line_of_an_invalid_history(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "cost.csv"
     path.write_text(text)
     with pytest.raises(InputError) as caught:
@@ -242,7 +244,7 @@ def test_a_file_that_is_no_history_is_named_with_its_line(tmp_path: Path, text: 
 
 
 @pytest.mark.slow
-def test_reading_does_not_load_what_is_not_needed(folder: Path) -> None:
+def test_reading_results_loads_no_heavy_packages(folder: Path) -> None:
     script = (
         "import sys, robocov as rc\n"
         f"results = rc.read_results({str(folder)!r})\n"

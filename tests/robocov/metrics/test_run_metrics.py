@@ -36,7 +36,7 @@ def history(values: list[float]) -> CostHistory:
     return CostHistory(np.arange(len(cost), dtype=float), cost, cost, np.zeros_like(cost))
 
 
-def test_integrals_are_those_of_plain_loops(record: Record) -> None:
+def test_integrals_agree_with_plain_loops(record: Record) -> None:
     work = effort = way = 0.0
     for k in range(len(record) - 1):
         step = record.time[k + 1] - record.time[k]
@@ -53,7 +53,7 @@ def test_integrals_are_those_of_plain_loops(record: Record) -> None:
     assert (np.diff(metrics.work) >= 0).all()
 
 
-def test_the_rate_says_how_often_and_changes_no_figure_of_the_run(record: Record) -> None:
+def test_the_rate_does_not_change_the_final_figures(record: Record) -> None:
     often, rarely = compute_run_metrics(record, 30.0), compute_run_metrics(record, 0.0)
     assert (len(often.time), len(rarely.time)) == (121, 2)
     assert often.final() == pytest.approx(rarely.final())
@@ -61,7 +61,7 @@ def test_the_rate_says_how_often_and_changes_no_figure_of_the_run(record: Record
         assert len(row) == 121, column
 
 
-def test_clearances_are_the_smallest_since_the_moment_before(record: Record) -> None:
+def test_clearances_are_minima_since_the_previous_moment(record: Record) -> None:
     radius = record.team.radius
     gaps = [
         np.hypot(*(record.positions[:, i] - record.positions[:, j]).T) - radius[i] - radius[j]
@@ -76,7 +76,7 @@ def test_clearances_are_the_smallest_since_the_moment_before(record: Record) -> 
     assert metrics.wall_clearance[0] <= walls[0].min() + 1e-6
 
 
-def test_areas_are_parts_of_the_free_area(record: Record) -> None:
+def test_covered_areas_are_parts_of_the_free_area(record: Record) -> None:
     metrics = compute_run_metrics(record)
     assert metrics.free_area == pytest.approx(ROOM.free.area)
     assert (metrics.sensed_area <= metrics.range_area + 1e-9).all()
@@ -84,7 +84,7 @@ def test_areas_are_parts_of_the_free_area(record: Record) -> None:
     assert "of the free area sensed at the end" in repr(metrics)
 
 
-def test_one_robot_has_no_other_to_be_near_to() -> None:
+def test_a_single_robot_has_no_clearance_to_others() -> None:
     alone = compute_run_metrics(Simulation(ROOM, Rapf(), [[1, 1]]).run(0.5))
     assert alone.final()["robot_clearance_m"] is None
     assert alone.components.tolist() == [1, 1]
@@ -93,7 +93,7 @@ def test_one_robot_has_no_other_to_be_near_to() -> None:
 
 @settings(max_examples=40)
 @given(st.integers(2, 9), st.floats(0.2, 4.0), st.integers(0, 2**32 - 1))
-def test_connectivity_is_that_of_the_laplacian_written_down(n: int, reach: float, seed: int) -> None:
+def test_connectivity_agrees_with_the_laplacian(n: int, reach: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     places = rng.uniform(0, 5, (n, 2))
     ranges = reach * rng.choice([1.0, 2.0], n)
@@ -109,7 +109,7 @@ def test_connectivity_is_that_of_the_laplacian_written_down(n: int, reach: float
     assert (connectivity == 0.0) == (parts > 1)
 
 
-def test_a_path_a_ring_and_everybody() -> None:
+def test_connectivity_of_known_graphs() -> None:
     turn = np.arange(6) * np.pi / 3
     ring = np.column_stack([np.cos(turn), np.sin(turn)])
     assert measure_connectivity(ring, np.full(6, 1.01)) == (1, pytest.approx(1.0))  # 2 - 2 cos(2 pi / 6)
@@ -128,17 +128,19 @@ def test_a_path_a_ring_and_everybody() -> None:
         ([3.0], 0.0),
     ],
 )
-def test_the_time_from_which_on_the_cost_is_that_of_the_end(values: list[float], expected: float) -> None:
+def test_the_cost_is_near_its_final_value_after_the_last_deviation(
+    values: list[float], expected: float
+) -> None:
     assert find_time_near_final(history(values)) == expected
 
 
-def test_figures_for_a_table(record: Record) -> None:
+def test_final_metrics_have_a_figure_for_each_column(record: Record) -> None:
     figures = compute_final_metrics(record, history([2.0, 1.0, 1.0]))
     assert figures["near_final_s"] == 1.0
     assert set(figures) == {*COLUMNS.values(), "near_final_s"} - {"time_s"}
 
 
 @pytest.mark.parametrize("rate", [-1.0, float("nan"), float("inf")])
-def test_rates_that_are_none(record: Record, rate: float) -> None:
+def test_invalid_rates_are_rejected(record: Record, rate: float) -> None:
     with pytest.raises(ParameterError, match="rate: "):
         compute_run_metrics(record, rate)

@@ -30,7 +30,7 @@ def seen_one_by_one(free: shapely.Geometry, place: np.ndarray, targets: np.ndarr
 
 @settings(max_examples=20)
 @given(seeds, st.sampled_from(["office", "rooms"]))
-def test_what_is_seen_is_what_segments_reach(seed: int, name: str) -> None:
+def test_visibility_polygons_agree_with_lines_of_sight(seed: int, name: str) -> None:
     rng = np.random.default_rng(seed)
     free = OFFICE.free if name == "office" else ROOMS
     targets = lattice(free)
@@ -44,13 +44,13 @@ def test_what_is_seen_is_what_segments_reach(seed: int, name: str) -> None:
     np.testing.assert_array_equal(inside[clear], seen_one_by_one(free, place, targets)[clear])
 
 
-def test_a_convex_room_is_seen_whole_from_anywhere() -> None:
+def test_all_of_a_convex_room_is_visible_from_anywhere() -> None:
     walls = shapely.box(0, 0, 4, 3)
     for view in compute_visibility_polygons(walls, np.array([[0.1, 0.1], [2.0, 1.5], [3.999, 2.999]])):
         assert view.area == pytest.approx(12.0, rel=1e-12)
 
 
-def test_corners_in_line_with_the_eye() -> None:
+def test_views_along_collinear_corners_are_exact() -> None:
     """From (0.5, 2) the two corners of the wall's head are on one level ray, which grazes it."""
     (view,) = compute_visibility_polygons(ROOMS, np.array([[0.5, 2.0]]))
     assert view.area == pytest.approx(2.9 * 3 + 3.1 * 1, rel=1e-12)
@@ -58,7 +58,7 @@ def test_corners_in_line_with_the_eye() -> None:
 
 @settings(max_examples=6)
 @given(seeds, st.integers(1, 5), st.floats(0.3, 6.0))
-def test_covered_areas_are_those_of_a_fine_lattice_and_of_buffers(seed: int, n: int, reach: float) -> None:
+def test_covered_areas_agree_with_a_fine_lattice(seed: int, n: int, reach: float) -> None:
     rng = np.random.default_rng(seed)
     free = OFFICE.free
     targets = lattice(free, 90)
@@ -74,7 +74,7 @@ def test_covered_areas_are_those_of_a_fine_lattice_and_of_buffers(seed: int, n: 
     assert found.sensed <= min(found.within_range, found.visible) * (1 + 1e-9)
 
 
-def test_a_disc_in_the_open_and_one_behind_a_wall() -> None:
+def test_covered_areas_of_known_discs() -> None:
     walls = shapely.box(0, 0, 10, 10)
     assert compute_covered_areas(walls, np.array([[5.0, 5.0]]), np.array([2.0])).sensed == pytest.approx(
         4 * np.pi, rel=5e-5
@@ -86,7 +86,7 @@ def test_a_disc_in_the_open_and_one_behind_a_wall() -> None:
     assert found.within_range > found.visible == pytest.approx(1.9 * 4)
 
 
-def test_robots_that_are_nowhere_cover_nothing() -> None:
+def test_robots_outside_the_free_space_cover_nothing() -> None:
     walls = ROOMS
     assert compute_covered_areas(walls, np.empty((0, 2)), np.empty(0)) == (0.0, 0.0, 0.0)
     assert compute_covered_areas(walls, np.array([[3.0, 1.0]]), np.array([2.0])) == (0.0, 0.0, 0.0)

@@ -66,7 +66,7 @@ def digests() -> list[str]:
 )
 @pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names of x86 processors")
-def test_another_process_on_any_x86_processor_has_the_same_bits(environment: dict[str, str]) -> None:
+def test_runs_are_the_same_in_another_process_on_any_x86_processor(environment: dict[str, str]) -> None:
     script = "import sys; sys.path.insert(0, sys.argv[1]); import test_simulation as t; print(*t.digests())"
     command = [sys.executable, "-W", "ignore", "-c", script, str(Path(__file__).parent)]
     done = subprocess.run(command, env=os.environ | environment, capture_output=True, text=True, check=True)
@@ -78,7 +78,7 @@ def test_another_process_on_any_x86_processor_has_the_same_bits(environment: dic
 @pytest.mark.parametrize("controller", CONTROLLERS, ids=["rapf", "paper", "rpf", "lloyd"])
 @settings(max_examples=5)
 @given(branch=st.integers(0, 400), seed=st.integers(0, 100))
-def test_a_copy_goes_on_identically(
+def test_copies_continue_identically(
     cluttered: Environment, controller: Controller, branch: int, seed: int
 ) -> None:
     simulation = Simulation(cluttered, controller, cluttered.start().sample(6, seed=seed))
@@ -113,7 +113,7 @@ def transformed(environment: Environment, turn: np.ndarray) -> Environment:
     [np.diag([-1.0, 1.0]), np.array([[0.0, -1.0], [1.0, 0.0]]), np.array([[0.6, -0.8], [0.8, 0.6]])],
     ids=["mirror", "quarter turn", "turn"],
 )
-def test_whole_runs_turn_and_mirror_with_the_world(controller: Controller, turn: np.ndarray) -> None:
+def test_runs_rotate_and_mirror_with_the_map(controller: Controller, turn: np.ndarray) -> None:
     room = Environment(
         "room",
         ((0.0, 0.0), (9.0, 0.0), (10.0, 7.0), (1.0, 8.0)),
@@ -130,7 +130,7 @@ def test_whole_runs_turn_and_mirror_with_the_world(controller: Controller, turn:
     assert np.abs(straight.positions[-1] - starts).max() > 0.5
 
 
-def test_rapf_ends_below_rpf_among_obstacles_and_touches_nothing() -> None:
+def test_rapf_beats_rpf_among_obstacles_without_contacts() -> None:
     """One run of the paper's figures 4 to 7; the study of the paper looks at many."""
     rooms = load_map("rooms")
     cost = CoverageCost(rooms, lattice=32)
@@ -140,7 +140,7 @@ def test_rapf_ends_below_rpf_among_obstacles_and_touches_nothing() -> None:
     assert count_contacts(rapf, compute_clearances(rapf)) == 0
 
 
-def test_two_hundred_robots_on_the_large_map() -> None:
+def test_two_hundred_robots_spread_over_a_large_map() -> None:
     campus = load_map("campus")
     record = Simulation(campus, Rapf(), campus.start().sample(200, seed=0)).run(15.0)
     clearance = compute_clearances(record)
@@ -150,7 +150,7 @@ def test_two_hundred_robots_on_the_large_map() -> None:
     assert np.isfinite(record.positions).all()
 
 
-def test_limits_and_times_of_a_record(cluttered: Environment) -> None:
+def test_records_respect_times_and_limits(cluttered: Environment) -> None:
     record = Simulation(cluttered, Rapf(), cluttered.start().sample(6), dt=0.02).run(5.0)
     assert len(record) == 251
     np.testing.assert_allclose(record.time, np.arange(251) * 0.02)
@@ -188,7 +188,7 @@ class Wild:
         (np.array([[0.0, 0.0], [np.nan, 1.0]]), r"returned the force \[nan, 1.0\] for robot 2 at 0.000 s"),
     ],
 )
-def test_a_controller_that_returns_nonsense_is_told_so(
+def test_invalid_forces_of_a_controller_are_rejected(
     empty: Environment, forces: np.ndarray, message: str
 ) -> None:
     simulation = Simulation(empty, Wild(forces), [[2.0, 2.0], [4.0, 4.0]])
@@ -207,7 +207,7 @@ def test_a_controller_that_returns_nonsense_is_told_so(
         ([1.0, 2.0], r"starts: expected an array of shape \(n, 2\) with n >= 1, got shape \(2,\)"),
     ],
 )
-def test_impossible_starts_are_refused(
+def test_impossible_starts_are_rejected(
     cluttered: Environment, starts: list[list[float]], message: str
 ) -> None:
     with pytest.raises(StartError, match=message):
@@ -215,12 +215,12 @@ def test_impossible_starts_are_refused(
 
 
 @pytest.mark.parametrize("dt", [0.0, -1.0, 2.0, float("nan"), float("inf")])
-def test_impossible_control_periods_are_refused(empty: Environment, dt: float) -> None:
+def test_impossible_control_periods_are_rejected(empty: Environment, dt: float) -> None:
     with pytest.raises(ParameterError, match="dt: "):
         Simulation(empty, Rapf(), [[1.0, 1.0]], dt=dt)
 
 
-def test_a_decision_must_be_one(empty: Environment) -> None:
+def test_invalid_controllers_and_decisions_are_rejected(empty: Environment) -> None:
     class Array(Wild):
         def decide(self, seen: Observations, memory: object) -> Decision:
             return self.forces  # type: ignore[return-value]
@@ -250,7 +250,7 @@ def test_a_decision_must_be_one(empty: Environment) -> None:
             simulation.run(duration)
 
 
-def test_a_copy_has_a_memory_of_its_own(empty: Environment) -> None:
+def test_copies_have_a_memory_of_their_own(empty: Environment) -> None:
     class Counting(Wild):
         def begin(self, region: object, team: object) -> list[int]:  # type: ignore[override]
             return [0]
@@ -283,7 +283,7 @@ class OwnCounter:
         return [0.1 * own.memory[0], 0.0]
 
 
-def test_a_copy_is_independent_of_memory_that_a_controller_for_one_robot_assigns(empty: Environment) -> None:
+def test_copies_are_independent_of_memory_assigned_by_a_controller_for_one_robot(empty: Environment) -> None:
     simulation = Simulation(empty, OwnCounter(), [[2.0, 2.0]])
     simulation.step()
     simulation.observe_and_decide()
@@ -295,7 +295,7 @@ def test_a_copy_is_independent_of_memory_that_a_controller_for_one_robot_assigns
     assert twin.positions.tobytes() == simulation.positions.tobytes()
 
 
-def test_memory_that_a_controller_for_one_robot_assigns_reaches_its_next_step(empty: Environment) -> None:
+def test_memory_assigned_by_a_controller_for_one_robot_reaches_its_next_step(empty: Environment) -> None:
     class Numbering:
         def force(self, own: OwnView) -> list[float]:
             own.memory = (own.memory or 0) + own.number + 1
@@ -354,7 +354,7 @@ def test_team_and_starts_must_agree(empty: Environment) -> None:
         Simulation(empty, Rapf(), [[1.0, 1.0]], Team.homogeneous(3))
 
 
-def test_a_run_follows_the_equations_of_motion() -> None:
+def test_runs_follow_the_equations_of_motion() -> None:
     """(23)-(28) written once more, plainly, and integrated by scipy: a run converges to it with its step."""
     from scipy.integrate import solve_ivp
 
@@ -422,7 +422,7 @@ class TestChanges:
             simulation.step()
         return simulation
 
-    def test_nothing_changed_goes_on_alike(self) -> None:
+    def test_without_changes_a_simulation_continues_identically(self) -> None:
         before = self.moving()
         after, twin = before.with_changes(), before.copy()
         assert after.time == before.time == pytest.approx(1.5)
@@ -435,7 +435,7 @@ class TestChanges:
         # the one that was changed stays where it is
         assert before.time == pytest.approx(1.5)
 
-    def test_another_controller_starts_from_here(self) -> None:
+    def test_another_controller_continues_from_the_same_state(self) -> None:
         before = self.moving()
         after = before.with_changes(controller=Rpf())
         assert after.controller == Rpf()
@@ -443,7 +443,7 @@ class TestChanges:
         np.testing.assert_array_equal(after.velocities, before.velocities)
         assert after.observe_and_decide().seen.time == before.time
 
-    def test_obstacles_and_robots_come_and_go(self) -> None:
+    def test_obstacles_and_robots_can_be_removed(self) -> None:
         before = self.moving()
         emptier = Environment("emptier", self.ROOM.boundary, self.ROOM.obstacles[1:], self.ROOM.starts)
         after = before.with_changes(environment=emptier)
@@ -455,14 +455,14 @@ class TestChanges:
         assert fewer.positions.shape == (4, 2)
 
     @pytest.mark.parametrize("controller", [Lloyd(), Rpf(k_rep=50.0, rho_0=9.0)], ids=["lloyd", "rpf"])
-    def test_robots_that_lean_on_something_are_no_fault(self, controller: Controller) -> None:
+    def test_robots_in_contact_are_accepted(self, controller: Controller) -> None:
         simulation = Simulation(self.ROOM, controller, self.ROOM.start().sample(10, seed=1))
         for k in range(600):
             simulation.step()
             if k % 20 == 0:
                 simulation.with_changes()
 
-    def test_robots_within_a_new_obstacle_are_named(self) -> None:
+    def test_errors_name_robots_inside_a_new_obstacle(self) -> None:
         before = self.moving()
         x, y = before.positions[2].tolist()
         block = PolygonObstacle(
@@ -472,7 +472,7 @@ class TestChanges:
         with pytest.raises(StartError, match=r"starts\[2\] = .* is inside an obstacle"):
             before.with_changes(environment=blocked)
 
-    def test_wrong_sizes_and_numbers_are_named(self) -> None:
+    def test_arrays_of_wrong_size_or_content_are_rejected(self) -> None:
         before = self.moving()
         with pytest.raises(ParameterError, match="team: expected 6 robots, one for each start, got 3"):
             before.with_changes(team=Team.homogeneous(3))
@@ -483,7 +483,7 @@ class TestChanges:
         with pytest.raises(ParameterError, match=r"external_forces: .* finite newtons"):
             before.step(np.full((6, 2), np.inf))
 
-    def test_pushed_robots_move_and_the_others_do_not_notice_by_force(self) -> None:
+    def test_external_forces_move_only_their_robot(self) -> None:
         before = self.moving()
         pushed, alone = before.copy(), before.copy()
         pushes = np.zeros((6, 2))
@@ -493,7 +493,7 @@ class TestChanges:
         np.testing.assert_array_equal(pushed.positions[1:], alone.positions[1:])
         assert pushed.velocities[0, 1] > alone.velocities[0, 1] + 0.05
 
-    def test_forces_from_outside_stand_in_for_the_controllers(self) -> None:
+    def test_given_forces_replace_those_of_the_controller(self) -> None:
         before = self.moving()
         driven, alone = before.copy(), before.copy()
         for _ in range(5):
@@ -509,7 +509,7 @@ class TestChanges:
             driven.step(forces=np.full((6, 2), np.inf))
 
 
-def test_it_is_short_in_words(empty: Environment) -> None:
+def test_simulations_have_a_short_repr(empty: Environment) -> None:
     simulation = Simulation(empty, Rapf(), empty.start().sample(3), dt=0.05)
     simulation.step()
     assert repr(simulation) == "<Simulation rapf on empty, 3 robots, at 0.05 s>"
@@ -524,7 +524,7 @@ def busy() -> Simulation:
     return Simulation(BUSY, Rapf(), [[4.0, 2.0], [4.0, 3.0], [6.0, 3.0]], conditions=TROUBLE)
 
 
-def test_asking_changes_nothing() -> None:
+def test_observing_changes_nothing() -> None:
     asked, left = busy(), busy()
     for _ in range(40):
         assert asked.observe_and_decide() is asked.observe_and_decide()
@@ -539,7 +539,7 @@ def test_asking_changes_nothing() -> None:
 
 
 @pytest.mark.parametrize("made", [busy, TestChanges().moving], ids=["everything changes", "rooms"])
-def test_a_copy_shares_nothing_that_is_changed(made: Callable[[], Simulation]) -> None:
+def test_copies_share_nothing_that_changes(made: Callable[[], Simulation]) -> None:
     simulation = made()
     simulation.step()
     twin, places, ranges = simulation.copy(), simulation.positions, simulation.team.sensing_range
