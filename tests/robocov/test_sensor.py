@@ -1,3 +1,5 @@
+"""The range sensor: nearest obstacle points and ray scans."""
+
 from __future__ import annotations
 
 import platform
@@ -6,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from robocov.compiled import IS_COMPILER_ENABLED
@@ -20,14 +22,14 @@ def sensor(cluttered: Environment) -> RangeSensor:
     return RangeSensor(build_solid_pieces(cluttered))
 
 
-def free_points(environment: Environment, n: int, seed: int) -> np.ndarray:
+def sample_free_points(environment: Environment, n: int, seed: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
     points = rng.uniform(0, 10, size=(20 * n, 2))
     return points[shapely.contains_xy(environment.free, points[:, 0], points[:, 1])][:n]
 
 
 def test_nearest_points_agree_with_shapely(cluttered: Environment, sensor: RangeSensor) -> None:
-    points = free_points(cluttered, 400, 0)
+    points = sample_free_points(cluttered, 400, 0)
     nearest = sensor.find_nearest_points(points, np.full(len(points), np.inf))
     expected = shapely.distance(shapely.points(points), cluttered.free.boundary)
     np.testing.assert_allclose(np.hypot(*(nearest - points).T), expected, atol=1e-9)
@@ -36,17 +38,17 @@ def test_nearest_points_agree_with_shapely(cluttered: Environment, sensor: Range
 
 
 def test_nothing_is_sensed_beyond_the_range(cluttered: Environment, sensor: RangeSensor) -> None:
-    points = free_points(cluttered, 200, 1)
+    points = sample_free_points(cluttered, 200, 1)
     distance = shapely.distance(shapely.points(points), cluttered.free.boundary)
-    reach = np.where(np.arange(len(points)) % 2, 0.5, 1.5)
-    nearest = sensor.find_nearest_points(points, reach)
-    assert (np.isnan(nearest[:, 0]) == (distance > reach)).all()
+    ranges = np.where(np.arange(len(points)) % 2, 0.5, 1.5)
+    nearest = sensor.find_nearest_points(points, ranges)
+    np.testing.assert_array_equal(np.isnan(nearest[:, 0]), distance > ranges)
 
 
 def test_compiled_queries_agree_with_public_ones(
     cluttered: Environment, sensor: RangeSensor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    positions = free_points(cluttered, 100, 2)
+    positions = sample_free_points(cluttered, 100, 2)
     for sensing_range in (0.3, 1.0, np.inf):
         ranges = np.full(len(positions), sensing_range)
         monkeypatch.undo()
@@ -70,7 +72,7 @@ def test_compiled_queries_are_used_where_they_work(monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.skipif(not IS_COMPILER_ENABLED, reason="the queries are compiled")
 def test_wrong_results_of_compiled_queries_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Such as those of another pymunk, whose C functions take other arguments."""
+    """Another version of pymunk might have C functions with other arguments."""
     from robocov import compiled_queries
 
     monkeypatch.setattr(compiled_queries, "find_nearest_points", lambda *args: np.array([[7.0, 7.0]]))
@@ -78,7 +80,7 @@ def test_wrong_results_of_compiled_queries_are_noticed(monkeypatch: pytest.Monke
 
 
 def test_a_query_does_not_depend_on_the_others(cluttered: Environment, sensor: RangeSensor) -> None:
-    points = free_points(cluttered, 30, 3)
+    points = sample_free_points(cluttered, 30, 3)
     ranges = np.full(len(points), 2.0)
     together = sensor.find_nearest_points(points, ranges)
     for i in range(len(points)):
@@ -91,22 +93,35 @@ def test_a_query_does_not_depend_on_the_others(cluttered: Environment, sensor: R
 def test_scan_agrees_with_shapely(
     cluttered: Environment, sensor: RangeSensor, x: float, y: float, rays: int, reach: float
 ) -> None:
-    place = np.array([x, y])
-    if cluttered.free.boundary.distance(shapely.Point(place)) < 1e-3 or not cluttered.free.contains(
-        shapely.Point(place)
-    ):
-        return
-    distances, points = sensor.scan_from(place, rays, reach)
+    position = np.array([x, y])
+    point = shapely.Point(position)
+    assume(cluttered.free.contains(point))
+    assume(cluttered.free.boundary.distance(point) > 1e-3)
+    distances, ends = sensor.scan_from(position, rays, reach)
     for k in range(rays):
         angle = 2 * np.pi * k / rays
-        end = place + reach * np.array([np.cos(angle), np.sin(angle)])
-        met = shapely.intersection(shapely.LineString([place, end]), cluttered.free.boundary)
-        expected = reach if met.is_empty else met.distance(shapely.Point(place))
+        direction = np.array([np.cos(angle), np.sin(angle)])
+        ray = shapely.LineString([position, position + reach * direction])
+        hits = shapely.intersection(ray, cluttered.free.boundary)
+        expected = reach if hits.is_empty else hits.distance(point)
         assert distances[k] == pytest.approx(expected, abs=1e-6)
-        np.testing.assert_allclose(points[k], place + distances[k] * (end - place) / reach, atol=1e-9)
+        np.testing.assert_allclose(ends[k], position + distances[k] * direction, atol=1e-9)
 
 
-def test_the_first_ray_looks_east(sensor: RangeSensor) -> None:
+def test_failed_robots_are_obstacles_as_long_as_they_are_given() -> None:
+    sensor = RangeSensor((np.array([[9.0, -1.0], [10.0, -1.0], [10.0, 1.0], [9.0, 1.0]]),))
+    position = np.zeros((1, 2))
+    ranges = np.array([5.0])
+    assert np.isnan(sensor.find_nearest_points(position, ranges)).all()
+    sensor.set_time(1.0, np.array([[2.0, 0.0, 0.5], [0.0, 3.0, 0.5]]))
+    np.testing.assert_allclose(sensor.find_nearest_points(position, ranges), [[1.5, 0.0]], atol=1e-12)
+    sensor.set_time(2.0, np.array([[0.0, 3.0, 0.5]]))
+    np.testing.assert_allclose(sensor.find_nearest_points(position, ranges), [[0.0, 2.5]], atol=1e-12)
+    sensor.set_time(0.0)
+    assert np.isnan(sensor.find_nearest_points(position, ranges)).all()
+
+
+def test_the_first_ray_points_along_x(sensor: RangeSensor) -> None:
     distances, points = sensor.scan_from(np.array([1.0, 2.0]), 4, 50.0)
     np.testing.assert_allclose(distances, [1.5, 3.0, 1.0, 2.0], atol=2e-3)
     np.testing.assert_allclose(points[0], [2.5, 2.0], atol=2e-3)

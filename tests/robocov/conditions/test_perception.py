@@ -182,6 +182,14 @@ def test_scans_are_noisy_where_they_hit_an_obstacle() -> None:
     assert abs(off.std() / 0.04 - 1.0) < 5 / np.sqrt(2 * len(off))
 
 
+def test_noisy_scans_measure_positive_distances() -> None:
+    team = Team.homogeneous(len(STARTS), sensing_range=2.5)
+    conditions = Conditions(sensing_noise=50.0, seed=6)
+    scans = Simulation(HALL, TangentBug(), STARTS, team, 0.05, conditions=conditions).observe().scans
+    assert scans is not None
+    assert scans.distances[scans.hit].min() == MIN_MEASURED_DISTANCE_M
+
+
 def test_records_contain_true_positions() -> None:
     one = simulation(Conditions(position_noise=0.5, seed=4))
     record = one.run(0.5)

@@ -1,6 +1,9 @@
+"""The communication graph, and neighbours within a reach."""
+
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from voronoi_cases import SQUARE
@@ -40,7 +43,7 @@ def test_two_robots_are_neighbours_when_both_are_in_range(n: int, seed: int) -> 
         assert neighbours.list_neighbours(i).tolist() == expected
 
 
-def seen(positions: np.ndarray, neighbours: Neighbours) -> Observations:
+def build_observations(positions: np.ndarray, neighbours: Neighbours) -> Observations:
     return Observations(positions, positions, neighbours, positions, SQUARE)
 
 
@@ -49,14 +52,22 @@ def test_infinite_ranges_give_the_complete_graph() -> None:
     neighbours = Neighbours.from_ranges(positions, np.full(3, np.inf))
     assert neighbours.is_complete
     assert neighbours.list_neighbours(1).tolist() == [0, 2]
-    first, second, _, _ = seen(positions, neighbours).find_near_neighbours(5.0)
+    first, second, _, _ = build_observations(positions, neighbours).find_near_neighbours(5.0)
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(0, 2), (2, 0)]
+
+
+@pytest.mark.parametrize("communication_range", [10.0, np.inf])
+def test_neighbours_at_exactly_the_reach_are_near(communication_range: float) -> None:
+    positions = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.5]])
+    neighbours = Neighbours.from_ranges(positions, np.full(3, communication_range))
+    near = build_observations(positions, neighbours).find_near_neighbours(2.0)
+    assert list(zip(near[0].tolist(), near[1].tolist(), strict=True)) == [(0, 1), (1, 0)]
 
 
 def test_near_neighbours_are_within_communication_range() -> None:
     positions = np.array([[0.0, 0.0], [1.0, 0.0], [1.5, 0.0]])
     neighbours = Neighbours.from_ranges(positions, np.array([0.5, 3.0, 3.0]))
-    first, second, offset, distance = seen(positions, neighbours).find_near_neighbours(2.0)
+    first, second, offset, distance = build_observations(positions, neighbours).find_near_neighbours(2.0)
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(1, 2), (2, 1)]
     np.testing.assert_allclose(distance, 0.5)
     np.testing.assert_allclose(offset, [[-0.5, 0.0], [0.5, 0.0]])

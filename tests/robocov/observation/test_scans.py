@@ -1,3 +1,5 @@
+"""Range scans, and the settings that controllers request."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -11,10 +13,12 @@ from robocov.simulation import Simulation
 from robocov.world.obstacle_pieces import build_solid_pieces
 
 
-class Looking:
-    """Stands still, and remembers when it was given scans."""
+class ScanCollector:
+    """Stands still, and remembers the times of its scans."""
 
-    name, label, summary = "looking", "Looking", "stands still"
+    name = "scan-collector"
+    label = "Scan collector"
+    summary = "stands still"
     scanning = Scanning(rays=8, period=0.1)
 
     def begin(self, region: object, team: object) -> tuple[float, ...]:
@@ -29,30 +33,30 @@ class Looking:
 
 
 def test_scans_arrive_with_the_requested_period(cluttered: Environment) -> None:
-    simulation = Simulation(cluttered, Looking(), [[1.0, 2.0], [1.5, 2.0]], dt=0.02)
+    simulation = Simulation(cluttered, ScanCollector(), [[1.0, 2.0], [1.5, 2.0]], dt=0.02)
     for _ in range(11):
         simulation.step()
     assert simulation.memory == (0.0, 0.1, 0.2)
     twin = simulation.copy()
-    for each in (simulation, twin):
+    for continued in (simulation, twin):
         for _ in range(5):
-            each.step()
-        assert each.memory == (0.0, 0.1, 0.2, 0.3)
+            continued.step()
+        assert continued.memory == (0.0, 0.1, 0.2, 0.3)
 
 
 def test_a_team_scan_equals_the_scans_of_single_robots(cluttered: Environment) -> None:
     sensor = RangeSensor(build_solid_pieces(cluttered))
-    places = np.array([[1.0, 2.0], [1.5, 2.2], [0.6, 4.0]])
+    positions = np.array([[1.0, 2.0], [1.5, 2.2], [0.6, 4.0]])
     ranges = np.array([0.7, 2.0, np.inf])
-    distances, hit = sensor.scan(places, 36, ranges)
+    distances, is_hit = sensor.scan(positions, 36, ranges)
     for i in range(3):
-        alone, points = sensor.scan_from(places[i], 36, float(ranges[i]))
-        assert np.array_equal(alone, distances[i])
-        ends = places[i] + distances[i][:, None] * compute_headings(36)
-        np.testing.assert_allclose(points, ends, atol=1e-9)
-        assert np.array_equal(hit[i], distances[i] < min(ranges[i], 1e6))
-    assert hit[2].all()
-    assert not hit[0].all()
+        own_distances, ends = sensor.scan_from(positions[i], 36, float(ranges[i]))
+        np.testing.assert_array_equal(own_distances, distances[i])
+        expected_ends = positions[i] + distances[i][:, None] * compute_headings(36)
+        np.testing.assert_allclose(ends, expected_ends, atol=1e-9)
+        np.testing.assert_array_equal(is_hit[i], distances[i] < min(ranges[i], 1e6))
+    assert is_hit[2].all()
+    assert not is_hit[0].all()
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Runs that are simulated together are what they are alone."""
+"""Runs that are simulated together equal separate simulations."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def assert_equal_records(first: list[Record], second: list[Record]) -> None:
 @pytest.mark.parametrize("name", ["rapf", "rpf", "lloyd", "range-limited", "howard"])
 @pytest.mark.parametrize("communication_range", [np.inf, 2.5])
 def test_each_run_is_the_same_as_alone(name: str, communication_range: float) -> None:
-    """Also where robots of several runs are in one place, and lean on walls and each other."""
+    """Robots of several runs start at the same positions, and lean on walls and on each other."""
     controller = make_controller(name)
     seeds = [0, 1, 2, 0]
     starts = [ROOMS.start().sample(4, seed=seed, radius=0.15) for seed in seeds]
@@ -52,18 +52,21 @@ def test_teams_of_any_size_are_the_same_as_alone(robots: int) -> None:
     assert_equal_records(together, alone)
 
 
+class StepCounter:
+    """Drives along x with a force that grows by the number of steps that it remembers."""
+
+    def begin(self, number: int, team: Team) -> int:
+        return 10 * number
+
+    def force(self, own: OwnView) -> list[float]:
+        own.memory += 1
+        return [0.01 * own.memory, 0.0]
+
+
 def test_memory_belongs_to_one_run() -> None:
-    class Counter:
-        def begin(self, number: int, team: Team) -> int:
-            return 10 * number
-
-        def force(self, own: OwnView) -> list[float]:
-            own.memory += 1
-            return [0.01 * own.memory, 0.0]
-
     starts = [ROOMS.start().sample(2, seed=seed) for seed in range(3)]
-    together = SimulationBatch(ROOMS, Counter(), starts).run(0.5)
-    alone = [Simulation(ROOMS, Counter(), positions).run(0.5) for positions in starts]
+    together = SimulationBatch(ROOMS, StepCounter(), starts).run(0.5)
+    alone = [Simulation(ROOMS, StepCounter(), positions).run(0.5) for positions in starts]
     assert_equal_records(together, alone)
 
 
@@ -74,14 +77,14 @@ def test_individual_controllers_without_begin_keep_numbers_and_memory_within_a_r
             return [0.01 * own.memory, 0.01 * own.number]
 
     starts = [ROOMS.start().sample(2, seed=seed) for seed in range(2)]
-    batch = SimulationBatch(ROOMS, Counter(), starts)
-    alone = [Simulation(ROOMS, Counter(), positions) for positions in starts]
+    batch = SimulationBatch(ROOMS, StepCounter(), starts)
+    alone = [Simulation(ROOMS, StepCounter(), positions) for positions in starts]
     for _ in range(5):
         batch.step()
         for simulation in alone:
             simulation.step()
     batch.restart(1, starts[1])
-    alone[1] = Simulation(ROOMS, Counter(), starts[1])
+    alone[1] = Simulation(ROOMS, StepCounter(), starts[1])
     for _ in range(5):
         batch.step()
         for simulation in alone:
@@ -106,7 +109,20 @@ def test_a_restarted_run_is_the_same_as_alone() -> None:
     assert batch.positions[1].tobytes() == other.positions.tobytes()
 
 
-def test_a_restart_forgets_the_memory_of_that_run_only() -> None:
+def test_a_restarted_run_starts_with_new_memory() -> None:
+    starts = [ROOMS.start().sample(2, seed=seed) for seed in range(2)]
+    batch = SimulationBatch(ROOMS, StepCounter(), starts)
+    for _ in range(10):
+        batch.step()
+    batch.restart(0, starts[1])
+    restarted = Simulation(ROOMS, StepCounter(), starts[1])
+    for _ in range(10):
+        batch.step()
+        restarted.step()
+    assert batch.positions[0].tobytes() == restarted.positions.tobytes()
+
+
+def test_a_restart_keeps_the_memory_of_other_runs() -> None:
     starts = [ROOMS.start().sample(3, seed=seed) for seed in range(2)]
     batch = SimulationBatch(ROOMS, Howard(), starts)
     other = Simulation(ROOMS, Howard(), starts[1])

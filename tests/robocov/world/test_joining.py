@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from robocov.conditions import Conditions, JoinedRobot
-from robocov.controllers import Lloyd
+from robocov.controllers import Lloyd, Rapf
 from robocov.environment import Environment, PolygonObstacle
 from robocov.errors import ParameterError
 from robocov.metrics import compute_clearances, compute_path_lengths
@@ -98,6 +98,7 @@ def test_copies_know_which_robots_have_joined() -> None:
         twin.step()
     assert [joined.robot for joined in simulation.joined] == [3]
     assert [joined.robot for joined in twin.joined] == [3, 2]
+    assert twin.with_changes(controller=Rapf()).joined == twin.joined
 
 
 def test_robots_that_are_placed_by_the_user_do_not_travel() -> None:
