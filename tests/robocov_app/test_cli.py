@@ -290,7 +290,7 @@ LONG = "x" * 300
         ("replay loop", "loop: "),
         (
             "run square --controller loop/mine.py:Mine",
-            "controller 'loop/mine.py:Mine': there is no file loop/",
+            "controller 'loop/mine.py:Mine': file not found: loop/",
         ),
         ("run square --robots 1.5", "--robots: '1.5', but a whole number was wanted"),
         (f"sweep a --workers {'9' * 5000}", "--workers: '999"),

@@ -1,6 +1,6 @@
-"""Controllers in users' files: their classes, the modules that they import, and their faults in one line.
+"""Controllers in files of users: their classes, the modules that they import, and their faults in one line.
 
-A file and the modules of its author that it imports are texts as well, which run on any machine.
+A file and the modules of its author that it imports can also be loaded from their texts, on any machine.
 """
 
 import ast
@@ -12,46 +12,60 @@ import os
 import sys
 import sysconfig
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib.machinery import ModuleSpec, PathFinder
 from itertools import accumulate
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 from robocov.errors import ControllerEndedError, ParameterError, RobocovError, describe_unknown_name, quote
 
-_MODULE = "robocov_user_"  # prefix of the names of modules loaded from files of users
-_OURS = str(Path(__file__).parents[1])
-_INSTALLED = frozenset(("site-packages", "dist-packages"))  # folders of packages, which have versions
+_MODULE_PREFIX = "robocov_user_"
+"""Prefix of the names of modules that are loaded from files of users."""
+_LIBRARY_FOLDER = str(Path(__file__).parents[1])
+_PACKAGE_FOLDERS = frozenset(("site-packages", "dist-packages"))
+"""Folders of installed packages, which have versions."""
 
 
 class ModuleText(NamedTuple):
-    """A module that a controller's file imports; a package without ``__init__.py`` has no path."""
+    """A module that a controller's file imports."""
 
     path: str
+    """Empty for a package without ``__init__.py``."""
     text: str
 
 
 class ControllerSource(NamedTuple):
-    """The file of a controller, its absolute path, and the `find_own_modules` that it imports, by name."""
+    """The file of a controller, and the modules that it imports."""
 
     path: str
+    """Absolute path of the file."""
     text: str
     modules: Mapping[str, ModuleText] = {}
+    """Modules by name, as `find_own_modules` returns them."""
+
+
+class _Call(NamedTuple):
+    """A call that led to an error."""
+
+    module: str
+    file: str
+    line: int
 
 
 def explain_fault(where: str, error: BaseException, when: str = "") -> RobocovError:
-    """Describe what went wrong in code that is not ours.
+    """Return the error that explains, in one line, a fault in code outside robocov.
 
     Parameters
     ----------
     where : str
         The controller, with which the message begins.
     error : BaseException
-        What the code raised; its notes, as "robot 3", are added to the message.
+        The exception that the code raised. Its notes, such as "robot 3", are added to the message.
     when : str
-        The end of the message, as " at 0.117 s".
+        The end of the message, such as " at 0.117 s".
 
     Returns
     -------
@@ -60,138 +74,232 @@ def explain_fault(where: str, error: BaseException, when: str = "") -> RobocovEr
     ParameterError
         For any other exception. Both name file and line.
     """
-    frames = _frames(error)
-    theirs = [frame for frame in frames if frame[0].startswith(_MODULE)]
-    theirs = theirs or [frame for frame in frames if not frame[1].startswith((_OURS, "<"))]
-    at = f" ({Path(theirs[-1][1]).name}, line {theirs[-1][2]})" if theirs else ""
-    notes = "".join(f" for {note}" for note in getattr(error, "__notes__", ()) if note.startswith("robot "))
+    notes = [note for note in getattr(error, "__notes__", ()) if note.startswith("robot ")]
+    place = _format_place(error) + "".join(f" for {note}" for note in notes) + when
     try:
         message = str(error)
-    except Exception:  # it is the user's own
+    except Exception:  # The exception is the user's own.
         message = "it has no message"
-    what = f"{type(error).__name__}: {message}" if message else type(error).__name__
+    fault = f"{type(error).__name__}: {message}" if message else type(error).__name__
     if isinstance(error, Exception):
-        return ParameterError(f"{where}: {what}{at}{notes}{when}")
-    return ControllerEndedError(f"{where}: it ended Python by {what}{at}{notes}{when}")
+        return ParameterError(f"{where}: {fault}{place}")
+    return ControllerEndedError(f"{where}: it ended Python by {fault}{place}")
+
+
+def explain_user_fault(error: BaseException) -> RobocovError | None:
+    """Return the error that explains a fault in a file of a user; None if the fault is elsewhere."""
+    if any(_is_in_user_file(call) for call in _list_calls(error)):
+        return explain_fault("a controller of your own", error)
+    return None
 
 
 def format_location(function: object) -> str:
-    """Return file and line of a function or method of a user, as " (mine.py, line 12)"; empty if unknown."""
-    with suppress(Exception):  # it may be any object that can be called
+    """Return file and line of a function of a user, as " (mine.py, line 12)"; empty if they are unknown."""
+    with suppress(Exception):  # Any object can be callable.
         code = inspect.unwrap(getattr(function, "__func__", function)).__code__  # type: ignore[arg-type]
         return f" ({Path(code.co_filename).name}, line {code.co_firstlineno})"
     return ""
 
 
-def explain_user_fault(error: BaseException) -> RobocovError | None:
-    """Return what tells of an error that came up in a user's file; None where it did elsewhere."""
-    theirs = any(frame[0].startswith(_MODULE) for frame in _frames(error))
-    return explain_fault("a controller of your own", error) if theirs else None
+def _format_place(error: BaseException) -> str:
+    """Return file and line of the last call outside robocov, as " (mine.py, line 12)", or an empty text."""
+    calls = _list_calls(error)
+    places = [call for call in calls if _is_in_user_file(call)]
+    if not places:
+        places = [call for call in calls if not call.file.startswith((_LIBRARY_FOLDER, "<"))]
+    if not places:
+        return ""
+    return f" ({Path(places[-1].file).name}, line {places[-1].line})"
 
 
-def _frames(error: BaseException) -> list[tuple[str, str, int]]:
-    """Return module, file and line of each call that led to an error."""
-    calls = traceback.walk_tb(error.__traceback__)
-    return [(str(call.f_globals.get("__name__")), call.f_code.co_filename, line) for call, line in calls]
+def _list_calls(error: BaseException) -> list[_Call]:
+    """Return the calls that led to an error, the last one at the end."""
+    return [
+        _Call(str(frame.f_globals.get("__name__")), frame.f_code.co_filename, line)
+        for frame, line in traceback.walk_tb(error.__traceback__)
+    ]
+
+
+def _is_in_user_file(call: _Call) -> bool:
+    return call.module.startswith(_MODULE_PREFIX)
 
 
 def load_class(name: str, source: ControllerSource | None) -> type[Any]:
-    """Return the controller class ``file.py:ClassName``; this runs the file, or its text in `source`."""
+    """Load a controller class from a file, which runs the file.
+
+    Parameters
+    ----------
+    name : str
+        ``file.py:ClassName``.
+    source : ControllerSource or None
+        Text that is run instead of the file.
+
+    Returns
+    -------
+    type
+
+    Raises
+    ------
+    ParameterError
+        If there is no such file or class, the file cannot be run, or the class is no frozen dataclass with a
+        method ``decide`` or ``force``.
+    """
     file, _, class_name = name.rpartition(":")
     where = f"controller {quote(name)}"
     if not class_name or not file.endswith(".py"):
-        raise ParameterError(f"{where}: a file and a class, as in mine.py:MyController, was wanted")
-    path = os.path.realpath(file) if source is None else source.path
-    if source is None and not Path(path).is_file():
-        raise ParameterError(f"{where}: there is no file {file}")
-    # a name of its own for each file, so that two files called mine.py do not replace each other
-    module_name = f"{_MODULE}{hashlib.sha256(path.encode()).hexdigest()[:12]}"
-    loader = None if source is None else _TextLoader(source.path, source.text)
-    spec = importlib.util.spec_from_file_location(module_name, path, loader=loader)
-    assert spec is not None and spec.loader is not None
-    sys.modules[module_name] = module = importlib.util.module_from_spec(spec)
+        raise ParameterError(f"{where}: expected a file and a class, as in mine.py:MyController")
+    if source is None and not Path(file).is_file():
+        raise ParameterError(f"{where}: file not found: {file}")
     try:
-        with provide_modules({} if source is None else source.modules):
-            spec.loader.exec_module(module)
+        module = _load_module(file, source)
     except KeyboardInterrupt:
         raise
     except BaseException as error:
         raise explain_fault(f"{where}: {file} cannot be run", error) from error
-    kind, wrong = vars(module).get(class_name), ""
+    kind = vars(module).get(class_name)
     if kind is None:
-        classes = {key: each for key, each in vars(module).items() if isinstance(each, type)}
-        kinds = [key for key, each in classes.items() if each.__module__ == module_name]
-        raise ParameterError(f"controller {file}: {describe_unknown_name('class', class_name, kinds)}")
-    if not (isinstance(kind, type) and (hasattr(kind, "decide") or hasattr(kind, "force"))):
-        wrong = "has neither a method decide(seen, memory) nor force(own)"
-    elif not getattr(getattr(kind, "__dataclass_params__", None), "frozen", False):
-        wrong = "is not a frozen dataclass; @dataclass(frozen=True) above it was wanted"
-    if wrong:
-        raise ParameterError(f"{where}: {class_name} {wrong}")
+        names = _list_own_classes(module)
+        raise ParameterError(f"controller {file}: {describe_unknown_name('class', class_name, names)}")
+    if not isinstance(kind, type) or not (hasattr(kind, "decide") or hasattr(kind, "force")):
+        raise ParameterError(
+            f"{where}: {class_name}: expected a class with a method decide(seen, memory) or force(own)"
+        )
+    if not getattr(getattr(kind, "__dataclass_params__", None), "frozen", False):
+        raise ParameterError(
+            f"{where}: {class_name}: expected a frozen dataclass. "
+            "Write @dataclass(frozen=True) above the class."
+        )
     return kind
 
 
-def find_own_modules(text: str) -> dict[str, ModuleText]:
-    """Return the modules that a text imports, and those that these import, as far as they are its author's.
+def _load_module(file: str, source: ControllerSource | None) -> ModuleType:
+    """Run a file, or its text, as a module."""
+    loader = None
+    path = os.path.realpath(file)
+    modules: Mapping[str, ModuleText] = {}
+    if source is not None:
+        loader = _TextLoader(source.path, source.text)
+        path = source.path
+        modules = source.modules
+    # Each file has a name of its own, so that two files called mine.py do not replace each other.
+    module_name = f"{_MODULE_PREFIX}{hashlib.sha256(path.encode()).hexdigest()[:12]}"
+    spec = importlib.util.spec_from_file_location(module_name, path, loader=loader)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module
+    with provide_modules(modules):
+        spec.loader.exec_module(module)
+    return module
 
-    They are found on ``sys.path`` without being executed. The standard library, installed packages and
-    robocov are left out; so is what cannot be read, and what is imported by a name put together at run time.
+
+def _list_own_classes(module: ModuleType) -> list[str]:
+    """Return the names of the classes that a module defines itself."""
+    return [
+        name
+        for name, value in vars(module).items()
+        if isinstance(value, type) and value.__module__ == module.__name__
+    ]
+
+
+def find_own_modules(text: str) -> dict[str, ModuleText]:
+    """Find the modules of its author that a text imports, and those that these import.
+
+    Modules are looked up on ``sys.path`` without being executed. The standard library, installed packages and
+    robocov are left out; so are files that cannot be read, and imports of a name that is only known when the
+    text runs.
+
+    Parameters
+    ----------
+    text : str
+        Python code.
+
+    Returns
+    -------
+    dict of str to ModuleText
+        Modules by name, sorted.
     """
     importlib.invalidate_caches()
-    found: dict[str, ModuleText] = {}
-    places: dict[str, list[str] | None] = {}  # where the submodules of what was looked for are
-    waiting = list(_imported(text, ""))
-    while waiting:
-        where: list[str] | None = None
-        for part in accumulate(waiting.pop().split("."), "{}.{}".format):
-            if part not in places:
-                spec = PathFinder.find_spec(part, where)
-                places[part] = None if spec is None else list(spec.submodule_search_locations or ())
-                if spec is None or not _is_own(spec):
-                    places[part] = None
-                elif spec.origin is None:
-                    found[part] = ModuleText("", "")
-                elif spec.origin.endswith(".py"):
-                    with suppress(OSError, SyntaxError, ValueError):
-                        text = importlib.util.decode_source(Path(spec.origin).read_bytes())
-                        found[part] = ModuleText(spec.origin, text)
-                        package = part if spec.submodule_search_locations else part.rpartition(".")[0]
-                        waiting += _imported(text, package)
-            where = places[part]
-            if not where:
+    collector = _ModuleCollector()
+    pending = list(_list_imports(text, package=""))
+    while pending:
+        pending += collector.add(pending.pop())
+    return dict(sorted(collector.modules.items()))
+
+
+class _ModuleCollector:
+    """Collects modules that are neither installed nor a part of Python or robocov."""
+
+    def __init__(self) -> None:
+        self.modules: dict[str, ModuleText] = {}
+        self._locations: dict[str, list[str]] = {}
+        """Folders of the submodules of each module that was looked up; empty if there are none."""
+
+    def add(self, name: str) -> list[str]:
+        """Add a module, and the packages that contain it; return the names that they import."""
+        imports: list[str] = []
+        locations: Sequence[str] | None = None  # The first name is looked up on ``sys.path``.
+        for module in accumulate(name.split("."), "{}.{}".format):
+            if module not in self._locations:
+                imports += self._add_module(module, locations)
+            locations = self._locations[module]
+            if not locations:
                 break
-    return dict(sorted(found.items()))
+        return imports
+
+    def _add_module(self, name: str, locations: Sequence[str] | None) -> list[str]:
+        """Add one module; return the names of the modules that it imports."""
+        self._locations[name] = []
+        spec = PathFinder.find_spec(name, locations)
+        if spec is None or not _is_own(spec):
+            return []
+        self._locations[name] = list(spec.submodule_search_locations or ())
+        if spec.origin is None:
+            self.modules[name] = ModuleText("", "")
+            return []
+        if not spec.origin.endswith(".py"):
+            return []
+        package = name if self._locations[name] else name.rpartition(".")[0]
+        try:
+            text = importlib.util.decode_source(Path(spec.origin).read_bytes())
+            self.modules[name] = ModuleText(spec.origin, text)
+            return list(_list_imports(text, package))
+        except (OSError, SyntaxError, ValueError):
+            return []
 
 
-def _imported(text: str, package: str) -> Iterator[str]:
-    """Yield the names of all modules that a text may import."""
+def _list_imports(text: str, package: str) -> Iterator[str]:
+    """Yield the names of all modules that a text within a package may import."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             base = node.module or ""
             if node.level:
-                with suppress(ImportError):  # outside the package: it will fail to run, too
+                with suppress(ImportError):  # Outside the package the import will fail as well.
                     base = importlib.util.resolve_name("." * node.level + base, package)
-            # what is imported from a package may be a module
+            # Whatever is imported from a package may be a module.
             yield from (f"{base}.{alias.name}" for alias in node.names if base)
 
 
 def _is_own(spec: ModuleSpec) -> bool:
     """Return whether a module is neither installed nor a part of Python or robocov."""
-    built_in = spec.origin is not None and not spec.has_location  # or frozen
-    if built_in or spec.name.partition(".")[0] in ("robocov", "robocov_app"):
+    is_built_in = spec.origin is not None and not spec.has_location
+    if is_built_in or spec.name.partition(".")[0] in ("robocov", "robocov_app"):
         return False
-    path = Path(os.path.realpath(spec.origin or next(iter(spec.submodule_search_locations or ()), "")))
-    others = [os.path.realpath(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib")]
-    return not _INSTALLED.intersection(path.parts) and not any(path.is_relative_to(each) for each in others)
+    folders = spec.submodule_search_locations or ()
+    path = Path(os.path.realpath(spec.origin or next(iter(folders), "")))
+    if _PACKAGE_FOLDERS.intersection(path.parts):
+        return False
+    libraries = [os.path.realpath(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib")]
+    return not any(path.is_relative_to(library) for library in libraries)
 
 
 class _TextLoader(importlib.abc.ExecutionLoader):
-    """Loads a module from the text of its file, which need not be there any more."""
+    """Loads a module from the text of its file, which need not exist any more."""
 
     def __init__(self, path: str, text: str) -> None:
-        self._path, self._text = path, text
+        self._path = path
+        self._text = text
 
     def get_filename(self, fullname: str) -> str:
         return self._path
@@ -211,19 +319,28 @@ class _TextFinder(importlib.abc.MetaPathFinder):
 
     def find_spec(self, fullname: str, path: object, target: object = None) -> ModuleSpec | None:
         module = self.modules.get(fullname)
-        if module is None or not module.path:
-            return None if module is None else ModuleSpec(fullname, None, is_package=True)
+        if module is None:
+            return None
+        if not module.path:
+            return ModuleSpec(fullname, None, is_package=True)
         loader = _TextLoader(module.path, module.text)
         return importlib.util.spec_from_file_location(fullname, module.path, loader=loader)
 
 
 @contextmanager
 def provide_modules(modules: Mapping[str, ModuleText]) -> Iterator[None]:
-    """Have these modules imported from their texts while the context lasts, whatever else has their names."""
-    if any(isinstance(each, _TextFinder) and each.modules is modules for each in sys.meta_path):
-        yield  # they are already, and are loaded once
+    """Import modules from their texts while the context lasts, whatever else has their names.
+
+    Parameters
+    ----------
+    modules : mapping of str to ModuleText
+        As `find_own_modules` returns them.
+    """
+    if any(isinstance(finder, _TextFinder) and finder.modules is modules for finder in sys.meta_path):
+        # An outer context provides them already, so that they are loaded once.
+        yield
         return
-    former = {name: sys.modules.pop(name) for name in modules if name in sys.modules}
+    former_modules = {name: sys.modules.pop(name) for name in modules if name in sys.modules}
     finder = _TextFinder(modules)
     sys.meta_path.insert(0, finder)
     try:
@@ -232,4 +349,4 @@ def provide_modules(modules: Mapping[str, ModuleText]) -> Iterator[None]:
         sys.meta_path.remove(finder)
         for name in modules:
             sys.modules.pop(name, None)
-        sys.modules.update(former)
+        sys.modules.update(former_modules)

@@ -362,9 +362,9 @@ def test_a_controller_in_a_file(tmp_path: Path) -> None:
     np.testing.assert_allclose(decision.forces, 2 * (decision.goals - seen.positions))
     for name, message in [
         (f"{file}:Nine", "did you mean 'Mine'"),
-        (f"{file}:Plain", "has neither a method decide"),
-        (f"{tmp_path}/no.py:Mine", "there is no file"),
-        (f"{file}", "a file and a class"),
+        (f"{file}:Plain", "expected a class with a method decide"),
+        (f"{tmp_path}/no.py:Mine", "file not found"),
+        (f"{file}", "expected a file and a class"),
     ]:
         with pytest.raises(ParameterError, match=message):
             make_controller(name)

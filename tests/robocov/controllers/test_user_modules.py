@@ -10,7 +10,7 @@ import pytest
 from robocov.controllers import load_controller_class
 from robocov.controllers.user_modules import ControllerSource, ModuleText, find_own_modules, provide_modules
 
-LAW = """
+CONTROLLER = """
 from dataclasses import dataclass
 import json, numpy, robocov, builtins, nothing_of_that_name
 import tree_a.branch
@@ -44,26 +44,26 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         (tmp_path / name).parent.mkdir(exist_ok=True, parents=True)
         (tmp_path / name).write_text(text)
     monkeypatch.syspath_prepend(str(tmp_path))
-    known = set(sys.modules)
+    loaded_before = set(sys.modules)
     yield tmp_path
-    for name in set(sys.modules) - known:
+    for name in set(sys.modules) - loaded_before:
         del sys.modules[name]
 
 
-def test_all_modules_of_the_author_are_found_and_nothing_is_executed(folder: Path) -> None:
-    found = find_own_modules(LAW)
-    assert list(found) == [
+def test_all_modules_of_the_author_are_found_without_running_them(folder: Path) -> None:
+    modules = find_own_modules(CONTROLLER)
+    assert list(modules) == [
         *("late_one", "plain_b", "plain_b.part"),
         *("tree_a", "tree_a.branch", "tree_a.inner", "tree_a.inner.core", "tree_a.leaf", "tree_a.twig"),
         "unreadable_one",
     ]
-    assert found["tree_a.leaf"] == ModuleText(str(folder / "tree_a" / "leaf.py"), FILES["tree_a/leaf.py"])
-    assert found["plain_b"] == ModuleText("", "")
+    assert modules["tree_a.leaf"] == ModuleText(str(folder / "tree_a" / "leaf.py"), FILES["tree_a/leaf.py"])
+    assert modules["plain_b"] == ModuleText("", "")
     assert "tree_a" not in sys.modules
-    assert pickle.loads(pickle.dumps(ControllerSource("mine.py", LAW, found))).modules == found
+    assert pickle.loads(pickle.dumps(ControllerSource("mine.py", CONTROLLER, modules))).modules == modules
 
 
-def test_installed_packages_are_not_the_authors(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_installed_packages_are_left_out(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (folder / "site-packages").mkdir()
     (folder / "site-packages" / "installed_c.py").touch()
     monkeypatch.syspath_prepend(str(folder / "site-packages"))
@@ -74,8 +74,12 @@ def test_modules_are_imported_from_their_texts_and_leave_no_trace(
     folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (folder / "tree_a" / "leaf.py").write_text("# -*- coding: latin-1 -*-\nword = 'ü'\n", "latin-1")
-    text = "import late_two\nfrom tree_a import leaf\nimport plain_b.part, tree_a.branch\n" + LAW.replace(
-        "import json, numpy, robocov, builtins, nothing_of_that_name", "word, TWO = leaf.word, late_two.TWO"
+    text = (
+        "import late_two\nfrom tree_a import leaf\nimport plain_b.part, tree_a.branch\n"
+        + CONTROLLER.replace(
+            "import json, numpy, robocov, builtins, nothing_of_that_name",
+            "word, TWO = leaf.word, late_two.TWO",
+        )
     )
     (folder / "late_two.py").write_text("TWO = 2\n")
     source = ControllerSource("/nowhere/mine.py", text, find_own_modules(text))

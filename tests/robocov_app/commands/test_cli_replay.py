@@ -193,7 +193,7 @@ def test_without_a_display_it_says_what_else_there_is(run: Path, monkeypatch, ca
         ("--out film", "--out: --frames or --video was wanted beside it"),
         ("--json", "--json: --frames or --video was wanted beside it"),
         ("--frames --out film --controller a.py:A", "--controller: neither --frames nor --video was wanted"),
-        ("--controller gone.py:Mine", "controller 'gone.py:Mine': there is no file gone.py"),
+        ("--controller gone.py:Mine", "controller 'gone.py:Mine': file not found: gone.py"),
         ("--controller lloyd", "--controller: lloyd, but the controller of a run was wanted: rapf"),
         ("--size 480x320", "--size: expected a number from 900 to 7680 pixels wide, got 480"),
         ("--frames --out film --fps 0", "--fps: expected a number from 1 to 240, got 0"),

@@ -88,7 +88,7 @@ WRONG = [
     ({"controllers": ("rapf", "rapf")}, "controllers[1]: 'rapf' is given already at controllers[0]"),
     ({"controllers": (3,)}, "controllers[0]: expected a text, got 3"),
     ({"controllers": ("none.py:Mine",)}, "controllers[0]: 'none.py:Mine': "),
-    ({"controllers": ("none.py",)}, "controllers[0]: controller 'none.py': a file and a class, "),
+    ({"controllers": ("none.py",)}, "controllers[0]: controller 'none.py': expected a file and a class, "),
     ({"robots": (6, 0)}, "robots[1]: expected a whole number from 1 to 10000, got 0"),
     ({"robots": (True,)}, "robots[0]: expected a whole number from"),
     ({"robots": ()}, "robots: none, "),
