@@ -1,4 +1,4 @@
-"""Adaptive coverage: robots do not know the density, and learn it from what they measure on their ways."""
+"""Adaptive coverage: robots do not know the density, and learn it from measurements where they move."""
 
 from __future__ import annotations
 
@@ -17,57 +17,71 @@ from robocov.observation.region import Region
 from robocov.team import Team
 from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_samples
 
-_SAMPLES = 40  # places along a side of the region at which densities are estimated
-_SQUARES = 20  # squares along a side of which one measurement each is kept
-_OVERLAP = 0.8  # standard deviation of a basis function, in distances to the next one
-_NOISE = 1e-3  # variance of a measurement, as a part of the prior's
+_SAMPLES_PER_SIDE = 40
+"""Number of samples along a side of the region, at which densities are estimated."""
+_SQUARES_PER_SIDE = 20
+"""Number of squares along a side; one measurement is stored for each square."""
+_BASIS_WIDTH = 0.8
+"""Standard deviation of a basis function, relative to the distance to the next one."""
+_NOISE_VARIANCE = 1e-3
+"""Variance of a measurement, relative to that of the prior."""
+_TIME_TOLERANCE_S = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AdaptiveMemory:
-    """Memory of the robots: what each knows of the density."""
+    """Memory of the robots: what each of them knows of the density."""
 
     team: Team
     lattice: Lattice
-    estimates: Array  # (n, k), φ at the samples of the lattice
-    parameters: Array  # (n, m), a of the basis
-    information: Array  # (n, m, m) s, Λ
-    told: Array  # (n, m) s, λ
-    measured: Array  # (n, s), φ in squares where anybody who was heard has been; nan elsewhere
-    goals: Array | None = None  # (n, 2) m
-    planned: float = -np.inf  # s
+    estimates: Array
+    """(n, k) Estimates of φ at the samples of the lattice."""
+    parameters: Array
+    """(n, m) a, weights of the basis functions."""
+    information: Array
+    """(n, m, m) s, Λ."""
+    projections: Array
+    """(n, m) s, λ."""
+    measurements: Array
+    """(n, s) Measurements of φ in the squares, also those of other robots; nan if there is none."""
+    goals: Array | None = None
+    """(n, 2) m"""
+    plan_time: float = -np.inf
+    """Time of the latest estimate, s."""
 
 
 @dataclass(frozen=True)
 class Adaptive(BaseController):
     """Lloyd's algorithm with a density that is learned (Schwager, Rus and Slotine, IJRR 28, 2009).
 
-    What a robot measures is the density in the place where it is, and nowhere else. Its estimate of it is
-    K(q)·a_i, with basis functions K, here Gaussians on a grid of `basis` by `basis`, divided by their sum,
-    so that a constant density can be told exactly. All robots begin with `prior` everywhere. Each heads for
-    the centroid C_i of its Voronoi cell V_i by its own estimate, and learns meanwhile:
+    A robot measures the density at its own position, and nowhere else. Its estimate of the density is
+    K(q)·a_i, with basis functions K, here Gaussians on a grid of `basis` by `basis`, divided by their sum, so
+    that a constant density is represented exactly. All robots start with `prior` everywhere. Each moves to
+    the centroid C_i of its Voronoi cell V_i by its own estimate, and learns on the way:
 
-        dΛ_i/dt = w K K^T,  dλ_i/dt = w K φ,                        at its place p_i
+        dΛ_i/dt = w K K^T,  dλ_i/dt = w K φ,                        at its position p_i
         da_i/dt = γ (λ_i - Λ_i a_i) + k P_i (C_i - p_i) + ζ Σ_j (a_j - a_i) / deg_i,    a_i >= `least`
 
-    The first term leads to all that it has measured, the second makes the paper's Lyapunov function fall,
-    with P_i = ∫ K (q - p_i)^T dq over V_i, the third to those it hears (consensus). What nobody came near
-    stays about as it was guessed: robots go where the cost is low, not where there is much to learn.
+    The first term fits all measurements of the robot. The second one makes the paper's Lyapunov function
+    fall, with P_i = ∫ K (q - p_i)^T dq over V_i. The third one is the consensus with the neighbours. Where no
+    robot has been, the estimate stays about as it was at first: robots move to where the cost is low, not to
+    where there is much to learn.
 
-    With ``estimate="gp"`` robots tell each other their measurements instead, one for each of 20 by 20
-    squares, as if taken in its middle, and the estimate is the mean of a Gaussian process with a squared
-    exponential kernel of length `correlation`, in the manner of Luo and Sycara (ICRA 2018) and Santos,
-    Diaz-Mercado and Egerstedt (2018), plus `explore` times its standard deviation: above 0, which takes
-    several times as long to compute, robots are drawn to where nobody was.
+    With ``estimate="gp"`` robots exchange their measurements instead, one for each of 20 by 20 squares, as if
+    taken at its centre. The estimate is the mean of a Gaussian process with a squared exponential kernel of
+    length `correlation`, following Luo and Sycara (ICRA 2018) and Santos, Diaz-Mercado and Egerstedt (2018),
+    plus `explore` times its standard deviation. With `explore` above 0, which takes several times as long to
+    compute, robots are drawn to where no robot has been.
 
-    The law reads the density of the map where the robots are, and nowhere else. That neighbours tell what
-    they have learned makes its information a shared map; who hears nobody learns alone, and takes the whole
-    region for its cell. Obstacles are not known to it, and it slides along them as `lloyd` does.
+    The controller reads the density of the map at the positions of the robots, and nowhere else. Neighbours
+    exchange what they have learned, therefore its information is a shared map. A robot without neighbours
+    learns alone, and takes the whole region for its cell. Obstacles are not known; the robot slides along
+    them, as with `lloyd`.
 
-    Taken from what is generally known of the papers, not from their texts. Decided here: parameters take
-    implicit steps of `period` seconds, so that no gain is unstable; cells and centroids are sampled on a
-    lattice; w = 1; the consensus weighs all who are heard alike. The Gaussian process is the plain one, not
-    their mixtures and bounds.
+    The implementation follows summaries of the papers, not their texts. Decisions made here: parameters are
+    integrated by implicit steps of `period` seconds, so that no gain is unstable; cells and centroids are
+    sampled on a lattice; w = 1; all neighbours have the same weight in the consensus. The Gaussian process is
+    the plain one, without the mixtures and bounds of the papers.
     """
 
     name = "adaptive"
@@ -77,170 +91,251 @@ class Adaptive(BaseController):
 
     estimate: str = choice("basis", ("basis", "gp"), "how the density is learned")
     basis: float = gain(8.0, "functions", "along a side of the region", low=2.0, high=20.0, whole=True)
-    prior: float = gain(1.0, "1", "the density everywhere, before anything was measured", low=1e-3)
-    least: float = gain(0.05, "1", "the least that the density is estimated to be", low=1e-6)
-    learning: float = gain(3.0, "1/s²", "γ, how fast measurements are learned")
-    consensus: float = gain(1.0, "1/s", "ζ, how fast neighbours agree")
-    coupling: float = gain(1e-3, "1/(m⁴ s)", "k, how much the way to the centroid tells")
-    correlation: float = gain(0.12, "sides", "length of the process, in the region's longer", low=0.01)
-    explore: float = gain(0.0, "σ", "how much of the process's standard deviation is added", high=100.0)
+    prior: float = gain(1.0, "1", "density everywhere before the first measurement", low=1e-3)
+    least: float = gain(0.05, "1", "minimum of the estimated density", low=1e-6)
+    learning: float = gain(3.0, "1/s²", "γ, rate at which measurements are learned")
+    consensus: float = gain(1.0, "1/s", "ζ, rate at which neighbours agree")
+    coupling: float = gain(1e-3, "1/(m⁴ s)", "k, effect of the offset to the centroid")
+    correlation: float = gain(
+        0.12, "sides", "correlation length of the process, in longer sides of the region", low=0.01
+    )
+    explore: float = gain(0.0, "σ", "number of standard deviations that are added", high=100.0)
     period: float = gain(0.2, "s", "time from one estimate to the next", low=0.01, high=60.0)
-    k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per metre of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> AdaptiveMemory:
-        """Return what the robots guess before they have measured anything."""
-        n, lattice = len(team), Lattice.over(region, int(self.basis), self.correlation)
-        (k, m), s = lattice.functions.shape, len(lattice.squares)
-        information = np.zeros((n, m, m))
-        guess = np.full((n, k), self.prior), np.full((n, m), self.prior)
-        return AdaptiveMemory(team, lattice, *guess, information, np.zeros((n, m)), np.full((n, s), np.nan))
+        """Return the memory of robots that have not measured anything."""
+        robots = len(team)
+        lattice = Lattice.build(region, int(self.basis), self.correlation)
+        samples, functions = lattice.functions.shape
+        return AdaptiveMemory(
+            team=team,
+            lattice=lattice,
+            estimates=np.full((robots, samples), self.prior),
+            parameters=np.full((robots, functions), self.prior),
+            information=np.zeros((robots, functions, functions)),
+            projections=np.zeros((robots, functions)),
+            measurements=np.full((robots, len(lattice.squares)), np.nan),
+        )
 
     def decide(self, seen: Observations, memory: AdaptiveMemory) -> Decision:
-        if memory.goals is None or not memory.planned <= seen.time < memory.planned + self.period - 1e-9:
-            robot, _, offset, _ = seen.find_near_neighbours(np.inf)
-            places, heard = memory.lattice.places, seen.positions[robot] - offset
-            mine = find_own_samples(places, seen.positions, robot, heard)
-            if self.estimate == "gp":
-                memory = self._by_process(seen, memory)
-            else:
-                memory = self._by_basis(seen, memory, mine)
-            goals = compute_sample_centroids(mine, places, memory.estimates, seen.positions)
-            memory = replace(memory, goals=goals, planned=seen.time)
+        next_plan_time = memory.plan_time + self.period - _TIME_TOLERANCE_S
+        if memory.goals is None or not memory.plan_time <= seen.time < next_plan_time:
+            memory = self._plan(seen, memory)
         assert memory.goals is not None
-        wanted = compute_approach_velocities(
+        velocities = compute_approach_velocities(
             memory.goals - seen.positions, self.k_prop, memory.team.max_speed
         )
-        forces = compute_drive_forces(wanted, seen, memory.team, self.response_time)
+        forces = compute_drive_forces(velocities, seen, memory.team, self.response_time)
         return Decision(forces, memory.goals, {"attraction": forces}, memory=memory)
 
-    def _by_basis(self, seen: Observations, memory: AdaptiveMemory, mine: BoolArray) -> AdaptiveMemory:
-        """Return the memory after one step of the adaptation law."""
-        lattice, before, dt = memory.lattice, memory.parameters, self.period
-        here = lattice.basis(seen.positions)
-        information = memory.information + dt * here[:, :, None] * here[:, None]
-        told = memory.told + dt * here * _measured(seen)[:, None]
-        goals = compute_sample_centroids(mine, lattice.places, memory.estimates, seen.positions)
-        away = lattice.places - seen.positions[:, None]
-        lever = mine * (away * (goals - seen.positions)[:, None]).sum(axis=2) * lattice.area
-        agreed = before.copy()
-        for i in range(len(before)):
-            known = seen.neighbours.list_neighbours(i)
-            if len(known):
-                agreed[i] = before[known].mean(axis=0)
-        change = (
-            self.learning * told
-            + self.consensus * agreed
-            + self.coupling * _product(lever, lattice.functions)
-        )
-        stiffness = self.learning * information + self.consensus * np.eye(before.shape[1])
-        system = np.eye(before.shape[1]) + dt * stiffness
-        after = np.maximum(_solved(system, before + dt * change), self.least)
-        estimates = _product(after, lattice.functions.T)
-        return replace(memory, estimates=estimates, parameters=after, information=information, told=told)
+    def _plan(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
+        """Return the memory with new estimates, and the centroids of the cells by these as goals."""
+        samples = memory.lattice.samples
+        robot, _, offset, _ = seen.find_near_neighbours(np.inf)
+        is_own = find_own_samples(samples, seen.positions, robot, seen.positions[robot] - offset)
+        if self.estimate == "gp":
+            memory = self._learn_by_process(seen, memory)
+        else:
+            memory = self._learn_by_basis(seen, memory, is_own)
+        goals = compute_sample_centroids(is_own, samples, memory.estimates, seen.positions)
+        return replace(memory, goals=goals, plan_time=seen.time)
 
-    def _by_process(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
-        """Return the memory with what was measured here and told by neighbours, and what follows from it."""
-        lattice, values = memory.lattice, _measured(seen)
-        measured, estimates = memory.measured.copy(), memory.estimates.copy()
-        for i, place in enumerate(seen.positions):
-            for j in seen.neighbours.list_neighbours(i):
-                measured[i] = np.where(np.isnan(measured[i]), memory.measured[j], measured[i])
-            measured[i, ((lattice.squares - place) ** 2).sum(axis=1).argmin()] = values[i]
-            known = ~np.isnan(measured[i])
-            if np.array_equal(measured[i], memory.measured[i], equal_nan=True):
-                continue
-            cross, within = lattice.cross[:, known], lattice.within[known][:, known]
-            factor = scipy.linalg.cho_factor(within + _NOISE * np.eye(len(within)))
-            estimate = self.prior + cross @ scipy.linalg.cho_solve(factor, measured[i, known] - self.prior)
-            if self.explore:
-                near = lattice.within[:, known]
-                solved = scipy.linalg.cho_solve(factor, near.T).T
-                variance = np.maximum(1.0 - (near * solved).sum(axis=1), 0.0)
-                estimate += self.explore * self.prior * np.sqrt(variance)[lattice.cross.argmax(axis=1)]
-            estimates[i] = np.maximum(estimate, self.least)
-        return replace(memory, estimates=estimates, measured=measured)
+    def _learn_by_basis(
+        self, seen: Observations, memory: AdaptiveMemory, is_own: BoolArray
+    ) -> AdaptiveMemory:
+        """Return the memory after one implicit step of the adaptation law.
+
+        Parameters
+        ----------
+        seen : Observations
+        memory : AdaptiveMemory
+        is_own : (n, k) bool array
+            Which samples are in the cell of each robot.
+        """
+        lattice = memory.lattice
+        dt = self.period
+        functions = lattice.evaluate_basis(seen.positions)
+        information = memory.information + dt * functions[:, :, None] * functions[:, None]
+        projections = memory.projections + dt * functions * _measure(seen)[:, None]
+        goals = compute_sample_centroids(is_own, lattice.samples, memory.estimates, seen.positions)
+        offsets = lattice.samples - seen.positions[:, None]
+        moments = is_own * (offsets * (goals - seen.positions)[:, None]).sum(axis=2) * lattice.sample_area
+        change = (
+            self.learning * projections
+            + self.consensus * self._average_neighbours(seen, memory.parameters)
+            + self.coupling * _multiply(moments, lattice.functions)
+        )
+        identity = np.eye(memory.parameters.shape[1])
+        stiffness = self.learning * information + self.consensus * identity
+        parameters = _solve(identity + dt * stiffness, memory.parameters + dt * change)
+        parameters = np.maximum(parameters, self.least)
+        return replace(
+            memory,
+            estimates=_multiply(parameters, lattice.functions.T),
+            parameters=parameters,
+            information=information,
+            projections=projections,
+        )
+
+    def _average_neighbours(self, seen: Observations, parameters: Array) -> Array:
+        """Return the mean parameters of each robot's neighbours; its own ones if it has no neighbours."""
+        means = parameters.copy()
+        for robot in range(len(parameters)):
+            neighbours = seen.neighbours.list_neighbours(robot)
+            if len(neighbours) > 0:
+                means[robot] = parameters[neighbours].mean(axis=0)
+        return means
+
+    def _learn_by_process(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
+        """Return the memory with the robots' own measurements, and those of their neighbours."""
+        lattice = memory.lattice
+        values = _measure(seen)
+        measurements = memory.measurements.copy()
+        estimates = memory.estimates.copy()
+        for robot, position in enumerate(seen.positions):
+            known = measurements[robot]
+            for neighbour in seen.neighbours.list_neighbours(robot):
+                known = np.where(np.isnan(known), memory.measurements[neighbour], known)
+            square = ((lattice.squares - position) ** 2).sum(axis=1).argmin()
+            known[square] = values[robot]
+            measurements[robot] = known
+            if not np.array_equal(known, memory.measurements[robot], equal_nan=True):
+                estimates[robot] = np.maximum(self._estimate_by_process(lattice, known), self.least)
+        return replace(memory, estimates=estimates, measurements=measurements)
+
+    def _estimate_by_process(self, lattice: Lattice, measurements: Array) -> Array:
+        """Return the estimate of one robot at the samples, (k,), from measurements in the squares, (s,)."""
+        is_known = ~np.isnan(measurements)
+        samples_known = lattice.sample_covariance[:, is_known]
+        known_known = lattice.square_covariance[is_known][:, is_known]
+        factor = scipy.linalg.cho_factor(known_known + _NOISE_VARIANCE * np.eye(len(known_known)))
+        deviations = measurements[is_known] - self.prior
+        estimate = self.prior + samples_known @ scipy.linalg.cho_solve(factor, deviations)
+        if self.explore:
+            squares_known = lattice.square_covariance[:, is_known]
+            solved = scipy.linalg.cho_solve(factor, squares_known.T).T
+            variance = np.maximum(1.0 - (squares_known * solved).sum(axis=1), 0.0)
+            nearest_square = lattice.sample_covariance.argmax(axis=1)
+            estimate += self.explore * self.prior * np.sqrt(variance)[nearest_square]
+        return np.asarray(estimate)
 
 
 @kernel
-def _product(one: Array, other: Array) -> Array:
-    """Return the product of two matrices: a library's has other bits on other processors."""
-    result = np.zeros((len(one), other.shape[1]))
-    for i in range(len(one)):
-        for k in range(len(other)):
-            for j in range(other.shape[1]):
-                result[i, j] += one[i, k] * other[k, j]
+def _multiply(first: Array, second: Array) -> Array:
+    """Return the product of two matrices, with the same bits on all processors, unlike a library's."""
+    result = np.zeros((len(first), second.shape[1]))
+    for i in range(len(first)):
+        for k in range(len(second)):
+            for j in range(second.shape[1]):
+                result[i, j] += first[i, k] * second[k, j]
     return result
 
 
 @kernel
-def _solved(systems: Array, right: Array) -> Array:
+def _solve(matrices: Array, right: Array) -> Array:
     """Return the solutions, (n, m), of symmetric positive definite systems, (n, m, m), by elimination."""
-    systems, right = systems.copy(), right.copy()
+    matrices = matrices.copy()
+    right = right.copy()
     m = right.shape[1]
     for i in range(len(right)):
         for k in range(m):
             for r in range(k + 1, m):
-                part = systems[i, r, k] / systems[i, k, k]
-                if part != 0.0:
-                    right[i, r] -= part * right[i, k]
+                factor = matrices[i, r, k] / matrices[i, k, k]
+                if factor != 0.0:
+                    right[i, r] -= factor * right[i, k]
                     for c in range(k, m):
-                        systems[i, r, c] -= part * systems[i, k, c]
+                        matrices[i, r, c] -= factor * matrices[i, k, c]
         for k in range(m - 1, -1, -1):
             for c in range(k + 1, m):
-                right[i, k] -= systems[i, k, c] * right[i, c]
-            right[i, k] /= systems[i, k, k]
+                right[i, k] -= matrices[i, k, c] * right[i, c]
+            right[i, k] /= matrices[i, k, k]
     return right
 
 
-def _measured(seen: Observations) -> Array:
-    """Return φ where the robots are, (n,): all that they may know of it."""
-    return np.ones(len(seen.positions)) if seen.density is None else seen.density.evaluate(seen.positions)
+def _measure(seen: Observations) -> Array:
+    """Return φ at the positions of the robots, (n,): all that they may know of it."""
+    if seen.density is None:
+        return np.ones(len(seen.positions))
+    return seen.density.evaluate(seen.positions)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lattice:
-    """Samples of the region, with what is known there of the basis functions and of the process."""
+    """Samples of the region, and the values of basis functions and covariances at the samples."""
 
-    places: Array  # (k, 2) m, the samples
-    area: float  # m², of one sample
-    centers: Array  # (m, 2) m, of the basis functions
-    width: float  # m, their standard deviation
-    functions: Array  # (k, m), K at the samples
-    squares: Array  # (s, 2) m, the middles of squares of which one measurement each is kept
-    cross: Array  # (k, s), covariances of samples and squares
-    within: Array  # (s, s), and of squares
+    samples: Array
+    """(k, 2) m"""
+    sample_area: float
+    """Area that each sample stands for, m²."""
+    centers: Array
+    """(m, 2) m, centres of the basis functions."""
+    width: float
+    """Standard deviation of the basis functions, m."""
+    functions: Array
+    """(k, m) K at the samples."""
+    squares: Array
+    """(s, 2) m, centres of the squares with one measurement each."""
+    sample_covariance: Array
+    """(k, s) Covariances of samples and squares."""
+    square_covariance: Array
+    """(s, s) Covariances of the squares."""
 
     @classmethod
-    def over(cls, region: Region, basis: int, correlation: float) -> Lattice:
-        """Return the lattice over a region; the correlation length is a part of its longer side."""
+    def build(cls, region: Region, basis: int, correlation: float) -> Lattice:
+        """Build the lattice of a region.
+
+        Parameters
+        ----------
+        region : Region
+        basis : int
+            Number of basis functions along each side of the bounding box.
+        correlation : float
+            Correlation length, in longer sides of the bounding box.
+        """
         low_x, low_y, high_x, high_y = region.bounds
-        side = max(high_x - low_x, high_y - low_y)
+        longer_side = max(high_x - low_x, high_y - low_y)
+        length = correlation * longer_side
+        width = _BASIS_WIDTH * longer_side / basis
+        samples = _build_grid(region, _SAMPLES_PER_SIDE)
+        sample_area = (high_x - low_x) * (high_y - low_y) / len(samples)
+        samples = samples[region.contains(samples)]
+        centers = _build_grid(region, basis)
+        squares = _build_grid(region, _SQUARES_PER_SIDE)
+        return cls(
+            samples=samples,
+            sample_area=sample_area,
+            centers=centers,
+            width=width,
+            functions=_evaluate_basis(samples, centers, width),
+            squares=squares,
+            sample_covariance=np.exp(-_compute_exponents(samples, squares, length)),
+            square_covariance=np.exp(-_compute_exponents(squares, squares, length)),
+        )
 
-        def grid(count: int) -> Array:
-            along = (np.arange(count) + 0.5) / count
-            x, y = np.meshgrid(low_x + along * (high_x - low_x), low_y + along * (high_y - low_y))
-            return np.column_stack([x.ravel(), y.ravel()])
-
-        places, centers, squares, width = grid(_SAMPLES), grid(basis), grid(_SQUARES), _OVERLAP * side / basis
-        area = (high_x - low_x) * (high_y - low_y) / len(places)
-        places = places[region.contains(places)]
-        cross, within = (np.exp(-_halved(each, squares, correlation * side)) for each in (places, squares))
-        return cls(places, area, centers, width, _basis(places, centers, width), squares, cross, within)
-
-    def basis(self, positions: Array) -> Array:
-        """Return K at (n, 2) m, (n, m)."""
-        return _basis(positions, self.centers, self.width)
-
-
-def _basis(places: Array, centers: Array, width: float) -> Array:
-    """Return Gaussians at places, (k, m), divided by their sum."""
-    exponent = _halved(places, centers, width)
-    # the nearest counts 1, however far it is
-    parts = np.exp(exponent.min(axis=1, keepdims=True) - exponent)
-    return np.asarray(parts / parts.sum(axis=1, keepdims=True))
+    def evaluate_basis(self, points: Array) -> Array:
+        """Return K at points, (n, m)."""
+        return _evaluate_basis(points, self.centers, self.width)
 
 
-def _halved(places: Array, others: Array, length: float) -> Array:
-    """Return half the squares of the distances of (k, 2) and (m, 2) places, in so many metres, (k, m)."""
-    return np.asarray(((places[:, None] - others) ** 2).sum(axis=2) / (2.0 * length * length))
+def _build_grid(region: Region, count: int) -> Array:
+    """Return the centres of `count` by `count` equal rectangles over the bounding box, (count², 2) m."""
+    low_x, low_y, high_x, high_y = region.bounds
+    fractions = (np.arange(count) + 0.5) / count
+    x, y = np.meshgrid(low_x + fractions * (high_x - low_x), low_y + fractions * (high_y - low_y))
+    return np.column_stack([x.ravel(), y.ravel()])
+
+
+def _evaluate_basis(points: Array, centers: Array, width: float) -> Array:
+    """Return Gaussians at points, (k, m), divided by their sum at each point."""
+    exponents = _compute_exponents(points, centers, width)
+    # The nearest Gaussian counts 1, however far away it is.
+    values = np.exp(exponents.min(axis=1, keepdims=True) - exponents)
+    return np.asarray(values / values.sum(axis=1, keepdims=True))
+
+
+def _compute_exponents(points: Array, others: Array, length: float) -> Array:
+    """Return half the squared distances of (k, 2) and (m, 2) points, in units of a length, (k, m)."""
+    squares = ((points[:, None] - others) ** 2).sum(axis=2)
+    return np.asarray(squares / (2.0 * length * length))

@@ -23,124 +23,132 @@ REGION = SQUARE.region
 HOT = Gaussians((Gaussian((7.5, 7.0), weight=6.0, sigma=1.5),), floor=0.3)
 
 
-class Probed(Density):
-    """A density that notes where it is asked for, and has no integrals."""
+class RecordingDensity(Density):
+    """A density that records where it is evaluated, and has no integrals."""
 
-    kind: ClassVar[str] = "probed"
+    kind: ClassVar[str] = "recording"
     min_value = 0.3
     max_value = 7.0
 
     def __init__(self) -> None:
-        self.asked: list[Array] = []
+        self.evaluated: list[Array] = []
 
     def evaluate(self, points: Array) -> Array:
-        self.asked.append(points.copy())
+        self.evaluated.append(points.copy())
         return HOT.evaluate(points)
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
-        raise AssertionError("nobody knows it but where it is")
+        raise AssertionError("it is known at the positions of the robots only")
 
 
 @dataclass(frozen=True)
-class OfBasis(Probed):
-    """The density that the basis can tell exactly."""
+class BasisDensity(RecordingDensity):
+    """A density that the basis represents exactly."""
 
     lattice: Lattice
     parameters: Array
 
     def evaluate(self, points: Array) -> Array:
-        return self.lattice.basis(points) @ self.parameters
+        return self.lattice.evaluate_basis(points) @ self.parameters
 
 
-def seen_from(positions: Array, time: float, density: Density | None, reach: float = np.inf) -> Observations:
+def build_observations(
+    positions: Array, time: float, density: Density | None, reach: float = np.inf
+) -> Observations:
     n = len(positions)
     neighbours = Neighbours.from_ranges(positions, np.full(n, reach))
-    nothing = np.full((n, 2), np.nan)
-    return Observations(positions, np.zeros((n, 2)), neighbours, nothing, REGION, time, density=density)
+    no_obstacles = np.full((n, 2), np.nan)
+    return Observations(positions, np.zeros((n, 2)), neighbours, no_obstacles, REGION, time, density=density)
 
 
-def carried(law: Adaptive, density: Density | None, steps: int, reach: float = np.inf) -> AdaptiveMemory:
-    """What five robots know that were carried through the square on rich ways."""
+def learn_everywhere(
+    controller: Adaptive, density: Density | None, steps: int, reach: float = np.inf
+) -> AdaptiveMemory:
+    """Return the memory of five robots that were moved to random positions in the square."""
     rng = np.random.default_rng(4)
-    memory = law.begin(REGION, Team.homogeneous(5))
+    memory = controller.begin(REGION, Team.homogeneous(5))
     for k in range(steps):
-        seen = seen_from(rng.uniform(0.2, 9.8, (5, 2)), k * law.period, density, reach)
-        memory = law.decide(seen, memory).memory
+        seen = build_observations(rng.uniform(0.2, 9.8, (5, 2)), k * controller.period, density, reach)
+        memory = controller.decide(seen, memory).memory
     return memory
 
 
 @pytest.mark.parametrize("estimate", ["basis", "gp"])
 def test_the_density_is_read_where_the_robots_are_and_nowhere_else(estimate: str) -> None:
-    law, density = Adaptive(estimate=estimate), Probed()
-    memory = law.begin(REGION, Team.homogeneous(3))
+    controller = Adaptive(estimate=estimate)
+    density = RecordingDensity()
+    memory = controller.begin(REGION, Team.homogeneous(3))
     for k in range(5):
         positions = np.random.default_rng(k).uniform(1, 9, (3, 2))
-        memory = law.decide(seen_from(positions, 0.2 * k, density), memory).memory
-        np.testing.assert_array_equal(density.asked.pop(), positions)
-    assert not density.asked
+        memory = controller.decide(build_observations(positions, 0.2 * k, density), memory).memory
+        np.testing.assert_array_equal(density.evaluated.pop(), positions)
+    assert not density.evaluated
 
 
 @pytest.mark.parametrize("estimate", ["basis", "gp"])
-def test_what_is_as_guessed_needs_no_learning_and_is_lloyds_algorithm(estimate: str) -> None:
-    law, positions = Adaptive(estimate=estimate), np.array([[2.0, 2.0], [7.0, 3.0], [5.0, 8.0]])
-    memory = carried(law, None, 30)
+def test_a_density_equal_to_the_prior_gives_lloyds_algorithm(estimate: str) -> None:
+    controller = Adaptive(estimate=estimate)
+    positions = np.array([[2.0, 2.0], [7.0, 3.0], [5.0, 8.0]])
+    memory = learn_everywhere(controller, None, 30)
     np.testing.assert_allclose(memory.estimates, 1.0, atol=1e-6 if estimate == "gp" else 0.02)
     team = Team.homogeneous(3)
-    goals = law.decide(seen_from(positions, 0.0, None), law.begin(REGION, team)).goals
-    lloyd = Lloyd().decide(seen_from(positions, 0.0, None), Lloyd().begin(REGION, team)).goals
+    goals = controller.decide(build_observations(positions, 0.0, None), controller.begin(REGION, team)).goals
+    lloyd = Lloyd().decide(build_observations(positions, 0.0, None), Lloyd().begin(REGION, team)).goals
     np.testing.assert_allclose(goals, lloyd, atol=0.1)
 
 
-def test_parameters_are_learned_on_rich_ways_and_agreed_on() -> None:
-    """The paper's corollary: where ways are rich enough, estimates come to the truth."""
-    law = Adaptive(basis=4.0, coupling=0.0, learning=30.0)
-    lattice = Lattice.over(REGION, 4, 0.1)
+def test_parameters_converge_on_rich_trajectories() -> None:
+    """The paper's corollary: if trajectories are rich enough, estimates converge to the truth."""
+    controller = Adaptive(basis=4.0, coupling=0.0, learning=30.0)
+    lattice = Lattice.build(REGION, 4, 0.1)
     truth = np.random.default_rng(2).uniform(0.2, 3.0, 16)
-    memory = carried(law, OfBasis(lattice, truth), 400)
+    memory = learn_everywhere(controller, BasisDensity(lattice, truth), 400)
     np.testing.assert_allclose(memory.parameters, np.broadcast_to(truth, (5, 16)), atol=0.05)
 
 
-def test_who_hears_nobody_learns_alone() -> None:
-    law = Adaptive(coupling=0.0)
-    together, alone = (carried(law, HOT, 40, reach) for reach in (np.inf, 0.01))
+def test_robots_without_neighbours_learn_alone() -> None:
+    controller = Adaptive(coupling=0.0)
+    together, alone = (learn_everywhere(controller, HOT, 40, reach) for reach in (np.inf, 0.01))
     spread = [np.ptp(memory.parameters, axis=0).max() for memory in (together, alone)]
     assert spread[0] < 0.5 * spread[1]
 
 
 @pytest.mark.slow
-def test_the_process_goes_through_what_was_measured() -> None:
-    law = Adaptive(estimate="gp")
-    memory = carried(law, HOT, 12)
+def test_the_process_fits_the_measurements() -> None:
+    controller = Adaptive(estimate="gp")
+    memory = learn_everywhere(controller, HOT, 12)
     for i in range(5):
-        known = np.flatnonzero(~np.isnan(memory.measured[i]))
-        assert len(known) > 40  # of the neighbours, too
+        known = np.flatnonzero(~np.isnan(memory.measurements[i]))
+        assert len(known) > 40, "also those of the neighbours"
         squares = memory.lattice.squares[known]
-        near = np.hypot(*(memory.lattice.places[:, None] - squares).transpose(2, 0, 1)).argmin(axis=0)
-        error = np.abs(memory.estimates[i, near] - np.maximum(memory.measured[i, known], law.least))
+        near = np.hypot(*(memory.lattice.samples[:, None] - squares).transpose(2, 0, 1)).argmin(axis=0)
+        error = np.abs(
+            memory.estimates[i, near] - np.maximum(memory.measurements[i, known], controller.least)
+        )
         assert np.median(error) < 0.25
-    bolder = carried(Adaptive(estimate="gp", explore=1.0), HOT, 12)
+    bolder = learn_everywhere(Adaptive(estimate="gp", explore=1.0), HOT, 12)
     assert (bolder.estimates >= memory.estimates - 1e-9).all()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("estimate", ["basis", "gp"])
-def test_a_team_that_learns_ends_nearer_to_one_that_knows(estimate: str) -> None:
+def test_a_team_that_learns_costs_nearly_as_little_as_one_that_knows(estimate: str) -> None:
     starts = SQUARE.start().sample(5, seed=2, radius=0.1)
-    places = {}
-    for name, law, density in (
+    final = {}
+    for name, controller, density in (
         ("knows", Lloyd(), HOT),
         ("blind", Lloyd(), None),
         ("learns", Adaptive(estimate=estimate), HOT),
     ):
         environment = SQUARE if density is None else SQUARE.with_density(density)
-        places[name] = Simulation(environment, law, starts).run(15.0).positions[-1]
-    cost = {name: hot_cost(place) for name, place in places.items()}
+        final[name] = Simulation(environment, controller, starts).run(15.0).positions[-1]
+    cost = {name: compute_hot_cost(positions) for name, positions in final.items()}
     assert cost["knows"] < cost["learns"] < 0.7 * cost["blind"] + 0.3 * cost["knows"]
 
 
-def hot_cost(places: Array) -> float:
-    """The locational cost with f = r², sampled."""
+def compute_hot_cost(positions: Array) -> float:
+    """Return the locational cost with f = r², sampled."""
     x, y = np.meshgrid(np.linspace(0.05, 9.95, 100), np.linspace(0.05, 9.95, 100))
     points = np.column_stack([x.ravel(), y.ravel()])
-    square = ((points[:, None] - places) ** 2).sum(axis=2).min(axis=1)
+    square = ((points[:, None] - positions) ** 2).sum(axis=2).min(axis=1)
     return float((HOT.evaluate(points) * square).mean())
