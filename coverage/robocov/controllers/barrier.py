@@ -1,4 +1,4 @@
-"""Lloyd's algorithm behind safety barrier certificates: nobody comes closer than the safe distance."""
+"""Lloyd's algorithm with safety barrier certificates: no robot comes closer than the safe distance."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -16,51 +16,68 @@ from robocov.controllers.driving import (
 )
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.known_cells import cells_choice, compute_known_cells
-from robocov.observation import Decision, Observations, Scanning
+from robocov.observation import Decision, NearNeighbours, Observations, Scanning
 from robocov.potential import compute_separations
 from robocov.team import Team
 
-_ROUNDING = 1e-3  # metres over which the braking curve, vertical at the safe distance, is rounded
-_TOGETHER = 1e-9  # distance in metres at which robots in one place are taken to be
+_ROUNDING_M = 1e-3
+"""Length over which the square root in h, which is vertical at the safe distance, is rounded."""
+_MIN_DISTANCE_M = 1e-9
+"""Distance that robots at the same position are treated as having."""
+_MIN_PASSING_CLEARANCE_M = 1e-3
+"""Length that is added to the safe gap where the distance to a passing robot divides."""
+_MIN_NORM = 1e-300
 
 
-class Heard(NamedTuple):
-    """Reported positions of the robots that were near."""
+class HeardNeighbours(NamedTuple):
+    """Reported positions of near robots at one time."""
 
-    time: float  # s
-    pair: IntArray  # (m,), robot * n + neighbour, ascending
-    positions: Array  # (m, 2) m, of the neighbour
+    time: float
+    """s"""
+    pair: IntArray
+    """(m,) robot * n + neighbour, ascending."""
+    positions: Array
+    """(m, 2) m, of the neighbours."""
+
+
+class HalfPlanes(NamedTuple):
+    """Half planes of allowed accelerations a of each robot: normals · a <= limits."""
+
+    normals: Array
+    """(n, k, 2) Unit normals; nan for no constraint."""
+    limits: Array
+    """(n, k) m/s²"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BarrierMemory(Memory):
-    """Memory of the robots, with the neighbours heard."""
+    """Memory of the robots, with the neighbours at the last step."""
 
-    heard: Heard | None = None
+    heard: HeardNeighbours | None = None
 
 
 @dataclass(frozen=True)
 class Barrier(BaseController):
     """Lloyd's algorithm, filtered by safety barrier certificates (Wang, Ames and Egerstedt 2017).
 
-    Two robots that brake as hard as they can must come to rest at the safe distance D_s or before:
+    Two robots that brake as hard as they can must come to rest at the safe distance D_s or before it:
 
         h_ij = sqrt(2 (alpha_i + alpha_j) (|dp| - D_s)) + dp · dv / |dp| >= 0
 
-    is kept by dh_ij/dt >= -gamma h_ij³, which is linear in the accelerations. Each of the two takes the
-    part alpha_i / (alpha_i + alpha_j) of it, so that everybody decides alone. What is wanted, here
-    Lloyd's acceleration, is changed as little as these half planes demand: one quadratic programme for
-    each robot, solved exactly. Where nothing is allowed, the robot brakes. An obstacle point does not
-    move and takes no part: alpha_j = 0; that it is a point of a wall, along which the closest point moves
-    on, is granted by leaving out what passing a lone point by would allow.
+    This is ensured by dh_ij/dt >= -gamma h_ij³, which is linear in the accelerations. Each of the two robots
+    takes the fraction alpha_i / (alpha_i + alpha_j) of it, so that all decide independently. The desired
+    acceleration, here Lloyd's, is changed as little as these half planes require: one quadratic programme for
+    each robot, solved exactly. If no acceleration is allowed, the robot brakes. An obstacle point does not
+    move and does not contribute: alpha_j = 0. The closest point of a wall moves on as the robot passes;
+    therefore the term by which a single point would be passed is left out.
 
-    Robots do not hear velocities: each derives its neighbours' from two positions that it heard. Obstacle
-    points are the closest one and the last scan's. That the bodies and limits of the others are known is
-    taken for granted. Decided here: the root is rounded over the last millimetre, and inside the safe
-    distance continued as an odd function, so that who begins too near is led out.
+    Robots do not know the velocities of others: each derives them from two reported positions. Obstacle
+    points are the closest one and those of the last scan. The bodies and limits of the others are assumed to
+    be known. Decisions made here: the square root is rounded over the last millimetre, and continued as an
+    odd function within the safe distance, so that robots that start too close to each other separate.
 
-    Taken from what is generally known of the paper (IEEE T-RO 33, 661-674), not from its text; h_ij as
-    the documentation of MathWorks' barrier certificate block has it.
+    The implementation follows summaries of the paper (IEEE T-RO 33, 661-674), not its text; h_ij is that of
+    the documentation of MathWorks' barrier certificate block.
     """
 
     name = "barrier"
@@ -69,93 +86,162 @@ class Barrier(BaseController):
     scanning = Scanning(rays=72, period=0.1)
     memory_type = BarrierMemory
 
-    safe_gap: float = gain(0.05, "m", "least distance between surfaces: D_s less the radii", high=100.0)
-    gamma: float = gain(20.0, "s/m²", "how fast h may fall, as gamma h³", low=1e-3)
-    braking: float = gain(0.8, "a_max", "alpha: the part of the acceleration counted on", low=0.05, high=1.0)
-    k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the centroid", high=100.0)
+    safe_gap: float = gain(0.05, "m", "minimum distance between surfaces: D_s minus the radii", high=100.0)
+    gamma: float = gain(20.0, "s/m²", "rate at which h may decrease, as gamma h³", low=1e-3)
+    braking: float = gain(
+        0.8, "a_max", "alpha, the fraction of the acceleration that is counted on", low=0.05, high=1.0
+    )
+    k_prop: float = gain(2.0, "1/s", "desired speed per metre of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()
     cells: str = cells_choice()
 
     def decide(self, seen: Observations, memory: BarrierMemory) -> Decision:
-        """Return the forces of the nearest accelerations to Lloyd's that are certified."""
         team = memory.team
         cells = compute_known_cells(seen, self.cells, memory.triangulation)
-        wanted = compute_approach_velocities(cells.centroid - seen.positions, self.k_prop, team.max_speed)
-        wanted = (wanted - seen.velocities) / self.response_time
-        chosen, memory = self.certified(seen, memory, wanted)
-        forces = chosen * team.mass[:, None] + seen.velocities * team.viscosity[:, None]
-        limit = team.max_acceleration / np.maximum(np.hypot(*wanted.T), 1e-300)
-        changed = (chosen - wanted * np.minimum(1.0, limit)[:, None]) * team.mass[:, None]
-        terms = {"attraction": forces - changed, "barrier": changed}
-        memory = replace(memory, triangulation=cells.triangulation)
-        return Decision(forces, cells.centroid, terms, cells, memory)
+        velocities = compute_approach_velocities(cells.centroid - seen.positions, self.k_prop, team.max_speed)
+        desired = (velocities - seen.velocities) / self.response_time
+        accelerations, memory = self.certify(seen, memory, desired)
+        forces = accelerations * team.mass[:, None] + seen.velocities * team.viscosity[:, None]
+        limit = team.max_acceleration / np.maximum(np.hypot(*desired.T), _MIN_NORM)
+        possible = desired * np.minimum(1.0, limit)[:, None]
+        corrections = (accelerations - possible) * team.mass[:, None]
+        return Decision(
+            forces=forces,
+            goals=cells.centroid,
+            terms={"attraction": forces - corrections, "barrier": corrections},
+            cells=cells,
+            memory=replace(memory, triangulation=cells.triangulation),
+        )
 
-    def certified(
-        self, seen: Observations, memory: BarrierMemory, wanted: Array
+    def certify(
+        self, seen: Observations, memory: BarrierMemory, desired: Array
     ) -> tuple[Array, BarrierMemory]:
-        """Return the certified accelerations nearest to the wanted ones, (n, 2) m/s², and the new memory."""
+        """Return the certified accelerations that are nearest to the desired ones.
+
+        Parameters
+        ----------
+        seen : Observations
+        memory : BarrierMemory
+        desired : (n, 2) array, m/s²
+
+        Returns
+        -------
+        accelerations : (n, 2) array, m/s²
+        memory : BarrierMemory
+        """
         team = memory.team
         returns = update_returns(seen, memory.returns)
-        robots, heard = self._robots(seen, memory)
-        obstacles = self._obstacles(seen, team, collect_obstacle_points(seen, returns))
-        normals, levels = (np.concatenate(both, axis=1) for both in zip(robots, obstacles, strict=True))
-        chosen, feasible = find_nearest_allowed(wanted, normals, levels, team.max_acceleration)
-        # to rest within the response time, or as hard as possible
+        near = self._find_near_neighbours(seen, team)
+        heard = _to_heard_neighbours(near, seen)
+        neighbour_velocities = _derive_velocities(heard, memory.heard, team.max_speed[near.neighbour])
+        robots = self._constrain_to_robots(seen, team, near, neighbour_velocities)
+        obstacles = self._constrain_to_obstacles(seen, team, collect_obstacle_points(seen, returns))
+        nearest, is_feasible = find_nearest_allowed(
+            desired,
+            np.concatenate([robots.normals, obstacles.normals], axis=1),
+            np.concatenate([robots.limits, obstacles.limits], axis=1),
+            team.max_acceleration,
+        )
+        # Brake to rest within the response time, or as hard as possible.
         speed = np.hypot(*seen.velocities.T)
-        brake = -np.minimum(1.0 / self.response_time, team.max_acceleration / np.maximum(speed, 1e-300))
-        chosen = np.where(feasible[:, None], chosen, seen.velocities * brake[:, None])
-        return chosen, replace(memory, heard=heard, returns=returns)
+        rate = -np.minimum(1.0 / self.response_time, team.max_acceleration / np.maximum(speed, _MIN_NORM))
+        accelerations = np.where(is_feasible[:, None], nearest, seen.velocities * rate[:, None])
+        return accelerations, replace(memory, heard=heard, returns=returns)
 
-    def _robots(self, seen: Observations, memory: BarrierMemory) -> tuple[tuple[Array, Array], Heard]:
-        """Return the half planes that keep robots apart, and what was heard."""
-        n, team = len(seen.positions), memory.team
-        alpha = self.braking * team.max_acceleration
-        # from farther away two robots at full speed can stop, and gamma h³ is not yet small
-        stopping = 2.0 * float(team.max_speed.max()) ** 2 / float(alpha.min())
-        reach = 2.0 * float(team.radius.max()) + self.safe_gap + 2.0 * stopping
-        robot, neighbour, offset, distance = seen.find_near_neighbours(reach)
-        heard = Heard(seen.time, robot * n + neighbour, seen.positions[robot] - offset)
-        closing = seen.velocities[robot] - _derived(heard, memory.heard, team.max_speed[neighbour])
-        together = distance < _TOGETHER
-        normal = offset / np.maximum(distance, _TOGETHER)[:, None]
-        normal[together] = compute_separations(robot[together], neighbour[together])
-        power = alpha[robot] + alpha[neighbour]
+    def _find_near_neighbours(self, seen: Observations, team: Team) -> NearNeighbours:
+        """Find the neighbours that constrain a robot now."""
+        # Two robots at full speed can stop from farther away. Twice that, because gamma h³ is then not small.
+        stopping_distance = 2.0 * float(team.max_speed.max()) ** 2 / float(self._count_on(team).min())
+        return seen.find_near_neighbours(
+            2.0 * float(team.radius.max()) + self.safe_gap + 2.0 * stopping_distance
+        )
+
+    def _count_on(self, team: Team) -> Array:
+        """Return alpha, the acceleration of each robot that is counted on for braking, (n,) m/s²."""
+        return np.asarray(self.braking * team.max_acceleration)
+
+    def _constrain_to_robots(
+        self, seen: Observations, team: Team, near: NearNeighbours, neighbour_velocities: Array
+    ) -> HalfPlanes:
+        """Return the half planes that keep robots apart."""
+        n = len(seen.positions)
+        robot, neighbour, offset, distance = near
+        alpha = self._count_on(team)
+        relative_velocities = seen.velocities[robot] - neighbour_velocities
+        is_together = distance < _MIN_DISTANCE_M
+        normal = offset / np.maximum(distance, _MIN_DISTANCE_M)[:, None]
+        normal[is_together] = compute_separations(robot[is_together], neighbour[is_together])
+        total_alpha = alpha[robot] + alpha[neighbour]
         gap = distance - team.radius[robot] - team.radius[neighbour] - self.safe_gap
-        along = (normal * closing).sum(axis=1)
-        passing = np.maximum((closing * closing).sum(axis=1) - along**2, 0.0)
-        level = self._level(gap, along, power) + passing / np.maximum(distance, self.safe_gap + 1e-3)
-        level *= alpha[robot] / power
-        return (arrange_in_rows(robot, n, -normal, np.nan), arrange_in_rows(robot, n, level, np.inf)), heard
+        along = (normal * relative_velocities).sum(axis=1)
+        squared_sideways = np.maximum((relative_velocities * relative_velocities).sum(axis=1) - along**2, 0.0)
+        min_distance = self.safe_gap + _MIN_PASSING_CLEARANCE_M
+        limit = self._limit_approach(gap, along, total_alpha)
+        limit += squared_sideways / np.maximum(distance, min_distance)
+        limit *= alpha[robot] / total_alpha
+        return HalfPlanes(
+            normals=arrange_in_rows(robot, n, -normal, np.nan),
+            limits=arrange_in_rows(robot, n, limit, np.inf),
+        )
 
-    def _obstacles(self, seen: Observations, team: Team, points: Array) -> tuple[Array, Array]:
-        """Return the half planes that keep robots off (n, k, 2) obstacle points; nan where none."""
+    def _constrain_to_obstacles(self, seen: Observations, team: Team, points: Array) -> HalfPlanes:
+        """Return the half planes that keep robots away from obstacle points, (n, k, 2) m; nan for none."""
         offset = seen.positions[:, None] - points
         distance = np.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2)
         normal = offset / np.where(distance > 0.0, distance, np.nan)[..., None]
         along = (normal * seen.velocities[:, None]).sum(axis=2)
         gap = distance - (team.radius + self.safe_gap)[:, None]
-        alpha = (self.braking * team.max_acceleration)[:, None]
-        level = self._level(np.nan_to_num(gap), np.nan_to_num(along), alpha)
-        return -normal, np.where(np.isnan(along), np.inf, level)
+        alpha = self._count_on(team)[:, None]
+        limit = self._limit_approach(np.nan_to_num(gap), np.nan_to_num(along), alpha)
+        return HalfPlanes(normals=-normal, limits=np.where(np.isnan(along), np.inf, limit))
 
-    def _level(self, gap: Array, along: Array, power: Array) -> Array:
-        """Return how much acceleration towards each other is allowed, m/s²: gamma h³ + d/dt of the root.
+    def _limit_approach(self, gap: Array, along: Array, alpha: Array) -> Array:
+        """Return the maximum acceleration towards each other: gamma h³ plus the derivative of the root in h.
 
-        Where h >= 0 it never asks for more than `power`; where it is not, no more could be asked for.
+        Parameters
+        ----------
+        gap : array, m
+            Distance minus D_s.
+        along : array, m/s
+            Speed away from each other.
+        alpha : array, m/s²
+            Sum of both accelerations that are counted on.
+
+        Returns
+        -------
+        array, m/s²
+            At least -alpha: if h >= 0, no harder braking is required; otherwise none is possible.
         """
-        rounded = np.sqrt(np.abs(gap) + _ROUNDING)
-        root = np.sqrt(2.0 * power)
-        h = root * np.copysign(rounded - np.sqrt(_ROUNDING), gap) + along
-        return np.asarray(np.maximum(self.gamma * h**3 + 0.5 * root / rounded * along, -power))
+        rounded = np.sqrt(np.abs(gap) + _ROUNDING_M)
+        root = np.sqrt(2.0 * alpha)
+        h = root * np.copysign(rounded - np.sqrt(_ROUNDING_M), gap) + along
+        return np.asarray(np.maximum(self.gamma * h**3 + 0.5 * root / rounded * along, -alpha))
 
 
-def _derived(heard: Heard, before: Heard | None, fastest: Array) -> Array:
-    """Return the velocities of neighbours, (m, 2) m/s, from where they were heard to be; unknown ones zero.
+def _to_heard_neighbours(near: NearNeighbours, seen: Observations) -> HeardNeighbours:
+    """Return the reported positions of near neighbours."""
+    pair = near.robot * len(seen.positions) + near.neighbour
+    return HeardNeighbours(seen.time, pair, seen.positions[near.robot] - near.offset)
 
-    Where a message was late, the next one makes a leap: nobody is faster than `fastest`, (m,) m/s.
+
+def _derive_velocities(heard: HeardNeighbours, previous: HeardNeighbours | None, max_speed: Array) -> Array:
+    """Derive the velocities of neighbours from two reported positions; unknown velocities are zero.
+
+    Parameters
+    ----------
+    heard : HeardNeighbours
+    previous : HeardNeighbours or None
+        Those of the last step.
+    max_speed : (m,) array, m/s
+        Maximum speeds of the neighbours. The position jumps when a message was late.
+
+    Returns
+    -------
+    (m, 2) array, m/s
     """
     velocities = np.zeros_like(heard.positions)
-    if before is not None and heard.time > before.time:
-        _, now, then = np.intersect1d(heard.pair, before.pair, assume_unique=True, return_indices=True)
-        velocities[now] = (heard.positions[now] - before.positions[then]) / (heard.time - before.time)
-    return compute_approach_velocities(velocities, 1.0, fastest)
+    if previous is not None and heard.time > previous.time:
+        _, now, before = np.intersect1d(heard.pair, previous.pair, assume_unique=True, return_indices=True)
+        moves = heard.positions[now] - previous.positions[before]
+        velocities[now] = moves / (heard.time - previous.time)
+    return compute_approach_velocities(velocities, 1.0, max_speed)

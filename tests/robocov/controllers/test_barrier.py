@@ -23,61 +23,64 @@ from robocov.team import Team
 SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
 
 
-def half_planes(seed: int, n: int, m: int) -> tuple[np.ndarray, ...]:
+def sample_half_planes(seed: int, n: int, m: int) -> tuple[np.ndarray, ...]:
     rng = np.random.default_rng(seed)
     normals = rng.normal(size=(n, m, 2))
     normals /= np.hypot(normals[..., 0], normals[..., 1])[..., None]
-    # mostly met by some point of the disc, as h >= 0 makes them
+    # Most of them contain a point of the disc, as they do with h >= 0.
     offsets = rng.normal(0.7, 0.8, size=(n, m))
     offsets[rng.random((n, m)) < 0.2] = np.inf
     normals[rng.random((n, m)) < 0.1] = np.nan
     return rng.normal(scale=2.0, size=(n, 2)), normals, offsets, rng.uniform(0.5, 2.5, n)
 
 
-def all_candidates(wanted: np.ndarray, normals: np.ndarray, offsets: np.ndarray, radius: float) -> np.ndarray:
-    """All points where an optimum can be: the wanted one, feet on lines and circle, meetings of any two."""
+def list_candidates(
+    desired: np.ndarray, normals: np.ndarray, offsets: np.ndarray, radius: float
+) -> np.ndarray:
+    """Return all possible optima: the desired point, its projections, and intersections of any two lines."""
     lines = [(a, b) for a, b in zip(normals, offsets, strict=True) if np.isfinite(b) and np.isfinite(a).all()]
-    found = [wanted, wanted * radius / max(np.hypot(*wanted), 1e-300)]
+    candidates = [desired, desired * radius / max(np.hypot(*desired), 1e-300)]
     for k, (a, b) in enumerate(lines):
-        found.append(wanted - (a @ wanted - b) * a)
+        candidates.append(desired - (a @ desired - b) * a)
         if abs(b) <= radius:
             half = np.sqrt(radius**2 - b**2) * np.array([-a[1], a[0]])
-            found += [a * b + half, a * b - half]
+            candidates += [a * b + half, a * b - half]
         for c, d in lines[:k]:
             matrix = np.array([a, c])
             if abs(np.linalg.det(matrix)) > 1e-9:
-                found.append(np.linalg.solve(matrix, [b, d]))
-    return np.array(found)
+                candidates.append(np.linalg.solve(matrix, [b, d]))
+    return np.array(candidates)
 
 
 @settings(max_examples=60)
 @given(seed=st.integers(0, 2**32), m=st.integers(0, 9))
-def test_the_programme_is_solved_exactly(seed: int, m: int) -> None:
-    """Against the best of all candidates, which is slow and obvious."""
-    wanted, normals, offsets, radius = half_planes(seed, 5, m)
-    best, feasible = find_nearest_allowed(wanted, normals, offsets, radius)
+def test_the_quadratic_programme_is_solved_exactly(seed: int, m: int) -> None:
+    """Compare with the best of all candidates."""
+    desired, normals, offsets, radius = sample_half_planes(seed, 5, m)
+    best, feasible = find_nearest_allowed(desired, normals, offsets, radius)
     for i in range(5):
         real = np.isfinite(offsets[i]) & np.isfinite(normals[i, :, 0])
-        candidates = all_candidates(wanted[i], normals[i], offsets[i], radius[i])
+        candidates = list_candidates(desired[i], normals[i], offsets[i], radius[i])
         beyond = (candidates @ normals[i, real].T - offsets[i, real]).max(axis=1, initial=-1.0)
         allowed = candidates[(beyond < 1e-9) & (np.hypot(*candidates.T) < radius[i] + 1e-9)]
         assert feasible[i] == bool(len(allowed))
         if feasible[i]:
-            least = np.hypot(*(allowed - wanted[i]).T).min()
-            assert np.hypot(*(best[i] - wanted[i])) == pytest.approx(least, abs=1e-8)
+            shortest = np.hypot(*(allowed - desired[i]).T).min()
+            assert np.hypot(*(best[i] - desired[i])) == pytest.approx(shortest, abs=1e-8)
             assert np.hypot(*best[i]) <= radius[i] + 1e-9
             assert (normals[i, real] @ best[i] <= offsets[i, real] + 1e-9).all()
 
 
-def test_against_a_general_solver() -> None:
-    wanted, normals, offsets, radius = half_planes(7, 20, 6)
-    nothing = np.isinf(offsets) | np.isnan(normals[..., 0])
-    normals[nothing], offsets[nothing] = (1.0, 0.0), 9.0
-    best, feasible = find_nearest_allowed(wanted, normals, offsets, radius)
+def test_the_solution_agrees_with_a_general_solver() -> None:
+    desired, normals, offsets, radius = sample_half_planes(7, 20, 6)
+    is_empty = np.isinf(offsets) | np.isnan(normals[..., 0])
+    normals[is_empty] = (1.0, 0.0)
+    offsets[is_empty] = 9.0
+    best, feasible = find_nearest_allowed(desired, normals, offsets, radius)
     assert 5 < feasible.sum() < 20
     for i in np.flatnonzero(feasible):
-        found = minimize(
-            lambda u, i=i: ((u - wanted[i]) ** 2).sum(),
+        solution = minimize(
+            lambda u, i=i: ((u - desired[i]) ** 2).sum(),
             best[i] * 0.9,
             constraints=[
                 {"type": "ineq", "fun": lambda u, i=i: offsets[i] - normals[i] @ u},
@@ -86,10 +89,10 @@ def test_against_a_general_solver() -> None:
             method="SLSQP",
             options={"ftol": 1e-13},
         )
-        np.testing.assert_allclose(best[i], found.x, atol=1e-5)
+        np.testing.assert_allclose(best[i], solution.x, atol=1e-5)
 
 
-def test_nobody_and_nothing() -> None:
+def test_no_robots_and_no_constraints_are_valid() -> None:
     best, feasible = find_nearest_allowed(
         np.zeros((0, 2)), np.zeros((0, 3, 2)), np.zeros((0, 3)), np.zeros(0)
     )
@@ -104,9 +107,9 @@ def test_nobody_and_nothing() -> None:
 
 @dataclass(frozen=True)
 class Headlong:
-    """Everybody straight to a place of its own as hard as it can, through walls and each other, if let."""
+    """Drives each robot straight to a goal as hard as possible, through walls and other robots if allowed."""
 
-    places: tuple[tuple[float, float], ...]
+    goals: tuple[tuple[float, float], ...]
     filter: Barrier
     name: ClassVar[str] = "headlong"
     label: ClassVar[str] = "Headlong"
@@ -120,64 +123,65 @@ class Headlong:
         return self.filter.begin(region, team)
 
     def decide(self, seen: Observations, memory: BarrierMemory) -> Decision:
-        wanted = 50.0 * (np.array(self.places) - seen.positions)
-        chosen, memory = self.filter.certified(seen, memory, wanted)
-        return Decision(chosen + 2.0 * seen.velocities, memory=memory)
+        desired = 50.0 * (np.array(self.goals) - seen.positions)
+        accelerations, memory = self.filter.certify(seen, memory, desired)
+        return Decision(accelerations + 2.0 * seen.velocities, memory=memory)
 
 
-def least_gaps(simulation: Simulation, seconds: float) -> tuple[float, float]:
-    """Return the least gaps between robots, and between robots and walls, over a run."""
-    robots = walls = np.inf
+def measure_min_gaps(simulation: Simulation, seconds: float) -> tuple[float, float]:
+    """Return the minimum gaps between robots, and between robots and walls, over a run."""
+    robots = np.inf
+    walls = np.inf
     radius = simulation.team.radius
     both = np.add.outer(radius, radius) + np.diag(np.full(len(radius), -np.inf))
     for _ in range(round(seconds / simulation.dt)):
         simulation.step()
-        places, points = simulation.positions, simulation.observe_and_decide().seen.obstacle_points
-        robots = min(robots, float((np.hypot(*(places[:, None] - places).T) - both).min()))
-        walls = min(walls, float(np.nanmin(np.hypot(*(places - points).T) - radius, initial=np.inf)))
+        positions = simulation.positions
+        points = simulation.observe_and_decide().seen.obstacle_points
+        robots = min(robots, float((np.hypot(*(positions[:, None] - positions).T) - both).min()))
+        walls = min(walls, float(np.nanmin(np.hypot(*(positions - points).T) - radius, initial=np.inf)))
     return robots, walls
 
 
 @pytest.mark.parametrize(("name", "seed"), [("rooms", 0), ("cave", 1), ("blocks-a", 2)])
-def test_nobody_comes_closer_than_the_safe_distance(name: str, seed: int) -> None:
-    """The claim of the paper: whoever begins at the safe distance keeps it, from robots and from walls."""
+def test_no_robot_comes_closer_than_the_safe_distance(name: str, seed: int) -> None:
+    """The claim of the paper: robots that start at the safe distance keep it, from robots and from walls."""
     environment = load_map(name)
-    law = Barrier(safe_gap=0.05)
-    apart = environment.start().sample(6, seed=seed, radius=0.16)
-    robots, walls = least_gaps(Simulation(environment, law, apart), 8.0)
+    starts = environment.start().sample(6, seed=seed, radius=0.16)
+    robots, walls = measure_min_gaps(Simulation(environment, Barrier(safe_gap=0.05), starts), 8.0)
     assert robots > 0.05 - 1e-3
     assert walls > 0.05 - 1e-3
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 2.0])
-def test_who_wants_to_go_through_each_other_does_not(speed: float) -> None:
-    """Robots on a circle, each of which wants to go straight to the other side, at full speed."""
+def test_robots_that_drive_through_each_other_are_stopped(speed: float) -> None:
+    """Each robot on a circle drives straight to the opposite side at full speed."""
     angle = np.arange(6) * np.pi / 3 + 0.1
     ring = 5.0 + 3.0 * np.column_stack([np.cos(angle), np.sin(angle)])
-    law = Headlong(tuple((10 - x, 10 - y) for x, y in ring.tolist()), Barrier(safe_gap=0.05))
+    controller = Headlong(tuple((10 - x, 10 - y) for x, y in ring.tolist()), Barrier(safe_gap=0.05))
     team = Team.homogeneous(6, max_speed=speed)
-    robots, _ = least_gaps(Simulation(SQUARE, law, ring, team), 8.0)
+    robots, _ = measure_min_gaps(Simulation(SQUARE, controller, ring, team), 8.0)
     assert 0.05 - 1e-3 < robots < 0.3
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_who_wants_to_go_through_walls_does_not(seed: int) -> None:
+def test_robots_that_drive_through_walls_are_stopped(seed: int) -> None:
     environment = load_map("rooms")
     starts = environment.start("uniform").sample(6, seed=seed, radius=0.16)
     goals = tuple((x, y) for x, y in environment.start("uniform").sample(6, seed=seed + 9).tolist())
-    robots, walls = least_gaps(Simulation(environment, Headlong(goals, Barrier()), starts), 5.0)
+    robots, walls = measure_min_gaps(Simulation(environment, Headlong(goals, Barrier()), starts), 5.0)
     assert robots > 0.05 - 1e-3
     assert 0.05 - 1e-3 < walls < 0.1
 
 
-def test_who_begins_too_near_is_led_out() -> None:
+def test_robots_that_start_too_close_to_each_other_separate() -> None:
     simulation = Simulation(SQUARE, Barrier(safe_gap=0.1), [[5.0, 5.0], [5.21, 5.0]])
-    robots, _ = least_gaps(simulation, 3.0)
+    robots, _ = measure_min_gaps(simulation, 3.0)
     assert robots > 0.0
-    assert least_gaps(simulation, 1.0)[0] > 0.1
+    assert measure_min_gaps(simulation, 1.0)[0] > 0.1
 
 
-def test_far_from_everything_it_is_lloyd() -> None:
+def test_far_from_obstacles_and_robots_it_is_lloyds_algorithm() -> None:
     seen = Observations(
         np.array([[3.0, 5.0], [7.0, 5.0]]),
         np.zeros((2, 2)),
@@ -185,15 +189,16 @@ def test_far_from_everything_it_is_lloyd() -> None:
         np.full((2, 2), np.nan),
         SQUARE.region,
     )
-    law = Barrier()
-    decision = law.decide(seen, law.begin(SQUARE.region, Team.homogeneous(2)))
+    controller = Barrier()
+    decision = controller.decide(seen, controller.begin(SQUARE.region, Team.homogeneous(2)))
     np.testing.assert_allclose(decision.terms["barrier"], 0.0, atol=1e-12)
     np.testing.assert_allclose(decision.forces, decision.terms["attraction"] + decision.terms["barrier"])
 
 
-def test_velocities_of_others_are_derived_from_where_they_were_heard() -> None:
-    """A robot that comes nearer leaves less than one that stands in the same place, or goes ahead."""
-    law, team = Barrier(), Team.homogeneous(2)
+def test_velocities_of_neighbours_are_derived_from_their_positions() -> None:
+    """An approaching robot allows less acceleration than one at rest there, or one that drives ahead."""
+    controller = Barrier()
+    team = Team.homogeneous(2)
     here = Observations(
         np.array([[3.0, 5.0], [3.4, 5.0]]),
         np.array([[0.3, 0.0], [0.0, 0.0]]),
@@ -204,21 +209,21 @@ def test_velocities_of_others_are_derived_from_where_they_were_heard() -> None:
     )
     ahead = np.array([[10.0, 0.0], [0.0, 0.0]])
 
-    def allowed(came_from: float) -> float:
-        was = replace(here, positions=np.array([[3.0, 5.0], [came_from, 5.0]]), time=1.0 - 1 / 60)
-        _, memory = law.certified(was, law.begin(SQUARE.region, team), ahead)
-        return float(law.certified(here, memory, ahead)[0][0, 0])
+    def compute_allowed(previous_x: float) -> float:
+        previous = replace(here, positions=np.array([[3.0, 5.0], [previous_x, 5.0]]), time=1.0 - 1 / 60)
+        _, memory = controller.certify(previous, controller.begin(SQUARE.region, team), ahead)
+        return float(controller.certify(here, memory, ahead)[0][0, 0])
 
-    coming, standing, going = (allowed(3.4 - speed / 60) for speed in (-0.3, 0.0, 0.3))
-    assert coming < standing < going
-    # the certificate itself, written down: alpha 1.6 each, D_s 0.25, the root rounded over 1 mm
+    approaching, standing, leaving = (compute_allowed(3.4 - speed / 60) for speed in (-0.3, 0.0, 0.3))
+    assert approaching < standing < leaving
+    # The certificate by hand: alpha 1.6 for each robot, D_s 0.25, the root rounded over 1 mm.
     root = np.sqrt(2 * 3.2)
     h = root * (np.sqrt(0.151) - np.sqrt(0.001)) - 0.3
     assert standing == pytest.approx((20 * h**3 - 0.3 * root / (2 * np.sqrt(0.151))) / 2, rel=1e-9)
 
 
-def test_the_same_run_twice() -> None:
+def test_two_runs_are_equal() -> None:
     rooms = load_map("rooms")
     starts = rooms.start().sample(6, seed=1)
-    one, other = (Simulation(rooms, Barrier(), starts).run(1.5) for _ in range(2))
-    assert one.positions.tobytes() == other.positions.tobytes()
+    first, second = (Simulation(rooms, Barrier(), starts).run(1.5) for _ in range(2))
+    assert first.positions.tobytes() == second.positions.tobytes()
