@@ -147,7 +147,12 @@ class Kernel:
         return self._dispatcher is not None and len(self._dispatcher.signatures) > 0
 
     def get_dispatcher(self) -> Any:
-        """Return numba's dispatcher for the function; import numba if this is the first kernel of all."""
+        """Return numba's dispatcher for the function; import numba if this is the first kernel of all.
+
+        Returns
+        -------
+        numba dispatcher
+        """
         with _lock:
             if self._dispatcher is None or (self._is_cached and not _is_cache_usable):
                 self._is_cached = _is_cache_usable and cache_folder() is not None
@@ -182,12 +187,23 @@ def interpret_kernels(must_interpret: Callable[[str], bool] | None) -> None:
 
 
 def is_interpreting() -> bool:
-    """Return whether some kernels may be run as Python; see `interpret_kernels`."""
+    """Return whether some kernels may be run as Python; see `interpret_kernels`.
+
+    Returns
+    -------
+    bool
+    """
     return _must_interpret is not None
 
 
 def list_compiled_kernels() -> list[str]:
-    """Return the names of the kernels that this process has compiled, or loaded from the cache."""
+    """Return the names of the kernels that this process has compiled, or loaded from the cache.
+
+    Returns
+    -------
+    list of str
+        In alphabetical order.
+    """
     return sorted(each.name for each in _kernels if each.is_compiled)
 
 
@@ -201,6 +217,10 @@ def import_numba() -> ModuleType:
     """Import numba, in spite of a folder `coverage` on the path, and let its kernels call ours.
 
     Numba takes any module `coverage` for coverage.py, also our source root of that name.
+
+    Returns
+    -------
+    module
     """
     with _lock:
         return _import_numba()
@@ -246,10 +266,15 @@ def _import_numba() -> ModuleType:
 
 @functools.cache
 def cache_folder() -> Path | None:
-    """Return the folder that keeps the machine code of this version, or None if nothing is kept.
+    """Return the folder that keeps the machine code of this version.
 
-    A folder that belongs to somebody else, or that others may write to, is ignored: whoever can write there
-    could run code as this user. So is one that cannot be written to.
+    A folder that belongs to somebody else, or that others may write to, is ignored, because code from it
+    would run as this user. So is one that cannot be written to.
+
+    Returns
+    -------
+    Path or None
+        None if nothing is kept.
     """
     named = os.environ.get("NUMBA_CACHE_DIR")
     root = Path(named) if named else find_cache_root()

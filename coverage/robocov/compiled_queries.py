@@ -45,7 +45,24 @@ _ALL_CATEGORIES = -1
 
 @numba.extending.intrinsic  # type: ignore[untyped-decorator]
 def call_c_function(typing_context: Any, address: Any, arguments: Any) -> Any:
-    """Call a C function at an address with floats and integers; return the integer that it returns."""
+    """Call a C function at an address with floats and integers.
+
+    This is an intrinsic of numba: it is called with the types of the arguments, when a kernel is compiled.
+
+    Parameters
+    ----------
+    typing_context : numba typing context
+    address : numba type
+        Integer: where the function is.
+    arguments : numba type
+        Tuple of floats and integers.
+
+    Returns
+    -------
+    signature : numba signature
+        The call returns an integer.
+    generate_code : callable
+    """
     argument_types = numba.types.Tuple([numba.types.unliteral(argument) for argument in arguments])
     signature = numba.types.intp(numba.types.intp, argument_types)
 
@@ -58,7 +75,12 @@ def call_c_function(typing_context: Any, address: Any, arguments: Any) -> Any:
 
 
 def is_usable() -> bool:
-    """Return whether the compiled queries give the same as the public ones here."""
+    """Return whether the compiled queries give the same results as the public ones here.
+
+    Returns
+    -------
+    bool
+    """
     if os.environ.get(PUBLIC_QUERIES_VARIABLE, "0") not in ("", "0"):
         return False
     if not _PASSES_STRUCTS_IN_REGISTERS:

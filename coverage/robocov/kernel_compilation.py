@@ -159,7 +159,16 @@ def compile_kernels(examples: Sequence[Example] = COMMON_EXAMPLES) -> None:
 
 
 def are_kernels_compiled(examples: Sequence[Example] = COMMON_EXAMPLES) -> bool:
-    """Return whether the machine code of the kernels of examples is in the cache."""
+    """Return whether the machine code of the kernels of examples is in the cache.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+
+    Returns
+    -------
+    bool
+    """
     folder = cache_folder()
     return folder is not None and all(_get_marker(folder, example).exists() for example in examples)
 
@@ -169,8 +178,12 @@ def compile_in_background() -> Iterator[None]:
     """Compile all kernels in another process, and run those that are not ready as Python.
 
     The results are the same. A step of six robots in Python takes less than a millisecond, so that a window
-    shows them in real time from the beginning. On leaving the context the other process is ended; what it has
-    not compiled, the next one does.
+    shows them in real time from the beginning. When the context ends, so does the other process; the next one
+    compiles the rest.
+
+    Returns
+    -------
+    context manager
     """
     folder = cache_folder()
     if folder is None or are_kernels_compiled(ALL_EXAMPLES):

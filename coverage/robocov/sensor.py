@@ -16,8 +16,8 @@ import pymunk
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import IS_COMPILER_ENABLED, is_interpreting
 from robocov.observation import compute_headings
-from robocov.world.bodies import Obstacles, build_obstacle_space
-from robocov.world.obstacle_pieces import Mover
+from robocov.world.bodies import build_obstacle_space
+from robocov.world.obstacle_pieces import Mover, Obstacles
 
 _MAX_RANGE_M = 1e6
 """Stands for an unlimited range: pymunk's bounding boxes cannot hold an infinite one."""
@@ -55,7 +55,12 @@ class RangeSensor:
         self._failed_robots: dict[tuple[float, float, float], pymunk.Circle] = {}
 
     def copy(self) -> RangeSensor:
-        """Return a sensor among the same obstacles at time zero."""
+        """Return a sensor among the same obstacles at time zero.
+
+        Returns
+        -------
+        RangeSensor
+        """
         return RangeSensor(self._walls, self._movers)
 
     def __reduce__(self) -> tuple[type[RangeSensor], tuple[Any, ...]]:

@@ -53,7 +53,17 @@ class TeamParameter(NamedTuple):
     may_be_infinite: bool = False
 
     def describe(self, infinity: str = "null for no limit") -> str:
-        """Return which values are expected, for messages."""
+        """Return which values are expected, for messages.
+
+        Parameters
+        ----------
+        infinity : str
+            What stands for no limit.
+
+        Returns
+        -------
+        str
+        """
         text = f"a number from {self.minimum:g} to {self.maximum:g}"
         return f"{text} or {infinity}" if self.may_be_infinite else text
 
@@ -147,7 +157,7 @@ class Team:
         return Team, tuple(getattr(self, name) for name in PARAMETERS)
 
     @classmethod
-    def homogeneous(
+    def homogeneous(  # noqa: PLR0913 - a keyword for each attribute
         cls,
         n: int,
         *,
@@ -193,7 +203,7 @@ class Team:
             track_width = 0.0
         if not is_number(n, Integral) or n < 1:
             raise ParameterError(f"robots: expected a whole number of at least 1, got {quote(n)}")
-        values = {
+        values: dict[str, float] = {
             "radius": radius,
             "mass": mass,
             "max_speed": max_speed,

@@ -15,7 +15,7 @@ from robocov.locational_cost.best_points import find_best_points
 from robocov.team import Team
 from robocov.voronoi import partition
 from robocov.world import World
-from robocov.world.obstacle_pieces import build_solid_pieces
+from robocov.world.obstacle_pieces import build_obstacles
 
 # (28): F = m q'' - ν q'
 
@@ -24,7 +24,7 @@ def test_with_the_printed_sign_of_28_robots_would_fly_apart(empty: Environment) 
     """Left alone, a robot must lose its energy; m q'' = ν q' makes it grow without bound."""
     m, nu, v0, seconds = 2.0, 1.5, 0.4, 1.0
     world = World(
-        build_solid_pieces(empty),
+        build_obstacles(empty),
         Team.homogeneous(1, mass=m, viscosity=nu),
         np.array([[2.0, 5.0]]),
         np.array([[v0, 0.0]]),

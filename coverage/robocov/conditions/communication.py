@@ -141,7 +141,7 @@ class Radio:
         reported : (n, 2) array, m
             Positions that the robots believe to have.
         positions : (n, 2) array, m
-            True positions, which decide who is in range.
+            True positions, which decide which robots are in range.
         working : (n,) bool array
 
         Returns

@@ -1,4 +1,4 @@
-"""The conditions of a run: what goes wrong, or changes, while it lasts."""
+"""The conditions of a run: noise, message loss, latency, and robots that fail or join."""
 
 from __future__ import annotations
 
@@ -15,8 +15,16 @@ from robocov.conditions.events import MAX_TIME_S, Failure, Join, build_events
 from robocov.conditions.random_streams import RandomStream
 from robocov.errors import ParameterError, is_number, quote, require_number
 
-LOSS, POSITION, SENSING, SCANNING, FAILING = range(5)
-"""Numbers of the independent random streams of a run."""
+LOSS = 0
+"""Number of the random stream for the loss of messages."""
+POSITION = 1
+"""Number of the random stream for localization noise."""
+SENSING = 2
+"""Number of the random stream for the noise of obstacle points."""
+SCANNING = 3
+"""Number of the random stream for the noise of scans."""
+FAILING = 4
+"""Number of the random stream for lifetimes."""
 TIME_TOLERANCE_S = 1e-9
 """Difference of times that count as equal, because sums of steps have rounding errors."""
 
@@ -56,7 +64,7 @@ UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
 
 @dataclass(frozen=True)
 class Conditions:
-    """All that goes wrong or changes during a run, with the seed of its random numbers.
+    """Imperfections and changes during a run, with the seed of its random numbers.
 
     Communication is ideal, as without conditions, unless there is loss, delay, a message rate or localization
     noise. With ideal communication, a robot that fails is forgotten at once, otherwise after `forget_after`.
@@ -164,7 +172,13 @@ class Conditions:
         return bool(self.failure_rate or self.failures or self.joins)
 
     def drop_team_changes(self) -> Conditions | None:
-        """Return the conditions without failures and joins; None if the others are ideal."""
+        """Return the conditions without failures and joins.
+
+        Returns
+        -------
+        Conditions or None
+            None if the others are ideal.
+        """
         remaining = replace(self, failure_rate=0.0, failures=(), joins=())
         return None if remaining.is_ideal else remaining
 
@@ -236,17 +250,44 @@ class Conditions:
         return self.find_present(time, count) & ~self.find_failed(time, count)
 
     def find_failed(self, time: float | Array, count: int) -> BoolArray:
-        """Find the robots that have failed; see `find_working`."""
+        """Find the robots that have failed.
+
+        Parameters
+        ----------
+        time : float or (k,) array, s
+        count : int
+            Number of robots n.
+
+        Returns
+        -------
+        (n,) or (k, n) bool array
+        """
         _, stops = self.compute_working_periods(count)
         return np.asarray(stops <= np.asarray(time)[..., None] + TIME_TOLERANCE_S)
 
     def find_present(self, time: float | Array, count: int) -> BoolArray:
-        """Find the robots that are present, working or failed; see `find_working`."""
+        """Find the robots that are present, working or failed.
+
+        Parameters
+        ----------
+        time : float or (k,) array, s
+        count : int
+            Number of robots n.
+
+        Returns
+        -------
+        (n,) or (k, n) bool array
+        """
         starts, _ = self.compute_working_periods(count)
         return np.asarray(starts <= np.asarray(time)[..., None] + TIME_TOLERANCE_S)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the conditions as plain JSON, with units in the names of the keys."""
+        """Return the conditions as plain JSON, with units in the names of the keys.
+
+        Returns
+        -------
+        dict
+        """
         plain: dict[str, Any] = {
             parameter.json_key: getattr(self, name) for name, parameter in PARAMETERS.items()
         }

@@ -1,4 +1,4 @@
-"""Imperfect perception: what robots know, with noise and with messages in place of ideal communication."""
+"""Imperfect perception: noisy observations, and messages in place of ideal communication."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MIN_MEASURED_DISTANCE_M = 1e-3
 
 
 class Perception:
-    """Turns the true state into what the robots know. Row i still is what robot i alone knows.
+    """Turns the true state into the observations of the robots. Row i is known to robot i alone.
 
     Parameters
     ----------
@@ -39,18 +39,24 @@ class Perception:
         self._scanning_stream = RandomStream(conditions.seed, SCANNING)
 
     def create_inbox(self) -> Inbox | None:
-        """Return the messages before the first step; None if communication is ideal."""
+        """Return the messages before the first step.
+
+        Returns
+        -------
+        Inbox or None
+            None if communication is ideal.
+        """
         return Inbox.create_empty(len(self._robots)) if self._conditions.uses_messages else None
 
     def perceive(
         self, truth: Observations, inbox: Inbox | None, working: BoolArray
     ) -> tuple[Observations, Inbox | None]:
-        """Compute what the robots know in a step.
+        """Compute the observations of the robots in a step.
 
         Parameters
         ----------
         truth : Observations
-            What they would know under ideal conditions.
+            Observations under ideal conditions.
         inbox : Inbox or None
             Messages before the step; None if communication is ideal.
         working : (n,) bool array

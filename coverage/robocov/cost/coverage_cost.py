@@ -278,7 +278,17 @@ class CoverageCost:
         )
 
     def to_grid(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Arrange values of the sites as an image of the lattice; see `Sites.to_grid`."""
+        """Arrange values of the sites as an image of the lattice.
+
+        Parameters
+        ----------
+        values : (m,) array
+
+        Returns
+        -------
+        (rows, columns) array
+            As `Sites.to_grid` returns it.
+        """
         return self.sites.to_grid(values)
 
     def find_path(self, positions: Array, point: Array) -> Array:

@@ -73,7 +73,18 @@ class Search(NamedTuple):
 
     @classmethod
     def allocate(cls, wall_index: AngularWallIndex, robots: int, corners: int, tiles: int) -> Search:
-        """Allocate a search for a number of robots, corners and tiles."""
+        """Allocate a search.
+
+        Parameters
+        ----------
+        wall_index : AngularWallIndex
+        robots, corners, tiles : int
+            Maximum number of each.
+
+        Returns
+        -------
+        Search
+        """
         return cls(
             wall_index=wall_index,
             reach=np.empty(robots),
@@ -104,7 +115,16 @@ class SitePaths(NamedTuple):
 
     @classmethod
     def allocate(cls, teams: int, sites: int) -> SitePaths:
-        """Allocate paths for a number of teams and sites."""
+        """Allocate paths for a number of teams and sites.
+
+        Parameters
+        ----------
+        teams, sites : int
+
+        Returns
+        -------
+        SitePaths
+        """
         shape = (teams, sites)
         return cls(
             distance=np.empty(shape),

@@ -142,15 +142,38 @@ class Uniform(Density):
         require_weight("weight", self.weight, above_zero=True)
 
     @property
-    def min_value(self) -> float:  # noqa: D102
+    def min_value(self) -> float:
+        """The weight."""
         return self.weight
 
     @property
-    def max_value(self) -> float:  # noqa: D102
+    def max_value(self) -> float:
+        """The weight."""
         return self.weight
 
-    def evaluate(self, points: Array) -> Array:  # noqa: D102
+    def evaluate(self, points: Array) -> Array:
+        """Evaluate the density: the weight at every point.
+
+        Parameters
+        ----------
+        points : (k, 2) array, m
+
+        Returns
+        -------
+        (k,) array
+        """
         return np.full(len(points), float(self.weight))
 
-    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:  # noqa: D102
+    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+        """Compute the moments of cells: those of their areas, times the weight.
+
+        Parameters
+        ----------
+        edges, origins
+            See `Density.compute_moments`.
+
+        Returns
+        -------
+        (n, 4) array, m², m³, m³ and m⁴
+        """
         return self.weight * edges.compute_moments(len(origins))

@@ -113,7 +113,17 @@ class Gaussian:
         return np.asarray(self.weight * np.exp(-0.5 * (x * x + y * y)))
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
-        """Compute mass, first moments and polar moment of cells; see `Density.compute_moments`."""
+        """Compute mass, first moments and polar moment of cells.
+
+        Parameters
+        ----------
+        edges, origins
+            See `Density.compute_moments`.
+
+        Returns
+        -------
+        (n, 4) array, m², m³, m³ and m⁴
+        """
         factor = self._factorize()
         lever = origins - np.array(self.center)
         edge_lever = lever[edges.cell]
@@ -189,13 +199,25 @@ class Gaussians(Density):
 
     @property
     def min_value(self) -> float:
+        """The constant, which no point falls below."""
         return self.floor
 
     @property
     def max_value(self) -> float:
+        """The sum of the constant and all peaks, as if their centres coincided."""
         return self.floor + sum(peak.weight for peak in self.peaks)
 
     def evaluate(self, points: Array) -> Array:
+        """Evaluate the sum of the constant and all peaks.
+
+        Parameters
+        ----------
+        points : (k, 2) array, m
+
+        Returns
+        -------
+        (k,) array
+        """
         points = np.asarray(points, dtype=float)
         total = np.full(len(points), float(self.floor))
         for peak in self.peaks:
@@ -203,6 +225,17 @@ class Gaussians(Density):
         return total
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+        """Compute mass, first moments and polar moment of cells in closed form.
+
+        Parameters
+        ----------
+        edges, origins
+            See `Density.compute_moments`.
+
+        Returns
+        -------
+        (n, 4) array, m², m³, m³ and m⁴
+        """
         total = self.floor * edges.compute_moments(len(origins))
         for peak in self.peaks:
             total += peak.compute_moments(edges, origins)

@@ -103,10 +103,12 @@ class WeightedPolygons(Density):
 
     @property
     def min_value(self) -> float:
+        """The smallest weight, of the areas and the background."""
         return min([self.background, *(area.weight for area in self.areas)])
 
     @property
     def max_value(self) -> float:
+        """The largest weight, of the areas and the background."""
         return max([self.background, *(area.weight for area in self.areas)])
 
     @cached_property
@@ -127,6 +129,16 @@ class WeightedPolygons(Density):
         return np.asarray(edges[~is_level & (edges[:, 4] != 0.0)])
 
     def evaluate(self, points: Array) -> Array:
+        """Evaluate the weight of the last area that contains each point, or the background.
+
+        Parameters
+        ----------
+        points : (k, 2) array, m
+
+        Returns
+        -------
+        (k,) array
+        """
         x, y = np.asarray(points, dtype=float).T
         values = np.full(len(x), float(self.background))
         for area in self.areas:
@@ -134,6 +146,17 @@ class WeightedPolygons(Density):
         return values
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+        """Compute mass, first moments and polar moment of cells without clipping them.
+
+        Parameters
+        ----------
+        edges, origins
+            See `Density.compute_moments`.
+
+        Returns
+        -------
+        (n, 4) array, m², m³, m³ and m⁴
+        """
         moments = self.background * edges.compute_moments(len(origins))
         _add_jumps(moments, self._jumps, edges.start, edges.end, edges.cell, np.ascontiguousarray(origins))
         return moments

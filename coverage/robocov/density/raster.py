@@ -102,13 +102,25 @@ class Raster(Density):
 
     @property
     def min_value(self) -> float:
+        """The smallest value of a pixel."""
         return float(self.values.min())
 
     @property
     def max_value(self) -> float:
+        """The largest value of a pixel."""
         return float(self.values.max())
 
     def evaluate(self, points: Array) -> Array:
+        """Evaluate the image; outside, the nearest pixel of its border counts.
+
+        Parameters
+        ----------
+        points : (k, 2) array, m
+
+        Returns
+        -------
+        (k,) array
+        """
         grid = _build_grid(self)
         u, v = ((np.asarray(points, dtype=float) - grid.origin) / grid.step).T
         rows, columns = grid.coefficients.shape[1:]
@@ -120,6 +132,17 @@ class Raster(Density):
         return np.asarray(a + b * xi + (c + d * xi) * eta)
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+        """Compute mass, first moments and polar moment of cells exactly.
+
+        Parameters
+        ----------
+        edges, origins
+            See `Density.compute_moments`.
+
+        Returns
+        -------
+        (n, 4) array, m², m³, m³ and m⁴
+        """
         grid = _build_grid(self)
         offsets = origins - grid.origin
         edge_offsets = offsets[edges.cell]

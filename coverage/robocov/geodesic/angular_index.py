@@ -88,6 +88,15 @@ class AngularWallIndex(NamedTuple):
 def compute_pseudo_angle(dx: float, dy: float) -> float:
     """Compute a number from 0 to 4 that grows with the angle of a direction, without trigonometry.
 
+    Parameters
+    ----------
+    dx, dy : float
+        The direction, of any length.
+
+    Returns
+    -------
+    float
+
     Examples
     --------
     >>> [compute_pseudo_angle(dx, dy) for dx, dy in ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))]
@@ -99,7 +108,22 @@ def compute_pseudo_angle(dx: float, dy: float) -> float:
 
 @kernel
 def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int) -> bool:
-    """Return whether all of a box is beyond the horizon of a source, in every bin that the box meets."""
+    """Return whether all of a box is beyond the horizon of a source, in every bin that the box meets.
+
+    Parameters
+    ----------
+    boxes : (nodes, 4) array, m
+        Boxes of a tree, as `box_tree` builds it.
+    node : int
+        Number of the box.
+    index : AngularWallIndex
+    source : int
+        Number of the source in the index.
+
+    Returns
+    -------
+    bool
+    """
     x = index.positions[source, 0]
     y = index.positions[source, 1]
     distance2 = compute_squared_box_distance(boxes, node, x, y) * (1.0 - _PADDING)
@@ -276,13 +300,39 @@ def _find_chain_end(
 
 @kernel
 def find_bin(bins: int, dx: float, dy: float) -> int:
-    """Return the angular bin of a direction."""
+    """Return the angular bin of a direction.
+
+    Parameters
+    ----------
+    bins : int
+        Number of bins of a full turn.
+    dx, dy : float
+        The direction, of any length.
+
+    Returns
+    -------
+    int
+    """
     return min(int(compute_pseudo_angle(dx, dy) * (bins * 0.25)), bins - 1)
 
 
 @kernel
 def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: float) -> bool:
-    """Return whether a source sees a point at any distance; from a vertex only into its free space."""
+    """Return whether a source sees a point at any distance; from a vertex only into its free space.
+
+    Parameters
+    ----------
+    walls : Walls
+    index : AngularWallIndex
+    source : int
+        Number of the source in the index.
+    x, y : float, m
+        The point.
+
+    Returns
+    -------
+    bool
+    """
     dx = x - index.positions[source, 0]
     dy = y - index.positions[source, 1]
     distance2 = dx * dx + dy * dy
@@ -300,6 +350,18 @@ def is_surely_visible(index: AngularWallIndex, source: int, x: float, y: float) 
     """Return whether a point is so close to a source that nothing can hide it.
 
     Loops that test many points call this before `is_visible`, which is too large for the compiler to inline.
+
+    Parameters
+    ----------
+    index : AngularWallIndex
+    source : int
+        Number of the source in the index.
+    x, y : float, m
+        The point.
+
+    Returns
+    -------
+    bool
     """
     dx = x - index.positions[source, 0]
     dy = y - index.positions[source, 1]

@@ -71,7 +71,17 @@ def compute_z_order(column: IntArray, row: IntArray) -> IntArray:
 
 @kernel
 def skip_subtree(node: int) -> int:
-    """Return the node that a search visits after a node and all below it, 0 at the end."""
+    """Return the node that a search visits after a node and all below it.
+
+    Parameters
+    ----------
+    node : int
+
+    Returns
+    -------
+    int
+        0 at the end.
+    """
     while node & 1:
         node >>= 1
     return node + 1 if node else 0
@@ -79,7 +89,21 @@ def skip_subtree(node: int) -> int:
 
 @kernel
 def compute_squared_box_distance(boxes: Array, node: int, x: float, y: float) -> float:
-    """Compute the squared distance of a point from a box, 0 inside."""
+    """Compute the squared distance of a point from a box.
+
+    Parameters
+    ----------
+    boxes : (nodes, 4) array, m
+    node : int
+        Number of the box.
+    x, y : float, m
+        The point.
+
+    Returns
+    -------
+    float, m²
+        0 inside.
+    """
     dx: float = max(boxes[node, 0] - x, x - boxes[node, 2], 0.0)
     dy: float = max(boxes[node, 1] - y, y - boxes[node, 3], 0.0)
     return dx * dx + dy * dy

@@ -38,7 +38,16 @@ class CornerPaths(NamedTuple):
 
     @classmethod
     def allocate(cls, corners: int) -> CornerPaths:
-        """Allocate paths to a number of corners."""
+        """Allocate paths to a number of corners.
+
+        Parameters
+        ----------
+        corners : int
+
+        Returns
+        -------
+        CornerPaths
+        """
         return cls(
             length=np.empty(corners),
             source=np.empty(corners, np.int64),
@@ -57,7 +66,16 @@ class CornerQueue(NamedTuple):
 
     @classmethod
     def allocate(cls, corners: int) -> CornerQueue:
-        """Allocate a queue of at most all corners."""
+        """Allocate a queue with space for all corners.
+
+        Parameters
+        ----------
+        corners : int
+
+        Returns
+        -------
+        CornerQueue
+        """
         return cls(corners=np.empty(corners + 1, np.int64), is_waiting=np.empty(corners, np.bool_))
 
 

@@ -208,7 +208,19 @@ def _find_hull_walls(segments: _Segments) -> BoolArray:
 
 @kernel
 def get_relative_ends(ends: Array, wall: int, x: float, y: float) -> tuple[float, float, float, float]:
-    """Return start x, start y, end x and end y of a wall as seen from a point."""
+    """Return the ends of a wall relative to a point.
+
+    Parameters
+    ----------
+    ends : (w, 4) array, m
+    wall : int
+    x, y : float, m
+        The point.
+
+    Returns
+    -------
+    start_x, start_y, end_x, end_y : float, m
+    """
     return ends[wall, 0] - x, ends[wall, 1] - y, ends[wall, 2] - x, ends[wall, 3] - y
 
 
@@ -218,6 +230,19 @@ def can_bend_at_corner(corners: Array, corner_walls: Array, corner: int, x: floa
 
     The point must lie in the corner's sector, but not in front of both of its walls: from there a path that
     bends at the corner could be shortened.
+
+    Parameters
+    ----------
+    corners : (c, 2) array, m
+    corner_walls : (c, 4) array, m
+        The walls that meet at each corner; see `Walls`.
+    corner : int
+    x, y : float, m
+        The point.
+
+    Returns
+    -------
+    bool
     """
     dx = x - corners[corner, 0]
     dy = y - corners[corner, 1]
@@ -230,7 +255,20 @@ def can_bend_at_corner(corners: Array, corner_walls: Array, corner: int, x: floa
 
 @kernel
 def find_vertex(vertices: Array, x: float, y: float) -> int:
-    """Find the vertex that a point coincides with, -1 for none."""
+    """Find the vertex that a point coincides with.
+
+    Parameters
+    ----------
+    vertices : (v, 2) array, m
+        Sorted by x, then y.
+    x, y : float, m
+        The point.
+
+    Returns
+    -------
+    int
+        -1 for none.
+    """
     low = 0
     high = len(vertices)
     while low < high:
@@ -246,7 +284,19 @@ def find_vertex(vertices: Array, x: float, y: float) -> int:
 
 @kernel
 def contains_direction(walls: Walls, vertex: int, dx: float, dy: float) -> bool:
-    """Return whether a direction from a vertex leads into its free space."""
+    """Return whether a direction from a vertex leads into its free space.
+
+    Parameters
+    ----------
+    walls : Walls
+    vertex : int
+    dx, dy : float
+        The direction, of any length.
+
+    Returns
+    -------
+    bool
+    """
     sectors = walls.sector_walls
     for sector in range(walls.first_sector[vertex], walls.first_sector[vertex + 1]):
         is_left_of_incoming = cross(sectors[sector, 0], sectors[sector, 1], dx, dy) >= 0.0

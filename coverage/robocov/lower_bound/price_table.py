@@ -26,7 +26,12 @@ class PriceTable(NamedTuple):
 
     @classmethod
     def build_empty(cls) -> PriceTable:
-        """Build a table without positions."""
+        """Build a table without positions.
+
+        Returns
+        -------
+        PriceTable
+        """
         return cls(np.zeros(1, np.int64), np.empty(0, np.int32), np.empty(0, np.float32))
 
     def append(self, distances: Array, max_distance: Array) -> PriceTable:
@@ -52,7 +57,19 @@ class PriceTable(NamedTuple):
         )
 
     def compute_worths(self, prices: Array, weights: Array) -> Array:
-        """Compute what the positions are worth, (p,), at prices, (m,) m, of sites with weights, (m,)."""
+        """Compute the worths of the positions.
+
+        Parameters
+        ----------
+        prices : (m,) array, m
+            Prices of the sites.
+        weights : (m,) array
+            Weights of the sites.
+
+        Returns
+        -------
+        (p,) array
+        """
         worths = np.empty(len(self.first_entry) - 1)
         _compute_worths(self, prices, weights, worths)
         return worths

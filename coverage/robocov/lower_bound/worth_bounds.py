@@ -41,7 +41,16 @@ class TriangleScratch(NamedTuple):
 
     @classmethod
     def allocate(cls, corners: int) -> TriangleScratch:
-        """Allocate space for a number of corners."""
+        """Allocate space for a number of corners.
+
+        Parameters
+        ----------
+        corners : int
+
+        Returns
+        -------
+        TriangleScratch
+        """
         return cls(
             corners=np.empty(corners, np.int64),
             corner_distances=np.empty(corners),

@@ -72,9 +72,17 @@ def advise(record: Record, clearances: Array) -> list[str]:
 
 
 def find_trembling(record: Record) -> IntArray:
-    """Find the robots that tremble at the end of a run, ascending row numbers.
+    """Find the robots that tremble at the end of a run.
 
-    A record without every control step has none: its displacements are not those of single steps.
+    Parameters
+    ----------
+    record : Record
+        A record without every control step has none: its displacements are not those of single steps.
+
+    Returns
+    -------
+    (k,) int array
+        Numbers of their rows, ascending.
     """
     steps = round(TREMBLE_WINDOW_S / record.dt)
     if steps < 2 or len(record) <= steps:
@@ -96,9 +104,17 @@ def find_trembling(record: Record) -> IntArray:
 
 
 def count_zigzags(record: Record, clearances: Array) -> IntArray:
-    """Count how many times each robot went from contact with a wall to contact with the opposite one, (n,).
+    """Count how many times each robot went from contact with a wall to contact with the opposite one.
 
-    `clearances`, (T, n) m, are those of `clearance.compute_clearances`.
+    Parameters
+    ----------
+    record : Record
+    clearances : (T, n) array, m
+        As `clearance.compute_clearances` returns them.
+
+    Returns
+    -------
+    (n,) int array
     """
     touches = clearances <= MAX_CONTACT_GAP_M
     begins_to_touch = touches.copy()

@@ -95,6 +95,10 @@ def count_contacts(record: Record, clearances: Array) -> int:
     record : Record
     clearances : (T, n) array, m
         As `compute_clearances` returns them. A robot that has failed is a wall.
+
+    Returns
+    -------
+    int
     """
     touches = clearances <= MAX_CONTACT_GAP_M
     touches_at_start = touches[0].sum()
@@ -108,6 +112,10 @@ def measure_robot_gaps(record: Record) -> RobotGaps:
     Parameters
     ----------
     record : Record
+
+    Returns
+    -------
+    RobotGaps
     """
     positions = np.where(record.working[:, :, None], record.positions, np.nan)
     smallest = np.full(len(positions), np.inf)

@@ -35,9 +35,13 @@ def measure_connectivity(positions: Array, ranges: Array) -> Connectivity:
     ranges : (n,) array, m
         Communication ranges.
 
+    Returns
+    -------
+    Connectivity
+
     Notes
     -----
-    The algebraic connectivity is n where all n robots are linked, and 0 for a single one. Source: M. Fiedler,
+    The algebraic connectivity is n if all n robots are linked, and 0 for a single one. Source: M. Fiedler,
     *Algebraic connectivity of graphs*, Czechoslovak Mathematical Journal 23 (1973).
 
     Examples

@@ -64,6 +64,10 @@ def compute_cost_history(
     on_sample : callable or None
         Called after each sample, to report progress.
 
+    Returns
+    -------
+    CostHistory
+
     Raises
     ------
     ParameterError
@@ -110,13 +114,18 @@ def compute_cost_history(
 
 
 def select_sampled_moments(record: Record, rate: float) -> list[int]:
-    """Return the row numbers of the moments nearest to multiples of 1/rate, and of the last moment.
+    """Return the moments nearest to multiples of 1/rate, and the last moment.
 
     Parameters
     ----------
     record : Record
     rate : float, Hz
-        At most `MAX_RATE_WITH_MOVING_OBSTACLES_HZ` is used where obstacles move.
+        At most `MAX_RATE_WITH_MOVING_OBSTACLES_HZ` is used if obstacles move.
+
+    Returns
+    -------
+    list of int
+        Numbers of their rows, ascending.
     """
     if record.environment.has_moving_obstacles:
         rate = min(rate, MAX_RATE_WITH_MOVING_OBSTACLES_HZ)
@@ -131,6 +140,10 @@ def compute_mean_over_run(time: Array, values: Array) -> float:
     time : (K,) array, s
         Ascending.
     values : (K,) array
+
+    Returns
+    -------
+    float
 
     Examples
     --------

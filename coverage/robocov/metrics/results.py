@@ -83,7 +83,7 @@ class Results:
 
     @property
     def study(self) -> dict[str, Any]:
-        """The content of ``study.json``, which describes the sweep; raises InputError if it is unreadable."""
+        """Content of ``study.json``, which describes the sweep."""
         path = self.folder / "study.json"
         try:
             return dict(json.loads(path.read_bytes()))
@@ -98,6 +98,10 @@ class Results:
         columns : sequence of str, or None
             By default all columns. Empty cells are None.
 
+        Returns
+        -------
+        iterator of dict
+
         Raises
         ------
         InputError
@@ -111,7 +115,21 @@ class Results:
     def to_pandas(self, columns: Sequence[str] | None = None) -> DataFrame:
         """Return the rows as a data frame.
 
-        It needs ``robocov[pandas]``. Parameters and errors are those of `rows`.
+        It needs ``robocov[pandas]``.
+
+        Parameters
+        ----------
+        columns : sequence of str, or None
+            By default all columns.
+
+        Returns
+        -------
+        pandas.DataFrame
+
+        Raises
+        ------
+        InputError
+            If there is no such column; the message suggests the nearest name.
         """
         pandas = import_optional("pandas", "pandas")
         names = list(columns or self.columns)
@@ -121,7 +139,13 @@ class Results:
         return frame.astype(dict.fromkeys(empty_columns, float))
 
     def failures(self) -> list[dict[str, Any]]:
-        """Return the rows of the runs that failed, as dicts by column; ``error`` is the message."""
+        """Return the rows of the runs that failed.
+
+        Returns
+        -------
+        list of dict
+            By column; ``error`` is the message.
+        """
         return [row for row in self.rows() if row["error"] is not None]
 
     def record(self, run: str | int | Mapping[str, Any]) -> Record:
@@ -132,6 +156,10 @@ class Results:
         run : str, int or mapping
             The name of its folder, the number of its row, or the row itself.
 
+        Returns
+        -------
+        Record
+
         Raises
         ------
         InputError
@@ -140,7 +168,22 @@ class Results:
         return Record.load(self._find_run_folder(run))
 
     def history(self, run: str | int | Mapping[str, Any]) -> CostHistory:
-        """Read the coverage cost along a run; parameters and errors are those of `record`."""
+        """Read the coverage cost along a run.
+
+        Parameters
+        ----------
+        run : str, int or mapping
+            The name of its folder, the number of its row, or the row itself.
+
+        Returns
+        -------
+        CostHistory
+
+        Raises
+        ------
+        InputError
+            If there is no such run, or it failed.
+        """
         return read_history(self._find_run_folder(run) / "cost.csv")
 
     def _read_kinds(self) -> dict[str, str]:
@@ -200,6 +243,10 @@ def read_results(folder: Path | str) -> Results:
     ----------
     folder : Path or str
 
+    Returns
+    -------
+    Results
+
     Raises
     ------
     InputError
@@ -223,6 +270,10 @@ def read_rows(
         Kinds of columns, as those of Parquet: "string", "int64" or "double".
     columns : sequence of str, or None
         By default all columns.
+
+    Yields
+    ------
+    dict
 
     Raises
     ------
@@ -258,6 +309,10 @@ def read_history(path: Path) -> CostHistory:
     Parameters
     ----------
     path : Path
+
+    Returns
+    -------
+    CostHistory
 
     Raises
     ------

@@ -75,13 +75,22 @@ class RunMetrics:
         )
 
     def rows(self) -> list[tuple[float, ...]]:
-        """Return the rows of ``metrics.csv``, whose columns are `COLUMNS`."""
+        """Return the rows of ``metrics.csv``, whose columns are `COLUMNS`.
+
+        Returns
+        -------
+        list of tuple of float
+        """
         return list(zip(*(getattr(self, name).tolist() for name in COLUMNS), strict=True))
 
     def final(self) -> dict[str, float | None]:
-        """Return the figures at the end of the run, by names that end in their units.
+        """Return the figures at the end of the run.
 
-        Clearances are the smallest of the run, and None if they are infinite.
+        Returns
+        -------
+        dict of str to float or None
+            By names that end in their units. Clearances are the smallest of the run, and None if they are
+            infinite.
         """
         figures: dict[str, float | None] = {}
         for name, column in COLUMNS.items():
@@ -114,6 +123,10 @@ def compute_run_metrics(
         Energy and path lengths are integrated over all moments of the record.
     on_sample : callable or None
         Called after each moment, to report progress.
+
+    Returns
+    -------
+    RunMetrics
 
     Raises
     ------
@@ -181,7 +194,19 @@ def find_time_near_final(history: CostHistory, tolerance: float = NEAR_FINAL_TOL
 
 
 def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, float | None]:
-    """Return the metrics at the end of a run, and the time from which on its cost was near the final one."""
+    """Return the metrics at the end of a run, and the time from which on its cost was near the final one.
+
+    Parameters
+    ----------
+    record : Record
+    history : CostHistory
+        Its coverage cost.
+
+    Returns
+    -------
+    mapping of str to float or None
+        By names that end in their units.
+    """
     return {
         **compute_run_metrics(record, rate=0.0).final(),
         "near_final_s": find_time_near_final(history),

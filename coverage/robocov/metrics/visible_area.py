@@ -60,6 +60,10 @@ def compute_covered_areas(free: BaseGeometry, positions: Array, ranges: Array) -
     ranges : (n,) array, m
         Sensing ranges; may be infinite.
 
+    Returns
+    -------
+    CoveredAreas
+
     Notes
     -----
     Areas in line of sight are exact up to rounding if the ranges are infinite. Sensing discs are polygons of

@@ -28,7 +28,19 @@ class Bins(NamedTuple):
 
 @kernel
 def find_bin(offset: float, scale: float) -> int:
-    """Return the row or column of bins at an offset from the first one; 0 if the offset is not a number."""
+    """Return the row or column of bins at an offset from the first one.
+
+    Parameters
+    ----------
+    offset : float, m
+    scale : float, 1/m
+        Bins per metre.
+
+    Returns
+    -------
+    int
+        0 if the offset is not a number.
+    """
     return int(offset * scale) if offset * scale > 0.0 else 0
 
 

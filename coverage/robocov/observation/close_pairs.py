@@ -33,6 +33,10 @@ def find_close_pairs(positions: Array, reach: float) -> ClosePairs:
     reach : float, m
         May be infinite.
 
+    Returns
+    -------
+    ClosePairs
+
     Examples
     --------
     >>> pairs = find_close_pairs(np.array([[0.0, 0.0], [1.0, 0.0], [5.0, 0.0]]), 2.0)

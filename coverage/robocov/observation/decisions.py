@@ -84,6 +84,10 @@ def copy_decision(decision: Decision, controller: str, source: str = "") -> Deci
     controller, source : str
         As for `check_decision`.
 
+    Returns
+    -------
+    Decision
+
     Raises
     ------
     ParameterError
@@ -114,6 +118,10 @@ def check_forces(values: Any, count: int, name: str) -> Array:
     name : str
         What messages call them.
 
+    Returns
+    -------
+    (count, 2) array, N
+
     Raises
     ------
     ParameterError
@@ -126,10 +134,18 @@ def check_forces(values: Any, count: int, name: str) -> Array:
 
 
 def to_numbers(values: object) -> Array | None:
-    """Convert real numbers to an array of floats; return None if that is not possible.
+    """Convert real numbers to an array of floats.
 
-    An array of floats is returned as it is. Complex numbers, strings and objects are not real numbers,
-    even if they can be converted to floats.
+    Complex numbers, strings and objects are not real numbers, even if they can be converted to floats.
+
+    Parameters
+    ----------
+    values : object
+
+    Returns
+    -------
+    array or None
+        An array of floats is returned as it is; None if the values are not real numbers.
     """
     if isinstance(values, np.ndarray) and values.dtype == np.float64:
         return values

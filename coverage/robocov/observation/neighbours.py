@@ -39,6 +39,10 @@ class Neighbours:
         ranges : (n,) array, m
             If all are infinite the graph is complete, and its entries are not stored.
 
+        Returns
+        -------
+        Neighbours
+
         Examples
         --------
         >>> positions = np.array([[0.0, 0.0], [1.0, 0.0], [5.0, 0.0]])
@@ -63,6 +67,10 @@ class Neighbours:
         robot, neighbour : (m,) int arrays
             Sorted by robot, then neighbour.
         ranges : (n,) array or None, m
+
+        Returns
+        -------
+        Neighbours
         """
         indptr = np.zeros(count + 1, dtype=np.intp)
         np.cumsum(np.bincount(robot, minlength=count), out=indptr[1:])
@@ -70,7 +78,16 @@ class Neighbours:
 
     @classmethod
     def combine(cls, graphs: Sequence[Neighbours]) -> Neighbours:
-        """Combine the graphs of separate runs, whose robots follow each other; runs are not linked."""
+        """Combine the graphs of separate runs, whose robots follow each other; runs are not linked.
+
+        Parameters
+        ----------
+        graphs : sequence of Neighbours
+
+        Returns
+        -------
+        Neighbours
+        """
         if len(graphs) == 1:
             return graphs[0]
         count = 0
@@ -89,13 +106,29 @@ class Neighbours:
         return self.indptr is None
 
     def list_neighbours(self, robot: int) -> IntArray:
-        """Return the neighbours of a robot, ascending."""
+        """List the neighbours of a robot.
+
+        Parameters
+        ----------
+        robot : int
+
+        Returns
+        -------
+        (k,) int array
+            Ascending.
+        """
         if self.indptr is None or self.indices is None:
             return np.delete(np.arange(self.count), robot)
         return self.indices[self.indptr[robot] : self.indptr[robot + 1]]
 
     def list_pairs(self) -> tuple[IntArray, IntArray]:
-        """Return all directed pairs of a robot and a neighbour, (m,) each, by robot, then neighbour."""
+        """List all directed pairs of a robot and a neighbour.
+
+        Returns
+        -------
+        robot, neighbour : (m,) int arrays
+            Sorted by robot, then neighbour.
+        """
         if self.indptr is None or self.indices is None:
             robot, neighbour = np.nonzero(~np.eye(self.count, dtype=bool))
             return robot, neighbour
@@ -108,6 +141,10 @@ class Neighbours:
         ----------
         working : (n,) bool array
             Which robots work.
+
+        Returns
+        -------
+        Neighbours
         """
         if working.all():
             return self

@@ -64,7 +64,17 @@ class Observations:
     team of points."""
 
     def get_neighbour_positions(self, robot: int) -> Array:
-        """Return the known positions of a robot's neighbours, (k, 2) m, as `list_neighbours` orders them."""
+        """Return the known positions of a robot's neighbours.
+
+        Parameters
+        ----------
+        robot : int
+
+        Returns
+        -------
+        (k, 2) array, m
+            In the order of `Neighbours.list_neighbours`.
+        """
         if self.reported_positions is None or self.neighbours.indptr is None:
             return self.positions[self.neighbours.list_neighbours(robot)]
         begin, end = self.neighbours.indptr[robot : robot + 2]
@@ -73,13 +83,16 @@ class Observations:
     def find_near_neighbours(self, reach: float) -> NearNeighbours:
         """Find the neighbours that are at most `reach` metres away, by their known positions.
 
-        The pairs are sorted, so that sums over the neighbours of a robot do not depend, to the last bit, on
-        robots that are not its neighbours.
-
         Parameters
         ----------
         reach : float, m
             May be infinite.
+
+        Returns
+        -------
+        NearNeighbours
+            Sorted, so that sums over the neighbours of a robot do not depend, to the last bit, on robots that
+            are not its neighbours.
         """
         if self.reported_positions is None and self.neighbours.is_complete:
             pairs = find_close_pairs(self.positions, reach)

@@ -62,6 +62,10 @@ def compute_view(seen: Observations, previous: View | None, scanning: Scanning, 
         Settings of the scans.
     reach : (n,) array, m
         Maximum distance of each robot's view.
+
+    Returns
+    -------
+    View
     """
     if seen.scans is not None:
         return View(np.minimum(seen.scans.distances, reach[:, None]), seen.scans.hit)
@@ -86,6 +90,10 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
         Maximum distance of each robot's view.
     jump : float, m
         Minimum increase of the depth.
+
+    Returns
+    -------
+    Windows
     """
     robots = []
     rays = []
@@ -123,7 +131,17 @@ def _predict_depth(view: View, reach: Array, side: int) -> Array:
 
 
 def evaluate_density(density: Density | None, points: Array) -> Array:
-    """Return φ at points of shape (..., 2) in metres, as an array of shape (...); without a density 1."""
+    """Evaluate a density, or 1 without one.
+
+    Parameters
+    ----------
+    density : Density or None
+    points : (..., 2) array, m
+
+    Returns
+    -------
+    (...) array
+    """
     if density is None:
         return np.ones(points.shape[:-1])
     return density.evaluate(points.reshape(-1, 2)).reshape(points.shape[:-1])
@@ -162,6 +180,10 @@ def is_behind_wall(x: float, y: float, walls: Array) -> bool:
     x, y : float, m
     walls : (rays,) array, m
         Distances of the walls along the robot's rays; infinite where there is none.
+
+    Returns
+    -------
+    bool
     """
     rays = len(walls)
     ray = math.floor(math.atan2(y, x) * (rays / (2.0 * math.pi)) + 0.5) % rays
@@ -180,6 +202,10 @@ def is_path_clear(x: float, y: float, dx: float, dy: float, walls: Array) -> boo
         Length of the path.
     walls : (rays,) array, m
         As for `is_behind_wall`.
+
+    Returns
+    -------
+    bool
     """
     for k in range(1, _PATH_PARTS):
         if is_behind_wall(x + dx * k / _PATH_PARTS, y + dy * k / _PATH_PARTS, walls):

@@ -40,7 +40,16 @@ class Scanning:
         require_number("scanning.period", self.period, 0.0, _MAX_PERIOD_S, "s")
 
     def count_steps(self, dt: float) -> int:
-        """Return the number of steps of `dt` seconds from one scan to the next, at least one.
+        """Return the number of steps from one scan to the next, at least one.
+
+        Parameters
+        ----------
+        dt : float, s
+            Control period.
+
+        Returns
+        -------
+        int
 
         Examples
         --------
@@ -71,6 +80,16 @@ class Scans:
 
 
 def compute_headings(rays: int) -> Array:
-    """Compute unit vectors evenly round a full turn, (rays, 2); the first points along +x."""
+    """Compute unit vectors evenly round a full turn.
+
+    Parameters
+    ----------
+    rays : int
+
+    Returns
+    -------
+    (rays, 2) array
+        The first points along +x.
+    """
     angle = np.arange(rays) * (2.0 * np.pi / rays)
     return np.column_stack([np.cos(angle), np.sin(angle)])

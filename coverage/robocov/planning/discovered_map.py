@@ -61,7 +61,16 @@ class DiscoveredMap:
 
     @classmethod
     def build_unknown(cls, raster: Raster) -> DiscoveredMap:
-        """Build the map of a robot that has not seen anything yet."""
+        """Build the map of a robot that has not seen anything yet.
+
+        Parameters
+        ----------
+        raster : Raster
+
+        Returns
+        -------
+        DiscoveredMap
+        """
         return cls(raster, np.zeros(raster.shape, dtype=np.uint8))
 
     def __deepcopy__(self, memo: object) -> DiscoveredMap:
@@ -138,7 +147,16 @@ class DiscoveredMap:
         return self._replace_state(state)
 
     def count_changed_walls(self, earlier: DiscoveredMap) -> int:
-        """Count the cells where walls have disappeared, or appeared in the open, since an earlier map."""
+        """Count the cells where walls have disappeared, or appeared in the open, since an earlier map.
+
+        Parameters
+        ----------
+        earlier : DiscoveredMap
+
+        Returns
+        -------
+        int
+        """
         if earlier is self:
             return 0
         disappeared = _count_opened_walls(earlier.state, self.state)

@@ -56,7 +56,19 @@ class GridPlanner(MapWindow):
 
     @classmethod
     def get_shared(cls, known_map: DiscoveredMap, window: Window, clearance: float) -> GridPlanner:
-        """Return the planner in use for this very map and window; build one if there is none."""
+        """Return the planner in use for this very map and window; build one if there is none.
+
+        Parameters
+        ----------
+        known_map : DiscoveredMap
+        window : Window
+        clearance : float, m
+            See `GridPlanner`.
+
+        Returns
+        -------
+        GridPlanner
+        """
         # A planner in use keeps its map alive, therefore no other map has the same id.
         key = id(known_map), window, clearance
         planner = _PLANNERS_IN_USE.get(key)
@@ -65,7 +77,18 @@ class GridPlanner(MapWindow):
         return _PLANNERS_IN_USE.setdefault(key, planner)
 
     def update(self, known_map: DiscoveredMap, window: Window) -> GridPlanner:
-        """Return the planner for a later map and window; the same planner if its cells are the same."""
+        """Return the planner for a later map and window.
+
+        Parameters
+        ----------
+        known_map : DiscoveredMap
+        window : Window
+
+        Returns
+        -------
+        GridPlanner
+            The same planner if its cells are the same.
+        """
         later = GridPlanner.get_shared(known_map, window, self.clearance)
         if (
             self.window == window
@@ -126,15 +149,33 @@ class GridPlanner(MapWindow):
         return self.compute_distance_table(self.sources)
 
     def get_distances(self, node: int) -> Array:
-        """Return the distances from a node to all nodes, (m,) m, infinite where no path leads."""
+        """Return the distances from a node to all nodes.
+
+        Parameters
+        ----------
+        node : int
+
+        Returns
+        -------
+        (m,) array, m
+            Infinite where no path leads.
+        """
         if node not in self._distances_of_node:
             self._distances_of_node[node] = self.compute_distance_table(np.array([node]))[0]
         return self._distances_of_node[node]
 
     def compute_distances_within(self, nodes: Sequence[int], limit: float) -> list[Array]:
-        """Compute the distances from each of some nodes to all nodes, (m,) m each.
+        """Compute the distances from each of some nodes to all nodes up to a limit.
 
-        Nodes farther away than a limit, m, may be infinitely far; the lower it is, the faster this is.
+        Parameters
+        ----------
+        nodes : sequence of int
+        limit : float, m
+            Nodes farther away may be infinitely far. The lower it is, the faster this is.
+
+        Returns
+        -------
+        list of (m,) arrays, m
         """
         return [
             self._distances_of_node[node]
@@ -144,12 +185,30 @@ class GridPlanner(MapWindow):
         ]
 
     def compute_distance_table(self, nodes: IntArray) -> Array:
-        """Compute the distances from some nodes, (k,), to all nodes, (k, m) m."""
+        """Compute the distances from some nodes to all nodes.
+
+        Parameters
+        ----------
+        nodes : (k,) int array
+
+        Returns
+        -------
+        (k, m) array, m
+        """
         table = np.array([self._search([node], [0.0]) for node in nodes.tolist()])
         return table.reshape(-1, len(self.nodes))
 
     def compute_distances_from(self, positions: Array) -> Array:
-        """Compute the distances of all nodes, (m,) m, from the nearest of (k, 2) m positions."""
+        """Compute the distances of all nodes from the nearest of some positions.
+
+        Parameters
+        ----------
+        positions : (k, 2) array, m
+
+        Returns
+        -------
+        (m,) array, m
+        """
         visible = [self._find_visible_nodes(position) for position in positions]
         lengths = [
             np.sqrt(((self.nodes[nodes] - position) ** 2).sum(axis=1))
@@ -168,16 +227,33 @@ class GridPlanner(MapWindow):
         )
 
     def find_nearest_node(self, position: Array) -> int:
-        """Return the roomy node nearest to a position, (2,) m; -1 if there is none."""
+        """Find the roomy node nearest to a position.
+
+        Parameters
+        ----------
+        position : (2,) array, m
+
+        Returns
+        -------
+        int
+            -1 if there is none.
+        """
         if not self.is_roomy.any():
             return -1
         square = np.where(self.is_roomy, ((self.nodes - position) ** 2).sum(axis=1), np.inf)
         return int(square.argmin())
 
     def find_own_node(self, position: Array) -> int:
-        """Return the node at which a robot at (2,) m is: the nearest roomy one in sight, or at all.
+        """Find the node at which a robot is: the nearest roomy one in sight, or at all.
 
-        -1 if there is none.
+        Parameters
+        ----------
+        position : (2,) array, m
+
+        Returns
+        -------
+        int
+            -1 if there is none.
         """
         visible = self._find_visible_nodes(position)
         return int(visible[0]) if len(visible) else -1

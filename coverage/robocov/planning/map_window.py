@@ -146,6 +146,15 @@ class MapWindow:
         return UnknownArea(patches=pairs // count, nodes=pairs % count, expected_cells=expected_cells)
 
     def sum_by_node(self, values: Array | BoolArray) -> Array:
-        """Sum values of cells, (h, w), by the nodes that stand for them, (m,)."""
+        """Sum values of cells by the nodes that stand for them.
+
+        Parameters
+        ----------
+        values : (h, w) array
+
+        Returns
+        -------
+        (m,) array
+        """
         blocks = values.reshape(self.window.block_shape)
         return np.asarray(blocks.sum(axis=(1, 3), dtype=np.float64).ravel())

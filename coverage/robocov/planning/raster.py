@@ -110,11 +110,35 @@ class Raster:
 
 @kernel
 def find_row(y: float, grid: CellGrid, rows: int) -> int:
-    """Return the row of cells at y, m; the nearest one if y is next to the raster."""
+    """Return the row of cells at a height; the nearest one next to the raster.
+
+    Parameters
+    ----------
+    y : float, m
+    grid : CellGrid
+    rows : int
+        Number of rows.
+
+    Returns
+    -------
+    int
+    """
     return min(max(math.floor((y - grid.low_y) / grid.cell_size), 0), rows - 1)
 
 
 @kernel
 def find_column(x: float, grid: CellGrid, columns: int) -> int:
-    """Return the column of cells at x, m; the nearest one if x is next to the raster."""
+    """Return the column of cells at a position in x; the nearest one next to the raster.
+
+    Parameters
+    ----------
+    x : float, m
+    grid : CellGrid
+    columns : int
+        Number of columns.
+
+    Returns
+    -------
+    int
+    """
     return min(max(math.floor((x - grid.low_x) / grid.cell_size), 0), columns - 1)

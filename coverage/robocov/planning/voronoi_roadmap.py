@@ -49,6 +49,10 @@ class VoronoiRoadmap(NamedTuple):
             Minimum distance from one vertex to the next, in cells.
         max_vertices : int
             Approximate maximum number of vertices.
+
+        Returns
+        -------
+        VoronoiRoadmap
         """
         is_graph = find_voronoi_cells(is_roomy)
         steps = max(1, math.ceil(max(spacing, np.count_nonzero(is_graph) / max_vertices)))

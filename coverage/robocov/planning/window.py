@@ -40,6 +40,10 @@ class Window(NamedTuple):
             What is at most that far away is in the window; infinite for the whole raster. The window moves in
             steps of a quarter of the reach, and therefore stays the same while the centre hardly moves.
         max_nodes : int
+
+        Returns
+        -------
+        Window
         """
         rows, columns = raster.shape
         row, column = raster.find_cells(np.asarray(center, dtype=float))
@@ -97,7 +101,16 @@ class Window(NamedTuple):
         return np.pad(cropped, ((0, missing_rows), (0, missing_columns)), constant_values=fill)
 
     def compute_nodes(self, raster: Raster) -> Array:
-        """Compute the positions of the nodes, (m, 2) m, row by row."""
+        """Compute the positions of the nodes, row by row.
+
+        Parameters
+        ----------
+        raster : Raster
+
+        Returns
+        -------
+        (m, 2) array, m
+        """
         row, column = np.mgrid[: self.rows, : self.columns].reshape(2, -1) * self.stride + self.stride // 2
         return raster.compute_centers(row + self.first_row, column + self.first_column)
 

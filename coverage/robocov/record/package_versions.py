@@ -13,7 +13,13 @@ _PACKAGES = ("robocov", "numpy", "scipy", "shapely", "pymunk")
 
 @cache
 def list_versions() -> Mapping[str, str]:
-    """Return the versions of Python and of the packages on which a result depends; read-only."""
+    """Return the versions of Python and of the packages on which a result depends.
+
+    Returns
+    -------
+    mapping of str to str
+        Read-only.
+    """
     versions = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:

@@ -178,6 +178,10 @@ class Record(Drawable):
         ----------
         k : int
             Number of the moment.
+
+        Returns
+        -------
+        Snapshot
         """
         working = None if self.conditions is None else self.working[k]
         neighbours = Neighbours.from_ranges(self.positions[k], self.team.communication_range)
@@ -206,6 +210,10 @@ class Record(Drawable):
         ----------
         time : float, s
 
+        Returns
+        -------
+        Snapshot
+
         Raises
         ------
         ParameterError
@@ -224,6 +232,10 @@ class Record(Drawable):
         ----------
         time : float, s
 
+        Returns
+        -------
+        Record
+
         Raises
         ------
         ParameterError
@@ -241,6 +253,10 @@ class Record(Drawable):
         ----------
         rate : float, Hz
             Moments per simulated second, see `select_nearest_moments`; 0 keeps the first and the last one.
+
+        Returns
+        -------
+        Record
 
         Raises
         ------
@@ -293,6 +309,10 @@ class Record(Drawable):
             The summary of the run, see `metrics.summarise`.
         lattice : int or None
             Lattice on which its cost was computed.
+
+        Returns
+        -------
+        dict
         """
         document: dict[str, Any] = {
             "format": FORMAT,
@@ -356,6 +376,10 @@ class Record(Drawable):
         Parameters
         ----------
         folder : Path or str
+
+        Returns
+        -------
+        Record
 
         Raises
         ------

@@ -29,7 +29,17 @@ _MAX_VALUES = {"time": 1e9, "positions": 1e7, "velocities": 1e300, "forces": 1e3
 
 
 def list_array_names(team: Team) -> tuple[str, ...]:
-    """Return the names of the arrays of a record of a team."""
+    """Return the names of the arrays of a record.
+
+    Parameters
+    ----------
+    team : Team
+        The robots of the record.
+
+    Returns
+    -------
+    tuple of str
+    """
     return (*ARRAYS, STEERING) if team.is_unicycle.any() else ARRAYS
 
 

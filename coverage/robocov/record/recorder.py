@@ -69,7 +69,12 @@ class Recorder:
         }
 
     def add(self, snapshot: Snapshot) -> None:
-        """Append a step; its arrays are copied."""
+        """Append a step; its arrays are copied.
+
+        Parameters
+        ----------
+        snapshot : Snapshot
+        """
         goals = snapshot.decision.goals
         if goals is None:
             goals = np.full_like(snapshot.seen.positions, np.nan)
@@ -83,7 +88,17 @@ class Recorder:
             self._rows[STEERING].append(snapshot.steering.copy())
 
     def record(self, joined: tuple[JoinedRobot, ...] = ()) -> Record:
-        """Return the record of the steps so far; `joined` are the robots that joined in them."""
+        """Return the record of the steps so far.
+
+        Parameters
+        ----------
+        joined : tuple of JoinedRobot
+            The robots that joined in them.
+
+        Returns
+        -------
+        Record
+        """
         arrays = {name: np.array(rows) for name, rows in self._rows.items()}
         return Record(
             environment=self.environment,

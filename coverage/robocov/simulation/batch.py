@@ -25,7 +25,7 @@ from robocov.simulation.simulation import MAX_START_OVERLAP_M
 from robocov.team import Team
 from robocov.world import World
 from robocov.world.free_positions import require_free_starts
-from robocov.world.obstacle_pieces import build_solid_pieces
+from robocov.world.obstacle_pieces import build_obstacles
 
 MAX_JOINT_TEAM_SIZE = 15
 """Largest teams whose controller is called once for all runs. Cells of larger teams come from a
@@ -117,9 +117,9 @@ class SimulationBatch:
         self._caller = ControllerCaller(controller, environment.static, time=0.0)
         self._joint_team = Team.concatenate([self.team] * runs)
         self._rows = [slice(run * robots, (run + 1) * robots) for run in range(runs)]
-        pieces = build_solid_pieces(environment)
-        self._world = World(pieces, self._joint_team, positions.reshape(-1, 2), runs=runs)
-        self.sensor = RangeSensor(pieces)
+        obstacles = build_obstacles(environment)
+        self._world = World(obstacles, self._joint_team, positions.reshape(-1, 2), runs=runs)
+        self.sensor = RangeSensor(obstacles.walls)
         self._complete_graphs: list[Neighbours] | None = None
         if np.isinf(self.team.communication_range).all():
             self._complete_graphs = [Neighbours(robots)] * runs
@@ -208,7 +208,10 @@ class SimulationBatch:
     def observe(self) -> Observations:
         """Return the present observations of the robots of all runs.
 
-        Row ``r * n + i`` belongs to robot i of run r. Robots hear only those of their own run.
+        Returns
+        -------
+        Observations
+            Row ``r * n + i`` belongs to robot i of run r. Robots hear only those of their own run.
         """
         if self._observations is None:
             scanning = self._caller.scanning
@@ -224,7 +227,16 @@ class SimulationBatch:
         return self._observations
 
     def observe_run(self, run: int) -> Observations:
-        """Return the present observations of the robots of one run, as `Simulation.observe` does."""
+        """Return the present observations of the robots of one run, as `Simulation.observe` does.
+
+        Parameters
+        ----------
+        run : int
+
+        Returns
+        -------
+        Observations
+        """
         observations = self.observe()
         rows = self._rows[run]
         scans = observations.scans
@@ -317,6 +329,11 @@ class SimulationBatch:
             Name of the start from which the positions were sampled, for the records.
         seeds : sequence of int, or None
             Seed of each run, with which its positions were sampled, for the records.
+
+        Returns
+        -------
+        list of Record
+            One for each run.
 
         Raises
         ------

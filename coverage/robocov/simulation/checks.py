@@ -42,6 +42,10 @@ def count_steps(duration: float, dt: float) -> int:
     duration : float, s
     dt : float, s
 
+    Returns
+    -------
+    int
+
     Raises
     ------
     ParameterError
@@ -60,6 +64,10 @@ def check_team(team: Any, robots: int) -> Team:
     ----------
     team : Team or None
     robots : int
+
+    Returns
+    -------
+    Team
 
     Raises
     ------
@@ -82,6 +90,10 @@ def check_conditions(conditions: Any, robots: int) -> Conditions | None:
     ----------
     conditions : Conditions or None
     robots : int
+
+    Returns
+    -------
+    Conditions or None
 
     Raises
     ------

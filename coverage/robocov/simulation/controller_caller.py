@@ -72,7 +72,19 @@ class ControllerCaller:
             )
 
     def begin(self, region: Region, team: Team, time: float) -> Any:
-        """Return the memory of the robots before their first decision."""
+        """Return the memory of the robots before their first decision.
+
+        Parameters
+        ----------
+        region : Region
+        team : Team
+        time : float, s
+            For messages.
+
+        Returns
+        -------
+        object
+        """
         return self._call(time, self._informed_controller.begin, region, team)
 
     def decide(self, observations: Observations, memory: Any) -> Decision:
@@ -83,6 +95,10 @@ class ControllerCaller:
         observations : Observations
         memory : object
             The memory that the previous decision returned, or `begin`.
+
+        Returns
+        -------
+        Decision
 
         Raises
         ------

@@ -32,6 +32,10 @@ def build_observations(
     time : float, s
     scanning : Scanning or None
         The scans to take in this step; None: no scan.
+
+    Returns
+    -------
+    Observations
     """
     scans = None
     if scanning is not None:
@@ -52,5 +56,19 @@ def build_observations(
 
 
 def is_scan_due(scanning: Scanning | None, step: int, dt: float) -> bool:
-    """Return whether the robots scan in a step, counted from 0."""
+    """Return whether the robots scan in a step.
+
+    Parameters
+    ----------
+    scanning : Scanning or None
+        None: they never scan.
+    step : int
+        Number of the step, from 0.
+    dt : float, s
+        Control period.
+
+    Returns
+    -------
+    bool
+    """
     return scanning is not None and step % scanning.count_steps(dt) == 0

@@ -36,7 +36,7 @@ from robocov.simulation.team_state import TeamState, to_team_state
 from robocov.team import Team
 from robocov.world import MAX_PENETRATION, ChangingWorld, World
 from robocov.world.free_positions import require_free_starts
-from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
+from robocov.world.obstacle_pieces import build_movers, build_obstacles, build_solid_pieces
 
 MAX_START_OVERLAP_M = 1e-6
 """Overlap of robots at rest, with walls or with each other, that is taken for rounding."""
@@ -154,12 +154,11 @@ class Simulation:
                 time=self.time,
             )
         return World(
-            build_solid_pieces(self.environment),
+            build_obstacles(self.environment),
             self.team,
             state.positions,
             state.velocities,
             steering=state.steering,
-            movers=build_movers(self.environment),
         )
 
     def _start_step(self) -> None:
@@ -244,7 +243,12 @@ class Simulation:
         self._start_step()
 
     def observe(self) -> Observations:
-        """Return the present observations of the robots; the controller is not called."""
+        """Return the present observations of the robots; the controller is not called.
+
+        Returns
+        -------
+        Observations
+        """
         return self._get_knowledge().observations
 
     def observe_and_decide(self) -> Snapshot:
@@ -333,6 +337,10 @@ class Simulation:
         duration : float, s
             Time to simulate.
 
+        Yields
+        ------
+        Snapshot
+
         Raises
         ------
         ParameterError
@@ -354,6 +362,10 @@ class Simulation:
             Name of the start from which the positions were sampled, for the record.
         seed : int or None
             Seed with which they were sampled, for the record.
+
+        Returns
+        -------
+        Record
 
         Raises
         ------
@@ -381,15 +393,29 @@ class Simulation:
         return recorder.record(self.joined)
 
     def show(self, *, height: int = 620) -> Any:
-        """Show the simulation in an interactive window, in a notebook in a cell of `height` px.
+        """Show the simulation in an interactive window, or in a cell of a notebook.
 
-        The window starts with the present positions at 0 s. It does not change this simulation; see
-        `robocov.show`.
+        The window starts with the present positions at 0 s. It does not change this simulation.
+
+        Parameters
+        ----------
+        height : int, px
+            Height of the cell.
+
+        Returns
+        -------
+        object
+            As `robocov.show`.
         """
         return show(self, height=height)
 
     def copy(self) -> Simulation:
-        """Return an independent simulation in the same state, which continues identically."""
+        """Return an independent simulation in the same state, which continues identically.
+
+        Returns
+        -------
+        Simulation
+        """
         twin = copy(self)
         twin._world = self._world.copy()
         twin.memory = deepcopy(self.memory)
@@ -408,12 +434,16 @@ class Simulation:
         self._start_step()
 
     def with_density(self, environment: Environment) -> Simulation:
-        """Return a simulation that continues in the same place with another density.
+        """Return a simulation that continues from the same state with another density.
 
         Parameters
         ----------
         environment : Environment
             The present one, apart from its density. A controller that knows the map is informed again.
+
+        Returns
+        -------
+        Simulation
         """
         twin = self.copy()
         twin.environment = environment
@@ -428,6 +458,10 @@ class Simulation:
         memory : object
         inbox : Inbox or None
             Messages that the robots have received; None: the present ones.
+
+        Returns
+        -------
+        Simulation
         """
         twin = self.copy()
         twin.memory = deepcopy(memory)
@@ -457,6 +491,10 @@ class Simulation:
             As those of `Simulation`; None: no change.
         positions, velocities, steering : (n, 2) arrays or None
             As those of `TeamState`; None: no change.
+
+        Returns
+        -------
+        Simulation
 
         Raises
         ------

@@ -72,5 +72,14 @@ def _check_rows(name: str, rows: Array, shape: tuple[int, ...], columns: str) ->
 
 
 def to_team_state(starts: Any) -> TeamState:
-    """Return the state of robots at rest at given positions; a state is returned as it is."""
+    """Return the state of robots at rest at given positions; a state is returned as it is.
+
+    Parameters
+    ----------
+    starts : TeamState or (n, 2) array_like, m
+
+    Returns
+    -------
+    TeamState
+    """
     return starts if isinstance(starts, TeamState) else TeamState(starts)

@@ -36,6 +36,7 @@ class VoronoiPartition(Cells):
 
     @cached_property
     def edges(self) -> CellEdges:
+        """The edges of all cells, which are computed when they are first used."""
         return self._find_edges()
 
     @cached_property
@@ -45,6 +46,7 @@ class VoronoiPartition(Cells):
 
     @property
     def outlines(self) -> tuple[list[Array], IntArray]:
+        """The polygons of the cells, and the number of the cell of each."""
         return self.polygons, np.arange(len(self.generators))
 
 
@@ -120,7 +122,21 @@ def partition(
 
 
 def to_generators(values: object) -> Array:
-    """Convert generators to a new array of shape (n, 2); raise InputError if that is not possible."""
+    """Convert generators to a new array.
+
+    Parameters
+    ----------
+    values : (n, 2) array_like, m
+
+    Returns
+    -------
+    (n, 2) array, m
+
+    Raises
+    ------
+    InputError
+        If they are no numbers of this shape.
+    """
     try:
         points = np.array(values, dtype=np.float64, order="C")
     except (TypeError, ValueError):
@@ -131,7 +147,19 @@ def to_generators(values: object) -> Array:
 
 
 def check_neighbours(neighbours: Neighbours, reported_positions: Array | None, robots: int) -> None:
-    """Raise InputError if neighbours or reported positions do not fit to the number of robots."""
+    """Check that neighbours and reported positions fit to the number of robots.
+
+    Parameters
+    ----------
+    neighbours : Neighbours
+    reported_positions : (m, 2) array or None, m
+    robots : int
+
+    Raises
+    ------
+    InputError
+        If they do not fit.
+    """
     if neighbours.count != robots:
         raise InputError(f"neighbours: expected a graph of {robots} robots, got {neighbours.count}")
     if reported_positions is None:

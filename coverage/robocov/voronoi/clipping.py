@@ -65,15 +65,42 @@ class CellArrays(NamedTuple):
 
 @kernel
 def create_workspace(robots: int, sides: int) -> Workspace:
-    """Allocate the working memory for cells of some robots in a region with some sides."""
+    """Allocate the working memory for the cells of a team in a region.
+
+    Parameters
+    ----------
+    robots : int
+    sides : int
+        Number of sides of the region.
+
+    Returns
+    -------
+    Workspace
+    """
     return Workspace(np.empty((2, sides + robots + 2, 4)), np.empty((robots, 4)))
 
 
 @inlined_kernel
 def add_neighbour(neighbours: Array, count: int, dx: float, dy: float, robot: int) -> int:
-    """Add a neighbour that may bound a cell to those of a workspace; return their new number.
+    """Add a neighbour that may bound a cell to those of a workspace.
 
     Neighbours at the same position are left out: two robots at one position do not cut each other's cells.
+
+    Parameters
+    ----------
+    neighbours : (n, 4) array
+        Changed in place; see `Workspace`.
+    count : int
+        Number of neighbours before.
+    dx, dy : float, m
+        Offset of the neighbour from the generator.
+    robot : int
+        Number of the neighbour.
+
+    Returns
+    -------
+    int
+        Number of neighbours after.
     """
     neighbours[count, DX] = dx
     neighbours[count, DY] = dy
@@ -98,6 +125,10 @@ def clip_cell(workspace: Workspace, neighbours: int, points: Array, sides: Array
         The region, as `Region.sides`.
     i : int
         Number of the robot.
+
+    Returns
+    -------
+    CellPolygon
     """
     rings = workspace.rings
     near = workspace.neighbours

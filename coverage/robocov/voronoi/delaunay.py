@@ -62,13 +62,31 @@ def update_triangulation(mesh: Mesh, points: Array, cotangents: Array, stack: In
 
 @inlined_kernel
 def get_next(h: int) -> int:
-    """Return the half-edge that follows h in its triangle."""
+    """Return the half-edge that follows another one in its triangle.
+
+    Parameters
+    ----------
+    h : int
+
+    Returns
+    -------
+    int
+    """
     return h + 1 if h & 3 < 2 else h - 2
 
 
 @inlined_kernel
 def get_previous(h: int) -> int:
-    """Return the half-edge of the same triangle that ends where h begins."""
+    """Return the half-edge of the same triangle that ends where another one begins.
+
+    Parameters
+    ----------
+    h : int
+
+    Returns
+    -------
+    int
+    """
     return h - 1 if h & 3 else h + 2
 
 

@@ -89,6 +89,7 @@ class WeightedCells(Cells):
 
     @cached_property
     def polar_moment(self) -> Array:
+        """Polar moments of the cells about their generators, (n,) m⁴; exact if the density is uniform."""
         if self.density is not None and not self.density.is_uniform:
             return super().polar_moment
         weight = 1.0 if self.density is None else self.density.max_value

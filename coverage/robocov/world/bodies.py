@@ -6,51 +6,25 @@ Only public pymunk is used. `pymunk.batch` reads and writes the states of all bo
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import pymunk
 from pymunk import batch
 
 from robocov.arrays import Array, IntArray
-from robocov.world.obstacle_pieces import Mover
+from robocov.world.obstacle_pieces import Mover, Obstacles
 
 WALL_CATEGORY = 0b1
 """Filter category of what robots never enter: walls and failed robots, but not moving obstacles."""
 WALLS_ONLY = pymunk.ShapeFilter(mask=WALL_CATEGORY)
 """Filter of queries that find nothing but walls and failed robots."""
 MAX_TEAMS_PER_SPACE = 31
-"""Teams that one space can keep apart: one filter category each, beside that of the walls."""
+"""Teams that one space can keep apart: one filter category each, in addition to that of the walls."""
 
 _ALL_BUT_WALLS = pymunk.ShapeFilter.ALL_CATEGORIES() & ~WALL_CATEGORY
 _FORCE_FIELD = batch.BodyFields.FORCE
 _STATE_FIELDS = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY
 _CONTACT_FIELDS = batch.ArbiterFields.BODY_A_ID | batch.ArbiterFields.BODY_B_ID
-
-
-@dataclass(frozen=True, eq=False)
-class Obstacles:
-    """Everything that is solid except for the working robots.
-
-    Attributes
-    ----------
-    walls : tuple of (k, 2) arrays, m
-        Convex polygons that tile everything that is not free, see
-        `obstacle_pieces.build_solid_pieces`.
-    movers : tuple of Mover
-        Moving obstacles.
-    failed_robots : (w, 3) array or None, m
-        Centre x, y and radius of robots that have failed.
-    """
-
-    walls: tuple[Array, ...]
-    movers: tuple[Mover, ...] = ()
-    failed_robots: Array | None = None
-
-    @property
-    def max_speed(self) -> float:
-        """Largest speed of a moving obstacle, m/s."""
-        return max((mover.path.speed for mover in self.movers), default=0.0)
 
 
 def build_obstacle_space(obstacles: Obstacles) -> tuple[pymunk.Space, list[pymunk.Body]]:
@@ -146,9 +120,17 @@ class BodyArrays:
         self._id_buffer = batch.Buffer()
 
     def find_rows(self, bodies: list[pymunk.Body]) -> slice | IntArray:
-        """Return the rows of bodies that are in the space, in the order of the list.
+        """Find the rows of bodies that are in the space.
 
-        They are a slice if they are consecutive, which is usual and quicker to index with.
+        Parameters
+        ----------
+        bodies : list of pymunk.Body
+
+        Returns
+        -------
+        slice or int array
+            In the order of the list. A slice if they are consecutive, which is usual and quicker to index
+            with.
         """
         self._id_buffer.clear()
         batch.get_space_bodies(self._space, batch.BodyFields.BODY_ID, self._id_buffer)
@@ -173,7 +155,13 @@ class BodyArrays:
         batch.get_space_bodies(self._space, _STATE_FIELDS, self._state_buffer)
 
     def list_touching_bodies(self) -> list[int]:
-        """Return the ids of the bodies that were in contact in the last step, each once per contact."""
+        """List the bodies that were in contact in the last step.
+
+        Returns
+        -------
+        list of int
+            Their ids, each once per contact.
+        """
         self._id_buffer.clear()
         batch.get_space_arbiters(self._space, _CONTACT_FIELDS, self._id_buffer)
         return self._read_ids()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from robocov.environment import Environment
 from robocov.errors import StartError
 from robocov.team import Team
 from robocov.world.free_positions import find_free_position
-from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
+from robocov.world.obstacle_pieces import build_obstacles
 from robocov.world.unicycles import initialize_steering
 from robocov.world.world import World
 
@@ -60,8 +61,7 @@ class ChangingWorld:
         self.team = team
         self._conditions = conditions
         self._environment = environment
-        self._pieces = build_solid_pieces(environment)
-        self._movers = build_movers(environment)
+        self._obstacles = build_obstacles(environment)
         self.positions = np.array(positions, dtype=float)
         self.velocities = np.zeros_like(self.positions) if velocities is None else np.array(velocities)
         self.steering = initialize_steering(team, self.velocities, steering)
@@ -79,7 +79,12 @@ class ChangingWorld:
         return np.column_stack([self.positions, self.team.radius])[self._failed]
 
     def copy(self) -> ChangingWorld:
-        """Return an independent world in the same state, which continues identically."""
+        """Return an independent world in the same state, which continues identically.
+
+        Returns
+        -------
+        ChangingWorld
+        """
         twin = copy(self)
         twin._world = None if self._world is None else self._world.copy()
         return twin
@@ -92,6 +97,14 @@ class ChangingWorld:
         self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
     ) -> None:
         """Move as `World.step` does; then robots fail and join.
+
+        Parameters
+        ----------
+        forces : (n, 2) array, N
+        dt : float, s
+        external_forces : (n, 2) array or None, N
+        time : float, s
+            Time at the start of the step.
 
         Raises
         ------
@@ -161,13 +174,11 @@ class ChangingWorld:
         if len(self._working_rows) > 0:
             rows = self._working_rows
             self._world = World(
-                self._pieces,
+                replace(self._obstacles, failed_robots=self.failed_robots),
                 self.team[rows],
                 self.positions[rows],
                 self.velocities[rows],
                 steering=None if self.steering is None else self.steering[rows],
-                movers=self._movers,
-                failed_robots=self.failed_robots,
             )
 
     def _protect_state(self) -> None:

@@ -15,8 +15,9 @@ import pymunk
 
 from robocov.arrays import Array, IntArray
 from robocov.team import Team
-from robocov.world.bodies import WALLS_ONLY, BodyArrays, Obstacles, build_obstacle_space, build_robot
+from robocov.world.bodies import WALLS_ONLY, BodyArrays, build_obstacle_space, build_robot
 from robocov.world.dynamics import compute_clip_factor
+from robocov.world.obstacle_pieces import Obstacles
 
 MAX_PENETRATION = 1e-3
 """Depth in metres to which robots may sink into walls or each other; in contact no substep is longer."""
@@ -68,18 +69,41 @@ class FreeSpace:
         self.set_robots(positions, velocities)
 
     def set_robots(self, positions: Array, velocities: Array) -> None:
-        """Set the positions, (n, 2) m, and velocities, (n, 2) m/s, of all robots."""
+        """Set the states of all robots.
+
+        Parameters
+        ----------
+        positions : (n, 2) array, m
+        velocities : (n, 2) array, m/s
+        """
         self._arrays.states[self._robot_rows, :2] = positions
         self._arrays.states[self._robot_rows, 2:] = velocities
         self._arrays.write_states()
 
     def set_movers(self, states: Array) -> None:
-        """Set the states of moving obstacles, (m, 4) m and m/s, as `bodies.compute_mover_states` returns."""
+        """Set the states of moving obstacles.
+
+        Parameters
+        ----------
+        states : (m, 4) array, m and m/s
+            As `bodies.compute_mover_states` returns them.
+        """
         self._arrays.states[self._mover_rows] = states
         self._arrays.write_states()
 
     def step(self, net_forces: Array, dt: float) -> Array:
-        """Move all robots under net forces, (n, 2) N, and return their states, (n, 4): x, y, vx, vy."""
+        """Move all robots under net forces.
+
+        Parameters
+        ----------
+        net_forces : (n, 2) array, N
+        dt : float, s
+
+        Returns
+        -------
+        (n, 4) array, m and m/s
+            x, y, vx and vy of each robot.
+        """
         self._arrays.forces[self._robot_rows] = net_forces
         self._arrays.write_forces()
         self._space.step(dt)
@@ -87,7 +111,13 @@ class FreeSpace:
         return self._arrays.states[self._robot_rows].copy()
 
     def list_touching_robots(self) -> list[int]:
-        """Return the robots that touched something in the last step, ascending."""
+        """List the robots that touched something in the last step.
+
+        Returns
+        -------
+        list of int
+            Ascending.
+        """
         bodies = self._arrays.list_touching_bodies()
         return sorted({self._robot_of_body[body] for body in bodies if body in self._robot_of_body})
 

@@ -34,7 +34,18 @@ class MotionResponse(NamedTuple):
 
 
 def compute_response(team: Team, dt: float) -> MotionResponse:
-    """Compute how the robots of a team respond to forces during a substep of `dt` seconds."""
+    """Compute the response of the robots of a team to forces during a substep.
+
+    Parameters
+    ----------
+    team : Team
+    dt : float, s
+        Duration of the substep.
+
+    Returns
+    -------
+    MotionResponse
+    """
     rate = team.viscosity / team.mass
     velocity_loss = -np.expm1(-rate * dt)
     is_viscous = rate > 0
@@ -51,7 +62,20 @@ def compute_response(team: Team, dt: float) -> MotionResponse:
 
 @kernel
 def compute_clip_factor(x: float, y: float, limit: float) -> float:
-    """Return the factor that clips the vector (x, y) to the length `limit`."""
+    """Return the factor that clips a vector to a length.
+
+    Parameters
+    ----------
+    x, y : float
+        The vector.
+    limit : float
+        Maximum length.
+
+    Returns
+    -------
+    float
+        1 if the vector is not longer.
+    """
     square = x * x + y * y
     if square > limit * limit:
         return limit / math.sqrt(square)

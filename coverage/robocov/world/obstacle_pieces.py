@@ -1,4 +1,4 @@
-"""Everything that is solid as convex pieces, which is what the physics engine can represent.
+"""Everything that is solid as convex pieces, because the physics engine represents nothing else.
 
 pymunk silently replaces a concave polygon by its hull. Therefore everything that is not free is triangulated,
 and the triangles are merged to larger convex pieces as long as they stay convex (Hertel and Mehlhorn 1983: at
@@ -6,6 +6,7 @@ most four times as many pieces as in an optimal decomposition).
 """
 
 import weakref
+from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple, TypeAlias
 
@@ -37,6 +38,44 @@ class Mover(NamedTuple):
 
     pieces: tuple[Array, ...]
     path: ObstaclePath
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacles:
+    """Everything that is solid except for the working robots.
+
+    Attributes
+    ----------
+    walls : tuple of (k, 2) arrays, m
+        Convex polygons that tile everything that is not free, see `build_solid_pieces`.
+    movers : tuple of Mover
+        Moving obstacles.
+    failed_robots : (w, 3) array or None, m
+        Centre x, y and radius of robots that have failed.
+    """
+
+    walls: tuple[Array, ...]
+    movers: tuple[Mover, ...] = ()
+    failed_robots: Array | None = None
+
+    @property
+    def max_speed(self) -> float:
+        """Largest speed of a moving obstacle, m/s."""
+        return max((mover.path.speed for mover in self.movers), default=0.0)
+
+
+def build_obstacles(environment: Environment) -> Obstacles:
+    """Build the walls and the moving obstacles of an environment.
+
+    Parameters
+    ----------
+    environment : Environment
+
+    Returns
+    -------
+    Obstacles
+    """
+    return Obstacles(build_solid_pieces(environment), build_movers(environment))
 
 
 def build_solid_pieces(environment: Environment) -> tuple[Array, ...]:
@@ -111,7 +150,7 @@ def _triangulate(polygon: BaseGeometry) -> list[Loop]:
     rings = shapely.get_coordinates(shapely.constrained_delaunay_triangles(polygon)).reshape(-1, 4, 2)
     triangles: list[Loop] = []
     for corners in rings[:, :3].tolist():
-        a, b, c = ((x, y) for x, y in corners)
+        a, b, c = map(tuple, corners)
         doubled_area = _compute_doubled_area(a, b, c)
         if doubled_area > 0.0:
             triangles.append([a, b, c])

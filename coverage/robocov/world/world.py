@@ -13,13 +13,19 @@ from robocov.arrays import Array, BoolArray
 from robocov.errors import ParameterError
 from robocov.observation.close_pairs import find_close_pairs
 from robocov.team import Team
-from robocov.world.bodies import MAX_TEAMS_PER_SPACE, Obstacles, compute_mover_states
+from robocov.world.bodies import MAX_TEAMS_PER_SPACE, compute_mover_states
 from robocov.world.contacts import ContactSolver, FreeSpace
 from robocov.world.dynamics import MotionResponse, compute_net_forces, compute_response
-from robocov.world.obstacle_pieces import Mover
-from robocov.world.unicycles import compute_drive_command, initialize_steering, remove_sideways_velocity
+from robocov.world.obstacle_pieces import Obstacles
+from robocov.world.unicycles import (
+    Wheels,
+    compute_drive_command,
+    initialize_steering,
+    remove_sideways_velocity,
+)
 
 MAX_SUBSTEP_S = 0.02
+"""Longest period over which motion is integrated at once."""
 MAX_MASS_RATIO = 1000.0
 """Mass of the heaviest robot over that of the lightest; beyond it contacts cannot be resolved."""
 
@@ -41,9 +47,7 @@ class World:
 
     Parameters
     ----------
-    pieces : tuple of (k, 2) arrays, m
-        Convex polygons that tile everything that is not free, see
-        `obstacle_pieces.build_solid_pieces`.
+    obstacles : Obstacles
     team : Team
         The n robots.
     positions : (n, 2) array, m
@@ -51,10 +55,6 @@ class World:
         By default robots are at rest.
     steering : (n, 2) array or None, rad and rad/s
         Heading and turning rate of unicycles; by default they face the direction in which they move.
-    movers : tuple of Mover
-        Moving obstacles.
-    failed_robots : (w, 3) array or None, m
-        x, y and radius of robots that have failed and stand in the way.
     runs : int
         Number of independent runs with teams of equal size. Row ``r * n / runs + i`` is robot i of run r;
         robots of different runs pass through each other.
@@ -80,21 +80,19 @@ class World:
     robot sinks into anything by more than `contacts.MAX_PENETRATION`. A step depends on nothing but
     positions, velocities and steering, so that a copy continues identically, bit for bit.
 
-    Moving obstacles keep to their path whatever is in the way, and push what they meet. Walls are stronger
+    Moving obstacles keep to their path and push what they meet. Walls are stronger
     still: where no space is left between a moving obstacle and a wall, the robot stays in front of the wall
     and the obstacle moves over it. Once there is space, the robot is pushed out on the nearest side.
     """
 
     def __init__(
         self,
-        pieces: tuple[Array, ...],
+        obstacles: Obstacles,
         team: Team,
         positions: Array,
         velocities: Array | None = None,
         *,
         steering: Array | None = None,
-        movers: tuple[Mover, ...] = (),
-        failed_robots: Array | None = None,
         runs: int = 1,
     ) -> None:
         lightest = float(team.mass.min())
@@ -105,9 +103,9 @@ class World:
                 f"got {lightest:g} to {heaviest:g} kg"
             )
         self.team = team
-        self.failed_robots = failed_robots
+        self.failed_robots = obstacles.failed_robots
         self.working: BoolArray = np.ones(len(team), dtype=bool)
-        self._obstacles = Obstacles(pieces, movers, failed_robots)
+        self._obstacles = obstacles
         self._is_unicycle = team.is_unicycle
         self._max_team_speed = float(team.max_speed.max())
         self._min_radius = float(team.radius.min())
@@ -120,7 +118,7 @@ class World:
             self._may_exceed_max_speed = True
         self._set_state(np.array(positions, dtype=float), np.array(velocities, dtype=float))
         self.steering = initialize_steering(team, self.velocities, steering)
-        self._mover_states = compute_mover_states(movers, time=0.0, dt=1.0)
+        self._mover_states = compute_mover_states(obstacles.movers, time=0.0, dt=1.0)
         self._response: MotionResponse | None = None
         self._response_dt = math.nan
         # Both are built when they are needed, and are the only objects that a step changes in place.
@@ -128,7 +126,13 @@ class World:
         self._contact_solver: ContactSolver | None = None
 
     def place(self, run: int, positions: Array) -> None:
-        """Move the robots of a run to other positions, (n / runs, 2) m, at rest, and facing along +x."""
+        """Move the robots of a run to other positions, at rest and facing along +x.
+
+        Parameters
+        ----------
+        run : int
+        positions : (n / runs, 2) array, m
+        """
         rows = self._rows_of_run(run)
         new_positions = self.positions.copy()
         new_velocities = self.velocities.copy()
@@ -143,7 +147,12 @@ class World:
             self.steering = steering
 
     def copy(self) -> World:
-        """Return an independent world in the same state, which continues identically."""
+        """Return an independent world in the same state, which continues identically.
+
+        Returns
+        -------
+        World
+        """
         return copy(self)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -200,16 +209,14 @@ class World:
             max_speed_after_contact = limits.pushed
         steering = self.steering
         if steering is not None:
-            rolls = self._list_rolling(external)
+            is_rolling = self._find_rolling(external)
             command = compute_drive_command(
                 forces=forces,
                 velocities=self.velocities,
                 # Robots that are carried keep their heading, and do not turn.
-                steering=steering * np.column_stack([np.ones(len(rolls)), rolls]),
+                steering=steering * np.column_stack([np.ones(len(is_rolling)), is_rolling]),
                 response=response,
-                track_width=self.team.track_width,
-                max_turning_rate=self.team.turning_rate,
-                rolls=rolls,
+                wheels=Wheels(self.team.track_width, self.team.turning_rate, is_rolling),
                 dt=dt,
             )
             forces = command.forces
@@ -227,7 +234,7 @@ class World:
                     velocities=velocities,
                     steering=steering,
                     max_speed=max_speed_after_contact - wheel_speed,
-                    rolls=rolls,
+                    is_rolling=is_rolling,
                 )
             steering.setflags(write=False)
             self.steering = steering
@@ -253,7 +260,7 @@ class World:
             pushed = np.maximum(driving, speeds + self._compute_push(external) * dt)
         return _SpeedLimits(driving, pushed)
 
-    def _list_rolling(self, external: Array) -> BoolArray:
+    def _find_rolling(self, external: Array) -> BoolArray:
         """Return which robots are unicycles on their own wheels: those that no external force carries."""
         if len(external) > 0:
             return self._is_unicycle & ~external.any(axis=1)
@@ -269,7 +276,7 @@ class World:
         return np.asarray(np.hypot(self.velocities[:, 0], self.velocities[:, 1]))
 
     def _set_state(self, positions: Array, velocities: Array) -> None:
-        """Set the state of all robots, in arrays that nobody who gets them can change."""
+        """Set the state of all robots, in read-only arrays."""
         positions.setflags(write=False)
         velocities.setflags(write=False)
         self.positions = positions
