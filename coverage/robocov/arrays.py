@@ -17,6 +17,12 @@ ComplexArray: TypeAlias = NDArray[np.complex128]
 BoolArray: TypeAlias = NDArray[np.bool_]
 """Masks."""
 
+Point: TypeAlias = tuple[float, float]
+"""x and y, m."""
+
+Ring: TypeAlias = tuple[Point, ...]
+"""Points of a closed ring, of which the first is not repeated, or of a poly-line."""
+
 
 def freeze(values: object) -> Array:
     """Copy values into a read-only, C-contiguous array of floats.
@@ -52,6 +58,29 @@ def compute_lengths(vectors: Array) -> Array:
     array([5., 2.])
     """
     return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
+
+
+def compute_point_distances(first: Array, second: Array) -> Array:
+    """Compute the Euclidean distances between points, sqrt(dx² + dy²).
+
+    Unlike `compute_lengths`, it uses the square root, as kernels do, so that both give the same bits.
+
+    Parameters
+    ----------
+    first, second : (..., 2) arrays, m
+        Their shapes broadcast together.
+
+    Returns
+    -------
+    (...) array, m
+
+    Examples
+    --------
+    >>> compute_point_distances(np.array([[3.0, 4.0], [0.0, 2.0]]), np.zeros(2))
+    array([5., 2.])
+    """
+    offsets = first - second
+    return np.asarray(np.sqrt(offsets[..., 0] ** 2 + offsets[..., 1] ** 2))
 
 
 def find_run_starts(values: IntArray) -> IntArray:

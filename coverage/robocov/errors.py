@@ -8,8 +8,8 @@
     ├── ControllerEndedError  a user's controller ended Python (exit status 1)
     └── OutputError           a result cannot be written (exit status 2)
 
-Every message is one line: the source (a file or an argument), the place in it, what was expected there, and
-the value that was found instead.
+Every message is one line with the source (a file or an argument), the place in it, the expected value, and
+the actual one.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Mistake(NamedTuple):
     path : tuple of str and int
         Path of the value that is wrong or missing.
     text : str
-        The place, what was expected there, and the value that was found.
+        The place, the expected value, and the actual one.
     at_key : bool
         Whether the last key of the path is wrong, rather than its value.
     line, column : int or None
@@ -72,7 +72,7 @@ class Mistake(NamedTuple):
         ----------
         path : tuple of str and int
         message : str
-            What is wrong.
+            Description of the mistake.
         at_key : bool
             Whether the last key of the path is wrong, rather than its value.
 
@@ -333,7 +333,7 @@ def require_number(
     if not is_number(value, kind) or not minimum <= value <= maximum:
         description = "a whole number" if whole else "a number"
         expected = f"{description} from {minimum:g} to {maximum:g} {unit}".rstrip()
-        raise ParameterError(f"{name}: expected {expected}, got {quote(value)}")
+        raise ParameterError(_describe_mismatch(name, value, expected))
     return float(value)
 
 
@@ -375,7 +375,7 @@ def to_floats(
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        raise error_type(f"{name}: expected {expected}, got {quote(values)}") from None
+        raise error_type(_describe_mismatch(name, values, expected)) from None
 
 
 def require_type(name: str, value: object, kind: type, expected: str) -> None:
@@ -396,7 +396,12 @@ def require_type(name: str, value: object, kind: type, expected: str) -> None:
         If the value has another type.
     """
     if not isinstance(value, kind):
-        raise ParameterError(f"{name}: expected {expected}, got {quote(value)}")
+        raise ParameterError(_describe_mismatch(name, value, expected))
+
+
+def _describe_mismatch(name: str, value: object, expected: str) -> str:
+    """Return the message for a value that is not what was expected."""
+    return f"{name}: expected {expected}, got {quote(value)}"
 
 
 def summarize_names(names: Sequence[str]) -> str:
@@ -421,7 +426,7 @@ def summarize_names(names: Sequence[str]) -> str:
 
 
 def format_count(count: int, noun: str) -> str:
-    """Format a number of things.
+    """Format a number of items.
 
     Parameters
     ----------
@@ -447,7 +452,7 @@ def describe_unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     Parameters
     ----------
     kind : str
-        What is named.
+        Kind of the item, such as "controller".
     name : str
     known : iterable of str
 

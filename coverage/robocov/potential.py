@@ -142,6 +142,22 @@ def compute_separations(robots: IntArray, neighbours: IntArray) -> Array:
     return directions
 
 
+def compute_spread_directions(numbers: IntArray) -> Array:
+    """Compute directions that are spread evenly: multiples of the golden angle.
+
+    Parameters
+    ----------
+    numbers : (k,) int array
+
+    Returns
+    -------
+    (k, 2) array
+        Unit vectors.
+    """
+    angles = GOLDEN_ANGLE * numbers
+    return np.column_stack([np.cos(angles), np.sin(angles)])
+
+
 @kernel
 def _compute_repulsion(distance: float, k_rep: float, rho_0: float) -> float:
     """Return the magnitude of (24) divided by the distance, N/m; zero at distance zero."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
+from robocov.arrays import Array, BoolArray, compute_point_distances
 from robocov.conditions.communication import Inbox, Radio
 from robocov.conditions.conditions import POSITION, SCANNING, SENSING, Conditions
 from robocov.conditions.random_streams import RandomStream
@@ -106,7 +106,7 @@ class Perception:
             return truth.obstacle_points
         offset = truth.obstacle_points - truth.positions
         if sigma:
-            distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
+            distance = compute_point_distances(truth.obstacle_points, truth.positions)
             noise = sigma * self._sensing_stream.draw_normal(step, self._robots)[:, 0]
             measured = np.maximum(distance + noise, MIN_MEASURED_DISTANCE_M)
             # The direction of a point at distance zero is unknown; it remains there.

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array, IntArray, compute_lengths
 from robocov.cost.lattice import Sites
 from robocov.drawing import Drawable
 from robocov.environment import Environment
@@ -111,7 +111,7 @@ class CoverageResult(Drawable):
         site = np.flatnonzero(self.owner >= 0)
         owner = self.owner[site]
         pull = self.first_waypoints[site] - self.positions[owner]
-        length = np.hypot(pull[:, 0], pull[:, 1])
+        length = compute_lengths(pull)
         pull /= np.where(length > 0.0, length, 1.0)[:, None]
         total_weight = float(len(site))
         if self.weights is not None:

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.arrays import Array, BoolArray, IntArray, compute_lengths
 from robocov.compiled import kernel
 
 REGION = -1
@@ -84,8 +84,8 @@ class CellEdges:
 
     def _has_length(self) -> BoolArray:
         """Return which edges are longer than rounding makes a point at their distance from the generator."""
-        length = np.hypot(self.end[:, 0] - self.start[:, 0], self.end[:, 1] - self.start[:, 1])
-        distance = np.hypot(self.start[:, 0], self.start[:, 1]) + np.hypot(self.end[:, 0], self.end[:, 1])
+        length = compute_lengths(self.end - self.start)
+        distance = compute_lengths(self.start) + compute_lengths(self.end)
         return np.asarray(length > 1e-12 * distance)
 
 

@@ -16,12 +16,11 @@ from typing import ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.arrays import Array, Point, compute_lengths
 from robocov.density.base import Density, require_weight
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError, quote
 
-Point: TypeAlias = tuple[float, float]
 Matrix: TypeAlias = tuple[Point, Point]
 
 _MIN_RELATIVE_DETERMINANT = 1e-9
@@ -248,7 +247,7 @@ def _integrate_along_edges(start: Array, end: Array) -> _EdgeIntegrals:
     from scipy.special import erf, owens_t
 
     along = end - start
-    length = np.hypot(along[:, 0], along[:, 1])
+    length = compute_lengths(along)
     has_length = length > 0.0
     tangent_x, tangent_y = (along / np.where(has_length, length, 1.0)[:, None]).T
     normal_x = tangent_y

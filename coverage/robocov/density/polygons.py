@@ -14,18 +14,16 @@ continuously on all ends, however edges meet, touch or coincide.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, TypeAlias
+from typing import ClassVar
 
 import numpy as np
 import shapely
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array, IntArray, Ring
 from robocov.compiled import kernel
 from robocov.density.base import Density, require_weight
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError
-
-Ring: TypeAlias = tuple[tuple[float, float], ...]
 
 _GAUSS_NODE = 0.5 - 0.5 / 3.0**0.5
 """First node of Gauss's rule with two points on [0, 1], which is exact for cubic polynomials."""

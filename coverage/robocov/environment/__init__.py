@@ -7,6 +7,7 @@
 - `polygons`: robust operations on polygons
 """
 
+from robocov.arrays import Point, Ring
 from robocov.environment.environment import Environment, require_environment
 from robocov.environment.obstacle_paths import (
     REPEATS,
@@ -23,7 +24,7 @@ from robocov.environment.obstacles import (
     shift_obstacle,
 )
 from robocov.environment.passages import MIN_POCKET_AREA_M2, Gap, find_narrow_gaps, find_narrowest_gap
-from robocov.environment.polygons import GRID_M, Point, Ring, find_overlaps
+from robocov.environment.polygons import GRID_M, find_nearest_inside, find_overlaps
 from robocov.environment.starts import (
     MAX_COUNTED_ROBOTS,
     MIN_START_GAP_RADII,
@@ -32,6 +33,8 @@ from robocov.environment.starts import (
     Start,
     StartSpec,
     UniformStart,
+    compute_start_clearance,
+    compute_start_spacing,
 )
 
 __all__ = [
@@ -56,9 +59,12 @@ __all__ = [
     "StartSpec",
     "UniformStart",
     "WallObstacle",
+    "compute_start_clearance",
+    "compute_start_spacing",
     "compute_swept_area",
     "find_narrow_gaps",
     "find_narrowest_gap",
+    "find_nearest_inside",
     "find_overlaps",
     "require_environment",
     "shift_obstacle",

@@ -11,12 +11,12 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from robocov.arrays import Array, freeze
+from robocov.arrays import Array, Ring, freeze
 from robocov.density import Density
 from robocov.density.polygon_masses import compute_polygon_masses
 from robocov.drawing import Drawable
 from robocov.environment.obstacles import Obstacle, shift_obstacle
-from robocov.environment.polygons import GRID_M, Ring, extract_polygons, unite_shapes
+from robocov.environment.polygons import GRID_M, extract_polygons, unite_shapes
 from robocov.environment.starts import Start, StartSpec, UniformStart
 from robocov.errors import StartError, describe_unknown_name, format_count, require_type
 from robocov.observation.region import Region

@@ -12,8 +12,7 @@ import shapely
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
-from robocov.environment.polygons import Ring
+from robocov.arrays import Array, Ring, compute_lengths
 
 Repeat: TypeAlias = Literal["loop", "back-and-forth"]
 """Behaviour at the end of a path: straight to its first point, or back along the path."""
@@ -54,7 +53,7 @@ class ObstaclePath:
         outward = np.array(self.points, dtype=float)
         back = outward[:1] if self.repeat == "loop" else outward[-2::-1]
         points = np.concatenate([outward, back])
-        lengths = np.hypot(*np.diff(points, axis=0).T)
+        lengths = compute_lengths(np.diff(points, axis=0))
         return points, np.concatenate([[0.0], np.cumsum(lengths)])
 
     @property

@@ -11,9 +11,8 @@ import numpy as np
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
+from robocov.arrays import Array, Point, Ring
 from robocov.environment.obstacle_paths import ObstaclePath
-from robocov.environment.polygons import Point, Ring
 
 MAX_SAGITTA_M = 1e-3
 """Largest distance between a circle and the polygon that represents it."""

@@ -11,21 +11,24 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 
-_CELL_AREA = math.sqrt(3) / 2
-"""Area per point of the hexagonal lattice of spacing 1, the densest packing of the plane."""
+_ROW_SPACING = math.sqrt(3) / 2
+"""Distance between the rows of the hexagonal lattice of spacing 1, the densest packing of the plane.
+
+The area per point is the same number.
+"""
 _PACKING_TRIALS = 6
-"""Random packings that are tried where there is room for at most `_MAX_FEW_POINTS`; otherwise one is."""
+"""Number of random packings that are tried if there is room for at most `_MAX_FEW_POINTS`; otherwise one."""
 _MAX_FEW_POINTS = 300
 _LATTICE_TRIALS = 20
-"""Random positions and directions that are tried of a lattice."""
+"""Number of random positions and directions in which a lattice is tried."""
 _MAX_LATTICE_STEPS = 2000
 """Larger lattices are not tried: darts fill such areas well enough."""
 _MIN_DARTS = 64
-"""Darts that are thrown at a time at least."""
+"""Minimum number of darts that are thrown at a time."""
 _DARTS_PER_POINT = 4
 """Darts inside the area that are thrown for each missing point."""
 _MAX_DARTS_PER_HIT = 100
-"""Throwing darts ends when more of those inside the area are needed for one that finds room."""
+"""Throwing ends when it takes more darts inside the area than this for one of them to find room."""
 _MIN_AREA_FRACTION = 1e-3
 """The fraction of the bounding box that an area fills is taken to be at least this."""
 
@@ -42,7 +45,7 @@ def compute_max_points(area: BaseGeometry, spacing: float) -> int:
     -------
     int
     """
-    return 1 + int(area.buffer(spacing / 2).area / (spacing**2 * _CELL_AREA))
+    return 1 + int(area.buffer(spacing / 2).area / (spacing**2 * _ROW_SPACING))
 
 
 def estimate_max_points(area: BaseGeometry, spacing: float) -> int:
@@ -57,7 +60,7 @@ def estimate_max_points(area: BaseGeometry, spacing: float) -> int:
     -------
     int
     """
-    return max(1, int(area.area / (spacing**2 * _CELL_AREA)))
+    return max(1, int(area.area / (spacing**2 * _ROW_SPACING)))
 
 
 def pack_densely(area: BaseGeometry, spacing: float) -> Array:
@@ -154,7 +157,7 @@ def pack_lattice(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: 
     """
     low_x, low_y, high_x, high_y = area.bounds
     max_distance = float(np.hypot(high_x - low_x, high_y - low_y)) / 2 + 2 * spacing
-    steps = int(np.ceil(max_distance / (spacing * np.sqrt(3) / 2))) + 1
+    steps = int(np.ceil(max_distance / (spacing * _ROW_SPACING))) + 1
     if steps > _MAX_LATTICE_STEPS:
         return np.empty((0, 2))
     lattice = _build_lattice(steps) * spacing
@@ -174,10 +177,11 @@ def pack_lattice(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: 
 
 
 def _build_lattice(steps: int) -> Array:
-    """Return the hexagonal lattice of spacing 1 round the origin, so many rows and columns each way."""
-    columns, rows = np.meshgrid(np.arange(-steps, steps + 1), np.arange(-steps, steps + 1))
+    """Return the hexagonal lattice of spacing 1 round the origin, with `steps` rows and columns each way."""
+    numbers = np.arange(-steps, steps + 1)
+    columns, rows = np.meshgrid(numbers, numbers)
     x = (columns + 0.5 * (rows % 2)).ravel()
-    y = (rows * np.sqrt(3) / 2).ravel()
+    y = (rows * _ROW_SPACING).ravel()
     return np.column_stack([x, y])
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.arrays import Array, BoolArray, IntArray, Point, compute_lengths
 from robocov.environment.obstacles import MAX_SAGITTA_M
-from robocov.environment.polygons import GRID_M, Point
+from robocov.environment.polygons import GRID_M
 from robocov.team import DEFAULT_RADIUS
 
 MIN_POCKET_AREA_M2 = math.pi * DEFAULT_RADIUS**2
@@ -204,12 +204,12 @@ class _PassageSearch:
         fraction = _dot(p - edge_start, along) / _dot(along, along)
         q = edge_start + np.clip(fraction, 0.0, 1.0)[:, None] * along
         offset = q - p
-        width = np.hypot(offset[:, 0], offset[:, 1])
+        width = compute_lengths(offset)
         is_candidate = (width > low) & (width < high)
         # The disc does not contain a part of the corner's own sides.
         for side_end in (self._start[self._previous[corner]], self._end[corner]):
             side = side_end - p
-            side_length = np.hypot(side[:, 0], side[:, 1])
+            side_length = compute_lengths(side)
             is_candidate &= _dot(side, offset) <= _LEAN_TOLERANCE * width * side_length
         rows = np.flatnonzero(is_candidate)
         rows = rows[np.argsort(width[rows], kind="stable")]

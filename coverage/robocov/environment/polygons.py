@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import shapely
@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
-Point: TypeAlias = tuple[float, float]
-"""x and y, m."""
-Ring: TypeAlias = tuple[Point, ...]
-"""Points of a closed ring, of which the first is not repeated, or of a poly-line."""
+from robocov.arrays import Array
+
 GRID_M = 1e-6
 """Derived geometry is computed on a grid of one micrometre, so that unions and differences are robust: shapes
 that touch to within rounding touch exactly, and no sliver survives."""
@@ -85,3 +83,34 @@ def extract_polygons(geometry: BaseGeometry) -> MultiPolygon:
     polygons = [part for part in parts if isinstance(part, Polygon) and part.area > 0.0]
     polygons.sort(key=lambda polygon: (-polygon.area, polygon.bounds))
     return MultiPolygon([shapely.orient_polygons(polygon) for polygon in polygons])
+
+
+def find_nearest_inside(area: Any, positions: Array) -> Array:
+    """Find the points of an area that are nearest to given positions.
+
+    Parameters
+    ----------
+    area : geometry or (n,) array of geometries, m
+        One area for all positions, or one for each.
+    positions : (n, 2) array, m
+
+    Returns
+    -------
+    (n, 2) array, m
+        The same array if all positions are inside.
+
+    Examples
+    --------
+    >>> find_nearest_inside(shapely.box(0, 0, 1, 1), np.array([[0.5, 0.5], [2.0, 0.25]]))
+    array([[0.5 , 0.5 ],
+           [1.  , 0.25]])
+    """
+    points = shapely.points(positions)
+    outside = np.flatnonzero(~shapely.intersects(area, points))
+    if len(outside) == 0:
+        return positions
+    areas = np.broadcast_to(area, len(points))
+    lines = shapely.shortest_line(areas[outside], points[outside])
+    moved = positions.copy()
+    moved[outside] = shapely.get_coordinates(lines)[::2]
+    return moved

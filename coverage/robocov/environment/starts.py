@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
+from robocov.arrays import Array, Point, Ring, compute_lengths
 from robocov.environment.packing import (
     choose_points,
     compute_max_points,
@@ -20,7 +20,6 @@ from robocov.environment.packing import (
     pack_lattice,
     throw_darts,
 )
-from robocov.environment.polygons import Point, Ring
 from robocov.errors import StartError, format_count, is_number, quote
 from robocov.team import DEFAULT_RADIUS
 
@@ -121,7 +120,7 @@ class Start:
         area = self.compute_center_area(radius)
         if area.is_empty:
             raise self._build_error(f"no room for a robot of radius {radius:g} m. Try a wider start.")
-        points = _sample_apart(np.random.default_rng([seed, n]), area, n, _compute_spacing(radius))
+        points = _sample_apart(np.random.default_rng([seed, n]), area, n, compute_start_spacing(radius))
         if len(points) < n:
             raise self._build_error(self._describe_lack_of_space(n, radius))
         return points
@@ -148,7 +147,7 @@ class Start:
         area = self.compute_center_area(radius)
         if area.is_empty:
             return 0
-        spacing = _compute_spacing(radius)
+        spacing = compute_start_spacing(radius)
         if compute_max_points(area, spacing) > MAX_COUNTED_ROBOTS:
             return estimate_max_points(area, spacing)
         return len(pack_densely(area, spacing))
@@ -164,7 +163,7 @@ class Start:
         -------
         geometry, m
         """
-        area = self.free.buffer(-radius * (1.0 + MIN_START_GAP_RADII))
+        area = self.free.buffer(-compute_start_clearance(radius))
         if isinstance(self.spec, DiscStart):
             # The disc contains the centres; robots may stick out of it by their radius.
             center = shapely.Point(self.spec.center)
@@ -213,7 +212,7 @@ class Start:
 
     def _require_apart(self, points: Array, radius: float) -> None:
         offsets = points[:, None] - points[None]
-        distances = np.hypot(offsets[:, :, 0], offsets[:, :, 1])
+        distances = compute_lengths(offsets)
         np.fill_diagonal(distances, np.inf)
         if distances.min() < 2 * radius:
             first, second = sorted(np.unravel_index(int(distances.argmin()), distances.shape))
@@ -226,8 +225,31 @@ class Start:
         return StartError(f"start {self.name!r}: {message}")
 
 
-def _compute_spacing(radius: float) -> float:
-    """Return the smallest distance between the centres of two robots, m."""
+def compute_start_clearance(radius: float) -> float:
+    """Compute the smallest distance of the centre of a robot from walls at the start.
+
+    Parameters
+    ----------
+    radius : float, m
+
+    Returns
+    -------
+    float, m
+    """
+    return radius * (1.0 + MIN_START_GAP_RADII)
+
+
+def compute_start_spacing(radius: float) -> float:
+    """Compute the smallest distance between the centres of two robots at the start.
+
+    Parameters
+    ----------
+    radius : float, m
+
+    Returns
+    -------
+    float, m
+    """
     return 2.0 * radius * (1.0 + MIN_START_GAP_RADII)
 
 

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 import shapely
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.arrays import Array, BoolArray, IntArray, compute_lengths
 from robocov.compiled import kernel
 from robocov.environment import GRID_M, Environment
 from robocov.errors import InputError
@@ -252,7 +252,7 @@ class Geodesics:
         free = around[(self.count_windings(around) > 0).any(axis=1)]
         if not len(free):
             free = self.walls.vertices
-        distance = np.hypot(free[:, 0] - place[0], free[:, 1] - place[1])
+        distance = compute_lengths(free - place)
         return np.asarray(free[distance.argmin()])
 
     def compute_distances(self, sources: Array, targets: Array) -> Array:

@@ -1,7 +1,7 @@
-"""A certified lower bound of the coverage cost: no placement of a team, whoever finds it, is better.
+"""A certified lower bound of the coverage cost: no placement of a team has a lower cost.
 
 Contents: `compute_lower_bound` returns a `LowerBound` (`bound`). It searches prices for the sites on a table
-of distances (`price_table`), and proves how much a position can be worth at these prices (`worth_bounds`).
+of distances (`price_table`), and proves a bound of the worth of positions at these prices (`worth_bounds`).
 
 The cost (22) asks for the positions p of n robots at which the sum over the sites c of w_c min_i d(c, p_i) is
 smallest: a p-median problem with geodesic distances d. For any prices u_c of the sites it is at least
@@ -10,8 +10,8 @@ smallest: a p-median problem with geodesic distances d. For any prices u_c of th
 
 since min_i d_i is at least u - sum_i max(0, u - d_i): the Lagrangian dual of the p-median problem
 (Cornuéjols, Fisher and Nemhauser 1977; from common knowledge of the paper, not from its text). Prices that
-make this large are searched on a table of distances from some positions, without any proof. How much a
-position can be worth is then proved for all positions, by branch and bound over triangles that cover them.
+make this large are searched on a table of distances from some positions, without any proof. A bound of the
+worth of all positions is then proved by branch and bound over triangles that cover them.
 On a triangle T of free space, d(c, .) is the minimum of the lengths of the shortest paths to c that pass the
 obstacles on given sides. Such a length is convex on T (the universal cover of the free space has no positive
 curvature; for simple polygons Pollack, Sharir and Rote 1989), so it is nowhere below its tangent at a point

@@ -34,7 +34,7 @@ _ROUGH_SMOOTHINGS = (0.02, 0.007)
 """Fractions of the cost over which the maximal worth is smoothed in the first searches for prices."""
 
 _SMOOTHING = 0.0025
-"""The same before the first proof; it is halved before each next one."""
+"""The same before the first proof; it is halved before each later one."""
 
 _SLACK = 0.3
 """Tolerance of a proof, as a fraction of the smoothing."""
@@ -49,7 +49,7 @@ _PLACES_PER_ROBOT = 60
 """About the minimum number of these for each robot."""
 
 _SERVING_ROBOTS = 4
-"""No price is above the distance from so many robots of the placement."""
+"""Number of robots of the placement from which a site is at least as far as its price, at most."""
 
 _PLACES_PER_BLOCK = 256
 """Number of positions whose distances are computed at the same time."""
@@ -58,7 +58,7 @@ _MAX_TRIANGLES = 1_000_000
 """A proof ends after this number of triangles with the bound it has by then."""
 
 _EROSION = 0.98
-"""Fraction of the radius by which the room is narrowed.
+"""Fraction of the radius by which the free space is narrowed.
 
 Before GEOS moves walls, it simplifies them by up to 1 % of the distance.
 """
@@ -156,31 +156,14 @@ def compute_lower_bound(
     require_number("precision", precision, MIN_PRECISION, 1.0)
     report = progress or (lambda fraction: None)
     cost = CoverageCost(
-        environment, lattice, progress=lambda part: report(_PROGRESS_BEFORE_SEARCH / 2.0 * part)
+        environment, lattice, progress=lambda fraction: report(_PROGRESS_BEFORE_SEARCH / 2.0 * fraction)
     )
     dual = _Dual(cost, np.asarray(positions, dtype=float), radius)
-    prices = dual.first_prices
-    for smoothing in _ROUGH_SMOOTHINGS:
-        prices = dual.improve_prices(prices, smoothing, partial(report, _PROGRESS_BEFORE_SEARCH))
-    best_bound = -math.inf
-    smoothing = _SMOOTHING
-    rounds = max(1, math.ceil(math.log2(8.0 * smoothing / precision)))
-    for k in range(rounds):
-        fraction = _PROGRESS_BEFORE_SEARCH + (1.0 - _PROGRESS_BEFORE_SEARCH) * k / rounds
-        beat = partial(report, fraction)
-        prices = dual.improve_prices(prices, smoothing, beat)
-        proof = dual.prove(prices, _SLACK * smoothing, beat)
-        if proof.bound > best_bound:
-            best_bound = proof.bound
-            best_prices = prices
-        if best_bound >= (1.0 - precision) * dual.placement_cost:
-            break
-        dual.add_places(proof.worthy_places)
-        smoothing /= 2.0
+    best = _search_best_prices(dual, precision, report)
     report(1.0)
-    mean_distance = max(best_bound, 0.0) / dual.total_weight
+    mean_distance = max(best.bound, 0.0) / dual.total_weight
     all_prices = np.full(len(cost.points), np.nan)
-    all_prices[dual.sites] = best_prices
+    all_prices[dual.sites] = best.prices
     mass = float(environment.free_masses[dual.is_covered].sum())
     return LowerBound(
         mean_distance=mean_distance,
@@ -191,12 +174,37 @@ def compute_lower_bound(
 
 
 class _Proof(NamedTuple):
-    """What a branch and bound has proved."""
+    """The result of a branch and bound."""
 
     bound: float
     """Lower bound of the cost, as a weighted sum over the sites, m."""
+    prices: Array
+    """(m,) m, prices of the sites that prove it."""
     worthy_places: Array
     """(p, 2) grid steps, positions that are worth more than all of the table."""
+
+
+def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float], None]) -> _Proof:
+    """Search prices on the table and prove bounds in turn; return the best proof."""
+    prices = dual.first_prices
+    for smoothing in _ROUGH_SMOOTHINGS:
+        prices = dual.improve_prices(prices, smoothing, partial(report, _PROGRESS_BEFORE_SEARCH))
+    best: _Proof | None = None
+    smoothing = _SMOOTHING
+    rounds = max(1, math.ceil(math.log2(8.0 * smoothing / precision)))
+    for k in range(rounds):
+        fraction = _PROGRESS_BEFORE_SEARCH + (1.0 - _PROGRESS_BEFORE_SEARCH) * k / rounds
+        beat = partial(report, fraction)
+        prices = dual.improve_prices(prices, smoothing, beat)
+        proof = dual.prove(prices, _SLACK * smoothing, beat)
+        if best is None or proof.bound > best.bound:
+            best = proof
+        if best.bound >= (1.0 - precision) * dual.placement_cost:
+            break
+        dual.add_places(proof.worthy_places)
+        smoothing /= 2.0
+    assert best is not None
+    return best
 
 
 class _Dual:
@@ -213,7 +221,7 @@ class _Dual:
     placement_cost : float, m
         Cost of the given placement.
     first_prices : (m,) array, m
-        Where the search starts.
+        Prices with which the search starts.
     """
 
     def __init__(self, cost: CoverageCost, positions: Array, radius: float) -> None:
@@ -257,7 +265,7 @@ class _Dual:
         self.add_places(np.concatenate([robots, self._thin_out(inside)]))
 
     def _build_room(self, environment: Environment, radius: float) -> shapely.Geometry:
-        """Return where the centres of robots can be, m; it may be a little too large, but never too small."""
+        """Return the area for the centres of robots, m; it may be a little too large, but never too small."""
         components = np.array(environment.free.geoms)[self.is_covered]
         # The arcs around corners become chords, which makes the room larger.
         room = shapely.union_all(shapely.buffer(components, -_EROSION * radius, quad_segs=2))
@@ -331,7 +339,7 @@ class _Dual:
         return np.asarray(solution.x)
 
     def bound_worths(self, prices: Array, triangles: Array) -> tuple[Array, Array, Array]:
-        """Bound what the points of triangles are worth.
+        """Bound the worths of the points of triangles.
 
         Parameters
         ----------
@@ -343,9 +351,9 @@ class _Dual:
         centres : (t, 2) array, grid steps
             A point in each triangle.
         worths : (t,) array, m
-            What it is worth.
+            Worths of these points.
         bounds : (t,) array, m
-            What any point of the triangle can be worth.
+            Upper bounds of the worths of all points of the triangles.
         """
         middles = self._geodesics.grid.to_metres(triangles.mean(axis=1))
         centres, _ = self._geodesics.snap_to_free_space(middles)
@@ -363,8 +371,7 @@ class _Dual:
     def prove(self, prices: Array, tolerance: float, beat: Callable[[], None]) -> _Proof:
         """Prove a lower bound of the cost.
 
-        The bound is lower than what it could be with these prices by at most a fraction, `tolerance`, of the
-        cost.
+        The bound is lower than the best one for these prices by at most a fraction, `tolerance`, of the cost.
         """
         slack = tolerance * self.placement_cost / self._robots
         table_worth = self._table.compute_worths(prices, self._weights).max()
@@ -390,4 +397,4 @@ class _Dual:
         bound = float(self._weights @ prices) - self._robots * max_worth - rounding
         candidates = np.concatenate(worthy)
         by_worth = np.argsort(-candidates[:, 0], kind="stable")
-        return _Proof(bound, self._thin_out(candidates[by_worth, 1:]))
+        return _Proof(bound, prices, self._thin_out(candidates[by_worth, 1:]))

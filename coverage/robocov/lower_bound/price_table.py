@@ -11,7 +11,7 @@ from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 
 _MIN_SHARE = 1e-9
-"""Positions with smaller shares of a robot are left out."""
+"""Smallest share of a robot at a position that counts."""
 
 
 class PriceTable(NamedTuple):
@@ -77,7 +77,7 @@ class PriceTable(NamedTuple):
 
 @kernel
 def _compute_worths(table: PriceTable, prices: Array, weights: Array, worths: Array) -> None:
-    """Write what the positions of the table are worth."""
+    """Write the worths of the positions of the table."""
     for position in range(len(worths)):
         worth = 0.0
         for entry in range(table.first_entry[position], table.first_entry[position + 1]):
@@ -97,7 +97,7 @@ def add_paid_shares(table: PriceTable, prices: Array, shares: Array, paid: Array
     shares : (p,) array
         Share of a robot at each position.
     paid : (m,) array
-        Result, added to what it contains.
+        Result, added to its content.
     """
     for position in range(len(shares)):
         if shares[position] > _MIN_SHARE:

@@ -1,4 +1,4 @@
-"""Bounds of what any position in a triangle is worth, by tangents of the distances; see `lower_bound`."""
+"""Bounds of the worths of positions in a triangle, by tangents of the distances; see `lower_bound`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robocov.geodesic.walls import Walls
 
 
 class SiteDistances(NamedTuple):
-    """What is known of the sites, in grid steps."""
+    """Weights and distances of the sites, in grid steps."""
 
     walls: Walls
     sites: Array
@@ -37,7 +37,7 @@ class TriangleScratch(NamedTuple):
     min_distances: Array
     """(3,) A lower bound of the distance of a site from each vertex."""
     max_worths: Array
-    """(3,) An upper bound of what each vertex is worth."""
+    """(3,) An upper bound of the worth of each vertex."""
 
     @classmethod
     def allocate(cls, corners: int) -> TriangleScratch:
@@ -70,7 +70,7 @@ def bound_worths(
     scratch: TriangleScratch,
     worths: Array,
 ) -> int:
-    """Compute what the centres of triangles are worth, and upper bounds for all their points.
+    """Compute the worths of the centres of triangles, and upper bounds for all their points.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def bound_worths(
         A point in each triangle.
     scratch : TriangleScratch
     worths : (2, t) array, grid steps
-        Result: what the centres are worth, and the bounds.
+        Result: the worths of the centres, and the bounds.
 
     Returns
     -------
@@ -116,14 +116,7 @@ def bound_worths(
             if is_visible(known.walls, index, 0, known.sites[site, 0], known.sites[site, 1]):
                 distance = straight
                 _lower_to_tangent(scratch, straight, dx, dy, straight)
-            for k in range(count):
-                corner = scratch.corners[k]
-                length = scratch.corner_distances[k] + known.from_corners[site, corner]
-                distance = min(distance, length)
-                if length - radius < max(min_distances[0], min_distances[1], min_distances[2]):
-                    corner_dx = x - corners[corner, 0]
-                    corner_dy = y - corners[corner, 1]
-                    _lower_to_tangent(scratch, length, corner_dx, corner_dy, scratch.corner_distances[k])
+            distance = min(distance, _lower_by_corners(known, scratch, count, site, x, y, radius))
             worth += known.weights[site] * max(price - distance, 0.0)
             for vertex in range(3):
                 scratch.max_worths[vertex] += known.weights[site] * (price - min_distances[vertex])
@@ -142,6 +135,28 @@ def _set_triangle(scratch: TriangleScratch, triangle: Array, x: float, y: float)
         radius = max(radius, np.hypot(scratch.vertices[vertex, 0], scratch.vertices[vertex, 1]))
         scratch.max_worths[vertex] = 0.0
     return radius
+
+
+@kernel
+def _lower_by_corners(
+    known: SiteDistances, scratch: TriangleScratch, count: int, site: int, x: float, y: float, radius: float
+) -> float:
+    """Lower the bounds of the distances of a site by its paths through the first `count` visible corners.
+
+    Return the length of the shortest of these paths from the centre (x, y).
+    """
+    corners = known.walls.corners
+    min_distances = scratch.min_distances
+    shortest = np.inf
+    for k in range(count):
+        corner = scratch.corners[k]
+        length = scratch.corner_distances[k] + known.from_corners[site, corner]
+        shortest = min(shortest, length)
+        if length - radius < max(min_distances[0], min_distances[1], min_distances[2]):
+            dx = x - corners[corner, 0]
+            dy = y - corners[corner, 1]
+            _lower_to_tangent(scratch, length, dx, dy, scratch.corner_distances[k])
+    return shortest
 
 
 @kernel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array, IntArray, compute_point_distances
 from robocov.errors import format_count, summarize_names
 from robocov.metrics.clearance import MAX_CONTACT_GAP_M
 from robocov.record import Record
@@ -91,9 +91,10 @@ def find_trembling(record: Record) -> IntArray:
         return np.zeros(0, dtype=np.intp)
     positions = record.positions[-steps - 1 :]
     displacements = np.diff(positions, axis=0)
-    length = np.sqrt((displacements**2).sum(axis=-1))
-    net_displacement = np.sqrt(((positions[-1] - positions[0]) ** 2).sum(axis=-1))
-    before, after = displacements[:-1], displacements[1:]
+    length = compute_point_distances(positions[1:], positions[:-1])
+    net_displacement = compute_point_distances(positions[-1], positions[0])
+    before = displacements[:-1]
+    after = displacements[1:]
     cross = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
     turn = np.abs(np.arctan2(cross, (before * after).sum(axis=-1)))
     trembles = length.mean(axis=0) >= MIN_TREMBLE_STEP_M
@@ -123,7 +124,7 @@ def count_zigzags(record: Record, clearances: Array) -> IntArray:
     for robot in np.flatnonzero(begins_to_touch.any(axis=0)).tolist():
         moments = np.flatnonzero(begins_to_touch[:, robot])
         away = record.positions[moments, robot] - record.obstacle_points[moments, robot]
-        away /= np.maximum(np.sqrt((away**2).sum(axis=1)), 1e-12)[:, None]
+        away /= np.maximum(compute_point_distances(away, np.zeros(2)), 1e-12)[:, None]
         # The cosine is below -1/2 for directions more than 120 degrees apart, and nan if nothing was sensed.
         is_opposite = (away[:-1] * away[1:]).sum(axis=1) < MAX_OPPOSITE_COSINE
         is_soon = np.diff(record.time[moments]) <= MAX_ZIGZAG_PERIOD_S
@@ -133,8 +134,8 @@ def count_zigzags(record: Record, clearances: Array) -> IntArray:
 
 def _describe_trembling(record: Record, robots: IntArray) -> str:
     steps = round(TREMBLE_WINDOW_S / record.dt)
-    displacements = np.diff(record.positions[-steps - 1 :, robots], axis=0)
-    step_lengths_cm = 100.0 * np.sqrt((displacements**2).sum(axis=-1)).mean(axis=0)
+    positions = record.positions[-steps - 1 :, robots]
+    step_lengths_cm = 100.0 * compute_point_distances(positions[1:], positions[:-1]).mean(axis=0)
     moving = f"{_format_robots(record, robots)} by up to {float(step_lengths_cm.max()):.0f} cm a step"
     cause = f"the control period of {record.dt:.3g} s is too long for the forces of {record.label}"
     return f"The team trembles: {moving}; {cause}. Try a shorter one (--dt), such as 1/60 s."

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array, IntArray, compute_point_distances
 from robocov.compiled import kernel
 from robocov.record import Record
 from robocov.sensor import RangeSensor
@@ -63,7 +63,7 @@ def _compute_clearances_from_record(record: Record) -> Array:
             nearest[rows] = sensor.find_nearest_points(positions[rows], np.full(len(rows), reach))
             rows = rows[np.isnan(nearest[rows, 0])]
             reach *= _REACH_FACTOR
-    distances = np.sqrt(((positions - nearest) ** 2).sum(axis=1)).reshape(record.positions.shape[:2])
+    distances = compute_point_distances(positions, nearest).reshape(record.positions.shape[:2])
     return np.asarray(distances - record.team.radius)
 
 
@@ -82,7 +82,7 @@ def _compute_clearances_by_queries(record: Record) -> Array:
         sensor.set_time(float(record.time[moment]), failed_robots)
         rows = np.flatnonzero(working[moment])
         nearest = sensor.find_nearest_points(positions[rows], reach[rows])
-        distances = np.sqrt(((positions[rows] - nearest) ** 2).sum(axis=1))
+        distances = compute_point_distances(positions[rows], nearest)
         clearances[moment, rows] = distances - radius[rows]
     return clearances
 

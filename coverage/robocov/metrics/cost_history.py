@@ -16,7 +16,7 @@ from robocov.record import Record, select_nearest_moments
 DEFAULT_RATE_HZ = 10.0
 """Samples of the coverage cost per simulated second."""
 MAX_RATE_WITH_MOVING_OBSTACLES_HZ = 1.0
-"""The same where obstacles move, and each moment has a map of its own."""
+"""The same if obstacles move, and each moment has a map of its own."""
 
 
 @dataclass(frozen=True, eq=False)

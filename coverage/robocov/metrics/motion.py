@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
+from robocov.arrays import Array, BoolArray, compute_point_distances
 from robocov.record import TIME_ROUNDING_S
 
 SETTLED_WINDOW_S = 4.0
@@ -57,8 +57,8 @@ def find_settling_time(
     span = round(window / dt) if dt > 0 else 0
     if span == 0 or len(time) <= span:
         return None
-    displacement = positions[span:] - positions[:-span]
-    is_moving = (np.sqrt((displacement**2).sum(axis=-1)) >= distance).any(axis=1)
+    displacement = compute_point_distances(positions[span:], positions[:-span])
+    is_moving = np.asarray((displacement >= distance).any(axis=1))
     first_at_rest = int(np.flatnonzero(is_moving).max(initial=-1)) + 1
     return float(time[first_at_rest]) if first_at_rest < len(is_moving) else None
 
@@ -81,7 +81,7 @@ def compute_path_lengths(positions: Array, travelled: BoolArray | None = None) -
     >>> compute_path_lengths(np.array([[[0.0, 0.0]], [[3.0, 4.0]], [[3.0, 5.0]]]))
     array([6.])
     """
-    lengths = np.sqrt((np.diff(positions, axis=0) ** 2).sum(axis=-1))
+    lengths = compute_point_distances(positions[1:], positions[:-1])
     if travelled is not None:
         lengths = np.where(travelled, lengths, 0.0)
     return np.asarray(lengths.sum(axis=0))
@@ -110,7 +110,7 @@ def count_stuck_robots(time: Array, positions: Array, goals: Array) -> int | Non
     if not has_goal.any() or window_start < float(time[0]) - TIME_ROUNDING_S:
         return None
     earlier = int(np.searchsorted(time, window_start + TIME_ROUNDING_S, side="right")) - 1
-    displacement = np.sqrt(((positions[-1] - positions[earlier]) ** 2).sum(axis=-1))
-    goal_distance = np.sqrt(((goals[-1] - positions[-1]) ** 2).sum(axis=-1))
+    displacement = compute_point_distances(positions[-1], positions[earlier])
+    goal_distance = compute_point_distances(goals[-1], positions[-1])
     is_stuck = (displacement < STUCK_DISTANCE_M) & (goal_distance > MIN_STUCK_GOAL_DISTANCE_M)
     return int(is_stuck.sum())

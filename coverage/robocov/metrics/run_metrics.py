@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array, IntArray, compute_point_distances
 from robocov.errors import ParameterError, format_count, quote
 from robocov.metrics.clearance import compute_clearances, measure_robot_gaps
 from robocov.metrics.connectivity import measure_connectivity
@@ -222,7 +222,7 @@ def _integrate(record: Record) -> _Integrals:
     power = np.abs((forces * record.velocities).sum(axis=-1)).sum(axis=1)
     squared_force = (forces**2).sum(axis=(1, 2))
     step = np.diff(record.time)
-    distances = np.sqrt((np.diff(record.positions, axis=0) ** 2).sum(axis=-1))
+    distances = compute_point_distances(record.positions[1:], record.positions[:-1])
     travelled = np.where(record.travelled, distances, 0.0).mean(axis=1)
     return _Integrals(
         work=_accumulate(0.5 * (power[1:] + power[:-1]) * step),

@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array, IntArray, compute_point_distances
 from robocov.density.base import Density
 from robocov.observation.close_pairs import find_close_pairs
 from robocov.observation.neighbours import Neighbours
@@ -104,6 +102,6 @@ class Observations:
         else:
             known_positions = self.reported_positions
         offset = self.positions[robot] - known_positions
-        distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
+        distance = compute_point_distances(self.positions[robot], known_positions)
         is_near = distance <= reach
         return NearNeighbours(robot[is_near], neighbour[is_near], offset[is_near], distance[is_near])

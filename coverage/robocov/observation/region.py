@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from robocov.arrays import Array, BoolArray, freeze
+from robocov.arrays import Array, BoolArray, compute_lengths, freeze
 from robocov.errors import InputError
 
 _MIN_BEND = 1e-9
@@ -58,7 +58,7 @@ class Region:
         # A vertex on the line between its neighbours would give an edge without a direction of its own.
         ring = _remove_collinear_vertices(ring)
         edges = np.roll(ring, -1, axis=0) - ring
-        lengths = np.hypot(edges[:, 0], edges[:, 1])
+        lengths = compute_lengths(edges)
         normals = np.column_stack([edges[:, 1], -edges[:, 0]]) / lengths[:, None]
         offsets = np.einsum("ed,ed->e", normals, ring)
         derived = {
@@ -112,5 +112,5 @@ def _remove_collinear_vertices(ring: Array) -> Array:
     before = ring - np.roll(ring, 1, axis=0)
     after = np.roll(ring, -1, axis=0) - ring
     cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    lengths = np.hypot(*before.T) * np.hypot(*after.T)
+    lengths = compute_lengths(before) * compute_lengths(after)
     return np.asarray(ring[cross > _MIN_BEND * lengths])

@@ -1,10 +1,12 @@
 """The centralised reference: the best positions for a team that knows the whole map.
 
-Contents: `find_optimum` searches the positions (`search`). It descends the exact cost (`descent`) within the
-space where robots fit (`configuration_space`).
+- `search`: many restarts, of which the best counts
+- `descent`: descent of the exact cost to a local minimum
+- `configuration_space`: positions at which robots fit
 """
 
-from robocov.optimum.configuration_space import ConfigurationSpace, find_nearest_inside
+from robocov.environment import find_nearest_inside
+from robocov.optimum.configuration_space import ConfigurationSpace
 from robocov.optimum.descent import descend
 from robocov.optimum.search import MAX_RESTARTS, MAX_ROBOTS, Optimum, find_optimum
 

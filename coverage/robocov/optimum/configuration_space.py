@@ -1,8 +1,6 @@
-"""Where robots can be: clear of walls, and of each other."""
+"""The positions at which robots fit: clear of walls, and of each other."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 import shapely
@@ -10,9 +8,9 @@ from scipy.spatial import cKDTree
 from shapely import MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, IntArray
-from robocov.environment import MIN_START_GAP_RADII
-from robocov.potential import GOLDEN_ANGLE
+from robocov.arrays import Array, IntArray, compute_lengths
+from robocov.environment import compute_start_clearance, compute_start_spacing, find_nearest_inside
+from robocov.potential import compute_spread_directions
 
 _EDGES_PER_QUARTER = 32
 """Edges of a quarter circle around corners: they cut 3e-4 of the radius off, less than the gap at starts."""
@@ -52,8 +50,8 @@ class ConfigurationSpace:
     """
 
     def __init__(self, free: MultiPolygon, radius: float) -> None:
-        self.clearance = radius * (1.0 + MIN_START_GAP_RADII)
-        self.spacing = 2.0 * radius * (1.0 + MIN_START_GAP_RADII)
+        self.clearance = compute_start_clearance(radius)
+        self.spacing = compute_start_spacing(radius)
         self.components: tuple[BaseGeometry, ...] = tuple(
             component.buffer(-self.clearance, quad_segs=_EDGES_PER_QUARTER) for component in free.geoms
         )
@@ -78,7 +76,7 @@ class ConfigurationSpace:
         for _ in range(_MAX_PUSHES):
             max_distance = self.spacing * (1.0 - 1e-9)
             pairs = cKDTree(positions).query_pairs(max_distance, output_type="ndarray")
-            if not len(pairs):
+            if len(pairs) == 0:
                 return positions
             ordered_pairs = pairs[np.lexsort(pairs.T)]
             positions = find_nearest_inside(areas, self._push_apart(positions, ordered_pairs))
@@ -89,11 +87,11 @@ class ConfigurationSpace:
         first = pairs[:, 0]
         second = pairs[:, 1]
         offset = positions[second] - positions[first]
-        distance = np.hypot(offset[:, 0], offset[:, 1])
+        distance = compute_lengths(offset)
         # Two robots at the same point have no direction apart: take a fixed one, another for each pair.
         coincide = distance == 0.0
-        angle = GOLDEN_ANGLE * (first[coincide] + second[coincide] * len(positions))
-        offset[coincide] = np.column_stack([np.cos(angle), np.sin(angle)])
+        numbers = first[coincide] + second[coincide] * len(positions)
+        offset[coincide] = compute_spread_directions(numbers)
         length = np.where(coincide, 1.0, distance)
         fraction = (_OVERSHOOT * self.spacing - distance) / 2.0 / length
         push = offset * fraction[:, None]
@@ -101,34 +99,3 @@ class ConfigurationSpace:
         np.subtract.at(pushed, first, push)
         np.add.at(pushed, second, push)
         return pushed
-
-
-def find_nearest_inside(area: Any, positions: Array) -> Array:
-    """Find the points of an area that are nearest to given positions.
-
-    Parameters
-    ----------
-    area : shapely geometry, or (n,) array of them
-        One area for all positions, or one for each.
-    positions : (n, 2) array
-
-    Returns
-    -------
-    (n, 2) array
-        The same array if all positions are inside.
-
-    Examples
-    --------
-    >>> find_nearest_inside(shapely.box(0, 0, 1, 1), np.array([[0.5, 0.5], [2.0, 0.25]]))
-    array([[0.5 , 0.5 ],
-           [1.  , 0.25]])
-    """
-    points = shapely.points(positions)
-    outside = np.flatnonzero(~shapely.intersects(area, points))
-    if not len(outside):
-        return positions
-    areas = np.broadcast_to(area, len(points))
-    lines = shapely.shortest_line(areas[outside], points[outside])
-    moved = positions.copy()
-    moved[outside] = shapely.get_coordinates(lines)[::2]
-    return moved

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array, IntArray, compute_lengths
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.optimum.configuration_space import ConfigurationSpace
 
@@ -156,7 +156,7 @@ def _compute_curvature(result: CoverageResult, min_distance: float) -> Array:
     owner = result.owner[site]
     offset = result.first_waypoints[site] - result.positions[owner]
     # Without a minimum, a site right at a robot would not let it go.
-    distance = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), min_distance)
+    distance = np.maximum(compute_lengths(offset), min_distance)
     pull = 1.0 / distance
     total_weight = float(max(len(site), 1))
     if result.weights is not None:

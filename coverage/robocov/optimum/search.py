@@ -1,4 +1,4 @@
-"""The search for the best positions of a team: many restarts, of which the best counts."""
+"""The search for the best positions of a team: the best of many restarts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import shapely
 from scipy.spatial import cKDTree
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, BoolArray, IntArray, freeze
+from robocov.arrays import Array, BoolArray, IntArray, compute_lengths, freeze
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.environment import Environment
 from robocov.errors import ParameterError, is_number, quote, require_number
@@ -24,7 +24,10 @@ from robocov.optimum.descent import descend
 from robocov.team import DEFAULT_RADIUS
 
 MAX_ROBOTS = 500
+"""Maximum number of robots of an optimum."""
+
 MAX_RESTARTS = 100_000
+"""Maximum number of restarts of the search."""
 
 _MIN_SOURCES = 600
 """About the minimum number of positions for robots in the table."""
@@ -45,10 +48,10 @@ _UNREACHABLE_SIZES = 1e4
 """Sizes of the map that stand for the distance to a site that cannot be reached."""
 
 _PROGRESS_AFTER_COST = 0.3
-"""Progress when the cost has been prepared,"""
+"""Progress when the cost has been prepared."""
 
 _PROGRESS_AFTER_TABLE = 0.5
-"""and when the table has been computed."""
+"""Progress when the table has been computed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +98,7 @@ class Optimum:
         return float((self.costs <= self.mean_distance * (1.0 + within)).mean())
 
     def compute_gap(self, mean_distance: float) -> float:
-        """Compute how far a mean distance is above the best one, J / J_ref - 1.
+        """Compute the relative excess of a mean distance over the best one, J / J_ref - 1.
 
         Parameters
         ----------
@@ -150,7 +153,7 @@ def find_optimum(
     The coverage cost (22) has many local minima. Each restart draws positions by k-median++ and improves them
     on a table of geodesic distances between some hundreds of positions, first by Lloyd's iteration, then by
     interchange, which leaves most of these minima. At last it descends the exact cost. The best of all
-    restarts is no proof of the global minimum; how many restarts agree with it tells how far to trust it.
+    restarts is no proof of the global minimum, but the more restarts agree with it, the more likely it is.
 
     If the free space has several components, the robots first cover as much of its area as they can, the
     largest components, and then minimise the cost of these. (The cost alone would be lowest with all robots
@@ -166,47 +169,44 @@ def find_optimum(
     """
     _check_parameters(robots, restarts, seed, radius)
     report = progress or (lambda fraction: None)
-    cost = CoverageCost(environment, lattice, progress=lambda part: report(_PROGRESS_AFTER_COST * part))
+    cost = CoverageCost(
+        environment, lattice, progress=lambda fraction: report(_PROGRESS_AFTER_COST * fraction)
+    )
     search = _Search(environment, cost, robots, float(radius))
     report(_PROGRESS_AFTER_TABLE)
-
-    best: CoverageResult | None = None
-    best_restart = 0
-    outcomes: list[_Outcome] = []
-    # Many restarts end with the same sources: descend from these only once.
-    outcome_by_sources: dict[tuple[int, ...], _Outcome] = {}
+    outcomes = []
     for restart in range(restarts):
         fraction = _PROGRESS_AFTER_TABLE + (1.0 - _PROGRESS_AFTER_TABLE) * restart / restarts
-        beat = partial(report, fraction)
-        sources = search.find_sources(np.random.default_rng([seed, restart]), beat)
-        key = tuple(sources.tolist())
-        if key not in outcome_by_sources:
-            positions = search.places[sources]
-            result = descend(cost, search.space, positions, search.component[sources], beat)
-            outcome_by_sources[key] = _Outcome(cost(positions).mean_distance, result.mean_distance)
-            if best is None or _get_rank(result) < _get_rank(best):
-                best = result
-                best_restart = restart
-        outcomes.append(outcome_by_sources[key])
+        rng = np.random.default_rng([seed, restart])
+        outcomes.append(search.run_restart(rng, partial(report, fraction)))
     report(1.0)
-    assert best is not None
+    best_restart = min(range(restarts), key=lambda restart: _get_rank(outcomes[restart]))
+    best = outcomes[best_restart]
     from_left_to_right = np.lexsort((best.positions[:, 1], best.positions[:, 0]))
     return Optimum(
         positions=freeze(best.positions[from_left_to_right]),
         mean_distance=best.mean_distance,
         value=best.value,
         uncovered_area=best.uncovered_area,
-        costs=freeze([outcome.descended for outcome in outcomes]),
+        costs=freeze([outcome.mean_distance for outcome in outcomes]),
         undescended=freeze([outcome.undescended for outcome in outcomes]),
         restart=best_restart,
     )
 
 
 class _Outcome(NamedTuple):
-    """The mean distances before and after the descent of a restart, m."""
+    """The outcome of a restart."""
 
     undescended: float
-    descended: float
+    """Mean distance before the descent, m."""
+    positions: Array
+    """(n, 2) m"""
+    mean_distance: float
+    """m"""
+    value: float
+    """m³"""
+    uncovered_area: float
+    """m²"""
 
 
 def _check_parameters(robots: int, restarts: int, seed: int, radius: float) -> None:
@@ -218,13 +218,13 @@ def _check_parameters(robots: int, restarts: int, seed: int, radius: float) -> N
         raise ParameterError(f"radius: expected a number above 0 m, got {quote(radius)}")
 
 
-def _get_rank(result: CoverageResult) -> tuple[float, float]:
-    """Return what is minimised, the first number before the second."""
+def _get_rank(result: CoverageResult | _Outcome) -> tuple[float, float]:
+    """Return the two numbers that are minimised, the first before the second."""
     return result.uncovered_area, result.mean_distance
 
 
 class _Search:
-    """What all restarts share.
+    """The data that all restarts share.
 
     Attributes
     ----------
@@ -252,7 +252,7 @@ class _Search:
         sources = max(_MIN_SOURCES, _SOURCES_PER_ROBOT * robots)
         spacing = max(math.sqrt(covered_area / sources), self.space.spacing)
         places = [_spread_points(areas[k], spacing) for k in covered]
-        self.component = np.repeat(covered, [len(part) for part in places]).astype(np.intp)
+        self.component = np.repeat(covered, [len(points) for points in places]).astype(np.intp)
         if len(self.component) < robots:
             capacity = sum(len(_spread_points(areas[k], self.space.spacing)) for k in usable)
             raise ParameterError(
@@ -261,6 +261,24 @@ class _Search:
             )
         self.places = np.concatenate(places)
         self.table = self._compute_table(site_component, np.isin(site_component, covered))
+        # Many restarts end with the same sources: descend from these only once.
+        self._outcome_by_sources: dict[tuple[int, ...], _Outcome] = {}
+
+    def run_restart(self, rng: np.random.Generator, beat: Callable[[], None]) -> _Outcome:
+        """Find sources, and descend from them."""
+        sources = self._find_sources(rng, beat)
+        key = tuple(sources.tolist())
+        if key not in self._outcome_by_sources:
+            positions = self.places[sources]
+            result = descend(self.cost, self.space, positions, self.component[sources], beat)
+            self._outcome_by_sources[key] = _Outcome(
+                undescended=self.cost(positions).mean_distance,
+                positions=result.positions,
+                mean_distance=result.mean_distance,
+                value=result.value,
+                uncovered_area=result.uncovered_area,
+            )
+        return self._outcome_by_sources[key]
 
     def _compute_table(self, site_component: IntArray, is_covered: BoolArray) -> Array:
         """Compute the table; its targets are one site for each component and square of some cells."""
@@ -283,7 +301,7 @@ class _Search:
         table[np.isinf(table)] = _UNREACHABLE_SIZES * cost.geodesics.size
         return np.ascontiguousarray((table * weight).T)
 
-    def find_sources(self, rng: np.random.Generator, beat: Callable[[], None]) -> IntArray:
+    def _find_sources(self, rng: np.random.Generator, beat: Callable[[], None]) -> IntArray:
         """Return the sources with which one restart ends, sorted, (n,).
 
         The table approximates the cost: an earlier stage counts if its exact cost is lower.
@@ -321,6 +339,6 @@ def _spread_points(area: BaseGeometry, spacing: float) -> Array:
         while distance[farthest] >= _STEPS_PER_SPACING * step:
             chosen.append(rest[farthest].tolist())
             offset = rest - rest[farthest]
-            distance = np.minimum(distance, np.hypot(offset[:, 0], offset[:, 1]))
+            distance = np.minimum(distance, compute_lengths(offset))
             farthest = int(distance.argmax())
     return np.array(chosen)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.arrays import Array, BoolArray, IntArray, compute_point_distances
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.planning.lattice import (
     Edges,
@@ -211,7 +211,7 @@ class GridPlanner(MapWindow):
         """
         visible = [self._find_visible_nodes(position) for position in positions]
         lengths = [
-            np.sqrt(((self.nodes[nodes] - position) ** 2).sum(axis=1))
+            compute_point_distances(self.nodes[nodes], position)
             for nodes, position in zip(visible, positions, strict=True)
         ]
         return self._search(np.concatenate([[], *visible]), np.concatenate([[], *lengths]))

@@ -14,7 +14,7 @@ from scipy import ndimage
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.arrays import Array, BoolArray, IntArray, compute_point_distances
 from robocov.compiled import kernel
 
 _MIN_FACING_ANGLE_RAD = math.radians(120.0)
@@ -59,7 +59,7 @@ class VoronoiRoadmap(NamedTuple):
         first_cells, vertex_of_cell = _group_cells(is_graph, steps, _NEIGHBOURS)
         vertices = np.column_stack(np.divmod(first_cells, is_roomy.shape[1]))
         starts, ends = _list_adjacent_groups(vertex_of_cell)
-        lengths = np.sqrt(((vertices[starts] - vertices[ends]) ** 2).sum(axis=1))
+        lengths = compute_point_distances(vertices[starts], vertices[ends])
         graph = csr_array((lengths, (starts, ends)), shape=(len(vertices), len(vertices)))
         _spread_groups(vertex_of_cell, is_free, _NEIGHBOURS[::2])
         return cls(

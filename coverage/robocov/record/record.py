@@ -94,24 +94,15 @@ class Record(Drawable):
     def working(self) -> BoolArray:
         """Mask of robots present and not failed, (T, n) bool; read-only."""
         if self.conditions is None:
-            return self._build_full_mask()
-        mask = self.conditions.find_working(self.time, len(self.team))
-        mask.setflags(write=False)
-        return mask
+            return self.present
+        return _protect(self.conditions.find_working(self.time, len(self.team)))
 
     @cached_property
     def present(self) -> BoolArray:
         """Mask of robots present, failed ones included, (T, n) bool; read-only."""
         if self.conditions is None:
-            return self._build_full_mask()
-        mask = self.conditions.find_present(self.time, len(self.team))
-        mask.setflags(write=False)
-        return mask
-
-    def _build_full_mask(self) -> BoolArray:
-        mask = np.ones(self.positions.shape[:2], dtype=bool)
-        mask.setflags(write=False)
-        return mask
+            return _protect(np.ones(self.positions.shape[:2], dtype=bool))
+        return _protect(self.conditions.find_present(self.time, len(self.team)))
 
     @cached_property
     def travelled(self) -> BoolArray:
@@ -128,8 +119,7 @@ class Record(Drawable):
             rows = [row_of_number[number] for number in placement["robots"] if number in row_of_number]
             if 0 < moment < len(self.time):
                 mask[moment - 1, rows] = False
-        mask.setflags(write=False)
-        return mask
+        return _protect(mask)
 
     @property
     def arrays(self) -> tuple[str, ...]:
@@ -417,6 +407,12 @@ class Record(Drawable):
             joined=tuple(_from_event(event) for event in document.events),
             **arrays,
         )
+
+
+def _protect(mask: BoolArray) -> BoolArray:
+    """Make a mask read-only, and return it."""
+    mask.setflags(write=False)
+    return mask
 
 
 def _to_event(joined: JoinedRobot) -> dict[str, Any]:

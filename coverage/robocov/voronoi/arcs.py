@@ -10,7 +10,7 @@ from math import comb
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.arrays import Array, compute_lengths
 from robocov.compiled import kernel
 
 START_X = 0
@@ -180,8 +180,8 @@ def link_rings(pieces: Array, max_deviation: float) -> list[Array]:
         last = first
         ring = [lines[first][:-1]]
         while remaining:
-            gap_to_first = np.hypot(*(starts[first] - ends[last]))
-            gaps = np.hypot(*(starts[remaining] - ends[last]).T)
+            gap_to_first = compute_lengths(starts[first] - ends[last])
+            gaps = compute_lengths(starts[remaining] - ends[last])
             if gap_to_first <= gaps.min():
                 break
             last = remaining.pop(int(gaps.argmin()))

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.arrays import Array, compute_lengths
 from robocov.density.cell_edges import REGION, CellEdges
 
 _CHORDS_PER_ARC = 64
@@ -58,7 +58,7 @@ def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array,
     cells = len(radii)
     # A disc that contains the whole cell cuts nothing, however large it is.
     size = np.zeros(cells)
-    np.maximum.at(size, edges.cell, np.hypot(edges.start[:, 0], edges.start[:, 1]))
+    np.maximum.at(size, edges.cell, compute_lengths(edges.start))
     radius = np.minimum(radii, 2.0 * size + 1.0)[edges.cell]
     cut = _cut_by_discs(edges, radius)
     cross = cut.first[:, 0] * cut.last[:, 1] - cut.first[:, 1] * cut.last[:, 0]

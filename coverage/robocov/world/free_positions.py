@@ -1,14 +1,14 @@
-"""Free positions for robots: whether they fit, where they move when walls change, where one more fits."""
+"""Free positions for robots: checks whether robots fit, and the nearest positions at which they do."""
 
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, BoolArray, IntArray
-from robocov.environment import Environment, Point
+from robocov.arrays import Array, BoolArray, IntArray, compute_lengths
+from robocov.environment import Environment, Point, find_nearest_inside
 from robocov.errors import StartError
 from robocov.observation.close_pairs import find_close_pairs
-from robocov.potential import GOLDEN_ANGLE
+from robocov.potential import compute_spread_directions
 from robocov.team import Team
 
 _CLEARANCE_M = 1e-3
@@ -60,7 +60,7 @@ def relocate_robots(environment: Environment, positions: Array, team: Team) -> A
 
 
 def _compute_center_areas(environment: Environment, team: Team) -> dict[float, BaseGeometry]:
-    """Return where the centres of robots may be, by their radius."""
+    """Return the areas for the centres of robots, by their radius."""
     areas = {}
     for radius in np.unique(team.radius).tolist():
         areas[radius] = _compute_center_area(environment, radius)
@@ -75,10 +75,8 @@ def _leave_walls(
 ) -> None:
     """Move the robots that are in walls to the nearest positions where they fit."""
     is_in_wall = _compute_wall_distances(environment, positions) < team.radius
-    for robot in np.flatnonzero(is_in_wall).tolist():
-        area = areas[float(team.radius[robot])]
-        line = shapely.shortest_line(area, shapely.Point(positions[robot]))
-        positions[robot] = line.coords[0]
+    areas_of_robots = np.array([areas[radius] for radius in team.radius[is_in_wall].tolist()], dtype=object)
+    positions[is_in_wall] = find_nearest_inside(areas_of_robots, positions[is_in_wall])
 
 
 def _compute_directions(positions: Array, first: IntArray, second: IntArray, distance: Array) -> Array:
@@ -87,9 +85,7 @@ def _compute_directions(positions: Array, first: IntArray, second: IntArray, dis
     divisor = np.where(is_same_point, 1.0, distance)
     directions: Array = (positions[second] - positions[first]) / divisor[:, None]
     # Robots at the same point have no direction apart. Each pair gets one of its own.
-    angle = GOLDEN_ANGLE * (first + second)
-    own_directions = np.column_stack([np.cos(angle), np.sin(angle)])
-    directions[is_same_point] = own_directions[is_same_point]
+    directions[is_same_point] = compute_spread_directions((first + second)[is_same_point])
     return directions
 
 
@@ -120,8 +116,7 @@ def find_free_position(
     """
     if radii is None:
         radii = np.full(len(others), radius)
-    offsets = others - point
-    distances = np.hypot(offsets[:, 0], offsets[:, 1])
+    distances = compute_lengths(others - point)
     wall_distance = _compute_wall_distances(environment, np.array([point]))[0]
     if wall_distance >= radius and (distances >= radius + radii).all():
         return float(point[0]), float(point[1])
@@ -134,7 +129,7 @@ def find_free_position(
         area = area.difference(shapely.union_all(discs))
     if area.is_empty:
         raise StartError("there is no room for a robot there")
-    x, y = shapely.shortest_line(area, shapely.Point(point)).coords[0]
+    x, y = find_nearest_inside(area, np.array([point], dtype=float))[0].tolist()
     return x, y
 
 
@@ -187,7 +182,7 @@ def require_free_starts(
 
 
 def _compute_center_area(environment: Environment, radius: float) -> BaseGeometry:
-    """Return where the centre of a robot may be, away from walls."""
+    """Return the area for the centre of a robot, away from walls."""
     return environment.free.buffer(-(radius + _CLEARANCE_M), join_style="round")
 
 

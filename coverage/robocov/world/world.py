@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
+from robocov.arrays import Array, BoolArray, compute_lengths
 from robocov.errors import ParameterError
 from robocov.observation.close_pairs import find_close_pairs
 from robocov.team import Team
@@ -239,7 +239,7 @@ class World:
             steering.setflags(write=False)
             self.steering = steering
         if self._may_exceed_max_speed or len(external) > 0:
-            speeds = np.hypot(velocities[:, 0], velocities[:, 1])
+            speeds = compute_lengths(velocities)
             self._may_exceed_max_speed = bool((speeds > self.team.max_speed).any())
         self._set_state(positions, velocities)
         if has_contacts:
@@ -270,10 +270,10 @@ class World:
         """Return the acceleration by external forces, (n,) m/s², or (1,) zero without such forces."""
         if len(external) == 0:
             return np.zeros(1)
-        return np.asarray(np.hypot(external[:, 0], external[:, 1]) / self.team.mass)
+        return compute_lengths(external) / self.team.mass
 
     def _compute_speeds(self) -> Array:
-        return np.asarray(np.hypot(self.velocities[:, 0], self.velocities[:, 1]))
+        return compute_lengths(self.velocities)
 
     def _set_state(self, positions: Array, velocities: Array) -> None:
         """Set the state of all robots, in read-only arrays."""
