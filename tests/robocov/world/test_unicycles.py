@@ -18,7 +18,7 @@ from robocov.mapfile import load_map
 from robocov.simulation import Simulation, TeamState
 from robocov.team import Team
 from robocov.world import World
-from robocov.world.obstacle_pieces import build_solid_pieces
+from robocov.world.obstacle_pieces import build_obstacles
 from robocov.world.unicycles import remove_sideways_velocity
 
 DT = 1 / 60
@@ -26,7 +26,7 @@ DT = 1 / 60
 
 def build_world(environment: Environment, positions: np.ndarray, **team: float) -> World:
     unicycles = Team.homogeneous(len(positions), kinematics="unicycle", **team)
-    return World(build_solid_pieces(environment), unicycles, positions)
+    return World(build_obstacles(environment), unicycles, positions)
 
 
 def compute_distances(positions: np.ndarray) -> np.ndarray:
@@ -106,7 +106,7 @@ def test_unicycles_turn_right_as_they_turn_left(empty: Environment, initial_spee
     """Mirrored forces give mirrored motion."""
     team = Team.homogeneous(1, kinematics="unicycle")
     velocities = np.array([[initial_speed, 0.0]])
-    worlds = [World(build_solid_pieces(empty), team, np.array([[2.0, 5.0]]), velocities) for _ in range(2)]
+    worlds = [World(build_obstacles(empty), team, np.array([[2.0, 5.0]]), velocities) for _ in range(2)]
     left, right = worlds
     for _ in range(90):
         left.step(np.array([[1.0, 0.8]]), DT)
@@ -138,7 +138,7 @@ def test_unicycles_brake_as_hard_as_points(
     final_velocities = {}
     for kinematics in ("point", "unicycle"):
         world = World(
-            build_solid_pieces(empty),
+            build_obstacles(empty),
             Team.homogeneous(1, kinematics=kinematics),
             np.array([[5.0, 5.0]]),
             speed * direction,
@@ -169,8 +169,8 @@ def test_points_next_to_unicycles_move_as_among_points(empty: Environment) -> No
     starts = np.array([[1.0 + 1.5 * k, 5.0] for k in range(n)])
     points = Team.homogeneous(n)
     mixed_team = replace(points, track_width=np.array([0.0, 0.2] * 3))
-    world_of_points = World(build_solid_pieces(empty), points, starts)
-    mixed_world = World(build_solid_pieces(empty), mixed_team, starts)
+    world_of_points = World(build_obstacles(empty), points, starts)
+    mixed_world = World(build_obstacles(empty), mixed_team, starts)
     assert world_of_points.steering is None
     for _ in range(60):
         forces = rng.normal(0.0, 1.0, (n, 2))
@@ -232,7 +232,7 @@ def test_unicycles_that_are_placed_anew_face_along_x(empty: Environment) -> None
     starts = np.array([[2.0, 2.0], [5.0, 5.0]])
     steering = np.array([[1.0, 0.5], [2.0, 0.25]])
     team = Team.homogeneous(2, kinematics="unicycle")
-    world = World(build_solid_pieces(empty), team, starts, steering=steering, runs=2)
+    world = World(build_obstacles(empty), team, starts, steering=steering, runs=2)
     world.place(1, np.array([[3.0, 3.0]]))
     assert world.steering is not None
     assert world.steering.tolist() == [[1.0, 0.5], [0.0, 0.0]]
