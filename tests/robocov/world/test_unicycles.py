@@ -158,7 +158,7 @@ def test_only_the_forward_part_of_a_velocity_remains_after_a_contact() -> None:
         velocities=velocities,
         steering=np.zeros((4, 2)),
         max_speed=np.array([1.0, 1.0, 0.6, 1.0]),
-        rolls=np.array([True, True, True, False]),
+        is_rolling=np.array([True, True, True, False]),
     )
     np.testing.assert_array_equal(remaining, [[0.5, 0.0], [0.0, 0.0], [0.6, 0.0], [-0.5, 0.3]])
 
