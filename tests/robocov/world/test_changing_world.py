@@ -17,7 +17,7 @@ from robocov.record import Record
 from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov.world import ChangingWorld, World
-from robocov.world.obstacle_pieces import build_solid_pieces
+from robocov.world.obstacle_pieces import build_obstacles
 
 HALL = Environment("hall", ((0, 0), (10, 0), (10, 8), (0, 8)))
 STARTS = np.array([[1.0, 1.0], [2.0, 1.5], [1.0, 3.0], [3.0, 2.5]])
@@ -31,7 +31,7 @@ def test_a_changing_world_equals_a_world_while_all_robots_work() -> None:
     """The robots touch each other; positions and velocities are the same bit for bit."""
     starts = np.array([[1.0, 1.0], [1.3, 1.0], [1.6, 1.05]])
     changing = build_world(Conditions(failures=((1, 100.0),)), starts)
-    plain = World(build_solid_pieces(HALL), Team.homogeneous(3), starts)
+    plain = World(build_obstacles(HALL), Team.homogeneous(3), starts)
     forces = np.array([[3.0, 0.0], [0.0, 0.1], [-3.0, 0.0]])
     for step in range(60):
         changing.step(forces, 0.05, time=step * 0.05)

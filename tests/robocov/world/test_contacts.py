@@ -8,6 +8,7 @@ import numpy as np
 
 from robocov.team import Team
 from robocov.world import MAX_PENETRATION, World
+from robocov.world.obstacle_pieces import Obstacles
 
 DT = 1 / 60
 DISTANT_WALL = np.array([[90.0, 90.0], [91.0, 90.0], [91.0, 91.0]])
@@ -18,8 +19,8 @@ def test_robots_without_contact_move_as_if_they_were_alone() -> None:
     """Robot 1 is between two robots that lean on each other and one that leans on a wall."""
     starts = np.array([[0.0, 3.0], [0.0, 0.0], [0.21, 3.0], [0.89, -3.0]])
     forces = np.array([[2.0, 0.0], [0.3, 0.1], [-2.0, 0.0], [2.0, 1.0]])
-    team = World((WALL,), Team.homogeneous(4), starts)
-    alone = World((WALL,), Team.homogeneous(1), starts[1:2])
+    team = World(Obstacles((WALL,)), Team.homogeneous(4), starts)
+    alone = World(Obstacles((WALL,)), Team.homogeneous(1), starts[1:2])
     for _ in range(60):
         team.step(forces, DT)
         alone.step(forces[1:2], DT)
@@ -38,7 +39,9 @@ def test_pushes_are_passed_on_along_a_row_of_robots() -> None:
     starts = np.column_stack([np.cumsum(gaps), np.zeros(n)])
     velocities = np.zeros((n, 2))
     velocities[0, 0] = 2.0
-    world = World((DISTANT_WALL,), replace(row, mass=mass, max_speed=max_speed), starts, velocities)
+    world = World(
+        Obstacles((DISTANT_WALL,)), replace(row, mass=mass, max_speed=max_speed), starts, velocities
+    )
     world.step(np.zeros((n, 2)), DT)
     assert world._list_touching() == [0, 1]
     assert (world.positions[1:, 0] > starts[1:, 0] + 0.01).all()

@@ -222,7 +222,7 @@ def test_faint_forces_turn_a_robot_at_rest_slowly(empty: Environment) -> None:
 
 def test_unicycles_brake_for_lateral_acceleration_that_turning_does_not_provide(empty: Environment) -> None:
     team = Team.homogeneous(1, kinematics="unicycle", viscosity=0.0, max_speed=3.0)
-    world = World(build_solid_pieces(empty), team, np.array([[2.0, 5.0]]), np.array([[0.8, 0.0]]))
+    world = World(build_obstacles(empty), team, np.array([[2.0, 5.0]]), np.array([[0.8, 0.0]]))
     world.step(np.array([[0.0, 50.0]]), DT)
     assert np.hypot(*world.velocities[0]) == pytest.approx(0.8 - team.max_acceleration[0] * DT)
 

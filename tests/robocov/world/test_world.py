@@ -14,7 +14,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.team import Team
 from robocov.world import MAX_PENETRATION, World
-from robocov.world.obstacle_pieces import build_solid_pieces
+from robocov.world.obstacle_pieces import Obstacles, build_obstacles
 
 DT = 1 / 60
 
@@ -23,7 +23,7 @@ def build_world(
     environment: Environment, n: int = 6, seed: int = 0, start: str = "uniform", **team: float
 ) -> World:
     positions = environment.start(start).sample(n, seed)
-    return World(build_solid_pieces(environment), Team.homogeneous(n, **team), positions)
+    return World(build_obstacles(environment), Team.homogeneous(n, **team), positions)
 
 
 def compute_wall_distance(environment: Environment, positions: np.ndarray) -> float:
@@ -36,7 +36,7 @@ def compute_wall_distance(environment: Environment, positions: np.ndarray) -> fl
 def test_viscous_motion_has_the_exact_solution(empty: Environment) -> None:
     """m v' = F - nu v: v(t) = F/nu (1 - exp(-nu t / m))."""
     team = Team.homogeneous(1, mass=2.0, viscosity=1.5)
-    world = World(build_solid_pieces(empty), team, np.array([[2.0, 5.0]]))
+    world = World(build_obstacles(empty), team, np.array([[2.0, 5.0]]))
     force = np.array([[0.6, 0.0]])
     for step in range(1, 121):
         world.step(force, DT)
@@ -46,7 +46,7 @@ def test_viscous_motion_has_the_exact_solution(empty: Environment) -> None:
 
 def test_without_viscosity_a_robot_coasts(empty: Environment) -> None:
     team = Team.homogeneous(1, viscosity=0.0)
-    world = World(build_solid_pieces(empty), team, np.array([[2.0, 5.0]]), np.array([[0.5, 0.0]]))
+    world = World(build_obstacles(empty), team, np.array([[2.0, 5.0]]), np.array([[0.5, 0.0]]))
     for _ in range(60):
         world.step(np.zeros((1, 2)), DT)
     np.testing.assert_allclose(world.velocities, [[0.5, 0.0]], rtol=1e-12)
@@ -66,7 +66,7 @@ def test_limits_hold_under_any_forces(cluttered: Environment, seed: int, max_for
 
 def test_acceleration_is_limited_without_contacts(empty: Environment) -> None:
     rng = np.random.default_rng(4)
-    world = World(build_solid_pieces(empty), Team.homogeneous(1), np.array([[5.0, 5.0]]))
+    world = World(build_obstacles(empty), Team.homogeneous(1), np.array([[5.0, 5.0]]))
     for _ in range(200):
         previous_velocities = world.velocities
         world.step(rng.normal(scale=50.0, size=(1, 2)), DT)
@@ -106,7 +106,7 @@ def test_a_pressed_crowd_neither_overlaps_nor_sinks_into_walls(
     team = replace(equal_team, mass=mass, radius=radius)
     starts = empty.start("uniform").sample(n, 1, radius=float(radius.max()))
     for target in ([5.0, 5.0], [-2.0, -1.0]):
-        world = World(build_solid_pieces(empty), team, starts)
+        world = World(build_obstacles(empty), team, starts)
         for _ in range(int(600 / speed)):
             world.step(50.0 * speed * mass[:, None] * (np.array(target) - world.positions), DT)
             offsets = world.positions[:, None] - world.positions
@@ -125,7 +125,7 @@ def test_masses_whose_contacts_cannot_be_resolved_are_rejected(empty: Environmen
     team = Team.concatenate([Team.homogeneous(1, mass=0.5), Team.homogeneous(1, mass=501.0)])
     message = r"team.mass: expected .* 1000 times as heavy .* got 0.5 to 501 kg"
     with pytest.raises(ParameterError, match=message):
-        World(build_solid_pieces(empty), team, np.array([[2.0, 2.0], [2.0, 6.0]]))
+        World(build_obstacles(empty), team, np.array([[2.0, 2.0], [2.0, 6.0]]))
 
 
 def test_energy_never_grows_without_forces(cluttered: Environment) -> None:
@@ -136,7 +136,7 @@ def test_energy_never_grows_without_forces(cluttered: Environment) -> None:
         velocities = rng.normal(size=(30, 2))
         velocities /= np.maximum(np.hypot(*velocities.T), 1.0)[:, None]
         team = Team.homogeneous(30, viscosity=viscosity)
-        world = World(build_solid_pieces(cluttered), team, positions, velocities)
+        world = World(build_obstacles(cluttered), team, positions, velocities)
         energy = 0.5 * (velocities**2).sum()
         for _ in range(300):
             previous_energy = energy
@@ -192,7 +192,7 @@ def test_heterogeneous_teams_keep_their_own_limits(empty: Environment) -> None:
         sensing_range=np.array([3.0, 3.0]),
         communication_range=np.array([np.inf, np.inf]),
     )
-    world = World(build_solid_pieces(empty), team, np.array([[2.0, 2.0], [2.0, 6.0]]))
+    world = World(build_obstacles(empty), team, np.array([[2.0, 2.0], [2.0, 6.0]]))
     for _ in range(120):
         world.step(np.full((2, 2), [100.0, 0.0]), DT)
     np.testing.assert_allclose(np.hypot(*world.velocities.T), [1.0, 0.4], rtol=1e-9)
@@ -204,7 +204,7 @@ DISTANT_WALL = np.array([[90.0, 90.0], [91.0, 90.0], [91.0, 91.0]])
 
 def test_a_thrown_robot_brakes_as_hard_as_it_can() -> None:
     team = Team.homogeneous(1, max_speed=1.0, max_acceleration=2.0, viscosity=0.5)
-    world = World((DISTANT_WALL,), team, np.zeros((1, 2)), np.array([[5.0, 0.0]]))
+    world = World(Obstacles((DISTANT_WALL,)), team, np.zeros((1, 2)), np.array([[5.0, 0.0]]))
     speeds = [5.0]
     for _ in range(180):
         # The controller asks for full speed.
@@ -217,7 +217,7 @@ def test_a_thrown_robot_brakes_as_hard_as_it_can() -> None:
 @pytest.mark.parametrize("mass", [1.0, 2.5])
 def test_external_forces_are_not_limited(mass: float) -> None:
     team = Team.homogeneous(2, mass=mass)
-    world = World((DISTANT_WALL,), team, np.array([[0.0, 0.0], [5.0, 0.0]]))
+    world = World(Obstacles((DISTANT_WALL,)), team, np.array([[0.0, 0.0], [5.0, 0.0]]))
     push = np.array([[0.0, 60.0], [0.0, 0.0]])
     world.step(np.zeros((2, 2)), 0.01, push)
     np.testing.assert_allclose(world.velocities, push / mass * 0.01, rtol=1e-12)
@@ -227,8 +227,8 @@ def test_external_forces_of_zero_change_nothing() -> None:
     team = Team.homogeneous(3)
     starts = np.array([[0.0, 0.0], [0.35, 0.0], [5.0, 5.0]])
     forces = np.array([[1.5, 0.3], [-1.0, 0.2], [0.4, -2.0]])
-    free = World((DISTANT_WALL,), team, starts)
-    unpushed = World((DISTANT_WALL,), team, starts)
+    free = World(Obstacles((DISTANT_WALL,)), team, starts)
+    unpushed = World(Obstacles((DISTANT_WALL,)), team, starts)
     for _ in range(120):
         free.step(forces, DT)
         unpushed.step(forces, DT, np.zeros((3, 2)))
@@ -239,14 +239,14 @@ def test_external_forces_of_zero_change_nothing() -> None:
 @pytest.mark.parametrize("force", [30.0, 300.0, 3000.0])
 def test_external_forces_push_no_robot_through_a_thin_wall(force: float) -> None:
     wall = np.array([[1.0, -1.0], [1.02, -1.0], [1.02, 1.0], [1.0, 1.0]])
-    world = World((wall,), Team.homogeneous(1, radius=0.1), np.zeros((1, 2)))
+    world = World(Obstacles((wall,)), Team.homogeneous(1, radius=0.1), np.zeros((1, 2)))
     for _ in range(60):
         world.step(np.zeros((1, 2)), DT, np.array([[force, 0.0]]))
         assert world.positions[0, 0] < 0.95
 
 
 def test_a_dragged_robot_follows_the_pointer_and_can_be_thrown() -> None:
-    world = World((DISTANT_WALL,), Team.homogeneous(1), np.zeros((1, 2)))
+    world = World(Obstacles((DISTANT_WALL,)), Team.homogeneous(1), np.zeros((1, 2)))
     pointer = np.array([[4.0, 1.0]])
     for _ in range(120):
         spring_force = 40.0 * (pointer - world.positions)
@@ -266,7 +266,7 @@ def test_pushed_robots_keep_their_speed_limit(empty: Environment) -> None:
     team = Team.concatenate([heavy, slow])
     starts = np.array([[3.0, 5.0], [3.5, 5.0]])
     velocities = np.array([[2.0, 0.0], [0.0, 0.0]])
-    world = World(build_solid_pieces(empty), team, starts, velocities)
+    world = World(build_obstacles(empty), team, starts, velocities)
     for _ in range(60):
         world.step(np.array([[500.0, 0.0], [0.0, 0.0]]), DT)
         assert (np.hypot(*world.velocities.T) <= team.max_speed + 1e-12).all()
@@ -279,7 +279,7 @@ def test_external_forces_move_robots_along_walls_without_limits() -> None:
     push = np.array([[1.0, 20.0]])
     speeds = []
     for obstacle in (wall, DISTANT_WALL):
-        world = World((obstacle,), Team.homogeneous(1), np.array([[0.9, 0.0]]))
+        world = World(Obstacles((obstacle,)), Team.homogeneous(1), np.array([[0.9, 0.0]]))
         for _ in range(30):
             world.step(np.zeros((1, 2)), DT, push)
         speeds.append(world.velocities[0, 1])
@@ -290,7 +290,9 @@ def test_external_forces_move_robots_along_walls_without_limits() -> None:
 @pytest.mark.parametrize("speed", [0.5, 1.0, 5.0])
 def test_robots_that_hit_a_wall_end_the_step_at_its_surface(speed: float) -> None:
     wall = np.array([[1.0, -5.0], [2.0, -5.0], [2.0, 5.0], [1.0, 5.0]])
-    world = World((wall,), Team.homogeneous(1, max_speed=speed), np.zeros((1, 2)), np.array([[speed, 0.0]]))
+    world = World(
+        Obstacles((wall,)), Team.homogeneous(1, max_speed=speed), np.zeros((1, 2)), np.array([[speed, 0.0]])
+    )
     for _ in range(round(2.0 / speed / DT)):
         world.step(np.array([[100.0, 0.0]]), DT)
         assert world.positions[0, 0] <= 0.9 + 2e-4
