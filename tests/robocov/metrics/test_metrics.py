@@ -1,3 +1,5 @@
+"""Settling, path lengths, clearance, contacts, stuck robots and the coverage cost along runs."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -21,19 +23,21 @@ from robocov.metrics import (
     select_sampled_moments,
     summarise,
 )
+from robocov.metrics.clearance import measure_robot_gaps
 from robocov.metrics.run_metrics import compute_run_metrics
 from robocov.record import Record
 from robocov.simulation import Simulation
+from robocov.team import Team
 
 DT = 0.1
 
 
-def times(seconds: float) -> np.ndarray:
-    return np.arange(round(seconds / DT) + 1) * DT
+def build_times(duration: float) -> np.ndarray:
+    return np.arange(round(duration / DT) + 1) * DT
 
 
-def track(x: np.ndarray) -> np.ndarray:
-    """Positions (T, 1, 2) of one robot that moves along x."""
+def build_trajectory(x: np.ndarray) -> np.ndarray:
+    """Return the positions of one robot that moves along x, (T, 1, 2) m."""
     return np.stack([x, np.zeros_like(x)], axis=-1)[:, None, :]
 
 
@@ -43,35 +47,35 @@ def record(cluttered: Environment) -> Record:
 
 
 def test_a_robot_that_stops_settles_when_it_stops() -> None:
-    time = times(20)
-    moving = track(np.minimum(time * 0.5, 3.0))  # stops at 6 s
-    # in the last window that begins before the stop it still gets 0.05 m
-    assert find_settling_time(time, moving) == pytest.approx(5.9, abs=0.11)
+    time = build_times(20)
+    # It stops at 6 s. In windows that start at least 0.1 s earlier, it still moves by 0.05 m.
+    positions = build_trajectory(np.minimum(time * 0.5, 3.0))
+    assert find_settling_time(time, positions) == pytest.approx(5.9, abs=0.11)
 
 
 def test_trembling_robots_have_settled_and_creeping_ones_have_not() -> None:
-    time = times(30)
-    assert find_settling_time(time, track(0.01 * np.sin(40 * time))) == 0.0
-    assert find_settling_time(time, track(0.02 * time)) is None
+    time = build_times(30)
+    assert find_settling_time(time, build_trajectory(0.01 * np.sin(40 * time))) == 0.0
+    assert find_settling_time(time, build_trajectory(0.02 * time)) is None
 
 
 def test_robots_that_move_late_settle_late() -> None:
-    time = times(30)
-    late = track(np.where(time > 15, np.minimum(time - 15, 1.0), 0.0))
-    assert find_settling_time(time, late) == pytest.approx(16.0, abs=0.11)
-    assert find_settling_time(time, track(np.where(time > 29, 1.0, 0.0))) is None
+    time = build_times(30)
+    positions = build_trajectory(np.where(time > 15, np.minimum(time - 15, 1.0), 0.0))
+    assert find_settling_time(time, positions) == pytest.approx(16.0, abs=0.11)
+    assert find_settling_time(time, build_trajectory(np.where(time > 29, 1.0, 0.0))) is None
 
 
 def test_one_robot_that_moves_by_the_limit_keeps_the_team_from_settling() -> None:
     time = np.arange(9) * 0.25
-    jump = track(np.where(time >= 1.0, 0.5, 0.0))
+    jump = build_trajectory(np.where(time >= 1.0, 0.5, 0.0))
     assert find_settling_time(time, jump, window=1.0, distance=0.5) == 1.0
-    team = np.concatenate([track(np.zeros(9)), jump], axis=1)
+    team = np.concatenate([build_trajectory(np.zeros(9)), jump], axis=1)
     assert find_settling_time(time, team, window=1.0, distance=0.5) == 1.0
 
 
 def test_a_run_shorter_than_the_window_cannot_settle() -> None:
-    assert find_settling_time(times(3), track(np.zeros(31))) is None
+    assert find_settling_time(build_times(3), build_trajectory(np.zeros(31))) is None
     assert find_settling_time(np.array([0.0]), np.zeros((1, 1, 2))) is None
 
 
@@ -91,70 +95,85 @@ def test_clearance_agrees_with_shapely_also_beyond_the_sensing_range(record: Rec
 
 def test_contacts_are_counted_when_they_begin(record: Record) -> None:
     steps = 5
-    gap = np.array([[0.5, 0.0], [0.0, 0.0], [0.0, 0.3], [0.2, 0.0], [0.0, 0.2]])
-    apart = np.zeros((steps, 2, 2))
-    apart[:, 1, 0] = [1.0, 0.2, 0.2, 0.5, 0.2]  # two robots of radius 0.1 meet, part and meet again
-    team = replace(record.team, **{name: getattr(record.team, name)[:2] for name in record.team.__slots__})
-    made = replace(record, team=team, positions=apart, time=np.arange(steps) * 0.1)
-    # walls: robot 0 at steps 1 and 4, robot 1 at step 0 (it starts so) and 3; robots: at steps 1 and 4
-    assert count_contacts(made, gap) == 4 + 2
+    clearances = np.array([[0.5, 0.0], [0.0, 0.0], [0.0, 0.3], [0.2, 0.0], [0.0, 0.2]])
+    positions = np.zeros((steps, 2, 2))
+    positions[:, 1, 0] = [1.0, 0.2, 0.2, 0.5, 0.2]
+    two_robots = replace(record, team=record.team[:2], positions=positions, time=np.arange(steps) * 0.1)
+    # Robot 0 touches a wall at steps 1 and 4, robot 1 at steps 0 and 3; they touch each other at 1 and 4.
+    assert count_contacts(two_robots, clearances) == 4 + 2
+
+
+def test_gaps_between_robots_of_different_size(record: Record) -> None:
+    """Robot 2, which is the largest, is farther along x than robot 1, and yet closer to robot 0."""
+    positions = np.array([[[0.0, 0.0], [0.0001, 0.25], [0.62, 0.0]]])
+    team = replace(record.team[:3], radius=np.array([0.1, 0.1, 0.5]))
+    three_robots = replace(record, team=team, positions=positions, time=np.zeros(1))
+    assert measure_robot_gaps(three_robots).smallest == pytest.approx([0.02])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robots", [1, 2, 7, 130])
 def test_contacts_of_robots_agree_with_a_check_of_all_pairs(record: Record, robots: int) -> None:
-    """Of few robots all pairs are looked at at once, of many only the close ones."""
     rng = np.random.default_rng(robots)
-    steps, size = 40, 0.2 * (robots - 1) ** 0.5
-    walk = np.cumsum(rng.normal(0.0, 0.05, (steps, robots, 2)), axis=0) + rng.uniform(0, size, (robots, 2))
+    steps = 40
+    starts = rng.uniform(0, 0.2 * (robots - 1) ** 0.5, (robots, 2))
+    positions = starts + np.cumsum(rng.normal(0.0, 0.05, (steps, robots, 2)), axis=0)
     radius = rng.uniform(0.02, 0.1, robots)
-    team = replace(
-        record.team,
-        **{name: np.full(robots, getattr(record.team, name)[0]) for name in record.team.__slots__},
-    )
-    made = replace(record, team=replace(team, radius=radius), positions=walk, time=np.arange(steps) * 0.1)
-    met = np.zeros((robots, robots), dtype=bool)
+    team = replace(Team.homogeneous(robots), radius=radius)
+    crowd = replace(record, team=team, positions=positions, time=np.arange(steps) * 0.1)
+    is_touching = np.zeros((robots, robots), dtype=bool)
     expected = 0
-    for places in walk:
+    for moment in range(steps):
         for i in range(robots):
             for j in range(i):
-                touch = bool(np.hypot(*(places[i] - places[j])) <= radius[i] + radius[j] + 1e-3)
-                expected += touch and not met[i, j]
-                met[i, j] = touch
-    assert count_contacts(made, np.ones((steps, robots))) == expected
+                distance = np.hypot(*(positions[moment, i] - positions[moment, j]))
+                touches = bool(distance <= radius[i] + radius[j] + 1e-3)
+                expected += touches and not is_touching[i, j]
+                is_touching[i, j] = touches
+    assert count_contacts(crowd, np.ones((steps, robots))) == expected
     assert (expected > 0) is (robots > 1)
 
 
 @pytest.fixture(scope="module")
 def changing(record: Record) -> Record:
     """Robot 2 fails after a second, and robot 1 runs into it; robot 3 joins where robot 1 has been."""
-    name = {name: getattr(record.team, name)[:3] for name in record.team.__slots__}
     positions = np.array(
-        [[[1.0, 1.0], [2.0, 1.0], [1.05, 1.0]], [[1.0, 1.0], [2.0, 1.0], [1.05, 1.0]]]
-        + [[[1.8, 1.0], [2.0, 1.0], [1.0, 1.0]]]
+        [
+            [[1.0, 1.0], [2.0, 1.0], [1.05, 1.0]],
+            [[1.0, 1.0], [2.0, 1.0], [1.05, 1.0]],
+            [[1.8, 1.0], [2.0, 1.0], [1.0, 1.0]],
+        ]
     )
-    arrays = {each: np.ones((3, 3, 2)) for each in ("velocities", "forces", "goals", "obstacle_points")}
-    conditions = Conditions(failures=((2, 1.0),), joins=((3, 2.0),))
-    team = replace(record.team, **name)
     return replace(
-        record, team=team, time=np.arange(3.0), positions=positions, conditions=conditions, **arrays
+        record,
+        team=record.team[:3],
+        time=np.arange(3.0),
+        positions=positions,
+        velocities=np.ones((3, 3, 2)),
+        forces=np.ones((3, 3, 2)),
+        goals=np.ones((3, 3, 2)),
+        obstacle_points=np.ones((3, 3, 2)),
+        conditions=Conditions(failures=((2, 1.0),), joins=((3, 2.0),)),
     )
 
 
 def test_failed_robots_are_walls_and_robots_that_have_not_joined_are_absent(changing: Record) -> None:
-    gap = compute_clearances(changing)
-    assert np.isinf(gap).tolist() == [[False, False, True], [False, True, True], [False, True, False]]
-    assert gap[:, 0] == pytest.approx([0.9, 0.8, 0.0], abs=1e-9)
-    assert count_contacts(changing, gap) == 1
+    clearances = compute_clearances(changing)
+    is_idle = [[False, False, True], [False, True, True], [False, True, False]]
+    assert np.isinf(clearances).tolist() == is_idle
+    assert clearances[:, 0] == pytest.approx([0.9, 0.8, 0.0], abs=1e-9)
+    assert count_contacts(changing, clearances) == 1
     cost = CoverageCost(changing.environment, lattice=24)
     history = compute_cost_history(changing, cost)
-    for k, rows in enumerate(([0, 1], [0], [0, 2])):
-        assert history.mean_distance[k] == cost(changing.positions[k, rows]).mean_distance
+    for moment, robots in enumerate(([0, 1], [0], [0, 2])):
+        expected = cost(changing.positions[moment, robots]).mean_distance
+        assert history.mean_distance[moment] == expected
 
 
 def test_only_working_robots_count_in_run_metrics(changing: Record) -> None:
     metrics = compute_run_metrics(changing, 1.0)
-    assert metrics.work == pytest.approx([0.0, 3.0, 6.0])  # |F v| is 2: of two robots, one, two
+    # |F v| is 2 for each robot; two, one and two of them work.
+    assert metrics.work == pytest.approx([0.0, 3.0, 6.0])
     assert metrics.effort == pytest.approx([0.0, 4.0, 6.0])
     assert metrics.robot_clearance == pytest.approx([0.8, np.inf, 0.6])
     assert metrics.components.tolist() == [1, 1, 1]
@@ -164,9 +183,9 @@ def test_metrics_use_the_map_of_each_moment() -> None:
     path = ObstaclePath(((0.0, 0.0), (4.0, 0.0)), 2.0)
     wall = PolygonObstacle(((3.0, 0.0), (3.5, 0.0), (3.5, 4.0), (3.0, 4.0)), path=path)
     hall = Environment("hall", ((0.0, 0.0), (8.0, 0.0), (8.0, 4.0), (0.0, 4.0)), (wall,))
-    some = Simulation(hall, Lloyd(), [[1.0, 2.0]], dt=0.1).run(1.0)
-    assert select_sampled_moments(some, 10.0) == [0, 10]
-    assert compute_run_metrics(some, 10.0).visible_area[[0, -1]] == pytest.approx([12.0, 20.0])
+    record = Simulation(hall, Lloyd(), [[1.0, 2.0]], dt=0.1).run(1.0)
+    assert select_sampled_moments(record, 10.0) == [0, 10]
+    assert compute_run_metrics(record, 10.0).visible_area[[0, -1]] == pytest.approx([12.0, 20.0])
 
 
 def test_the_mean_over_a_run_is_weighted_by_time() -> None:
@@ -176,39 +195,51 @@ def test_the_mean_over_a_run_is_weighted_by_time() -> None:
     assert compute_mean_over_run(np.array([0.0]), np.array([3.0])) == 3.0
 
 
-def goals(position: float, steps: int) -> np.ndarray:
-    return np.tile([position, 0.0], (steps, 1, 1))
+def build_goals(x: float, steps: int) -> np.ndarray:
+    """Return the goals of one robot at (x, 0), (T, 1, 2) m."""
+    return np.tile([x, 0.0], (steps, 1, 1))
 
 
 def test_a_robot_at_rest_away_from_its_goal_is_stuck() -> None:
-    time = times(20)
-    still = track(np.minimum(time, 3.0))
-    assert count_stuck_robots(time, still, goals(3.6, 201)) == 1
-    assert count_stuck_robots(time, still, goals(3.4, 201)) == 0, "it is nearly there"
-    assert count_stuck_robots(time, track(0.02 * time), goals(9.0, 201)) == 0, "it creeps on"
-    assert count_stuck_robots(time, track(0.005 * time), goals(9.0, 201)) == 1
-    trembling = track(0.01 * np.sin(40 * time))
-    assert count_stuck_robots(time, trembling, goals(9.0, 201)) == 1, "net displacement counts"
+    time = build_times(20)
+    stopping = build_trajectory(np.minimum(time, 3.0))
+    assert count_stuck_robots(time, stopping, build_goals(3.6, 201)) == 1
+    # Close to its goal a robot is not stuck.
+    assert count_stuck_robots(time, stopping, build_goals(3.4, 201)) == 0
+    # The net displacement counts: creeping robots are not stuck, trembling ones are.
+    creeping = build_trajectory(0.02 * time)
+    assert count_stuck_robots(time, creeping, build_goals(9.0, 201)) == 0
+    creeping_slowly = build_trajectory(0.005 * time)
+    assert count_stuck_robots(time, creeping_slowly, build_goals(9.0, 201)) == 1
+    trembling = build_trajectory(0.01 * np.sin(40 * time))
+    assert count_stuck_robots(time, trembling, build_goals(9.0, 201)) == 1
 
 
 def test_the_window_of_a_stuck_robot_contains_its_first_moment() -> None:
     time = np.arange(41) * 0.25
-    assert count_stuck_robots(time, track(np.where(time > 5.0, 1.0, 0.0)), goals(9.0, 41)) == 0
-    assert count_stuck_robots(time, track(np.where(time >= 5.0, 1.0, 0.0)), goals(9.0, 41)) == 1
+    assert (
+        count_stuck_robots(time, build_trajectory(np.where(time > 5.0, 1.0, 0.0)), build_goals(9.0, 41)) == 0
+    )
+    assert (
+        count_stuck_robots(time, build_trajectory(np.where(time >= 5.0, 1.0, 0.0)), build_goals(9.0, 41)) == 1
+    )
 
 
 def test_robots_are_counted_and_those_without_goals_are_not_stuck() -> None:
-    time = times(6)
+    time = build_times(6)
     positions = np.zeros((61, 3, 2))
-    aims = np.stack([np.full((61, 2), np.nan), np.full((61, 2), 4.0), np.full((61, 2), 5.0)], axis=1)
-    assert count_stuck_robots(time, positions, aims) == 2
+    goals = np.zeros((61, 3, 2))
+    goals[:, 0] = np.nan
+    goals[:, 1] = 4.0
+    goals[:, 2] = 5.0
+    assert count_stuck_robots(time, positions, goals) == 2
     assert count_stuck_robots(time, positions, np.full_like(positions, np.nan)) is None
 
 
 def test_runs_shorter_than_the_window_have_no_stuck_robots() -> None:
-    assert count_stuck_robots(times(4), np.zeros((41, 1, 2)), goals(9.0, 41)) is None
-    assert count_stuck_robots(times(5), np.zeros((51, 1, 2)), goals(9.0, 51)) == 1
-    assert count_stuck_robots(np.array([0.0]), np.zeros((1, 1, 2)), goals(9.0, 1)) is None
+    assert count_stuck_robots(build_times(4), np.zeros((41, 1, 2)), build_goals(9.0, 41)) is None
+    assert count_stuck_robots(build_times(5), np.zeros((51, 1, 2)), build_goals(9.0, 51)) == 1
+    assert count_stuck_robots(np.array([0.0]), np.zeros((1, 1, 2)), build_goals(9.0, 1)) is None
 
 
 def test_cost_history_samples_at_the_rate_and_at_the_end(record: Record) -> None:
@@ -216,8 +247,8 @@ def test_cost_history_samples_at_the_rate_and_at_the_end(record: Record) -> None
     history = compute_cost_history(record, cost, rate=10.0)
     np.testing.assert_allclose(history.time, np.arange(121) / 10, atol=1e-9)
     assert history.mean_distance[-1] == cost(record.positions[-1]).mean_distance
-    odd = replace(record, time=record.time[:-7], positions=record.positions[:-7])
-    assert select_sampled_moments(odd, 10.0)[-1] == len(odd) - 1
+    shorter = replace(record, time=record.time[:-7], positions=record.positions[:-7])
+    assert select_sampled_moments(shorter, 10.0)[-1] == len(shorter) - 1
 
 
 def test_summaries_contain_the_figures_of_a_run(record: Record) -> None:
@@ -236,7 +267,7 @@ def test_summaries_contain_the_figures_of_a_run(record: Record) -> None:
     }
     assert history.mean_distance.min() < summary["mean_distance_over_run_m"] < history.mean_distance.max()
     assert 0 <= summary["stuck_robots"] <= 6
-    assert summary["contacts"] > 0, "Lloyd's robots slide along walls here"
+    assert summary["contacts"] > 0
     assert -2e-3 < summary["min_clearance_m"] < 1e-3
     assert len(summary["path_length_m"]) == 6
     assert summary["cost_m3"] == pytest.approx(summary["mean_distance_m"] * record.environment.free_area)
@@ -244,8 +275,8 @@ def test_summaries_contain_the_figures_of_a_run(record: Record) -> None:
 
 
 def test_rapf_touches_nothing(cluttered: Environment) -> None:
-    quiet = Simulation(cluttered, Rapf(), cluttered.start().sample(6), dt=0.02).run(12.0)
-    assert count_contacts(quiet, compute_clearances(quiet)) == 0
+    record = Simulation(cluttered, Rapf(), cluttered.start().sample(6), dt=0.02).run(12.0)
+    assert count_contacts(record, compute_clearances(record)) == 0
 
 
 def test_histories_have_a_short_repr(record: Record) -> None:

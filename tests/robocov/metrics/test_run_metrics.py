@@ -1,3 +1,5 @@
+"""Metrics of a run over time, and connectivity."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -31,34 +33,38 @@ def record() -> Record:
     return Simulation(ROOM, Rapf(), [[1, 1], [2, 1], [1, 3]], team, dt=1 / 30).run(4.0)
 
 
-def history(values: list[float]) -> CostHistory:
+def build_history(values: list[float]) -> CostHistory:
     cost = np.array(values)
     return CostHistory(np.arange(len(cost), dtype=float), cost, cost, np.zeros_like(cost))
 
 
 def test_integrals_agree_with_plain_loops(record: Record) -> None:
-    work = effort = way = 0.0
+    work = 0.0
+    effort = 0.0
+    mean_path_length = 0.0
     for k in range(len(record) - 1):
         step = record.time[k + 1] - record.time[k]
         for robot in range(3):
-            power = [abs(record.forces[m, robot] @ record.velocities[m, robot]) for m in (k, k + 1)]
-            work += step * sum(power) / 2
+            power = abs(record.forces[k, robot] @ record.velocities[k, robot])
+            next_power = abs(record.forces[k + 1, robot] @ record.velocities[k + 1, robot])
+            work += step * (power + next_power) / 2
             effort += step * record.forces[k, robot] @ record.forces[k, robot]
-            way += np.hypot(*(record.positions[k + 1, robot] - record.positions[k, robot])) / 3
+            mean_path_length += np.hypot(*(record.positions[k + 1, robot] - record.positions[k, robot])) / 3
     metrics = compute_run_metrics(record, 5.0)
     assert metrics.work[0] == metrics.effort[0] == metrics.path_length[0] == 0.0
     assert metrics.work[-1] == pytest.approx(work, rel=1e-12)
     assert metrics.effort[-1] == pytest.approx(effort, rel=1e-12)
-    assert metrics.path_length[-1] == pytest.approx(way, rel=1e-12)
+    assert metrics.path_length[-1] == pytest.approx(mean_path_length, rel=1e-12)
     assert (np.diff(metrics.work) >= 0).all()
 
 
 def test_the_rate_does_not_change_the_final_figures(record: Record) -> None:
-    often, rarely = compute_run_metrics(record, 30.0), compute_run_metrics(record, 0.0)
-    assert (len(often.time), len(rarely.time)) == (121, 2)
-    assert often.final() == pytest.approx(rarely.final())
-    for column, row in zip(COLUMNS.values(), np.array(often.rows()).T, strict=True):
-        assert len(row) == 121, column
+    fine = compute_run_metrics(record, 30.0)
+    coarse = compute_run_metrics(record, 0.0)
+    assert len(fine.time) == 121
+    assert len(coarse.time) == 2
+    assert fine.final() == pytest.approx(coarse.final())
+    assert np.array(fine.rows()).shape == (121, len(COLUMNS))
 
 
 def test_clearances_are_minima_since_the_previous_moment(record: Record) -> None:
@@ -85,34 +91,34 @@ def test_covered_areas_are_parts_of_the_free_area(record: Record) -> None:
 
 
 def test_a_single_robot_has_no_clearance_to_others() -> None:
-    alone = compute_run_metrics(Simulation(ROOM, Rapf(), [[1, 1]]).run(0.5))
-    assert alone.final()["robot_clearance_m"] is None
-    assert alone.components.tolist() == [1, 1]
-    assert alone.algebraic_connectivity.tolist() == [0.0, 0.0]
+    metrics = compute_run_metrics(Simulation(ROOM, Rapf(), [[1, 1]]).run(0.5))
+    assert metrics.final()["robot_clearance_m"] is None
+    assert metrics.components.tolist() == [1, 1]
+    assert metrics.algebraic_connectivity.tolist() == [0.0, 0.0]
 
 
 @settings(max_examples=40)
 @given(st.integers(2, 9), st.floats(0.2, 4.0), st.integers(0, 2**32 - 1))
 def test_connectivity_agrees_with_the_laplacian(n: int, reach: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    places = rng.uniform(0, 5, (n, 2))
+    positions = rng.uniform(0, 5, (n, 2))
     ranges = reach * rng.choice([1.0, 2.0], n)
-    linked = [
-        [i != j and np.hypot(*(places[i] - places[j])) <= min(ranges[i], ranges[j]) for j in range(n)]
-        for i in range(n)
-    ]
-    laplacian = np.diag(np.sum(linked, axis=1)) - np.array(linked, dtype=float)
-    values = np.linalg.eigvalsh(laplacian)
-    parts, connectivity = measure_connectivity(places, ranges)
-    assert parts == int((values < 1e-9).sum())
-    assert connectivity == pytest.approx(max(values[1], 0.0), abs=1e-9)
-    assert (connectivity == 0.0) == (parts > 1)
+    offsets = positions[:, None] - positions
+    is_linked = np.hypot(offsets[:, :, 0], offsets[:, :, 1]) <= np.minimum(ranges[:, None], ranges)
+    np.fill_diagonal(is_linked, False)
+    laplacian = np.diag(is_linked.sum(axis=1)) - is_linked.astype(float)
+    eigenvalues = np.linalg.eigvalsh(laplacian)
+    components, connectivity = measure_connectivity(positions, ranges)
+    assert components == int((eigenvalues < 1e-9).sum())
+    assert connectivity == pytest.approx(max(eigenvalues[1], 0.0), abs=1e-9)
+    assert (connectivity == 0.0) == (components > 1)
 
 
 def test_connectivity_of_known_graphs() -> None:
-    turn = np.arange(6) * np.pi / 3
-    ring = np.column_stack([np.cos(turn), np.sin(turn)])
-    assert measure_connectivity(ring, np.full(6, 1.01)) == (1, pytest.approx(1.0))  # 2 - 2 cos(2 pi / 6)
+    angle = np.arange(6) * np.pi / 3
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    # The second eigenvalue of a ring is 2 - 2 cos(2 pi / 6).
+    assert measure_connectivity(ring, np.full(6, 1.01)) == (1, pytest.approx(1.0))
     assert measure_connectivity(ring, np.full(6, np.inf)) == (1, 6.0)
     assert measure_connectivity(ring, np.full(6, 0.5)) == (6, 0.0)
     assert measure_connectivity(np.empty((0, 2)), np.empty(0)) == (0, 0.0)
@@ -131,11 +137,11 @@ def test_connectivity_of_known_graphs() -> None:
 def test_the_cost_is_near_its_final_value_after_the_last_deviation(
     values: list[float], expected: float
 ) -> None:
-    assert find_time_near_final(history(values)) == expected
+    assert find_time_near_final(build_history(values)) == expected
 
 
 def test_final_metrics_have_a_figure_for_each_column(record: Record) -> None:
-    figures = compute_final_metrics(record, history([2.0, 1.0, 1.0]))
+    figures = compute_final_metrics(record, build_history([2.0, 1.0, 1.0]))
     assert figures["near_final_s"] == 1.0
     assert set(figures) == {*COLUMNS.values(), "near_final_s"} - {"time_s"}
 
