@@ -57,13 +57,23 @@ def test_late_messages_of_who_goes_straight_on_are_made_up_for(seed: int, delay:
     assert np.allclose(known.reported_positions, paths[-1][other], atol=1e-9)
 
 
-def test_nobody_is_taken_to_go_on_for_ever() -> None:
-    paths = np.concatenate([lines(2, 40), np.repeat(lines(2, 40)[-1:], 60, axis=0)])
-    known, estimates, _ = driven(paths[:45], Conditions(delay=2.0, message_rate=2.0, forget_after=9.0))
+def test_others_are_extrapolated_for_a_limited_time() -> None:
+    conditions = Conditions(delay=2.0, message_rate=2.0, forget_after=9.0)
+    known, estimates, _ = driven(lines(2, 90), conditions)
     robot, other = known.neighbours.list_pairs()
     assert known.reported_positions is not None
-    ahead = np.hypot(*(known.reported_positions - estimates.tracks.positions[robot, other]).T)
-    assert np.allclose(ahead, 1.5 * np.hypot(*estimates.tracks.velocities[robot, other].T))
+    distances = np.hypot(*(known.reported_positions - estimates.tracks.positions[robot, other]).T)
+    speeds = np.hypot(*estimates.tracks.velocities[robot, other].T)
+    assert speeds.min() > 0.1
+    np.testing.assert_allclose(distances, 1.5 * speeds)
+
+
+def test_others_are_no_faster_than_a_robot_itself() -> None:
+    """The robots of this team move at 1 m/s at most, but their messages say 3 m/s."""
+    paths = np.zeros((40, 2, 2))
+    paths[:, 1, 0] = 3.0 * DT * np.arange(40)
+    _, estimates, _ = driven(paths, Conditions(message_rate=4.0))
+    assert np.hypot(*estimates.tracks.velocities[0, 1]) == pytest.approx(1.0)
 
 
 @given(st.integers(0, 30))
