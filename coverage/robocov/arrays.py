@@ -21,7 +21,7 @@ Point: TypeAlias = tuple[float, float]
 """x and y, m."""
 
 Ring: TypeAlias = tuple[Point, ...]
-"""Points of a closed ring, of which the first is not repeated, or of a poly-line."""
+"""Points of a poly-line, or of a closed ring, whose first point is not repeated."""
 
 
 def freeze(values: object) -> Array:

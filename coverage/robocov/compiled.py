@@ -31,6 +31,7 @@ from robocov.files.cache_folders import find_cache_root, open_private_folder
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 IS_COMPILER_ENABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
+"""Whether kernels are compiled; the environment variable ``NUMBA_DISABLE_JIT`` prevents it."""
 _MAX_KEPT_VERSIONS = 4
 """Number of versions whose machine code is kept, the most recently used ones."""
 _MIN_UNUSED_DAYS = 1.0
@@ -44,13 +45,13 @@ _is_cache_usable = True
 _must_interpret: Callable[[str], bool] | None = None
 _kernels: weakref.WeakSet[Kernel] = weakref.WeakSet()
 _CACHE_ERRORS = (OSError, EOFError, pickle.UnpicklingError)
-"""What numba raises if its cache cannot be read or written; kernels themselves raise none of these."""
+"""Errors that numba raises if its cache cannot be read or written; kernels themselves raise none of these."""
 
 
 def kernel(function: _Function) -> _Function:
     """Compile a function of numbers, arrays and named tuples of these when it is first called.
 
-    A kernel may call other kernels, from whatever module, and read global numbers. Arithmetic is that of
+    A kernel may call other kernels, from any module, and read global numbers. Arithmetic is that of
     Python, without fused or reordered operations, so that all processors give the same bits.
 
     Parameters
@@ -137,7 +138,7 @@ class Kernel:
         except _CACHE_ERRORS:
             if not _is_cache_usable:
                 raise
-            # A cache is never in the way: go on without it if it is damaged, or the disk is full.
+            # A cache is never an obstacle: continue without it if it is damaged, or the disk is full.
             _disable_cache()
             return self.get_dispatcher()(*args, **kwargs)
 
@@ -254,11 +255,12 @@ def _import_numba() -> ModuleType:
         """Passes the names of kernels on to `on_compile`."""
 
         def on_start(self, started: Any) -> None:
+            """Report the kernel that is compiled."""
             for report in tuple(on_compile):
                 report(started.data["dispatcher"].__name__)
 
         def on_end(self, ended: Any) -> None:
-            pass
+            """Ignore the end of a compilation."""
 
     register("numba:compile", CompilationListener())
     return numba

@@ -55,7 +55,7 @@ class Mistake(NamedTuple):
     at_key : bool
         Whether the last key of the path is wrong, rather than its value.
     line, column : int or None
-        Where the mistake is in the file, in lines and characters from 1; None if there is no file.
+        Place of the mistake in the file, in lines and characters from 1; None if there is no file.
     """
 
     path: JsonPath
@@ -400,7 +400,7 @@ def require_type(name: str, value: object, kind: type, expected: str) -> None:
 
 
 def _describe_mismatch(name: str, value: object, expected: str) -> str:
-    """Return the message for a value that is not what was expected."""
+    """Return the message for an unexpected value."""
     return f"{name}: expected {expected}, got {quote(value)}"
 
 

@@ -23,7 +23,7 @@ Beat: TypeAlias = Callable[[], None]
 _MIN_SAVING = 1e-9
 """Fraction of the cost that an iteration must save: far more than rounding, so that none undoes another."""
 _MAX_ROUNDS = 60
-"""Maximum number of rounds of `improve_sources`, of which a few are usual."""
+"""Maximum number of rounds of `improve_sources`; a few are usual."""
 _MIN_SAVING_OF_ROUND = 1e-4
 """Fraction of the cost that a round of `improve_sources` must save."""
 _REMOVAL_SIZES = (2, 3)
@@ -91,8 +91,8 @@ def choose_greedily(table: Array, count: int) -> IntArray:
 
     Notes
     -----
-    The sources save at least 1 - 1/e of what the best k sources save, in comparison with one that is far from
-    everything (Nemhauser, Wolsey and Fisher 1978).
+    The sources save at least 1 - 1/e of the saving by the best k sources, in comparison with one source that
+    is far from everything (Nemhauser, Wolsey and Fisher 1978).
     """
     sources = np.zeros(count, dtype=np.intp)
     return _replace_sources(table, sources, np.arange(count), 0)[1]

@@ -37,13 +37,14 @@ from robocov.simulation import Simulation
 from robocov.team import Team
 
 Example: TypeAlias = Callable[[], None]
+"""A function that calls kernels, so that they are compiled."""
 
 _COMPILED_LIST = "compiled.json"
 """File in the cache folder with the names of the kernels whose machine code is there."""
 _LOOK_PERIOD_S = 0.25
-"""Time between two looks whether more kernels have been compiled."""
+"""Time between two checks whether more kernels have been compiled."""
 _UNTIL_STDIN_CLOSES = "--until-stdin-closes"
-"""Option with which the module ends when the process that started it does, whatever way that ends."""
+"""Option with which the module ends when the process that started it ends, in any manner."""
 _SQUARE = ((0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0))
 _TRIANGLE = PolygonObstacle(((3.0, 3.0), (4.0, 3.0), (4.0, 4.0)))
 _MAP = Environment("example", _SQUARE, (_TRIANGLE,))
@@ -117,7 +118,7 @@ def call_controller_kernels() -> None:
 
 
 COMMON_EXAMPLES: tuple[Example, ...] = (call_cost_kernels, call_step_kernels, call_summary_kernels)
-"""What a run of the paper's controllers and its summary need."""
+"""Examples of a run of the paper's controllers, and its summary."""
 ALL_EXAMPLES: tuple[Example, ...] = (
     call_step_kernels,
     call_cost_kernels,
@@ -127,6 +128,7 @@ ALL_EXAMPLES: tuple[Example, ...] = (
     call_density_kernels,
     call_controller_kernels,
 )
+"""Examples of all kernels."""
 
 
 def _place_robots(count: int) -> Array:

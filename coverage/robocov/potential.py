@@ -195,7 +195,7 @@ def _sum_repulsion_of_neighbours(
 
 @kernel
 def _sum_repulsion_of_all_robots(positions: Array, gains: PotentialGains) -> Array:
-    """Return the sums of (24) over all other robots, (n, 2) N, of which those out of range are skipped."""
+    """Return the sums of (24) over all other robots in range, (n, 2) N."""
     n = len(positions)
     sums = np.zeros((n, 2))
     if n == 0:

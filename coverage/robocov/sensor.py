@@ -159,7 +159,7 @@ class RangeSensor:
         distances : (rays,) array, m
             Distance to the first obstacle, or the range where there is none.
         ends : (rays, 2) array, m
-            Where the rays end.
+            Ends of the rays.
         """
         distances, _ = self.scan(np.asarray(position)[None], rays, np.array([sensing_range]))
         return distances[0], position + distances[0][:, None] * compute_headings(rays)
@@ -192,5 +192,5 @@ def _load_compiled_queries() -> ModuleType | None:
 
         return compiled_queries if compiled_queries.is_usable() else None
     except Exception:
-        # Whatever is wrong with a shortcut, the way without it works.
+        # If anything is wrong with the shortcut, the public queries still work.
         return None

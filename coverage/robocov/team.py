@@ -58,7 +58,7 @@ class TeamParameter(NamedTuple):
         Parameters
         ----------
         infinity : str
-            What stands for no limit.
+            Text that stands for no limit.
 
         Returns
         -------
@@ -248,7 +248,7 @@ class Team:
 
     @property
     def is_unicycle(self) -> BoolArray:
-        """Which robots are unicycles, which have to turn, (n,) bool."""
+        """Mask of the robots that are unicycles and have to turn, (n,) bool."""
         return np.asarray(self.track_width > 0.0)
 
     def _list_relevant_parameters(self) -> list[str]:

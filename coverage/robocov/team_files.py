@@ -32,7 +32,7 @@ from robocov.files.strictjson import parse, parse_toml, read_bytes
 from robocov.team import KINEMATICS, MAX_ROBOTS, PARAMETERS, Team
 
 TeamDefaults: TypeAlias = Mapping[str, float | str | None]
-"""Arguments of `Team.homogeneous` for what a group does not say; None is a range without limit."""
+"""Arguments of `Team.homogeneous` that a group does not set; None is a range without limit."""
 
 _NO_LIMIT = "null"
 """Stands for a range without limit in TOML, which has no null."""
@@ -47,7 +47,7 @@ def read_team(path: Path | str, defaults: TeamDefaults | None = None) -> Team:
     path : path
         A TOML file, or a JSON file of the same structure if its name ends in .json.
     defaults : mapping or None
-        Parameters for groups that do not set them. What is not there either has the default of
+        Parameters for groups that do not set them. Any other parameter has the default of
         `Team.homogeneous`. None as a value is a range without limit.
 
     Returns

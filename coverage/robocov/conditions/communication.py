@@ -183,7 +183,7 @@ class Radio:
         Returns
         -------
         neighbours : Neighbours
-            Robots of which each robot knows.
+            Robots from which each robot has such a message.
         places : (m, 2) array, m
             Positions in the messages, in the order of ``neighbours.indices``.
         ages : (m,) array, s
@@ -207,7 +207,7 @@ class Radio:
         return count > previous_count
 
     def _find_receivers(self, step: int, positions: Array, working: BoolArray) -> BoolArray:
-        """Return which robots receive the messages of which ones, (receiver, sender) bool."""
+        """Find the receivers of the messages of each robot, (receiver, sender) bool."""
         links = Neighbours.from_ranges(positions, self._ranges).keep_working(working)
         receiver, sender = links.list_pairs()
         is_received = np.zeros((len(positions), len(positions)), dtype=bool)

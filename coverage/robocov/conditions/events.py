@@ -83,6 +83,7 @@ class JoinedRobot(NamedTuple):
 
 
 Event = TypeVar("Event", bound=Failure | Join)
+"""`Failure` or `Join`."""
 
 
 def parse_event(kind: type[Event], text: str) -> Event:

@@ -60,7 +60,7 @@ class Perception:
         inbox : Inbox or None
             Messages before the step; None if communication is ideal.
         working : (n,) bool array
-            Which robots work.
+            Mask of the robots that work.
 
         Returns
         -------

@@ -72,7 +72,7 @@ class RandomStream:
         step : int
             From 0, below 2⁶⁴.
         one, other : int arrays of shapes that broadcast together
-            What each number is for, such as the numbers of two robots; from 0, below 2³².
+            Purpose of each number, such as the numbers of two robots; from 0, below 2³².
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Which sites each corner sees: known before the robots."""
+"""The sites that each corner sees, which do not depend on the robots."""
 
 from __future__ import annotations
 

@@ -104,8 +104,8 @@ class CoverageResult(Drawable):
         """Derivative of `value` with respect to the positions, (n, 2) m²; with `speeds` in m s.
 
         Each site pulls its owner towards its first waypoint, by a unit vector times the site's share of the
-        integral of φ, divided by the owner's speed. Exact wherever `value` is differentiable and owners and
-        corners stay what they are.
+        integral of φ, divided by the owner's speed. Exact if `value` is differentiable and owners and corners
+        do not change.
         """
         count = len(self.positions)
         site = np.flatnonzero(self.owner >= 0)

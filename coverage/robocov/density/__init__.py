@@ -1,6 +1,6 @@
 """The density φ: how important each point of the region is, and its integrals over cells.
 
-- `base`: what a density is, and the uniform one
+- `base`: the interface of densities, and the uniform one
 - `gaussians`, `polygons`, `raster`: sums of Gaussians, weighted areas, and images
 - `cell_edges`: cells as edges, over which densities are integrated
 - `polygon_masses`: integrals over other polygons

@@ -1,4 +1,4 @@
-"""What a density is, and the uniform one."""
+"""The interface of densities, and the uniform one."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass

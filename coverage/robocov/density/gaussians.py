@@ -22,6 +22,7 @@ from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError, quote
 
 Matrix: TypeAlias = tuple[Point, Point]
+"""A 2 x 2 matrix, row by row."""
 
 _MIN_RELATIVE_DETERMINANT = 1e-9
 """Determinant of a covariance, relative to the product of its diagonal, below which it counts as singular."""
@@ -36,7 +37,7 @@ class _Factor(NamedTuple):
 
 
 class _EdgeIntegrals(NamedTuple):
-    """What edges add to integrals of the standard Gaussian, (s,) each.
+    """Contributions of edges to integrals of the standard Gaussian, (s,) each.
 
     The second moments are stored as their differences from the mass, and xy as its negative.
     """

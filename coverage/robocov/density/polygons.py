@@ -70,7 +70,7 @@ class WeightedPolygons(Density):
     Parameters
     ----------
     areas : tuple of WeightedArea
-        Where areas overlap, the last of them counts.
+        If areas overlap, the last of them counts.
     background : float
         Density outside of all areas, from 0.
 
@@ -161,7 +161,7 @@ class WeightedPolygons(Density):
 
 
 def _build_jumps(points: Array, step: float) -> Array:
-    """Return the edges of a closed, counter-clockwise ring, inside of which φ is larger by `step`."""
+    """Return the edges of a closed, counter-clockwise ring that encloses a φ larger by `step`."""
     start = points[:-1]
     end = points[1:]
     falls = start[:, 1:] > end[:, 1:]

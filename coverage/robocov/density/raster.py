@@ -37,7 +37,7 @@ class Raster(Density):
     values : (rows, columns) array
         From 0, **the lowest row first**. The attribute is read-only.
     extent : (x_min, y_min, x_max, y_max), m
-        What the image covers. Outside, the nearest pixel of its border counts.
+        Extent of the image. Outside, the nearest pixel of its border counts.
     interpolation : {"bilinear", "cells"}
 
     Raises
@@ -215,8 +215,8 @@ class _Grid(NamedTuple):
     left: Array
 
 
-# A grid takes ten times the memory of its image. While an image is painted there are many, of which only the
-# last few are still in use.
+# A grid takes ten times the memory of its image. While an image is painted there are many, but only the last
+# few are still in use.
 @lru_cache(maxsize=4)
 def _build_grid(raster: Raster) -> _Grid:
     values = raster.values
@@ -314,7 +314,7 @@ def _integrate_cells(
 
 @kernel
 def _find_first_line(start: float, step: float, lines: int) -> int:
-    """Return the first inner line of a grid that is crossed on the way from a coordinate along an axis."""
+    """Return the first inner line of a grid that a motion from a coordinate along an axis crosses."""
     if step > 0.0:
         return int(max(np.floor(start) + 1.0, 1.0))
     return int(min(np.ceil(start), lines + 0.0) - 1.0)

@@ -17,6 +17,7 @@ from robocov.arrays import Array, Ring, compute_lengths
 Repeat: TypeAlias = Literal["loop", "back-and-forth"]
 """Behaviour at the end of a path: straight to its first point, or back along the path."""
 REPEATS: tuple[str, ...] = get_args(Repeat)
+"""The values of `Repeat`."""
 _PARALLEL_TOLERANCE_M2 = 1e-12
 """Cross product up to which an edge counts as parallel to the motion, and sweeps no area."""
 
@@ -63,7 +64,7 @@ class ObstaclePath:
         return float(path_lengths[-1]) / self.speed
 
     def compute_displacement(self, time: float) -> Array:
-        """Compute by how much the obstacle has moved since time zero.
+        """Compute the displacement of the obstacle since time zero.
 
         Parameters
         ----------
@@ -103,7 +104,7 @@ def compute_swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
 
 
 def _sweep(polygon: Polygon, start: Array, end: Array) -> BaseGeometry:
-    """Return the Minkowski sum of a polygon and a line: both end positions, and what the edges sweep."""
+    """Return the Minkowski sum of a polygon and a line: both end positions, and the areas swept by edges."""
     parts: list[BaseGeometry] = []
     motion = end - start
     for ring in (polygon.exterior, *polygon.interiors):

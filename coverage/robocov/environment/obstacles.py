@@ -19,7 +19,7 @@ MAX_SAGITTA_M = 1e-3
 _MIN_SIDES = 12
 """Sides of the polygon that represents the smallest circles."""
 _MITRE_LIMIT = 4.0
-"""Corners of walls reach out by at most so many half widths."""
+"""Maximum distance of the tip of a wall's corner from its axis, in half widths."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class PolygonObstacle:
     holes : sequence of (k, 2) sequences, m
     name : str or None
     path : ObstaclePath or None
-        How it moves; None if it does not.
+        Path along which it moves; None if it does not move.
     """
 
     vertices: Ring
@@ -56,7 +56,7 @@ class CircleObstacle:
     radius : float, m
     name : str or None
     path : ObstaclePath or None
-        How it moves; None if it does not.
+        Path along which it moves; None if it does not move.
 
     Notes
     -----
@@ -90,7 +90,7 @@ class WallObstacle:
     width : float, m
     name : str or None
     path : ObstaclePath or None
-        How it moves; None if it does not.
+        Path along which it moves; None if it does not move.
     """
 
     points: Ring
@@ -107,6 +107,7 @@ class WallObstacle:
 
 
 Obstacle: TypeAlias = PolygonObstacle | CircleObstacle | WallObstacle
+"""Any kind of obstacle."""
 
 
 def shift_obstacle(obstacle: Obstacle, displacement: Array) -> Obstacle:

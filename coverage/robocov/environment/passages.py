@@ -43,7 +43,7 @@ class Gap(NamedTuple):
     width : float, m
         Diameter of the largest disc that passes.
     between : pair of (x, y), m
-        Where the walls face each other.
+        Points at which the walls face each other.
     """
 
     width: float
@@ -227,7 +227,7 @@ class _PassageSearch:
     def _leads_somewhere(self, corner: int, edge: int, q: Array, width: float) -> bool:
         """Return whether the gap from a corner to the point q of an edge leads to more than a pocket.
 
-        A cut between two rings separates nothing; one from a ring to itself separates what it encloses.
+        A cut between two rings separates nothing; one from a ring to itself separates the enclosed area.
         """
         ring = self._ring[corner]
         if ring != self._ring[edge]:

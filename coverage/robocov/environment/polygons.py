@@ -20,6 +20,7 @@ _MIN_OVERLAP_M2 = 1e-6
 """Smaller overlaps are rounding errors of shapes that touch."""
 
 Name = TypeVar("Name", bound=Hashable)
+"""Type of the names of shapes."""
 
 
 def find_overlaps(

@@ -52,7 +52,7 @@ class UniformStart:
 
 @dataclass(frozen=True)
 class PointsStart:
-    """The robots start at given positions; at most as many robots as there are positions.
+    """The robots start at given positions, one robot at each.
 
     Attributes
     ----------
@@ -63,6 +63,7 @@ class PointsStart:
 
 
 StartSpec: TypeAlias = DiscStart | UniformStart | PointsStart
+"""Description of any kind of start."""
 
 
 @dataclass(frozen=True, eq=False)

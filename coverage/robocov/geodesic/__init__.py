@@ -2,7 +2,7 @@
 
 Contents: `Geodesics` computes distances and paths. It searches a graph of the corners that see each other
 (`corner_graph`), which is built with an index of the walls around a point (`angular_index`). Walls and
-corners (`walls`) have whole-number coordinates (`grid`), so that no rounding decides what is visible.
+corners (`walls`) have whole-number coordinates (`grid`), so that visibility does not depend on rounding.
 """
 
 from robocov.geodesic.geodesics import Geodesics

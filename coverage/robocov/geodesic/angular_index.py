@@ -188,7 +188,7 @@ def add_walls(
         if is_box_hidden(boxes, node, index, source):
             continue
         if node < leaves:
-            # The nearer half comes first: what it hides need not be visited.
+            # The nearer half comes first: boxes that it hides need not be visited.
             left2 = compute_squared_box_distance(boxes, 2 * node, x, y)
             right2 = compute_squared_box_distance(boxes, 2 * node + 1, x, y)
             nearer = 2 * node + int(right2 < left2)
@@ -374,7 +374,7 @@ def is_surely_visible(index: AngularWallIndex, source: int, x: float, y: float) 
 def _is_visible_past_walls(
     walls: Walls, index: AngularWallIndex, source: int, k: int, dx: float, dy: float
 ) -> bool:
-    """Return whether a source sees what is at (dx, dy) from it, in bin k, by testing every wall there."""
+    """Return whether a source sees the point at (dx, dy) from it, in bin k, by testing every wall there."""
     x = index.positions[source, 0]
     y = index.positions[source, 1]
     if index.clear2[source, k] < 0.0:
@@ -393,7 +393,7 @@ def _is_visible_past_walls(
 
 @kernel
 def _hides(ends: Array, wall: int, x: float, y: float, dx: float, dy: float) -> bool:
-    """Return whether a wall that faces (x, y) hides what is at (dx, dy) from there."""
+    """Return whether a wall that faces (x, y) hides the point at (dx, dy) from there."""
     ax, ay, bx, by = get_relative_ends(ends, wall, x, y)
     return (
         cross(bx - ax, by - ay, dx - ax, dy - ay) < 0.0
@@ -412,7 +412,7 @@ def _faces(ends: Array, wall: int, x: float, y: float) -> bool:
 
 @kernel
 def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> bool:
-    """Return whether no wall hides what is at (dx, dy) from (x, y), by a search along the segment."""
+    """Return whether no wall hides the point at (dx, dy) from (x, y), by a search along the segment."""
     boxes = walls.boxes
     leaves = len(boxes) // 2
     node = 1
@@ -436,7 +436,7 @@ def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> 
 
 @kernel
 def _is_box_off_segment(boxes: Array, node: int, x: float, y: float, dx: float, dy: float) -> bool:
-    """Return whether a box certainly does not meet the segment from (x, y) to what is at (dx, dy) from it."""
+    """Return whether a box certainly does not meet the segment of length (dx, dy) from (x, y)."""
     if boxes[node, 0] > x + max(dx, 0.0) or boxes[node, 2] < x + min(dx, 0.0):
         return True
     if boxes[node, 1] > y + max(dy, 0.0) or boxes[node, 3] < y + min(dy, 0.0):

@@ -1,8 +1,8 @@
-"""Trees of bounding boxes, with which searches skip everything that is out of the way.
+"""Trees of bounding boxes, with which searches skip everything that is far away.
 
 A tree is an (2 k, 4) array with rows of low x, low y, high x and high y. Node 1 is the root, and node k
-contains nodes 2 k and 2 k + 1. The second half of the rows are leaves, each of which contains `LEAF_SIZE`
-consecutive items; leaves without any are boxes that start at infinity. Row 0 is not used.
+contains nodes 2 k and 2 k + 1. The second half of the rows are leaves of `LEAF_SIZE` consecutive items
+each; leaves without any are boxes that start at infinity. Row 0 is not used.
 """
 
 import numpy as np

@@ -126,7 +126,7 @@ def find_visible_corners(
     Returns
     -------
     int
-        How many corners were found.
+        Number of corners that were found.
     """
     corners = walls.corners
     boxes = walls.corner_boxes

@@ -35,7 +35,7 @@ _CORNERS_PER_REPORT = 64
 _TARGETS_PER_BLOCK = 1024
 """Number of targets whose walls are indexed at the same time."""
 _MIN_ENTRIES_PER_SOURCE = {SOURCE_BINS: 256, _CORNER_BINS: 1 << 14}
-"""Entries of the index for each source at the beginning; twice as many whenever they are not enough."""
+"""Initial number of entries of the index for each source; it is doubled whenever it is too small."""
 _SNAP_STEPS = 2
 """Grid steps around the nearest point of a slanted wall among which a free grid point is sought."""
 

@@ -15,7 +15,7 @@ from robocov.geodesic.box_tree import LEAF_SIZE, build_box_tree, compute_z_order
 from robocov.geodesic.grid import GRID_BITS, compute_crosses, cross
 
 _ON_BOUNDARY = 1000
-"""What a wall through a point adds to its winding number: more than any number of turns."""
+"""Contribution of a wall through a point to its winding number: more than any number of turns."""
 
 
 class Walls(NamedTuple):
@@ -181,7 +181,7 @@ def _find_corners(vertex: IntArray, incoming: Array, outgoing: Array) -> BoolArr
     """Find the sectors that are corners, given their vertices and the directions of their walls."""
     turn = compute_crosses(incoming, outgoing)
     is_pinch = np.bincount(vertex)[vertex] > 1
-    # At a pinch a straight wall is a corner, too: the walls of the other sector would hide what is ahead.
+    # At a pinch a straight wall is a corner, too: the walls of the other sector would hide the points ahead.
     return np.asarray((turn < 0.0) | ((turn == 0.0) & is_pinch))
 
 
@@ -343,7 +343,7 @@ def count_windings(walls: Walls, points: Array, windings: IntArray) -> None:
 
 @kernel
 def _count_winding(ends: Array, wall: int, x: float, y: float) -> int:
-    """Return what a wall adds to the winding number of a point."""
+    """Return the contribution of a wall to the winding number of a point."""
     ax, ay, bx, by = ends[wall, 0], ends[wall, 1], ends[wall, 2], ends[wall, 3]
     if min(ay, by) > y or max(ay, by) < y or max(ax, bx) < x:
         return 0

@@ -23,8 +23,10 @@ from robocov.observation import Cells
 
 TARGETS = ("centroid", "sensing", "median")
 """The optima for f = r², (12); f = 1/(r²+h²), (14); and f = r, which the coverage cost (22) counts."""
-TARGET_HELP = "what a robot heads for in its cell: the optimum for r², for 1/(r²+h²), or for r"
-HEIGHT_HELP = "h of (14), for the target sensing: how high the sensor is; what is much farther counts little"
+TARGET_HELP = "the goal of a robot in its cell: the optimum for r², for 1/(r²+h²), or for r"
+"""Description of the gain of controllers that selects a target."""
+HEIGHT_HELP = "height h of the sensor in (14), for the target sensing; points much farther away count little"
+"""Description of the gain of controllers for the height."""
 
 _MAX_ITERATIONS = 80
 """Most cells need 4; a cell as thin as a hair below a low sensor needs some dozens."""
@@ -103,7 +105,7 @@ def find_targets(cells: Cells, density: Density | None, target: str, height: flo
 
     Notes
     -----
-    Centroid and median take the distances of all points of the cell into account. 1/(r²+h²) rewards what is
+    Centroid and median take the distances of all points of the cell into account. 1/(r²+h²) rewards points
     within a few h: in a cell that is large in comparison, the far ends are given up; if h is much larger
     than the cells, the target is the centroid. Without obstacles that hardly changes the coverage cost
     (22). Walls magnify it: whether a robot gets round one depends on centimetres of its goal, usually to the

@@ -124,7 +124,8 @@ def compute_gradients(edges: CellEdges, points: Array, f: Performance) -> Array:
     Notes
     -----
     At the generators this is equation (11). As the cells move with their generators, it is also the gradient
-    of the whole cost: what the boundary between two cells adds to one it subtracts from the other, (8)-(10).
+    of the whole cost: the boundary between two cells adds to one the same that it subtracts from the other,
+    (8)-(10).
     """
     derivatives = compute_derivatives(edges, points, f)
     return np.column_stack([derivatives.x, derivatives.y])

@@ -47,8 +47,8 @@ class Sensing:
 
     Notes
     -----
-    In contrast to what the paper says after (14), the optimum depends on the height: it is the centroid only
-    for h → ∞.
+    In contrast to the remark of the paper after (14), the optimum depends on the height: it is the centroid
+    only for h → ∞.
     """
 
     kind: ClassVar[int] = SENSING

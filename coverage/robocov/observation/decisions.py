@@ -116,7 +116,7 @@ def check_forces(values: Any, count: int, name: str) -> Array:
     count : int
         Number of robots.
     name : str
-        What messages call them.
+        Name of the forces in messages.
 
     Returns
     -------

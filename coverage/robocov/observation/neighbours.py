@@ -140,7 +140,7 @@ class Neighbours:
         Parameters
         ----------
         working : (n,) bool array
-            Which robots work.
+            Mask of the robots that work.
 
         Returns
         -------
@@ -173,6 +173,10 @@ class NeighbourPositions(NamedTuple):
         neighbours : Neighbours
         reported_positions : (m, 2) array or None, m
             As in `Observations`; ignored if the graph is complete.
+
+        Returns
+        -------
+        NeighbourPositions
         """
         if neighbours.indptr is None or neighbours.indices is None:
             return cls(_NO_INDICES, _NO_INDICES, _NO_POSITIONS)
@@ -183,5 +187,14 @@ class NeighbourPositions(NamedTuple):
 
     @classmethod
     def build_empty(cls, robots: int) -> NeighbourPositions:
-        """Build the positions for a number of robots without any neighbours."""
+        """Build the positions for a number of robots without any neighbours.
+
+        Parameters
+        ----------
+        robots : int
+
+        Returns
+        -------
+        NeighbourPositions
+        """
         return cls(np.zeros(robots + 1, dtype=np.intp), _NO_INDICES, _NO_POSITIONS)

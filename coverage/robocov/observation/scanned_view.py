@@ -150,7 +150,7 @@ def evaluate_density(density: Density | None, points: Array) -> Array:
 def compute_step_fractions(gradient: Array, previous: Array | None, step: Array | None) -> Array:
     """Compute the fraction of full speed with which robots follow gradients that jump.
 
-    Areas in view have ridges, such as doors, from both sides of which the gradient leads back. The step is
+    Areas in view have ridges, such as doors, to which the gradient leads back from both sides. The step is
     halved each time when the gradient turns by more than a right angle, and grows again otherwise.
 
     Parameters

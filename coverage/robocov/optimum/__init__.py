@@ -1,6 +1,6 @@
 """The centralised reference: the best positions for a team that knows the whole map.
 
-- `search`: many restarts, of which the best counts
+- `search`: the best of many restarts
 - `descent`: descent of the exact cost to a local minimum
 - `configuration_space`: positions at which robots fit
 """

@@ -61,9 +61,9 @@ def descend(
     ----------
     cost : CoverageCost
     space : ConfigurationSpace
-        Where robots can be.
+        Positions at which robots fit.
     positions : (n, 2) array, m
-        Where the descent starts.
+        Positions from which the descent starts.
     component : (n,) int array
         The component of the free space in which each robot stays.
     beat : callable, optional

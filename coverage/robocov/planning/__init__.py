@@ -1,4 +1,4 @@
-"""Planning by one robot: what it knows of the obstacles, routes among them, and where robots should be.
+"""Planning by one robot: its map of the obstacles, routes among them, and positions for robots.
 
 - `raster`, `discovered_map`: square cells, and the occupancy grid that a robot builds from its scans
 - `openness`: how likely an unknown cell is free

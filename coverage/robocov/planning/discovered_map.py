@@ -87,7 +87,7 @@ class DiscoveredMap:
         Parameters
         ----------
         position : (2,) array, m
-            Where the scan was taken.
+            Position from which the scan was taken.
         distances : (rays,) array, m
             Lengths of rays evenly round a full turn, the first along +x.
         is_hit : (rays,) bool array

@@ -41,7 +41,7 @@ _MAX_REMEMBERED_POSITIONS = 1000
 class GridPlanner(MapWindow):
     """Distances and routes in a window of a discovered map, around its walls.
 
-    Planners compute what they are asked for once, and are shared by robots that share a map.
+    Planners compute each result once, and are shared by robots that share a map.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class GridPlanner(MapWindow):
 
     @cached_property
     def _frame(self) -> Frame:
-        """Where the window's cells are; the last row and column are at most those of the raster."""
+        """Position of the window's cells; the last row and column are at most those of the raster."""
         rows, columns = self.known_map.raster.shape
         height, width = self.window.shape
         low_x, low_y = self.known_map.raster.origin
@@ -266,7 +266,7 @@ class GridPlanner(MapWindow):
                 self._visible_nodes.clear()
             close = self._find_close_nodes(position, self.is_roomy)
             visible = close[self.find_clear_lines(position, self.nodes[close], self.is_blocked)]
-            # A robot that is inside what is believed to be a wall is actually next to it.
+            # A robot that seems to be inside a wall is actually next to it.
             self._visible_nodes[key] = visible if len(visible) else close[:1]
         return self._visible_nodes[key]
 
@@ -286,7 +286,7 @@ class GridPlanner(MapWindow):
         is_obstructing : (h, w) bool array
             For example `is_blocked` or `is_tight`.
         ignored_length : float, m
-            What is closer to the position does not count: a robot may be where no route leads to, but only
+            Unknown cells closer to the position do not count: a robot may be where no route leads, but only
             away from there.
 
         Returns
@@ -342,7 +342,7 @@ class GridPlanner(MapWindow):
         return int(close[is_visible.argmax()]) if is_visible.any() else -1
 
     def _remove_detours(self, position: Array, points: Array) -> Array:
-        """Return the way-points without those that are passed in sight of later ones."""
+        """Return the waypoints without those that are unnecessary, because later ones are in sight."""
         remaining: list[Array] = []
         here = position
         k = 0

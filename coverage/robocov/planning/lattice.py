@@ -25,7 +25,7 @@ _SIGHT_STEP_CELLS = 0.5
 
 
 class LatticeCells(NamedTuple):
-    """What the graph of a lattice depends on."""
+    """The properties of a lattice on which its graph depends."""
 
     is_tight: BoolArray
     """(h, w) Whether each cell is too close to a wall."""
@@ -49,7 +49,7 @@ class Edges(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """Where the cells of a window are."""
+    """Position of the cells of a window."""
 
     low_x: float
     """Lower left corner of the raster, m."""
@@ -298,9 +298,9 @@ def find_clear_lines(
     is_obstructing : (h, w) bool array
         Cells of a window.
     frame : Frame
-        Where these cells are.
+        Position of these cells.
     ignored_length : float, m
-        What is closer to the position than that does not count.
+        Cells closer to the position do not count.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""How likely each unknown cell of an occupancy grid is free."""
+"""The probability that each unknown cell of an occupancy grid is free."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _OUTSIDE = 255
 
 
 class _BlockGrid(NamedTuple):
-    """Square blocks of cells, and how many sides of cells they share with what is next to them."""
+    """Square blocks of cells, and the number of sides of cells that they share with their neighbours."""
 
     unknown_cells: Array
     """(rows, columns) Number of unknown cells in each block."""
@@ -50,7 +50,7 @@ def compute_openness(state: NDArray[np.uint8], is_outside: BoolArray, max_blocks
     is_outside : (rows, columns) bool array
         Cells outside the region, which do not count at all.
     max_blocks : int
-        Maximum number of square blocks of cells, each of which is one unknown of the equation.
+        Maximum number of square blocks of cells; each is one unknown of the equation.
 
     Returns
     -------

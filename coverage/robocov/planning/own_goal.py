@@ -47,7 +47,7 @@ def find_own_goal(
     other_positions : (k, 2) array, m
         Of all other robots.
     first_node : int
-        Where the search begins.
+        Position from which the search starts.
     former_goal : (2,) array, m
         It is kept if the new one is hardly better; nan if there is none.
     min_saving : float
@@ -136,7 +136,7 @@ def _list_neighbours(planner: GridPlanner, node: int) -> list[int]:
 def _refine_goal(
     planner: GridPlanner, node: int, neighbours: list[int], costs: Mapping[int, float], former_goal: Array
 ) -> tuple[Array, float]:
-    """Return the minimum of the parabolas around a node, and how far the former goal is above it.
+    """Return the minimum of the parabolas around a node, and the excess of the former goal over it.
 
     The latter is infinite if the former goal is outside the parabolas, more than one spacing away.
     """

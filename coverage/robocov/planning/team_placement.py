@@ -24,7 +24,7 @@ _MAX_ROBOTS_OF_THOROUGH_SEARCH = 8
 
 
 class TeamSituation(NamedTuple):
-    """Where the robots of a team are, and were to go, from the view of the first one, which plans."""
+    """Positions and former goals of the robots of a team, as known to the first one, which plans."""
 
     positions: Array
     """(k, 2) m"""
@@ -33,7 +33,7 @@ class TeamSituation(NamedTuple):
     is_fixed: BoolArray
     """(k,) Whether each robot stays at its former goal; never the first one."""
     other_positions: Array
-    """(o, 2) m, of robots that stay where they are and that nobody plans for."""
+    """(o, 2) m, of robots that do not move and are not part of the plan."""
 
 
 class MinSavings(NamedTuple):

@@ -1,4 +1,4 @@
-"""Where a robot looks at what it has not seen of its own cell."""
+"""Viewpoints from which a robot sees the unseen parts of its own cell."""
 
 from collections.abc import Sequence
 
@@ -30,7 +30,7 @@ def find_viewpoint(
     min_stake : float
         Stake below which a patch is not worth a look, in cells times metres.
     former_viewpoints : sequence of (2,) arrays, m
-        Where the robot has looked from already.
+        Viewpoints at which the robot has already been.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def find_viewpoint(
 
     Notes
     -----
-    The stake of a patch is what it is expected to add to the cost: the inside of an obstacle hardly adds
+    The stake of a patch is its expected contribution to the cost: the inside of an obstacle hardly adds
     anything. The viewpoint maximises the stake over one metre plus the path length.
     """
     window = planner.window

@@ -1,7 +1,7 @@
 """Generalized Voronoi graph of free space: the points as far from one wall as from another.
 
 It is the roadmap of Choset and Burdick (IJRR 19, 2000), on a grid: a thinning of the free cells that keeps
-how they are connected, loops, and what is halfway between two walls that face each other.
+how they are connected, loops, and the points halfway between two walls that face each other.
 """
 
 from __future__ import annotations

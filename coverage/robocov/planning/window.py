@@ -37,8 +37,8 @@ class Window(NamedTuple):
         raster : Raster
         center : (2,) array, m
         reach : float, m
-            What is at most that far away is in the window; infinite for the whole raster. The window moves in
-            steps of a quarter of the reach, and therefore stays the same while the centre hardly moves.
+            All points up to this distance are in the window; infinite for the whole raster. The window moves
+            in steps of a quarter of the reach, and therefore stays the same while the centre hardly moves.
         max_nodes : int
 
         Returns

@@ -33,7 +33,9 @@ from robocov.team import Team
 from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
 
 FORMAT = "robocov-run"
+"""Name of the format of ``run.json``."""
 FORMAT_VERSION = 1
+"""Its present version."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,7 @@ class Record(Drawable):
     steering : (T, n, 2) rad, rad/s
         Heading, from +x, and turning rate of unicycles; None in a team of points.
     session : dict
-        Where the run comes from, if it is part of a session in the window.
+        Origin of the run, if it is part of a session in the window.
     conditions : Conditions or None
         None: ideal ones.
     joined : tuple of JoinedRobot

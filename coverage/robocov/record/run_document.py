@@ -11,11 +11,17 @@ from robocov.files.strictjson import Document, wanted
 from robocov.team import MAX_ROBOTS
 
 Seconds: TypeAlias = Annotated[float, Field(gt=0, le=1e6), wanted("a number above 0 (s)")]
+"""A duration above 0, s."""
 Time: TypeAlias = Annotated[float, Field(ge=0, le=1e9), wanted("a number from 0 (s)")]
+"""A simulation time, s."""
 Number: TypeAlias = Annotated[int, Field(ge=1, le=MAX_ROBOTS), wanted("the number of a robot, from 1,")]
+"""The number of a robot, from 1."""
 Key: TypeAlias = Annotated[str, Field(pattern=r"^[1-9]\d{0,8}$"), wanted("the number of a robot")]
+"""The number of a robot as the key of an object."""
 Point: TypeAlias = Annotated[list[float], Field(min_length=2, max_length=2), wanted("a point [x, y]")]
+"""x and y, m."""
 Seed: TypeAlias = Annotated[int, Field(ge=0), wanted("a whole number from 0")]
+"""The seed of a random start."""
 
 
 class _Failure(Document):
@@ -83,7 +89,7 @@ class JoinEvent(Document):
 
 
 class _Session(Document):
-    """Where a run comes from that is part of a session in the window."""
+    """Origin of a run that is part of a session in the window."""
 
     began_at_s: Time = 0.0
     start_velocities_m_per_s: list[Point] = Field([])

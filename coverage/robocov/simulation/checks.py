@@ -15,7 +15,9 @@ from robocov.team import Team
 DEFAULT_DT = 1 / 60
 """Default control period, s."""
 MIN_DT_S = 1e-4
+"""Shortest control period."""
 MAX_DT_S = 1.0
+"""Longest control period."""
 
 
 def check_dt(dt: float) -> None:

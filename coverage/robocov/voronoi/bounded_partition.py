@@ -74,7 +74,7 @@ def partition(
         takes a fraction of the time. Its cells are the same, to the last bit unless four generators lie on a
         circle up to rounding.
     reported_positions : (m, 2) array or None, m
-        Where robots know their neighbours to be, in the order of ``neighbours.indices``. The cells of two
+        Known positions of the neighbours, in the order of ``neighbours.indices``. The cells of two
         robots may then overlap or leave a gap, as each is based on the knowledge of its own robot. None: the
         neighbours are where they are.
     density : Density or None

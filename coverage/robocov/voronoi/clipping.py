@@ -262,7 +262,7 @@ def write_cell(
     i : int
         Number of the robot.
     cells : CellArrays
-        Changed in place. As many edges are written as there are rows for.
+        Changed in place. Edges for which there is no row are not written.
     total : int
         Number of edges of the cells before.
 

@@ -20,7 +20,7 @@ def find_own_samples(
     robot : (m,) int array
         A robot for each of its neighbours.
     neighbour_positions : (m, 2) array, m
-        Where that robot knows that neighbour to be.
+        Position of that neighbour, as that robot knows it.
 
     Returns
     -------
@@ -46,7 +46,7 @@ def compute_sample_centroids(is_own: BoolArray, samples: Array, mass: Array, pos
     Parameters
     ----------
     is_own : (n, k) bool array
-        Which samples belong to which cell.
+        Whether each sample belongs to each cell.
     samples : (k, 2) array, m
     mass : (k,) or (n, k) array
         Mass of each sample, or of each sample as each robot knows it.

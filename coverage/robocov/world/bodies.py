@@ -35,7 +35,7 @@ def build_obstacle_space(obstacles: Obstacles) -> tuple[pymunk.Space, list[pymun
     Parameters
     ----------
     obstacles : Obstacles
-        What the space contains.
+        Content of the space.
 
     Returns
     -------

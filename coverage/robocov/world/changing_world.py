@@ -29,7 +29,7 @@ class ChangingWorld:
     Parameters
     ----------
     conditions : Conditions
-        When robots fail and join.
+        Times at which robots fail and join.
     environment : Environment
     team : Team
         All n robots.
@@ -44,7 +44,7 @@ class ChangingWorld:
     positions, velocities, steering
         As those of `World`; read-only.
     working : (n,) bool array
-        Which robots are present and have not failed. Read-only.
+        Mask of the robots that are present and have not failed. Read-only.
     """
 
     def __init__(

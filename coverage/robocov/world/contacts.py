@@ -190,7 +190,7 @@ class ContactSolver:
         self._space.add(*bodies)
         try:
             rows = self._arrays.find_rows(bodies)
-            self._arrays.states[:] = 0.0  # also the row of the static body, wherever it is
+            self._arrays.states[:] = 0.0  # also the row of the static body
             self._arrays.states[self._mover_rows] = mover_states
             self._arrays.states[rows] = states
             self._arrays.write_states()

@@ -19,7 +19,7 @@ from robocov.team import Team
 
 
 class MotionResponse(NamedTuple):
-    """How robots respond to forces during one substep; each (n,)."""
+    """Response of robots to forces during one substep; each (n,)."""
 
     velocity_loss: Array
     """Fraction of the velocity that viscosity removes, 1 - exp(-nu dt / m)."""

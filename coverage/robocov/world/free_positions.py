@@ -12,7 +12,7 @@ from robocov.potential import compute_spread_directions
 from robocov.team import Team
 
 _CLEARANCE_M = 1e-3
-"""Clearance of a robot from what it is moved away from."""
+"""Clearance of a robot from walls and robots after it was moved away from them."""
 _MAX_ROUNDS = 300
 """Robots that still overlap after this number of rounds have no room next to each other."""
 _QUADRANT_SEGMENTS = 16
@@ -151,7 +151,7 @@ def require_free_starts(
     tolerance : float, m
         Overlaps up to this depth are accepted.
     is_present : (n,) bool array or None
-        Which robots are checked; by default all.
+        Mask of the robots that are checked; by default all are.
 
     Raises
     ------

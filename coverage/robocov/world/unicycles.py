@@ -12,7 +12,7 @@ and a turning rate ω. In every substep it turns that acceleration into
 
 So it turns in place if the point would move off in another direction, and drives once it nearly faces it.
 The wheels, v ∓ ω b / 2 with the track width b, approach these speeds as fast as `max_acceleration` allows.
-Braking comes first, then the turn; of `max_speed` the turn takes what it needs and the speed gets the rest.
+Braking comes first, then the turn, then speeding up; the turn takes its share of `max_speed` first.
 Such heading control (ω from e, speed from the projection on the heading) is that of Aicardi, Casalino, Bicchi
 and Balestrino (1995) and Astolfi (1999), as it is commonly described; their texts were not consulted.
 
@@ -55,7 +55,7 @@ class Wheels(NamedTuple):
     max_turning_rate: Array
     """rad/s."""
     is_rolling: BoolArray
-    """Which robots are unicycles on their own wheels. The others are points, or are carried."""
+    """Mask of the unicycles on their own wheels. The others are points, or are carried."""
 
 
 class DriveCommand(NamedTuple):
@@ -268,7 +268,7 @@ def remove_sideways_velocity(
     max_speed : (n,) array, m/s
         Largest forward speed.
     is_rolling : (n,) bool array
-        Which robots are unicycles on their own wheels. The others keep their velocity.
+        Mask of the unicycles on their own wheels. The others keep their velocity.
 
     Returns
     -------

@@ -66,7 +66,7 @@ class World:
     steering : (n, 2) array or None, rad and rad/s
         Heading and turning rate of unicycles; None for a team without any. Read-only.
     working : (n,) bool array
-        Which robots work; all of them do.
+        Mask of the robots that work; all of them do.
 
     Raises
     ------
@@ -80,7 +80,7 @@ class World:
     robot sinks into anything by more than `contacts.MAX_PENETRATION`. A step depends on nothing but
     positions, velocities and steering, so that a copy continues identically, bit for bit.
 
-    Moving obstacles keep to their path and push what they meet. Walls are stronger
+    Moving obstacles keep to their path and push robots aside. Walls are stronger
     still: where no space is left between a moving obstacle and a wall, the robot stays in front of the wall
     and the obstacle moves over it. Once there is space, the robot is pushed out on the nearest side.
     """
