@@ -1,3 +1,5 @@
+"""Conditions: checks of parameters, working periods of robots, and JSON."""
+
 from __future__ import annotations
 
 import json
@@ -15,21 +17,21 @@ from robocov.errors import ParameterError
 def test_conditions_are_ideal_by_default() -> None:
     assert Conditions().is_ideal
     assert Conditions(seed=4, forget_after=1.0).is_ideal
-    for given_ in ({"loss": 0.1}, {"delay": 0.1}, {"message_rate": 2.0}, {"position_noise": 0.1}):
-        assert Conditions(**given_).uses_messages
-        assert not Conditions(**given_).is_ideal
-    for given_ in (
+    for parameters in ({"loss": 0.1}, {"delay": 0.1}, {"message_rate": 2.0}, {"position_noise": 0.1}):
+        assert Conditions(**parameters).uses_messages
+        assert not Conditions(**parameters).is_ideal
+    for parameters in (
         {"sensing_noise": 0.1},
         {"failure_rate": 0.1},
         {"failures": ((1, 2),)},
         {"joins": ((1, 2),)},
     ):
-        assert not Conditions(**given_).uses_messages
-        assert not Conditions(**given_).is_ideal
+        assert not Conditions(**parameters).uses_messages
+        assert not Conditions(**parameters).is_ideal
 
 
 @pytest.mark.parametrize(
-    ("given_", "message"),
+    ("parameters", "message"),
     [
         ({"loss": 1.5}, "conditions.loss: expected a number from 0 to 1, got 1.5"),
         ({"loss": True}, "conditions.loss: expected a number from 0 to 1, got True"),
@@ -66,9 +68,9 @@ def test_conditions_are_ideal_by_default() -> None:
         ({"seed": -1}, "conditions.seed: expected a whole number from 0, got -1"),
     ],
 )
-def test_invalid_conditions_are_rejected(given_: dict[str, object], message: str) -> None:
+def test_invalid_conditions_are_rejected(parameters: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError, match=message) as caught:
-        Conditions(**given_)  # type: ignore[arg-type]
+        Conditions(**parameters)  # type: ignore[arg-type]
     assert "\n" not in str(caught.value)
 
 
@@ -85,8 +87,8 @@ def test_a_team_must_contain_the_robots_of_all_events() -> None:
 
 def test_robots_work_from_joining_to_failing() -> None:
     conditions = Conditions(failures=((1, 5.0), (3, 7.0)), joins=((2, 4.0), (3, 6.0)))
-    found = conditions.find_working(np.array([0.0, 3.99, 4.0, 5.0, 6.5, 7.0]), 4)
-    assert found.astype(int).tolist() == [
+    working = conditions.find_working(np.array([0.0, 3.99, 4.0, 5.0, 6.5, 7.0]), 4)
+    assert working.astype(int).tolist() == [
         [1, 0, 0, 1],
         [1, 0, 0, 1],
         [1, 1, 0, 1],
@@ -99,29 +101,31 @@ def test_robots_work_from_joining_to_failing() -> None:
 
 
 def test_rounding_of_time_does_not_shift_events_by_a_step() -> None:
-    """Sums of steps miss a time by rounding; that must not shift a failure by a step."""
     conditions = Conditions(failures=((1, 0.8),))
-    steps = np.add.accumulate(np.full(8, 0.1))
-    assert steps[-1] < 0.8
-    assert conditions.find_failed(float(steps[-1]), 1).all()
+    time = float(np.add.accumulate(np.full(8, 0.1))[-1])
+    assert time < 0.8
+    assert conditions.find_failed(time, 1).all()
     assert not conditions.find_failed(0.79, 1).any()
-    assert Conditions(joins=((1, 0.8),)).find_working(float(steps[-1]), 2).all()
+    assert Conditions(joins=((1, 0.8),)).find_working(time, 2).all()
 
 
 def test_lifetimes_are_exponential() -> None:
-    count, rate = 20_000, 0.02
-    begins, ends = Conditions(failure_rate=rate, seed=5, joins=((1, 30.0),)).compute_working_periods(count)
-    lives = ends - np.maximum(begins, 0.0)
-    assert abs(lives.mean() * rate - 1.0) < 5 / math.sqrt(count)
-    assert abs((lives > 50.0).mean() - math.exp(-1.0)) < 5 * 0.5 / math.sqrt(count)
-    late = Conditions(failure_rate=rate, seed=5, joins=((1, 1e5),)).compute_working_periods(1)[1]
-    assert late[0] - 1e5 == pytest.approx(ends[0] - 30.0), "it lives as long wherever it begins"
-    # each robot's own, whatever the size of the team
-    assert (Conditions(failure_rate=rate, seed=5).compute_working_periods(3)[1][1:] == ends[1:3]).all()
-    assert (
-        Conditions(failure_rate=rate, seed=6).compute_working_periods(3)[1]
-        != Conditions(failure_rate=rate).compute_working_periods(3)[1]
-    ).all()
+    """Bounds are five standard errors wide."""
+    count = 20_000
+    _, stops = Conditions(failure_rate=0.02, seed=5).compute_working_periods(count)
+    assert abs(stops.mean() * 0.02 - 1.0) < 5 / math.sqrt(count)
+    assert abs((stops > 50.0).mean() - math.exp(-1.0)) < 5 * 0.5 / math.sqrt(count)
+
+
+def test_lifetimes_depend_on_robot_and_seed_alone() -> None:
+    _, stops = Conditions(failure_rate=0.02, seed=5).compute_working_periods(3)
+    _, stops_in_larger_team = Conditions(failure_rate=0.02, seed=5).compute_working_periods(9)
+    np.testing.assert_array_equal(stops_in_larger_team[:3], stops)
+    # A robot that joins later works as long.
+    _, late_stops = Conditions(failure_rate=0.02, seed=5, joins=((1, 1e5),)).compute_working_periods(3)
+    assert late_stops[0] - 1e5 == pytest.approx(stops[0])
+    _, other_stops = Conditions(failure_rate=0.02, seed=6).compute_working_periods(3)
+    assert (other_stops != stops).all()
 
 
 times = st.floats(0, 1e5, allow_nan=False)
@@ -187,8 +191,7 @@ def test_reprs_contain_what_differs_from_the_defaults() -> None:
 
 
 def test_the_earlier_of_two_failures_counts() -> None:
-    by_chance = Conditions(failure_rate=1.0, seed=5).compute_working_periods(2)[1]
-    given_ = Conditions(failure_rate=1.0, seed=5, failures=((1, 500.0), (2, 1e-6))).compute_working_periods(
-        2
-    )[1]
-    assert given_.tolist() == [by_chance[0], 1e-6]
+    _, random_stops = Conditions(failure_rate=1.0, seed=5).compute_working_periods(2)
+    failures = ((1, 500.0), (2, 1e-6))
+    _, stops = Conditions(failure_rate=1.0, seed=5, failures=failures).compute_working_periods(2)
+    assert stops.tolist() == [random_stops[0], 1e-6]

@@ -1,3 +1,5 @@
+"""Random numbers that depend on nothing but seed, stream, step and robots."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -23,37 +25,44 @@ def test_philox_agrees_with_the_reference_implementation(counter: str, key: str,
     assert [f"{int(word):08x}" for word in compute_philox(words, (first, second))] == answer.split()
 
 
-@given(st.integers(0, 2**63), st.integers(0, 2**40), st.lists(st.integers(0, 2**20), min_size=1, max_size=9))
-def test_each_number_depends_on_its_robot_and_step_alone(seed: int, step: int, who: list[int]) -> None:
-    draws, rows = RandomStream(seed, 1), np.array(who)
-    together = draws.draw_uniform(step, rows, 5)
-    assert ((together > 0.0) & (together < 1.0)).all()
-    for k, one in enumerate(who):
-        assert draws.draw_uniform(step, np.array([one]), 5)[0] == together[k]
-        assert (
-            RandomStream(seed, 1).draw_normal(step, np.array([one]))[0] == draws.draw_normal(step, rows)[k]
-        ).all()
+@given(
+    seed=st.integers(0, 2**63),
+    step=st.integers(0, 2**40),
+    robots=st.lists(st.integers(0, 2**20), min_size=1, max_size=9),
+)
+def test_each_number_depends_on_its_robot_and_step_alone(seed: int, step: int, robots: list[int]) -> None:
+    stream = RandomStream(seed, 1)
+    uniform = stream.draw_uniform(step, np.array(robots), 5)
+    normal = stream.draw_normal(step, np.array(robots))
+    assert ((uniform > 0.0) & (uniform < 1.0)).all()
+    for k, robot in enumerate(robots):
+        assert stream.draw_uniform(step, np.array([robot]), 5)[0] == uniform[k]
+        own_normal = RandomStream(seed, 1).draw_normal(step, np.array([robot]))[0]
+        np.testing.assert_array_equal(own_normal, normal[k])
 
 
 def test_seeds_streams_steps_and_pairs_differ() -> None:
-    rows = np.arange(50)
-    found = [
-        RandomStream(seed, stream).draw_uniform(step, rows, other)
-        for seed, stream, step, other in [(0, 0, 0, 0), (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0)]
+    robots = np.arange(50)
+    draws = [
+        RandomStream(0, 0).draw_uniform(0, robots, 0),
+        RandomStream(1, 0).draw_uniform(0, robots, 0),
+        RandomStream(0, 1).draw_uniform(0, robots, 0),
+        RandomStream(0, 0).draw_uniform(1, robots, 0),
+        RandomStream(0, 0).draw_uniform(0, robots, 1),
+        RandomStream(0, 0).draw_uniform(2**32, robots, 0),
     ]
-    found += [RandomStream(0, 0).draw_uniform(0, rows, 1), RandomStream(0, 0).draw_uniform(2**32, rows)]
-    assert len({value for row in found for value in row.tolist()}) == 50 * len(found)
+    assert len(np.unique(np.concatenate(draws))) == 50 * len(draws)
 
 
 def test_moments_and_independence() -> None:
     """Bounds are five standard errors wide; the draws are the same each time."""
     count = 100_000
-    draws = RandomStream(3, 0)
-    even = draws.draw_uniform(0, np.arange(count))
-    assert abs(even.mean() - 0.5) < 5 / np.sqrt(12 * count)
-    assert abs(np.corrcoef(even[:-1], even[1:])[0, 1]) < 5 / np.sqrt(count)
-    bell = draws.draw_normal(9, np.arange(count))
-    assert np.abs(bell.mean(axis=0)).max() < 5 / np.sqrt(count)
-    assert np.abs(bell.var(axis=0) - 1.0).max() < 5 * np.sqrt(2 / count)
-    assert abs(np.corrcoef(bell.T)[0, 1]) < 5 / np.sqrt(count)
-    assert abs((bell**4).mean() - 3.0) < 5 * np.sqrt(96 / (2 * count))
+    stream = RandomStream(3, 0)
+    uniform = stream.draw_uniform(0, np.arange(count))
+    assert abs(uniform.mean() - 0.5) < 5 / np.sqrt(12 * count)
+    assert abs(np.corrcoef(uniform[:-1], uniform[1:])[0, 1]) < 5 / np.sqrt(count)
+    normal = stream.draw_normal(9, np.arange(count))
+    assert np.abs(normal.mean(axis=0)).max() < 5 / np.sqrt(count)
+    assert np.abs(normal.var(axis=0) - 1.0).max() < 5 * np.sqrt(2 / count)
+    assert abs(np.corrcoef(normal.T)[0, 1]) < 5 / np.sqrt(count)
+    assert abs((normal**4).mean() - 3.0) < 5 * np.sqrt(96 / (2 * count))
