@@ -1,4 +1,4 @@
-"""Ten thousand random events for each of the two windows: nothing is raised, and the windows can be used."""
+"""Thousands of random events for each of the two windows: nothing is raised, and the windows can be used."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from robocov_app.toolkit.faults import FaultLog
 from robocov_app.toolkit.window import BaseWindow
 from robocov_app.viewer.costs import Costs
 
-EVENTS = 10_000
+EVENTS = 4_000
 FEW_EVENTS = 150
 SEED = 1
 
