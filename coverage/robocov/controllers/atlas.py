@@ -137,9 +137,9 @@ class AtlasMemory:
     states: tuple[PlannerState, ...]
     """One of each robot."""
     routes: tuple[Array, ...]
-    """Way-points of each robot, (w, 2) m, the last one the goal."""
+    """Waypoints of each robot, (w, 2) m, the last one the goal."""
     legs: IntArray
-    """(n,) Number of the way-point that each robot heads for."""
+    """(n,) Number of the waypoint that each robot heads for."""
     returns: Array | None = None
     """(n, rays, 2) m, what the last scan of each robot has met."""
     estimates: Estimates | None = None

@@ -66,8 +66,8 @@ class Diffeomorphism(WholeMapController):
     computes its cell by those that it hears. Unreachable rooms are part of the chart, and moving obstacles
     are not.
 
-    The controller follows what is generally known of the two papers ("A coverage algorithm for a class of
-    non-convex regions", CDC 2008; "Performing coverage on nonconvex domains", CCA 2008), not their texts. It
+    The controller is based on secondary sources, not on the texts of the two papers ("A coverage algorithm
+    for a class of non-convex regions", CDC 2008; "Performing coverage on nonconvex domains", CCA 2008). It
     differs in F, which is piecewise linear, and in that obstacles become small but not points.
     """
 

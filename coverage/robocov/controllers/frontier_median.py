@@ -1,4 +1,4 @@
-"""First explore, then place: coordinated frontier exploration and the k-median of the map that it leaves."""
+"""Coordinated exploration by frontiers, followed by placement at the k-median of the discovered map."""
 
 from __future__ import annotations
 
@@ -18,54 +18,58 @@ _INSPECTED_RADIUS_M = 0.5
 _ARRIVAL_RADIUS_M = 0.3
 """Distance from a target at which a robot inspects it."""
 _MIN_PROGRESS_M = 0.05
-"""A robot that moves less between two plans does not get to its target."""
+"""A robot that moves less between two plans is stuck."""
 _BLOCK = np.ones((3, 3), dtype=bool)
 
 
 @dataclass(frozen=True)
 class FrontierMedian(SharedMapController):
-    """The two phases of the obvious solution: explore all of the building, then solve the k-median problem.
+    """Exploration of the whole building by frontiers, and then the k-median of the discovered map.
 
-    *Exploration.* Frontiers are the borders of what is known to be free with what is unknown (Yamauchi 1997,
-    and 1998 for several robots, which share their maps). Who goes to which is by Burgard, Moors, Stachniss
-    and Schneider (IEEE T-RO 21, 2005): of all robots i and targets t that pair comes first for which
+    *Exploration.* Frontiers are the borders between known free space and unknown space (Yamauchi 1997, and
+    1998 for several robots, which share their maps). Targets on the frontiers are assigned to robots by
+    Burgard, Moors, Stachniss and Schneider (IEEE T-RO 21, 2005).
 
-        U_t - beta V_t^i
-
-    is the largest, where V is the length of the way and the utility U is 1 at first. It is then lowered for
-    targets t' within sensing range R in view of t, which will be seen from there, by 1 - |t - t'| / R; so on
-    for the other robots.
-
-    *Placement.* When no frontier is left they go to the k-median of what is known to be free: the greedy
+    *Placement.* When no frontier is left, robots move to the k-median of the known free space: the greedy
     solution, improved by Lloyd's iteration and interchange (`robocov.k_median`), then on a finer lattice.
 
-    Decided here: targets are as far apart as the nodes of the lattice of ways. Specks that rays have missed
-    are no frontier, nor are frontiers shorter than `shortest`, or that robots cannot get through. A frontier
-    that stays though somebody has looked there, or does not get on towards it, is left alone. A robot for
-    which no target has any utility left stays where it is; in the paper it would go all the same.
+    Notes
+    -----
+    The pair of robot i and target t with the largest
 
-    Taken from the abstracts of the papers and what is generally known of them, not from their text.
+        U_t - β V_t^i
+
+    is assigned first, where V is the path length, and U is the utility, which is 1 at first. Then the utility
+    of each target t' in view of t and within the sensing range R is reduced by 1 - |t - t'| / R, because a
+    robot at t will see it; and so on for the other robots.
+
+    The controller is based on the abstracts of the papers and on secondary sources, not on their texts. The
+    following choices are ours. The distance between targets is the spacing of the planning lattice. Small
+    gaps between rays are no frontiers, nor are frontiers that are shorter than `shortest` or out of reach. A
+    frontier is ignored after a robot has been there, or has got stuck on its path to it. A robot for which no
+    target has any utility left stays where it is; in the paper it moves to one all the same.
     """
 
     name = "frontier-median"
     label = "Frontiers, then k-median"
-    summary = "explores by frontiers (Yamauchi 1997, Burgard et al. 2005), then goes to the map's k-median"
+    summary = "explores by frontiers (Yamauchi 1997, Burgard et al. 2005), then moves to the map's k-median"
 
     period: float = gain(1.0, "s", "between two plans", low=0.05, high=60.0)
-    beta: float = gain(0.05, "1/m", "utility that a metre of way is worth", high=1e3)
-    shortest: float = gain(0.15, "m", "length of a frontier that is worth going to", high=100.0)
-    threshold: float = gain(0.01, "1", "part of the cost that another placement must save", high=1.0)
+    beta: float = gain(0.05, "1/m", "β, utility of a metre of path length", high=1e3)
+    shortest: float = gain(0.15, "m", "minimum length of a frontier that is explored", high=100.0)
+    threshold: float = gain(0.01, "1", "fraction of the cost that another placement must save", high=1.0)
 
     def compute_placement(self, situation: Situation) -> Placement:
-        looked = self._list_inspected_targets(situation)
-        targets = self._find_targets(situation, looked)
+        """Compute targets on frontiers or, if there are none, the final goals."""
+        inspected = self._list_inspected_targets(situation)
+        targets = self._find_targets(situation, inspected)
         if len(targets):
             goals = self._assign_targets(situation, targets)
-            return Placement(goals=goals, is_final=False, notes=looked)
-        return Placement(goals=self._compute_median(situation), is_final=True, notes=looked)
+            return Placement(goals=goals, is_final=False, notes=inspected)
+        return Placement(goals=self._compute_median(situation), is_final=True, notes=inspected)
 
     def _list_inspected_targets(self, situation: Situation) -> Array:
-        """Return the targets that no robot has to go to any more, (m, 2) m."""
+        """Return the targets that need no further visit, (m, 2) m."""
         former_plan = situation.former_plan
         if former_plan is None:
             return np.empty((0, 2))
@@ -79,14 +83,14 @@ class FrontierMedian(SharedMapController):
         is_stuck = np.isfinite(goals[:, 0]) & (progress < _MIN_PROGRESS_M)
         return np.unique(np.vstack([notes, goals[is_there | is_stuck]]), axis=0)
 
-    def _find_targets(self, situation: Situation, looked: Array) -> Array:
+    def _find_targets(self, situation: Situation, inspected: Array) -> Array:
         """Return positions on the frontiers, (t, 2) m."""
         raster = situation.known_map.raster
         planner = situation.planner
         window = planner.window
         state = window.crop(situation.known_map.state, np.uint8(FREE))
         is_unknown = (state == UNKNOWN) & ~planner.is_outside
-        # Between two rays that are just as far apart there is nothing to look for.
+        # Gaps between neighbouring rays are not worth a visit.
         is_area = ndimage.binary_opening(is_unknown, _BLOCK) & ~planner.is_tight
         is_frontier = (state == FREE) & ~planner.is_tight & ndimage.binary_dilation(is_area)
         labels, _ = ndimage.label(is_frontier, _BLOCK)
@@ -96,11 +100,11 @@ class FrontierMedian(SharedMapController):
         # One target for each block of a frontier.
         _, first = np.unique(labels[row, column] * len(planner.nodes) + block, return_index=True)
         targets = raster.compute_centers(row[first] + window.first_row, column[first] + window.first_column)
-        square = ((targets[:, None] - looked) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
+        square = ((targets[:, None] - inspected) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
         return np.asarray(targets[square > _INSPECTED_RADIUS_M**2])
 
     def _assign_targets(self, situation: Situation, targets: Array) -> Array:
-        """Return where each robot is to look, (k, 2) m."""
+        """Return the target of each robot, (k, 2) m; its position if it has none."""
         planner = situation.planner
         goals = situation.positions.copy()
         roomy = np.flatnonzero(planner.is_roomy)

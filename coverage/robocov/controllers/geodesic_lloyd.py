@@ -23,7 +23,7 @@ from robocov.optimum import find_nearest_inside
 from robocov.team import Team
 
 _MIN_STEP_FRACTION = 0.25
-"""Minimum distance to a first way-point, as a fraction of the spacing of sites: a site at the position of a
+"""Minimum distance to a first waypoint, as a fraction of the spacing of sites: a site at the position of a
 robot would have an infinite weight."""
 
 
@@ -33,7 +33,7 @@ class GeodesicPlan(NamedTuple):
     goals: Array
     """(n, 2) m"""
     waypoints: Array
-    """(n, 2) m, the first way-point of each path."""
+    """(n, 2) m, the first waypoint of each path."""
     remaining_lengths: Array
     """(n,) m, lengths of the paths from there to the goals."""
 
@@ -61,17 +61,17 @@ class GeodesicLloyd(WholeMapController):
     -----
     For each point q of the geodesic cell, the gradient of the cost with f(d) points along the first straight
     piece of the path to q, with the magnitude f'(d). For f = d^s with 1 <= s <= 2, the cost as a function of
-    the robot's position p is bounded from above by a paraboloid around the first way-point c of q, with the
+    the robot's position p is bounded from above by a paraboloid around the first waypoint c of q, with the
     weight d^(s-1) / |c - p|. The goal minimises the sum of these paraboloids: it is the weighted mean of the
-    first way-points. The cost never rises on a step to the goal, which is the centroid for s = 2 without
+    first waypoints. The cost never rises on a step to the goal, which is the centroid for s = 2 without
     obstacles, and a step of Weiszfeld's algorithm for s = 1, the cost (22). Points are weighted by the
     density of the map.
 
     Distances are exact, and cells are sampled on a lattice. Walls are enlarged by the radius of the robot and
     `clearance`; goals are moved into the remaining space, in which robots follow shortest paths.
 
-    The controller follows what is generally known of the two papers, not their texts; cells of the papers
-    consist of grid cells.
+    The controller is based on secondary sources, not on the texts of the two papers, whose cells consist of
+    grid cells.
     """
 
     name = "geodesic-lloyd"
@@ -100,7 +100,7 @@ class GeodesicLloyd(WholeMapController):
         offsets = plan.waypoints - seen.positions
         distance = np.hypot(*offsets.T)
         speed = np.minimum(self.k_prop * (distance + plan.remaining_lengths), team.max_speed)
-        # A robot does not slow down before a way-point, but must not overshoot it.
+        # A robot does not slow down before a waypoint, but must not overshoot it.
         speed = np.minimum(speed, distance / self.response_time)
         velocities = compute_approach_velocities(offsets, np.inf, speed)
         forces = compute_drive_forces(velocities, seen, team, self.response_time)

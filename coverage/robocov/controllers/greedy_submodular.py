@@ -1,4 +1,4 @@
-"""Greedy placement on the map that the team discovers, and local descent from there."""
+"""Greedy placement on the map that the team discovers, followed by local descent."""
 
 from __future__ import annotations
 
@@ -13,31 +13,37 @@ from robocov.k_median import choose_greedily, run_lloyd
 
 @dataclass(frozen=True)
 class GreedySubmodular(SharedMapController):
-    """Each place in turn is where it helps the most, given the earlier ones; then all descend.
+    """Greedy placement, followed by descent (after Sun, Cassandras and Meng 2019).
 
+    Robots are placed one after another, each where it reduces the cost most, given the earlier ones; then all
+    positions descend. The map is the one that the robots discover and share; unknown space counts as free
+    where a path may lead to. When the map has changed, the team plans again. It keeps descending from the
+    former goals unless the new greedy solution saves the fraction `threshold` of the cost. Goals are assigned
+    to robots such that the sum of the squared path lengths is minimal.
+
+    Notes
+    -----
     Sun, Cassandras and Meng (Automatica 100, 2019) start the distributed gradient descent of Zhong and
     Cassandras (IEEE T-AC 56, 2011) from the greedy solution. Coverage is monotone and submodular in the set
-    of places: each place adds the less the more there are, so that the greedy ones gain at least 1 - 1/e of
-    what the best ones gain (Nemhauser, Wolsey and Fisher 1978).
+    of positions: each position adds the less, the more there are. The greedy solution therefore gains at
+    least 1 - 1/e of the maximum gain (Nemhauser, Wolsey and Fisher 1978).
 
-    The papers maximise a probability of detection on a known map. Here it is the cost (22): the gain of a set
-    of places is by how much it lowers the cost of one robot that is far from everything, which is submodular,
-    too; the bound holds for that gain, not for the cost. The descent is Lloyd's iteration on geodesic cells,
-    without any interchange. The map is the one that the robots discover and share; what is not known to be
-    wall counts as free where a way may lead to. As it grows the team plans anew, and keeps the former places,
-    descending from them, where greedy ones save less than the part `threshold` of the cost. Who goes where is
-    such that the sum of the squared ways is the least.
+    The papers maximise a probability of detection on a known map. This controller minimises the cost (22).
+    The gain of a set of positions is the reduction of the cost of a single robot that is far from everything.
+    This gain is submodular as well; the bound holds for it, not for the cost. The descent is Lloyd's
+    iteration on geodesic cells, without interchange.
 
-    Taken from the abstracts of the papers and what is generally known of them, not from their text.
+    The controller is based on the abstracts of the papers and on secondary sources, not on their texts.
     """
 
     name = "greedy-submodular"
     label = "Greedy submodular"
     summary = "greedy placement on the shared map, then Lloyd's descent (after Sun, Cassandras and Meng 2019)"
 
-    threshold: float = gain(0.01, "1", "part of the cost that a greedy plan made anew must save", high=1.0)
+    threshold: float = gain(0.01, "1", "fraction of the cost that a new greedy plan must save", high=1.0)
 
     def compute_placement(self, situation: Situation) -> Placement:
+        """Compute the greedy placement, or the former one if that is about as good, after descent."""
         notes = np.empty((0, 2))
         weights = situation.compute_weights(~situation.known_map.is_blocked)
         candidates = Candidates.build_at_nodes(situation, weights, situation.planner.sources)

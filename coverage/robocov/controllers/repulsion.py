@@ -176,10 +176,10 @@ class Howard(BaseController):
     charge `k_obs`, so that its effect does not depend on the number of rays. Before the first scan the
     closest obstacle point is taken for a straight wall.
 
-    The sum over all obstacles and robots, the inverse-square forces and the friction follow what is generally
-    known of the paper, not its text. Three choices are ours: the fraction of a ray; forces that no longer
-    grow below 5 cm; and that robots repel others if they hear them, because the range sensor does not detect
-    robots.
+    The sum over all obstacles and robots, the inverse-square forces and the friction are based on secondary
+    sources, not on the text of the paper. Three choices are ours: the fraction of a ray; forces that no
+    longer grow below 5 cm; and that robots repel others if they hear them, because the range sensor does not
+    detect robots.
     """
 
     name = "howard"
@@ -239,9 +239,9 @@ class Poduri(BaseController):
 
     At d = η R_c the two are equal: k_degree = k_cover (1/η - 1)².
 
-    The two forces, their balance at η R_c and the degree of at least K follow what is generally known of the
-    paper, not its text. The following choices are ours. If at most K robots are within η R_c of a robot, the
-    links to its K nearest neighbours are critical for it, before they are in danger. Robots know only
+    The two forces, their balance at η R_c and the degree of at least K are based on secondary sources, not on
+    the text of the paper. The following choices are ours. If at most K robots are within η R_c of a robot,
+    the links to its K nearest neighbours are critical for it, before they are in danger. Robots know only
     positions of others: each also keeps a link that, by the positions that it knows, is critical for the
     neighbour. The closest obstacle point repels with (24), within `rho_obs`.
 
@@ -379,12 +379,11 @@ class Dispersion(BaseController):
 
     Robots need neither identities nor communication.
 
-    Notes
-    -----
-    The behaviours and their order follow the paper's abstract and what is generally known of it, not its
-    text; the formulas are ours. Robots of the paper move at constant speed and never come to rest. To make
-    placements comparable, `explore_speed` is 0 by default, and the speed falls to zero at `reach`, so that
-    robots do not oscillate there. Each robot assumes that others may be as large as the largest of the team.
+    Notes ----- The behaviours and their order are based on the paper's abstract and on secondary sources, not
+    on its text; the formulas are ours. Robots of the paper move at constant speed and never come to rest. To
+    make placements comparable, `explore_speed` is 0 by default, and the speed falls to zero at `reach`, so
+    that robots do not oscillate there. Each robot assumes that others may be as large as the largest of the
+    team.
     """
 
     name = "dispersion"

@@ -18,8 +18,8 @@ from robocov.controllers.driving import (
 from robocov.observation import Observations
 from robocov.team import Team
 
-_WAY_POINT_RADIUS_M = 0.2
-"""Distance from a way-point at which it counts as reached."""
+_WAYPOINT_RADIUS_M = 0.2
+"""Distance from a waypoint at which it counts as reached."""
 _BRAKING_FRACTION = 0.4
 """Fraction of the maximum acceleration that is counted on: less than half, for the lag of the drive."""
 _STEERING_FRACTION = 0.7
@@ -44,7 +44,7 @@ class RouteCommand(NamedTuple):
     goals: Array
     """(n, 2) m, ends of the routes."""
     legs: IntArray
-    """(n,) Number of the way-point that each robot heads for now."""
+    """(n,) Number of the waypoint that each robot heads for now."""
 
 
 def follow_routes(
@@ -63,9 +63,9 @@ def follow_routes(
     seen : Observations
     team : Team
     routes : sequence of (w, 2) arrays, m
-        Way-points of each robot; the last one is the goal.
+        Waypoints of each robot; the last one is the goal.
     legs : (n,) int array
-        Number of the way-point that each robot headed for.
+        Number of the waypoint that each robot headed for.
     returns : (n, rays, 2) array or None, m
         Points of the last scans, as `driving.update_returns` returns them.
     k_prop : float, 1/s
@@ -78,15 +78,15 @@ def follow_routes(
     RouteCommand
     """
     last_legs = np.array([len(route) - 1 for route in routes])
-    targets = _select_way_points(routes, legs)
-    is_reached = np.hypot(*(targets - seen.positions).T) < _WAY_POINT_RADIUS_M
+    targets = _select_waypoints(routes, legs)
+    is_reached = np.hypot(*(targets - seen.positions).T) < _WAYPOINT_RADIUS_M
     legs = legs + ((legs < last_legs) & is_reached)
-    offsets = _select_way_points(routes, legs) - seen.positions
+    offsets = _select_waypoints(routes, legs) - seen.positions
 
     speed_limit = _compute_speed_limits(seen, team)
-    to_way_point = compute_approach_velocities(offsets, math.inf, speed_limit)
+    to_waypoint = compute_approach_velocities(offsets, math.inf, speed_limit)
     to_goal = compute_approach_velocities(offsets, k_prop, speed_limit)
-    velocities = np.where((legs == last_legs)[:, None], to_goal, to_way_point)
+    velocities = np.where((legs == last_legs)[:, None], to_goal, to_waypoint)
     # Turning must not use up the acceleration that is needed for braking.
     max_change = _STEERING_FRACTION * team.max_acceleration * response_time
     velocities = seen.velocities + compute_approach_velocities(velocities - seen.velocities, 1.0, max_change)
@@ -108,8 +108,8 @@ def follow_routes(
     )
 
 
-def _select_way_points(routes: Sequence[Array], legs: IntArray) -> Array:
-    """Return the way-point that each robot heads for, (n, 2) m."""
+def _select_waypoints(routes: Sequence[Array], legs: IntArray) -> Array:
+    """Return the waypoint that each robot heads for, (n, 2) m."""
     return np.array([route[leg] for route, leg in zip(routes, legs, strict=True)])
 
 

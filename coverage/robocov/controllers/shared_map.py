@@ -176,9 +176,9 @@ class SharedMapMemory:
     """What each robot has discovered, or has been told."""
     plans: tuple[Plan | None, ...]
     routes: tuple[Array, ...]
-    """Way-points of each robot, (w, 2) m, the last one the goal."""
+    """Waypoints of each robot, (w, 2) m, the last one the goal."""
     legs: IntArray
-    """(n,) Number of the way-point that each robot heads for."""
+    """(n,) Number of the waypoint that each robot heads for."""
     next_plan_time: float = -math.inf
     """s"""
     returns: Array | None = None

@@ -61,7 +61,7 @@ class BugState:
     waypoint: Array
     """Point that it heads for."""
     is_passing: bool = False
-    """Whether it continues from the way-point, and need not slow down there."""
+    """Whether it continues from the waypoint, and need not slow down there."""
     fixed_goal: Array | None = None
     """Its goal since it met an obstacle; None while the goal is its centroid."""
     best_point: Array | None = None
@@ -131,7 +131,7 @@ class TangentBug(BaseController):
 
     Notes
     -----
-    The controller follows the paper's abstract and what is generally known of both papers, not their texts.
+    The controller is based on the paper's abstract and on secondary sources, not on the texts of the papers.
     The following choices are ours. Because a robot's centroid moves with it and would draw it back from each
     detour, the goal is fixed from the time when the robot meets a boundary until it is reached or given up. A
     path along a wall may be as long as the building: the robot follows a boundary for at most `detour` times
@@ -160,7 +160,7 @@ class TangentBug(BaseController):
     cells: str = cells_choice()
 
     def decide(self, seen: Observations, memory: TangentBugMemory) -> Decision:
-        """Compute the forces that drive each robot to its way-point."""
+        """Compute the forces that drive each robot to its waypoint."""
         team = memory.team
         cells = compute_known_cells(seen, self.cells, memory.triangulation)
         returns = update_returns(seen, memory.returns)
@@ -234,7 +234,7 @@ class TangentBug(BaseController):
     def _compute_velocities(
         self, seen: Observations, team: Team, bugs: tuple[BugState, ...], centroids: Array
     ) -> Array:
-        """Return the desired velocities towards the way-points, (n, 2) m/s."""
+        """Return the desired velocities towards the waypoints, (n, 2) m/s."""
         waypoints = np.array([bug.waypoint for bug in bugs])
         is_passing = np.array([bug.is_passing for bug in bugs])
         # A robot with its centroid in view follows it until the next scan.
@@ -243,7 +243,7 @@ class TangentBug(BaseController):
         offsets = waypoints - seen.positions
         distance = np.hypot(*offsets.T)
         speed = np.where(is_passing, team.max_speed, np.minimum(self.k_prop * distance, team.max_speed))
-        # A way-point that is close must not be overshot.
+        # A waypoint that is close must not be overshot.
         speed = np.minimum(speed, distance / self.response_time)
         return compute_approach_velocities(offsets, math.inf, speed)
 

@@ -22,36 +22,43 @@ MAX_VERTICES = 300
 _MIN_SPACING_M = 0.25
 """Distance between vertices."""
 _MIN_FURTHER_SAVING = 1e-6
-"""Fraction of the cost that an exchange must save, once there is one that saves the threshold."""
+"""Fraction of the cost that an exchange must save after one that saved the threshold."""
 
 
 @dataclass(frozen=True)
 class VoronoiGraphCoverage(SharedMapController):
-    """Robots are placed on the roadmap of the building, by distances along it.
+    """Placement of robots on the roadmap of the building, by distances along it.
 
-    The roadmap is the generalized Voronoi graph of Choset and Burdick (IJRR 19, 2000): the places halfway
-    between walls. The placement is that of Yun and Rus, "Distributed coverage with mobile robots on a graph:
-    locational optimization and equal-mass partitioning" (Robotica 32, 2014): the cost is the sum over the
-    vertices of their mass times the distance along the graph to the nearest robot, and vertex substitution
-    (Teitz and Bart 1968) lowers it, robot by robot, until no exchange of one vertex for another helps.
+    The roadmap is the generalized Voronoi graph of Choset and Burdick (IJRR 19, 2000): the points with equal
+    distances to two walls. The placement is that of Yun and Rus, "Distributed coverage with mobile robots on
+    a graph: locational optimization and equal-mass partitioning" (Robotica 32, 2014): vertex substitution
+    reduces the cost, robot by robot, until no exchange of one vertex for another saves any.
 
-    The paper's graph is given, its robots know their neighbours of neighbours. Here it is the graph of the
-    map that robots discover and share, on which each plans for all whom it hears; what is not known to be
-    wall counts as free where a way may lead to, so that the graph reaches into the unknown. The mass of a
-    vertex is the area nearest to it by a way, times φ. As the map grows, the plan goes on from the former
-    vertices; exchanges must then save the part `threshold` of the cost. Ways are the shortest ones on the
-    map, which need not follow the graph. Who goes where is such that their sum of squares is the least.
+    Notes
+    -----
+    The cost is the sum, over all vertices, of the mass times the distance along the graph to the nearest
+    robot. It is minimised by vertex substitution (Teitz and Bart 1968). The mass of a vertex is the area to
+    which it is the nearest vertex, by path length, times φ.
 
-    Taken from the abstract of Yun and Rus and what is generally known of the others, not from their text.
+    In the paper the graph is known, and robots know the neighbours of their neighbours. Here it is the graph
+    of the map that robots discover and share, and each robot plans for all robots that it hears. Unknown
+    space counts as free where a path may lead to, so that the graph extends into it. When the map has
+    changed, the plan starts from the former vertices; the first exchange must then save the fraction
+    `threshold` of the cost. Robots follow the shortest paths on the map, not the graph. Goals are assigned to
+    robots such that the sum of the squared path lengths is minimal.
+
+    The controller is based on the abstract of Yun and Rus and on secondary sources, not on the texts of the
+    papers.
     """
 
     name = "voronoi-graph"
     label = "Voronoi graph"
     summary = "k-median on the Voronoi graph of the shared map (Choset and Burdick 2000, Yun and Rus 2014)"
 
-    threshold: float = gain(0.01, "1", "part of the cost that a first exchange must save", high=1.0)
+    threshold: float = gain(0.01, "1", "fraction of the cost that the first exchange must save", high=1.0)
 
     def compute_placement(self, situation: Situation) -> Placement:
+        """Compute the placement by vertex substitution, starting from the former one."""
         notes = np.empty((0, 2))
         candidates = self._build_vertices(situation)
         count = len(situation.positions)
