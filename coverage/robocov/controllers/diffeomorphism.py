@@ -66,7 +66,7 @@ class Diffeomorphism(WholeMapController):
     computes its cell by those that it hears. Unreachable rooms are part of the chart, and moving obstacles
     are not.
 
-    The controller is based on secondary sources, not on the texts of the two papers ("A coverage algorithm
+    The controller is based on general knowledge, not on the texts of the two papers ("A coverage algorithm
     for a class of non-convex regions", CDC 2008; "Performing coverage on nonconvex domains", CCA 2008). It
     differs in F, which is piecewise linear, and in that obstacles become small but not points.
     """

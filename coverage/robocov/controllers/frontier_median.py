@@ -43,7 +43,7 @@ class FrontierMedian(SharedMapController):
     of each target t' in view of t and within the sensing range R is reduced by 1 - |t - t'| / R, because a
     robot at t will see it; and so on for the other robots.
 
-    The controller is based on the abstracts of the papers and on secondary sources, not on their texts. The
+    The controller is based on the abstracts of the papers and on general knowledge, not on their texts. The
     following choices are ours. The distance between targets is the spacing of the planning lattice. Small
     gaps between rays are no frontiers, nor are frontiers that are shorter than `shortest` or out of reach. A
     frontier is ignored after a robot has been there, or has got stuck on its path to it. A robot for which no

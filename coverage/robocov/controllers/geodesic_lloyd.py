@@ -70,7 +70,7 @@ class GeodesicLloyd(WholeMapController):
     Distances are exact, and cells are sampled on a lattice. Walls are enlarged by the radius of the robot and
     `clearance`; goals are moved into the remaining space, in which robots follow shortest paths.
 
-    The controller is based on secondary sources, not on the texts of the two papers, whose cells consist of
+    The controller is based on general knowledge, not on the texts of the two papers, whose cells consist of
     grid cells.
     """
 

@@ -33,7 +33,7 @@ class GreedySubmodular(SharedMapController):
     This gain is submodular as well; the bound holds for it, not for the cost. The descent is Lloyd's
     iteration on geodesic cells, without interchange.
 
-    The controller is based on the abstracts of the papers and on secondary sources, not on their texts.
+    The controller is based on the abstracts of the papers and on general knowledge, not on their texts.
     """
 
     name = "greedy-submodular"

@@ -176,8 +176,8 @@ class Howard(BaseController):
     charge `k_obs`, so that its effect does not depend on the number of rays. Before the first scan the
     closest obstacle point is taken for a straight wall.
 
-    The sum over all obstacles and robots, the inverse-square forces and the friction are based on secondary
-    sources, not on the text of the paper. Three choices are ours: the fraction of a ray; forces that no
+    The sum over all obstacles and robots, the inverse-square forces and the friction are based on general
+    knowledge, not on the text of the paper. Three choices are ours: the fraction of a ray; forces that no
     longer grow below 5 cm; and that robots repel others if they hear them, because the range sensor does not
     detect robots.
     """
@@ -239,7 +239,7 @@ class Poduri(BaseController):
 
     At d = η R_c the two are equal: k_degree = k_cover (1/η - 1)².
 
-    The two forces, their balance at η R_c and the degree of at least K are based on secondary sources, not on
+    The two forces, their balance at η R_c and the degree of at least K are based on general knowledge, not on
     the text of the paper. The following choices are ours. If at most K robots are within η R_c of a robot,
     the links to its K nearest neighbours are critical for it, before they are in danger. Robots know only
     positions of others: each also keeps a link that, by the positions that it knows, is critical for the
@@ -379,7 +379,9 @@ class Dispersion(BaseController):
 
     Robots need neither identities nor communication.
 
-    Notes ----- The behaviours and their order are based on the paper's abstract and on secondary sources, not
+    Notes
+    -----
+    The behaviours and their order are based on the paper's abstract and on general knowledge, not
     on its text; the formulas are ours. Robots of the paper move at constant speed and never come to rest. To
     make placements comparable, `explore_speed` is 0 by default, and the speed falls to zero at `reach`, so
     that robots do not oscillate there. Each robot assumes that others may be as large as the largest of the

@@ -131,7 +131,7 @@ class TangentBug(BaseController):
 
     Notes
     -----
-    The controller is based on the paper's abstract and on secondary sources, not on the texts of the papers.
+    The controller is based on the paper's abstract and on general knowledge, not on the texts of the papers.
     The following choices are ours. Because a robot's centroid moves with it and would draw it back from each
     detour, the goal is fixed from the time when the robot meets a boundary until it is reached or given up. A
     path along a wall may be as long as the building: the robot follows a boundary for at most `detour` times

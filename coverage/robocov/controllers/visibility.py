@@ -70,7 +70,7 @@ class Visibility(BaseController):
     Arcs and windows are found in the robot's own scan; between scans, robots keep their velocities. A robot
     that hears no others has the whole view as its cell.
 
-    The motion is based on the paper's abstract (Automatica 53, 195-207) and on secondary sources, not on its
+    The motion is based on the paper's abstract (Automatica 53, 195-207) and on general knowledge, not on its
     text. In the paper, robots send each other their views. Here they send positions, and a robot assumes that
     a neighbour sees a point unless its own scan has met an obstacle in front of the line between the two.
     Avoiding collisions by slowing down is ours as well.

@@ -47,7 +47,7 @@ class VoronoiGraphCoverage(SharedMapController):
     `threshold` of the cost. Robots follow the shortest paths on the map, not the graph. Goals are assigned to
     robots such that the sum of the squared path lengths is minimal.
 
-    The controller is based on the abstract of Yun and Rus and on secondary sources, not on the texts of the
+    The controller is based on the abstract of Yun and Rus and on general knowledge, not on the texts of the
     papers.
     """
 
