@@ -1,4 +1,4 @@
-"""Atlas: every robot plans the placement of its team on the map that it has discovered itself."""
+"""Atlas: each robot plans the placement of its team on the map that it has discovered itself."""
 
 from __future__ import annotations
 
@@ -43,41 +43,47 @@ MIN_REST_S = 3.0
 
 _MIN_TEAM_NODES = 1000
 _MAX_TEAM_NODES = 4000
-"""Nodes of the lattice for a whole team, unless `_MIN_NODES_PER_ROBOT` asks for more."""
+"""Range of the number of nodes of the lattice for a whole team."""
 _NODES_PER_ROBOT = 160
+"""Number of nodes for each robot, within that range."""
 _MIN_NODES_PER_ROBOT = 27
+"""Minimum number of nodes for each robot, even if they exceed the range."""
 _GROUP_NODES = 500
-"""Nodes of the lattice for a group within a larger team."""
+"""Number of nodes of the lattice for a group within a larger team."""
 _OWN_NODES = 2500
-"""Nodes of the lattice on which a robot finds its own goal."""
+"""Number of nodes of the lattice on which a robot finds its own goal."""
 _GROUP_REACH = 2.0
-"""A group is planned for in a window this many times as far as its robots are,"""
+"""Size of the window for a group, in distances of its farthest robot."""
 _MIN_GROUP_REACH_M = 1.0
-"""but at least as far as this."""
+"""Minimum size of that window."""
 _MAX_IDLE_MOVE = 0.1
 """Fraction of the spacing of nodes that others may move without a new plan."""
 _CHANGED_WALL_RADII = 4.0
-"""Length of changed walls, in radii: longer than the visible side of a robot that has failed."""
+"""Length of changed walls, in radii, that matters: longer than the visible side of a failed robot."""
 _ARRIVAL_RADIUS_M = 0.35
+"""Distance from a goal at which a robot has arrived."""
 _LISTENING_S = 2.0
-"""Time that robots whose messages are late stay where they start."""
+"""Time for which robots with delayed messages stay at their starts."""
 _SHARED_PATIENCE_FACTOR = 2.5
-"""Factor of the patience if all robots learn of a look."""
+"""Factor of the patience if all robots learn from what one of them sees."""
 _MIN_PROGRESS_M = 0.05
-"""A robot that moves less between two plans, away from its goal, does not get on."""
+"""A robot that moves less between two plans, away from its goal, is stuck."""
 _MAX_STUCK_PLANS = 3
-"""Number of such plans after which it is in a jam,"""
+"""Number of plans after which a stuck robot is in a jam."""
 _JAM_RADIUS_M = 0.7
-"""with the robots within this distance,"""
+"""Distance from a robot within which others are in the same jam."""
 _MAX_EVASION_S = 8.0
-"""and makes way for at most this time."""
+"""Maximum time for which a robot moves out of a jam."""
 _SWAP_SAVING = 0.1
 """Fraction of the squared path lengths that an exchange of goals must save."""
 _JOINT_PLANNING_CROSSINGS = 3.0
-"""A robot plans for others as long as it takes to cross the region this many times."""
+"""Time for which a robot plans for others, in times that it takes to cross the region."""
 _STAGGERING = 0.5
 """Fraction of the period in which all robots make their first plans."""
+_MAX_DOUBLINGS = 60.0
+"""Limit of exponents of 2: larger powers make no difference."""
 _GOLDEN_FRACTION = (math.sqrt(5.0) - 1.0) / 2.0
+"""Its multiples, modulo 1, are spread evenly between 0 and 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,23 +95,25 @@ class PlannerState:
     """s"""
     teammates: Teammates
     met: frozenset[int] = frozenset()
-    """Robots that it has ever heard, or heard of, and that have not failed."""
+    """Robots that it has ever heard or heard of, except for failed ones."""
     gone: Mapping[int, float] = field(default_factory=dict)
-    """When it took a robot for failed, or missed it, s. Never changed in place."""
+    """Times at which it considered robots failed or missing, s. Never changed in place."""
     start_time: float = 0.0
-    """When it started, or the team or the walls changed, s."""
+    """Time of its start, or of the last change of the team or the walls, s."""
     path_length: float = 0.0
-    """How far it has moved since then, m."""
+    """Length of its path since then, m."""
     looking_length: float = 0.0
-    """How far of that it has moved to look around, m."""
+    """Length of the part of that path to viewpoints, m."""
     planned_map: DiscoveredMap | None = None
     """The map when the last plan was made."""
     planner: GridPlanner | None = None
+    """Planner of its own goal and its routes."""
     team_planner: GridPlanner | None = None
+    """Planner of the placement of the team."""
     group: IntArray | None = None
-    """(k,) Robots at the last plan, this one first."""
+    """(k,) Robots that it knew of at the last plan, itself first."""
     positions: Array | None = None
-    """(k, 2) m, where they were."""
+    """(k, 2) m, positions of these robots then."""
     was_quiet: bool = False
     """Whether all others were at rest then."""
     planned_robots: IntArray | None = None
@@ -115,14 +123,15 @@ class PlannerState:
     own_goal: Array | None = None
     """(2,) m"""
     viewpoint: Array | None = None
-    """(2,) m, where it goes first, to look around."""
+    """(2,) m, point to which it moves first, to look around."""
     former_viewpoints: tuple[Array, ...] = ()
+    """(2,) m each, viewpoints that it has reached since `start_time`."""
     is_idle: bool = False
     """Whether the next plan may be skipped if nothing has changed."""
     stuck_plans: int = 0
-    """Number of plans for which it has not got on, away from its goal."""
+    """Number of the latest plans since which it has been stuck."""
     evasion_end: float = 0.0
-    """Time until which it makes way for others, s."""
+    """Time until which it moves out of a jam, s."""
 
     def __deepcopy__(self, memo: object) -> PlannerState:
         return self
@@ -135,15 +144,15 @@ class AtlasMemory:
     team: Team
     """A robot knows its own limits."""
     states: tuple[PlannerState, ...]
-    """One of each robot."""
+    """State of each robot."""
     routes: tuple[Array, ...]
     """Waypoints of each robot, (w, 2) m, the last one the goal."""
     legs: IntArray
-    """(n,) Number of the waypoint that each robot heads for."""
+    """(n,) Index of the waypoint that each robot heads for."""
     returns: Array | None = None
-    """(n, rays, 2) m, what the last scan of each robot has met."""
+    """(n, rays, 2) m, obstacle points that the last scan of each robot has met; nan for none."""
     estimates: Estimates | None = None
-    """Position estimates, if robots know each other by messages."""
+    """Position estimates, if robots know positions of others by messages."""
 
     @property
     def maps(self) -> tuple[DiscoveredMap, ...]:
@@ -152,20 +161,34 @@ class AtlasMemory:
 
     @property
     def reports(self) -> tuple[Teammates, ...]:
-        """What each robot knows of the others, which it reports if maps are shared."""
+        """Knowledge of each robot about the others, which it reports if maps are shared."""
         return tuple(state.teammates for state in self.states)
 
 
 class _Others(NamedTuple):
-    """The other robots from the view of one, those that it plans for first."""
+    """The other robots that one knows of; first those that it plans for."""
 
     robots: IntArray
+    """(k,) Their numbers."""
     positions: Array
     """(k, 2) m"""
     is_fixed: BoolArray
-    """(k,) Whether each is at rest, was not heard now, or is not planned for."""
+    """(k,) Whether each is at rest, out of contact now, or not planned for."""
     is_quiet: bool
     """Whether all of them are at rest."""
+
+
+class _Cooperation(NamedTuple):
+    """How a robot plans for the others."""
+
+    is_agreed: bool
+    """Whether all robots plan on the same map, and therefore make the same plan."""
+    is_joint: bool
+    """Whether the robot plans for others as well, not for itself alone."""
+    is_fixed: BoolArray
+    """(k,) Whether each of the others keeps its position in the plan."""
+    settling: float
+    """Factor of the savings that relocations and goals require."""
 
 
 class _TeamPlan(NamedTuple):
@@ -174,7 +197,7 @@ class _TeamPlan(NamedTuple):
     key: tuple[object, ...]
     density: Density | None
     goals: Array
-    """(k, 2) m, by the numbers of the robots."""
+    """(k, 2) m, in the order of the numbers of the robots."""
 
 
 _LATEST_PLANS: WeakKeyDictionary[GridPlanner, _TeamPlan] = WeakKeyDictionary()
@@ -182,88 +205,125 @@ _LATEST_PLANS: WeakKeyDictionary[GridPlanner, _TeamPlan] = WeakKeyDictionary()
 
 @dataclass(frozen=True)
 class Atlas(BaseController):
-    """Each robot plans for its whole team on its own discovered map, and goes to its own goal in that plan.
+    """Each robot plans for its whole team on its own discovered map, and moves to its own goal in that plan.
 
-    Twice a second every robot scans, and adds what it sees to its own grid (`DiscoveredMap`). Cells where the
-    robots that it hears are become free. Robots send nothing but positions. A robot that gets out of range is
-    presumed to go to its goal in the plan, and forgotten when it is missed there. Once in `period` seconds a
-    robot looks for positions P with a low coverage cost (22) on its own map,
+    Twice a second each robot scans, and adds the scan to its own grid map (`DiscoveredMap`). Robots send
+    nothing but positions; cells at the positions of others become free. A robot out of range is assumed to
+    move to its goal in the plan, and forgotten if it is not there. Once in `period` seconds a robot minimises
+    the coverage cost (22) on its own map, in four stages:
+
+    1. *A plan for the team*, on a coarse lattice: Lloyd's iteration from the former plan, alternating with
+       interchange (the k-median problem). A robot at rest (`MIN_REST_S`) keeps its position in the plan.
+       Relocations must save the fraction `threshold` of the cost, those within the robot's own cell the
+       fraction `nearby`. Goals are assigned such that the sum of the squared path lengths is minimal; this
+       assignment stays the same while the robots move. After some time, enough to cross the region a few
+       times, each robot plans for itself alone on known free space, and leaves its cell only while all others
+       are at rest.
+    2. *Its own goal*, on a fine lattice: the local minimum of the cost as a function of its own position,
+       interpolated between nodes by a parabola. A new goal must save the fraction `rest` of the cost of its
+       own cell.
+    3. *Viewpoints*: at its goal, it moves to points from which it sees unknown parts of its own cell, if the
+       cost at stake exceeds the fraction `stake` of the cost. This fraction doubles with the length of the
+       path to viewpoints (`patience`). A robot without others does not look around: its goal hardly depends
+       on unknown space.
+    4. *The route*: the shortest one on its map. The robot brakes before walls and other robots
+       (`route_following`).
+
+    Notes
+    -----
+    The coverage cost of positions P on the map is
 
         J(P) = sum over q of w_q min_j d(q, p_j),
 
-    where q are the nodes of a lattice, d the geodesic distances among the walls that it knows, and w_q the
-    areas, times φ; unknown cells count by their openness: insides of obstacles hardly do (`openness`).
+    where q are the nodes of a lattice, d are geodesic distances among known walls, and w_q are areas times φ.
+    Unknown cells are weighted by their openness, because the insides of obstacles stay unknown (`openness`).
 
-    1. *A plan for the team.* Lloyd's iteration from the former plan on, in turn with interchange (the
-       k-median problem), on a coarse lattice. A robot at rest (`MIN_REST_S`) is where it wants to be, and
-       keeps its position in the plan. Relocations must save the fraction `threshold` of J, one within its own
-       cell the fraction `nearby`. Goals are assigned such that the sum of the squared path lengths is
-       minimal, which stays so on the way. When there has been time to cross the region a few times, each
-       robot decides for itself alone, by what it knows to be free, and relocates out of its cell only while
-       all others are at rest.
-    2. *Its own goal.* The local minimum of J by its own position, on a fine lattice, between its nodes by a
-       parabola; a goal that saves less than the fraction `rest` of the cost of its own cell is not worth a
-       move.
-    3. *A look.* At its goal, it goes to look at what is still unknown of its own cell, as long as the stake
-       is higher than the fraction `stake` of J, which doubles with the distance that it moves to look
-       (`patience`). A robot that is alone does not look: its goal hardly depends on what it has not seen.
-    4. *The route* is the shortest one on its map, braking before walls and other robots (`route_following`).
+    The maps of different robots become more and more similar where it matters, and so do the plans. Otherwise
+    the team comes to rest because robots at rest are fixed, and because the required savings of relocations
+    and goals double with the path length of a robot (`settling`), not with time: a robot at rest stays as
+    ready to move as it was. Path lengths start from zero when robots join or fail, and when a robot sees a
+    wall appear or disappear. In a team of more than `MAX_PLANNING_GROUP` robots each one plans for itself and
+    its nearest neighbours, in the part of the map around them; the others stay where they are.
 
-    Private maps agree more and more where it matters, and so do the plans. If they do not, the team comes to
-    rest by 1, and because the saving that relocations and goals require doubles with the path length of a
-    robot, not with time (`settling`): a robot at rest stays as ready to move as it was. It starts again when
-    robots join or fail, and when a robot sees a wall appear or disappear. In a team of more than
-    `MAX_PLANNING_GROUP` robots each plans for itself and its nearest ones, in the part of the map where these
-    are; the others are where they are.
+    Examples
+    --------
+    >>> from robocov.environment import Environment
+    >>> from robocov.simulation import Simulation
+    >>> room = Environment("room", ((0, 0), (8, 0), (8, 6), (0, 6)))
+    >>> simulation = Simulation(room, Atlas(), [[1.0, 1.0]])
+    >>> simulation.run(12.0).positions[-1].round(0)
+    array([[4., 3.]])
     """
 
     name = "atlas"
     label = "Atlas"
     summary = "plans the team's placement on the map that each robot discovers itself"
     scanning = Scanning(rays=240, period=0.5)
-    staggered: ClassVar[bool] = True  # whether robots plan at different times
+    is_staggered: ClassVar[bool] = True
+    """Whether robots plan at different times."""
 
     period: float = gain(1.0, "s", "between two plans of a robot", low=0.05, high=60.0)
-    threshold: float = gain(0.01, "1", "part of the cost that a relocation must save", high=1.0)
-    nearby: float = gain(0.003, "1", "part of the cost that a relocation in its own cell must save", high=1.0)
-    rest: float = gain(0.002, "1", "part of its own cell's cost that a new goal must save", high=1.0)
-    stake: float = gain(0.004, "1", "part of the cost that is worth a look", high=1.0)
+    threshold: float = gain(0.01, "1", "fraction of the cost that a relocation must save", high=1.0)
+    nearby: float = gain(0.003, "1", "the same for a relocation within the robot's own cell", high=1.0)
+    rest: float = gain(0.002, "1", "fraction of its own cell's cost that a new goal must save", high=1.0)
+    stake: float = gain(0.004, "1", "fraction of the cost at stake for a viewpoint", high=1.0)
     patience: float = gain(
-        0.12, "1", "way of looks, in diameters of the region, that doubles it", low=1e-3, high=1e4
+        0.12, "1", "path to viewpoints, in diameters of the region, that doubles it", low=1e-3, high=1e4
     )
     settling: float = gain(
-        0.5, "1", "way, in diameters, that doubles what relocations and goals must save", low=1e-3, high=1e6
+        0.5, "1", "path, in diameters, that doubles the required savings", low=1e-3, high=1e6
     )
     clearance: float = gain(0.03, "m", "that routes keep between rim and walls", high=10.0)
-    k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the goal", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per metre of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> AtlasMemory:
-        """Return the memory of robots that have seen nothing yet."""
+        """Return the memory of robots that know neither walls nor other robots."""
         unknown_map = build_unknown_map(region)
         nobody = Teammates.build_empty()
         states = []
         for robot in range(len(team)):
             delay = 0.0
-            if self.staggered:
+            if self.is_staggered:
                 delay = self.period * _STAGGERING * (robot * _GOLDEN_FRACTION % 1.0)
             states.append(PlannerState(unknown_map, delay, nobody))
         routes = (np.full((1, 2), np.nan),) * len(team)
         return AtlasMemory(team, tuple(states), routes, np.zeros(len(team), dtype=np.intp))
 
     def decide(self, seen: Observations, memory: AtlasMemory) -> Decision:
+        """Compute the forces that lead robots along their routes, after new plans if these are due."""
         estimates = memory.estimates
-        first_plan_time = 0.0 if estimates is None else _LISTENING_S
+        cautious = seen
         if seen.reported_positions is not None:
             previous = estimates or Estimates.build_initial(len(seen.positions))
             seen, estimates = estimate_positions(seen, previous, memory.team)
-            first_plan_time = _LISTENING_S
+            cautious = assume_closer_neighbours(seen, estimates)
+        memory = self._add_scans(seen, memory)
+        memory = self._plan_routes(seen, memory, first_plan_time=0.0 if estimates is None else _LISTENING_S)
+        returns = update_returns(seen, memory.returns)
+        command = follow_routes(
+            cautious, memory.team, memory.routes, memory.legs, returns, self.k_prop, self.response_time
+        )
+        return Decision(
+            forces=command.forces,
+            goals=command.goals,
+            terms={"attraction": command.forces},
+            memory=replace(memory, legs=command.legs, returns=returns, estimates=estimates),
+        )
+
+    def _add_scans(self, seen: Observations, memory: AtlasMemory) -> AtlasMemory:
+        """Return the memory with the maps after the scans, if there are any."""
+        if seen.scans is None:
+            return memory
+        maps = self._update_maps(list(memory.maps), seen, seen.scans, memory.team.radius)
+        states = [
+            replace(state, known_map=known_map) for state, known_map in zip(memory.states, maps, strict=True)
+        ]
+        return replace(memory, states=tuple(states))
+
+    def _plan_routes(self, seen: Observations, memory: AtlasMemory, *, first_plan_time: float) -> AtlasMemory:
+        """Return the memory with the plans that are due, and the routes of these robots to their goals."""
         states = list(memory.states)
-        if seen.scans is not None:
-            maps = self._update_maps(list(memory.maps), seen, seen.scans, memory.team.radius)
-            states = [
-                replace(state, known_map=known_map) for state, known_map in zip(states, maps, strict=True)
-            ]
         routes = list(memory.routes)
         legs = memory.legs.copy()
         for robot, state in enumerate(states):
@@ -276,29 +336,12 @@ class Atlas(BaseController):
                     legs[robot] = 0
             elif state.planned_map is None:
                 routes[robot] = seen.positions[robot : robot + 1]
-        returns = update_returns(seen, memory.returns)
-        cautious = seen
-        if estimates is not None and seen.reported_positions is not None:
-            cautious = assume_closer_neighbours(seen, estimates)
-        command = follow_routes(cautious, memory.team, routes, legs, returns, self.k_prop, self.response_time)
-        return Decision(
-            command.forces,
-            command.goals,
-            {"attraction": command.forces},
-            memory=AtlasMemory(
-                team=memory.team,
-                states=tuple(states),
-                routes=tuple(routes),
-                legs=command.legs,
-                returns=returns,
-                estimates=estimates,
-            ),
-        )
+        return replace(memory, states=tuple(states), routes=tuple(routes), legs=legs)
 
     def _update_maps(
         self, maps: list[DiscoveredMap], seen: Observations, scans: Scans, radius: Array
     ) -> list[DiscoveredMap]:
-        """Return the maps after a scan of each robot; cells where others are become free."""
+        """Return the maps after a scan of each robot; cells at the positions of others become free."""
         later = []
         for robot, known_map in enumerate(maps):
             scanned = known_map.add_scan(seen.positions[robot], scans.distances[robot], scans.hit[robot])
@@ -307,26 +350,25 @@ class Atlas(BaseController):
         return later
 
     def _list_reports(self, states: Sequence[PlannerState], heard: IntArray) -> list[Teammates]:
-        """Return what the robots that are heard report of others."""
+        """Return the reports about others of the robots that are heard."""
         return []
 
     def _is_agreed(self, teammates: Teammates, seen: Observations) -> bool:
-        """Return whether all robots plan on the same map, and therefore make the same plan."""
+        """Return whether all robots plan on the same map, see `_Cooperation`."""
         return False
 
     def _plan(
         self, seen: Observations, team: Team, before: PlannerState, robot: int, reports: Sequence[Teammates]
     ) -> tuple[PlannerState, Array | None]:
-        """Return the state of a robot after its plan, and where to go; None if its route stays."""
+        """Return the state of a robot after its plan, and its next goal; None if it keeps its route."""
         position = seen.positions[robot]
-        raster = before.known_map.raster
-        max_speed = float(team.max_speed[robot])
         radius = float(team.radius[robot])
+        max_speed = float(team.max_speed[robot])
         state = self._update_teammates(seen, team, before, robot, reports)
         is_agreed = self._is_agreed(state.teammates, seen)
         others = _list_others(state.teammates, position, seen.time, is_agreed=is_agreed)
-        window = Window.build_around(raster, position, math.inf, _OWN_NODES)
-        spacing = window.stride * raster.cell_size
+        window = Window.build_around(state.known_map.raster, position, math.inf, _OWN_NODES)
+        spacing = window.stride * state.known_map.raster.cell_size
         step_length = 0.0 if before.positions is None else math.dist(position, before.positions[0])
         state = replace(
             state,
@@ -342,35 +384,14 @@ class Atlas(BaseController):
         positions = np.vstack([position, others.positions])
         if _is_unchanged(before, group, positions, others.is_quiet, max_move=_MAX_IDLE_MOVE * spacing):
             return replace(state, path_length=before.path_length), None
-        clearance = radius + self.clearance
-        planner = state.planner or GridPlanner.get_shared(state.known_map, window, clearance)
+        planner = state.planner or GridPlanner.get_shared(state.known_map, window, radius + self.clearance)
         planner = planner.update(state.known_map, window)
         state = replace(state, planned_map=state.known_map, positions=positions, group=group, planner=planner)
-        joint_planning_time = _JOINT_PLANNING_CROSSINGS * seen.region.diameter / max_speed
-        is_joint = is_agreed or seen.time - state.start_time <= joint_planning_time
-        if not is_joint:
-            is_fixed = np.ones_like(others.is_fixed)  # Each robot decides for itself alone.
-        elif is_agreed:
-            is_fixed = np.zeros_like(others.is_fixed)
-        else:
-            is_fixed = others.is_fixed
-        settling = 2.0 ** min(state.path_length / (self.settling * seen.region.diameter), 60.0)
-        state = self._plan_for_team(state, seen, is_fixed, settling, is_joint=is_joint, is_agreed=is_agreed)
-        goals = state.planned_goals
-        assert goals is not None
-        first_node = planner.find_nearest_node(goals[0])
-        if first_node < 0:
+        cooperation = self._choose_cooperation(state, seen, others, max_speed=max_speed, is_agreed=is_agreed)
+        state = self._plan_for_team(state, seen, cooperation)
+        own = self._find_own_goal(state, seen, cooperation)
+        if own is None:
             return replace(state, own_goal=position, is_idle=False), position
-        other_positions = others.positions.copy()
-        other_positions[~is_fixed] = goals[1:][~is_fixed[: len(goals) - 1]]
-        own = find_own_goal(
-            planner,
-            compute_node_weights(planner, seen.density),
-            other_positions,
-            first_node,
-            np.full(2, np.nan) if state.own_goal is None else state.own_goal,
-            min(1.0, self.rest * settling),
-        )
         state = replace(state, own_goal=own.goal)
         if is_agreed and before.positions is not None:
             state, evasion_goal = self._find_evasion_goal(state, step_length, seen.time, robot)
@@ -379,20 +400,60 @@ class Atlas(BaseController):
         walked = state.path_length - before.path_length
         return self._choose_goal(state, own, position, walked, is_agreed=is_agreed)
 
+    def _choose_cooperation(
+        self, state: PlannerState, seen: Observations, others: _Others, *, max_speed: float, is_agreed: bool
+    ) -> _Cooperation:
+        """Return how a robot plans for the others: the longer it has planned, the less."""
+        diameter = seen.region.diameter
+        joint_planning_time = _JOINT_PLANNING_CROSSINGS * diameter / max_speed
+        is_joint = is_agreed or seen.time - state.start_time <= joint_planning_time
+        is_fixed = others.is_fixed
+        if is_agreed:
+            is_fixed = np.zeros_like(is_fixed)
+        elif not is_joint:
+            is_fixed = np.ones_like(is_fixed)
+        doublings = min(state.path_length / (self.settling * diameter), _MAX_DOUBLINGS)
+        return _Cooperation(
+            is_agreed=is_agreed, is_joint=is_joint, is_fixed=is_fixed, settling=2.0**doublings
+        )
+
+    def _find_own_goal(
+        self, state: PlannerState, seen: Observations, cooperation: _Cooperation
+    ) -> OwnGoal | None:
+        """Return a robot's own goal, next to its goal in the plan; None if there is no node near that."""
+        planner = state.planner
+        goals = state.planned_goals
+        assert planner is not None and state.positions is not None and goals is not None
+        first_node = planner.find_nearest_node(goals[0])
+        if first_node < 0:
+            return None
+        is_free = ~cooperation.is_fixed
+        other_positions = state.positions[1:].copy()
+        other_positions[is_free] = goals[1:][is_free[: len(goals) - 1]]
+        return find_own_goal(
+            planner,
+            compute_node_weights(planner, seen.density),
+            other_positions,
+            first_node,
+            np.full(2, np.nan) if state.own_goal is None else state.own_goal,
+            min(1.0, self.rest * cooperation.settling),
+        )
+
     def _compute_period(self, before: PlannerState, robot: int, time_to_next_node: float) -> float:
-        """Return the time until the next plan, s: no robot gets farther than to the next node meanwhile."""
+        """Return the time until the next plan, s: at least the time to move to the next node."""
         period = max(self.period, time_to_next_node)
-        if before.planned_map is None and self.staggered:
+        if before.planned_map is None and self.is_staggered:
             period = period * (1.0 + (robot + 1) * _GOLDEN_FRACTION % 1.0)
         return period
 
     def _update_teammates(
         self, seen: Observations, team: Team, state: PlannerState, robot: int, reports: Sequence[Teammates]
     ) -> PlannerState:
-        """Return the state with what a robot now knows of the others: where they are, and who is gone.
+        """Return the state with a robot's present knowledge about the others.
 
-        A robot that falls silent and cannot have got out of range has failed. Others are presumed to be where
-        they were going, and are forgotten, but not taken for failed, when they are not heard there.
+        A robot that becomes silent, and cannot have moved out of range, has failed. Other silent robots are
+        assumed to be at their goals in the last plan. They are missing, but not considered failed, if they
+        are not heard there.
         """
         teammates = state.teammates
         position = seen.positions[robot]
@@ -417,75 +478,55 @@ class Atlas(BaseController):
         return replace(state, teammates=teammates, met=met | {*teammates.robots.tolist()}, gone=gone)
 
     def _plan_for_team(
-        self,
-        state: PlannerState,
-        seen: Observations,
-        is_fixed: BoolArray,
-        settling: float,
-        *,
-        is_joint: bool,
-        is_agreed: bool,
+        self, state: PlannerState, seen: Observations, cooperation: _Cooperation
     ) -> PlannerState:
-        """Return the state with a plan for the team, or for the robot and its nearest ones."""
+        """Return the state with a plan for the team, or for the robot and its nearest neighbours."""
         assert state.planner is not None and state.positions is not None and state.group is not None
-        size = len(state.group) if is_agreed else min(len(state.group), MAX_PLANNING_GROUP)
+        size = len(state.group)
+        if not cooperation.is_agreed:
+            size = min(size, MAX_PLANNING_GROUP)
         group = state.group[:size]
-        positions = state.positions[:size]
-        window = _build_team_window(state.known_map, positions, is_whole_team=size == len(state.group))
+        is_whole_team = size == len(state.group)
+        window = _build_team_window(state.known_map, state.positions[:size], is_whole_team=is_whole_team)
         planner = (state.team_planner or state.planner).update(state.known_map, window)
-        fixed = np.concatenate([[False], is_fixed])[:size]
-        goals = positions.copy()
-        if state.planned_robots is not None and state.planned_goals is not None:
-            _, here, there = np.intersect1d(group, state.planned_robots, return_indices=True)
-            is_free = ~fixed[here]
-            former_goals = state.planned_goals[there]
-            goals[here[is_free]] = former_goals[is_free]
-        if is_agreed:
-            settling = 1.0  # Each robot moves along another path, but all make one plan.
-        # A relocation of one of many robots saves less.
-        relocation = self.threshold * min(1.0, MAX_PLANNING_GROUP / len(group)) * settling
-        may_relocate = is_joint or state.was_quiet
-        min_savings = MinSavings(
-            relocation=min(1.0, relocation) if may_relocate else 1.0,
+        situation = _build_situation(state, group, cooperation.is_fixed)
+        min_savings = self._compute_min_savings(state, cooperation, size)
+        if cooperation.is_agreed:
+            goals = _place_agreed_team(planner, seen.density, group, situation, min_savings)
+        else:
+            # A robot that plans for itself alone does not move to cells that may not be free.
+            weights = compute_node_weights(planner, seen.density, only_known=not cooperation.is_joint)
+            goals = place_team(planner, weights, situation, min_savings)
+        return replace(state, team_planner=planner, planned_robots=group, planned_goals=goals)
+
+    def _compute_min_savings(
+        self, state: PlannerState, cooperation: _Cooperation, group_size: int
+    ) -> MinSavings:
+        """Return the fractions of the cost that changes of a plan must save; 1 allows no change."""
+        # If all make one plan, it does not depend on the path length of the robot that makes it.
+        settling = 1.0 if cooperation.is_agreed else cooperation.settling
+        relocation = 1.0
+        if cooperation.is_joint or state.was_quiet:
+            # The relocation of one of many robots saves less.
+            scale = min(1.0, MAX_PLANNING_GROUP / group_size)
+            relocation = min(1.0, self.threshold * scale * settling)
+        return MinSavings(
+            relocation=relocation,
             own_cell=min(1.0, self.nearby * settling),
-            swap=_SWAP_SAVING * is_agreed,
+            swap=_SWAP_SAVING if cooperation.is_agreed else 0.0,
         )
-        # Robots that plan on the same map make the same plan, which is computed once.
-        order = np.argsort(group) if is_agreed else np.arange(len(group))
-        situation = TeamSituation(
-            positions=positions[order],
-            former_goals=goals[order],
-            is_fixed=fixed[order],
-            other_positions=state.positions[size:],
-        )
-        key = (
-            group[order].tobytes(),
-            situation.positions.tobytes(),
-            situation.former_goals.tobytes(),
-            min_savings.relocation,
-        )
-        plan = _LATEST_PLANS.get(planner) if is_agreed else None
-        if plan is None or plan.key != key or plan.density is not seen.density:
-            # A robot that decides for itself does not leave for cells that may not be free.
-            weights = compute_node_weights(planner, seen.density, only_known=not is_joint)
-            plan = _TeamPlan(key, seen.density, place_team(planner, weights, situation, min_savings))
-            if is_agreed:
-                _LATEST_PLANS[planner] = plan
-        planned_goals = np.empty_like(goals)
-        planned_goals[order] = plan.goals
-        return replace(state, team_planner=planner, planned_robots=group, planned_goals=planned_goals)
 
     def _find_evasion_goal(
         self, state: PlannerState, step_length: float, time: float, robot: int
     ) -> tuple[PlannerState, Array | None]:
-        """Return the state, and where to make way for others in the same jam; None if it is in none."""
+        """Return the state, and a goal outside the jam of robots; None if the robot is in none."""
         assert state.positions is not None and state.own_goal is not None
         positions = state.positions
         position = positions[0]
         is_stuck = step_length < _MIN_PROGRESS_M and math.dist(position, state.own_goal) > _ARRIVAL_RADIUS_M
         state = replace(state, stuck_plans=state.stuck_plans + 1 if is_stuck else 0)
         if state.stuck_plans >= _MAX_STUCK_PLANS:
-            # Each robot makes way for another time, so that they do not all come back at once.
+            # Robots move away for different times, so that they do not all return at once.
             duration = _MAX_EVASION_S * ((robot + time) * _GOLDEN_FRACTION % 1.0)
             state = replace(state, stuck_plans=0, evasion_end=time + duration)
         is_close = ((positions - position) ** 2).sum(axis=1) < _JAM_RADIUS_M**2
@@ -498,7 +539,7 @@ class Atlas(BaseController):
     def _choose_goal(
         self, state: PlannerState, own: OwnGoal, position: Array, walked: float, *, is_agreed: bool
     ) -> tuple[PlannerState, Array]:
-        """Return the state, and where to go: to the own goal, or first to a viewpoint."""
+        """Return the state, and the next goal: the own goal, or first a viewpoint."""
         planner = state.planner
         assert planner is not None and state.group is not None
         if state.viewpoint is None and math.dist(own.goal, position) > _ARRIVAL_RADIUS_M:
@@ -511,11 +552,11 @@ class Atlas(BaseController):
                 former_viewpoints = (*former_viewpoints, state.viewpoint)
         viewpoint = None
         node = planner.find_own_node(position)
-        # The goal of a robot that is alone hardly depends on what it has not seen.
+        # The goal of a robot without others hardly depends on unknown space.
         if node >= 0 and self.stake < 1.0 and len(state.group) > 1:
             patience = self.patience * (_SHARED_PATIENCE_FACTOR if is_agreed else 1.0)
             doubling_length = patience * state.known_map.raster.region.diameter
-            min_stake = self.stake * own.cost * 2.0 ** min(looking_length / doubling_length, 60.0)
+            min_stake = self.stake * own.cost * 2.0 ** min(looking_length / doubling_length, _MAX_DOUBLINGS)
             path_lengths = planner.get_distances(node)
             viewpoint = find_viewpoint(
                 planner, own.cell_distances, path_lengths, min_stake, former_viewpoints
@@ -530,8 +571,58 @@ class Atlas(BaseController):
         return state, own.goal if viewpoint is None else viewpoint
 
 
+def _build_situation(state: PlannerState, group: IntArray, is_fixed: BoolArray) -> TeamSituation:
+    """Return the situation of a group of robots; all start from their former goals except for fixed ones."""
+    assert state.positions is not None
+    size = len(group)
+    positions = state.positions[:size]
+    is_fixed_in_group = np.concatenate([[False], is_fixed])[:size]
+    former_goals = positions.copy()
+    if state.planned_robots is not None and state.planned_goals is not None:
+        _, here, there = np.intersect1d(group, state.planned_robots, return_indices=True)
+        is_free = ~is_fixed_in_group[here]
+        former_goals[here[is_free]] = state.planned_goals[there[is_free]]
+    return TeamSituation(
+        positions=positions,
+        former_goals=former_goals,
+        is_fixed=is_fixed_in_group,
+        other_positions=state.positions[size:],
+    )
+
+
+def _place_agreed_team(
+    planner: GridPlanner,
+    density: Density | None,
+    group: IntArray,
+    situation: TeamSituation,
+    min_savings: MinSavings,
+) -> Array:
+    """Return the goals of a team, (k, 2) m, in a plan that all robots make, but that is computed once."""
+    order = np.argsort(group)
+    situation = TeamSituation(
+        positions=situation.positions[order],
+        former_goals=situation.former_goals[order],
+        is_fixed=situation.is_fixed[order],
+        other_positions=situation.other_positions,
+    )
+    key = (
+        group[order].tobytes(),
+        situation.positions.tobytes(),
+        situation.former_goals.tobytes(),
+        min_savings.relocation,
+    )
+    plan = _LATEST_PLANS.get(planner)
+    if plan is None or plan.key != key or plan.density is not density:
+        weights = compute_node_weights(planner, density)
+        plan = _TeamPlan(key=key, density=density, goals=place_team(planner, weights, situation, min_savings))
+        _LATEST_PLANS[planner] = plan
+    goals = np.empty_like(plan.goals)
+    goals[order] = plan.goals
+    return goals
+
+
 def _list_others(teammates: Teammates, position: Array, time: float, *, is_agreed: bool) -> _Others:
-    """Return the others, those that a robot at (2,) m plans for first."""
+    """Return the others, sorted such that those come first for which a robot at (2,) m plans."""
     is_fixed = (time - teammates.rest_times >= MIN_REST_S) | (teammates.heard_times < time)
     is_quiet = bool(is_fixed.all())
     is_beyond = np.full(len(teammates.robots), not is_agreed)
@@ -548,7 +639,7 @@ def _list_others(teammates: Teammates, position: Array, time: float, *, is_agree
 
 
 def _has_changed(before: PlannerState, state: PlannerState, radius: float) -> bool:
-    """Return whether this is the first plan, or team or walls have changed: there may be much to do again."""
+    """Return whether this is the first plan, or the team or the walls have changed."""
     if before.planned_map is None or state.met != before.met:
         return True
     changed_walls = state.known_map.count_changed_walls(before.planned_map)
@@ -571,7 +662,7 @@ def _is_unchanged(
 
 
 def _build_team_window(known_map: DiscoveredMap, positions: Array, *, is_whole_team: bool) -> Window:
-    """Build the window in which a team, or a group at (k, 2) m around the first one, is planned for."""
+    """Build the window of the plan for a team, or for a group around its first robot, at (k, 2) m."""
     if is_whole_team:
         max_nodes = min(_NODES_PER_ROBOT * len(positions), _MAX_TEAM_NODES)
         max_nodes = max(_MIN_TEAM_NODES, max_nodes, _MIN_NODES_PER_ROBOT * len(positions))
@@ -583,39 +674,40 @@ def _build_team_window(known_map: DiscoveredMap, positions: Array, *, is_whole_t
 
 @dataclass(frozen=True)
 class AtlasShared(Atlas):
-    """`Atlas`, but robots that hear each other also send each other their maps, and where others are.
+    """`Atlas` with shared maps: robots that hear each other exchange their maps and positions of others.
 
-    As long as a robot hears all robots that it has met, all have the same map and make the same plan for the
-    whole team, however large: relocations are final, no robot has to decide for itself alone, and all learn
-    of a look. A robot that has not got on for some plans, away from its goal, is in a jam, and makes way for
-    a while, each robot for another time. A robot that does not hear all others acts like `Atlas` on the map
-    that it has, and presumes the robots that it does not hear where they were last heard by one that it
-    hears.
+    As long as a robot hears all robots that it has met, all have the same map, and make the same plan for the
+    whole team, however large it is: relocations are final, no robot plans for itself alone, and all learn
+    from each viewpoint. A robot that is stuck for some plans, away from its goal, is in a jam: it moves out
+    of it for a while, each robot for a different time. A robot that does not hear all others behaves as with
+    `Atlas` on the map that it has. It assumes that robots out of contact are where one of the robots that it
+    hears has last heard them.
     """
 
     name = "atlas-shared"
     label = "Atlas, shared maps"
-    summary = "as Atlas, with the maps merged among the robots that hear each other"
+    summary = "as Atlas, with maps merged among the robots that hear each other"
     information = "shared map"
-    staggered = False  # one plan is for all
+    is_staggered = False
 
     def _update_maps(
         self, maps: list[DiscoveredMap], seen: Observations, scans: Scans, radius: Array
     ) -> list[DiscoveredMap]:
         circles = list_circles(seen.neighbours)
-        # Robots that share a map also share the next one.
-        later: dict[tuple[int, Circle, float], DiscoveredMap] = {}
-        result = []
         scanned_maps = update_maps(maps, seen, scans, circles)
+        # Robots that share a map also share the next one.
+        shared_maps: dict[tuple[int, Circle, float], DiscoveredMap] = {}
+        later = []
         for known_map, circle, size in zip(scanned_maps, circles, radius.tolist(), strict=True):
             key = (id(known_map), circle, size)
-            if key not in later:
-                later[key] = known_map.add_robots(seen.positions[list(circle)], size)
-            result.append(later[key])
-        return result
+            if key not in shared_maps:
+                shared_maps[key] = known_map.add_robots(seen.positions[list(circle)], size)
+            later.append(shared_maps[key])
+        return later
 
     def _list_reports(self, states: Sequence[PlannerState], heard: IntArray) -> list[Teammates]:
-        if len(heard) == len(states) - 1:  # A robot that hears all others needs no reports.
+        hears_all = len(heard) == len(states) - 1
+        if hears_all:
             return []
         return [states[other].teammates for other in heard.tolist()]
 
