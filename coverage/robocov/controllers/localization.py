@@ -16,24 +16,24 @@ from robocov.team import Team
 _AVERAGING_S = 2.0
 """Time over which position fixes are averaged."""
 _OUTLIER_SIGMAS = 6.0
-"""A fix that is off by more standard deviations means that the robot was carried away."""
+"""Number of standard deviations of a fix beyond which the robot has been carried away."""
 _MIN_FIXES = 10
-"""Number of fixes from which on their noise is known."""
+"""Number of fixes after which their noise is known."""
 _MIN_DISTANCE_M = 1e-9
 _MANOEUVRE_FRACTION = 0.5
 """Fraction of the maximum acceleration with which others are assumed to change their velocity."""
 _MAX_EXTRAPOLATION_S = 1.5
-"""Time for which others are assumed to go on as they did."""
+"""Time for which others are assumed to keep their velocities."""
 _DOUBT_SIGMAS = 1.0
-"""Standard deviations of a fix by which others may be closer than estimated,"""
+"""Number of standard deviations of a fix by which others may be closer than estimated."""
 _DOUBT_SPEED = 1.0
-"""and speed in m/s at which they may have come closer since their last message."""
+"""Speed in m/s at which others may have come closer since their last message."""
 _MAX_DOUBT_FRACTION = 0.75
-"""Fraction of the estimated distance by which others may be closer at most."""
+"""Maximum fraction of the estimated distance by which others may be closer."""
 
 
 class Tracks(NamedTuple):
-    """What each robot, by rows, knows of each other one, by columns, from its messages."""
+    """Filter states of each robot, by rows, for each other one, by columns, from messages."""
 
     sent: Array
     """(n, n) s, when the newest message was sent, nan for none."""
@@ -43,6 +43,19 @@ class Tracks(NamedTuple):
     """(n, n, 2) m, filtered position at that time."""
     velocities: Array
     """(n, n, 2) m/s, filtered velocity at that time."""
+
+
+class _Messages(NamedTuple):
+    """The newest messages that robots have of each other."""
+
+    receiver: IntArray
+    """(m,)"""
+    sender: IntArray
+    """(m,)"""
+    positions: Array
+    """(m, 2) m, reported position of the sender."""
+    sent: Array
+    """(m,) s, when each message was sent."""
 
 
 class Estimates(NamedTuple):
@@ -80,7 +93,7 @@ class Estimates(NamedTuple):
 
 
 def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> tuple[Observations, Estimates]:
-    """Estimate where robots and their neighbours are.
+    """Estimate the positions of robots and their neighbours.
 
     Parameters
     ----------
@@ -102,20 +115,23 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
     A robot integrates its own velocity and averages the residuals of its position fixes over two seconds.
     Others are tracked by their messages with the steady-state gains of Kalata (1984, *The tracking index*),
     larger ones for the first messages; the noise of a message is that of the robot's own fixes. They are
-    assumed to go on as they did for at most 1.5 seconds since their last message.
+    assumed to keep their velocities for at most 1.5 seconds since their last message.
     """
     assert seen.reported_positions is not None and seen.report_ages is not None
     positions, fixes, variance = _filter_own_positions(seen, previous, team)
     robot, other = seen.neighbours.list_pairs()
+    messages = _Messages(
+        receiver=robot,
+        sender=other,
+        positions=seen.reported_positions,
+        sent=seen.time - seen.report_ages,
+    )
     tracks = _update_tracks(
-        robot,
-        other,
-        seen.reported_positions,
-        seen.time - seen.report_ages,
-        np.sqrt(variance),
-        _MANOEUVRE_FRACTION * team.max_acceleration,
-        team.max_speed,
         previous.tracks,
+        messages,
+        sigma=np.sqrt(variance),
+        manoeuvre=_MANOEUVRE_FRACTION * team.max_acceleration,
+        max_speed=team.max_speed,
     )
     estimates = Estimates(
         time=seen.time,
@@ -153,7 +169,7 @@ def _filter_own_positions(seen: Observations, previous: Estimates, team: Team) -
 
 
 def assume_closer_neighbours(seen: Observations, estimates: Estimates) -> Observations:
-    """Return the observations with neighbours as close as they may be, for keeping away from them.
+    """Return the observations with neighbours as close as they may be, to avoid collisions.
 
     Parameters
     ----------
@@ -175,18 +191,20 @@ def assume_closer_neighbours(seen: Observations, estimates: Estimates) -> Observ
 
 @kernel
 def _update_tracks(
-    robot: IntArray,
-    other: IntArray,
-    reported: Array,
-    sent: Array,
-    sigma: Array,
-    manoeuvre: Array,
-    max_speed: Array,
-    previous: Tracks,
+    previous: Tracks, messages: _Messages, sigma: Array, manoeuvre: Array, max_speed: Array
 ) -> Tracks:
-    """Return the tracks after messages, (m,), of others to robots: reported positions, and when sent.
+    """Return the tracks after messages.
 
-    Robots have (n,) noise sigma (m), maximum speeds (m/s) and accelerations of manoeuvres (m/s²).
+    Parameters
+    ----------
+    previous : Tracks
+    messages : _Messages
+    sigma : (n,) array, m
+        Standard deviation of position fixes of each robot.
+    manoeuvre : (n,) array, m/s²
+        Assumed acceleration of others.
+    max_speed : (n,) array, m/s
+        Assumed maximum speed of others.
     """
     tracks = Tracks(
         previous.sent.copy(),
@@ -195,38 +213,49 @@ def _update_tracks(
         previous.velocities.copy(),
     )
     is_heard = np.zeros(tracks.sent.shape, np.bool_)
-    for m in range(len(robot)):
-        i = robot[m]
-        j = other[m]
+    for m in range(len(messages.receiver)):
+        i = messages.receiver[m]
+        j = messages.sender[m]
         is_heard[i, j] = True
         # Sums of steps are slightly off.
-        if tracks.counts[i, j] and not sent[m] > tracks.sent[i, j] + 1e-6:
+        if tracks.counts[i, j] and not messages.sent[m] > tracks.sent[i, j] + 1e-6:
             continue
         if tracks.counts[i, j] == 0:
             for axis in range(2):
                 tracks.velocities[i, j, axis] = 0.0
-                tracks.positions[i, j, axis] = reported[m, axis]
+                tracks.positions[i, j, axis] = messages.positions[m, axis]
         else:
-            dt = sent[m] - tracks.sent[i, j]
-            k = tracks.counts[i, j] + 1.0
-            tracking_index = manoeuvre[i] * dt * dt / max(sigma[i], 1e-9)
-            discriminant = 8.0 * tracking_index + tracking_index * tracking_index
-            root = (4.0 + tracking_index - math.sqrt(discriminant)) / 4.0
-            alpha = max(1.0 - root * root, 2.0 * (2.0 * k - 1.0) / (k * (k + 1.0)))
-            beta = min(max(2.0 * (1.0 - root) ** 2, 6.0 / (k * (k + 1.0))), 1.0)
-            for axis in range(2):
-                expected = tracks.positions[i, j, axis] + dt * tracks.velocities[i, j, axis]
-                residual = reported[m, axis] - expected
-                tracks.positions[i, j, axis] = expected + alpha * residual
-                tracks.velocities[i, j, axis] += beta * residual / dt
-            speed = math.sqrt(tracks.velocities[i, j, 0] ** 2 + tracks.velocities[i, j, 1] ** 2)
-            if speed > max_speed[i]:
-                tracks.velocities[i, j, 0] *= max_speed[i] / speed
-                tracks.velocities[i, j, 1] *= max_speed[i] / speed
-        tracks.sent[i, j] = sent[m]
+            _update_track(tracks, messages, m, sigma[i], manoeuvre[i], max_speed[i])
+        tracks.sent[i, j] = messages.sent[m]
         tracks.counts[i, j] += 1
+    # A track starts again when a robot is heard again.
     for i in range(len(is_heard)):
         for j in range(len(is_heard)):
             if not is_heard[i, j]:
                 tracks.counts[i, j] = 0
     return tracks
+
+
+@kernel
+def _update_track(
+    tracks: Tracks, messages: _Messages, m: int, sigma: float, manoeuvre: float, max_speed: float
+) -> None:
+    """Update the position and the velocity of one track, in place, by message m."""
+    i = messages.receiver[m]
+    j = messages.sender[m]
+    dt = messages.sent[m] - tracks.sent[i, j]
+    k = tracks.counts[i, j] + 1.0
+    tracking_index = manoeuvre * dt * dt / max(sigma, 1e-9)
+    discriminant = 8.0 * tracking_index + tracking_index * tracking_index
+    root = (4.0 + tracking_index - math.sqrt(discriminant)) / 4.0
+    alpha = max(1.0 - root * root, 2.0 * (2.0 * k - 1.0) / (k * (k + 1.0)))
+    beta = min(max(2.0 * (1.0 - root) ** 2, 6.0 / (k * (k + 1.0))), 1.0)
+    for axis in range(2):
+        expected = tracks.positions[i, j, axis] + dt * tracks.velocities[i, j, axis]
+        residual = messages.positions[m, axis] - expected
+        tracks.positions[i, j, axis] = expected + alpha * residual
+        tracks.velocities[i, j, axis] += beta * residual / dt
+    speed = math.sqrt(tracks.velocities[i, j, 0] ** 2 + tracks.velocities[i, j, 1] ** 2)
+    if speed > max_speed:
+        tracks.velocities[i, j, 0] *= max_speed / speed
+        tracks.velocities[i, j, 1] *= max_speed / speed

@@ -179,7 +179,7 @@ def test_it_plans_now_and_then() -> None:
 
 def test_gains_are_checked() -> None:
     assert make_controller("atlas", {"period": 2}) == replace(Atlas(), period=2.0)
-    with pytest.raises(ParameterError, match=r"atlas-shared.threshold: -1"):
+    with pytest.raises(ParameterError, match=r"atlas-shared.threshold: expected .*, got -1"):
         make_controller("atlas-shared", {"threshold": -1})
 
 
