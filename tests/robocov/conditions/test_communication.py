@@ -1,10 +1,12 @@
-"""Messages, against a plain simulation of every one of them."""
+"""Messages between robots, and what controllers make of them."""
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import replace
 from fractions import Fraction
 from math import floor
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.conditions import LOSS, Conditions
-from robocov.conditions.communication import Inbox, Radio
+from robocov.conditions.communication import NEVER, Inbox, Radio
 from robocov.conditions.random_streams import RandomStream
 from robocov.controllers import CONTROLLERS, Controller, atlas, inform_controller
 from robocov.environment import Environment
@@ -28,89 +30,109 @@ OPEN = Environment("open", ((0, 0), (10, 0), (10, 10), (0, 10)))
 SQUARE = Region(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]))
 
 
-def build_radio(conditions: Conditions, ranges: np.ndarray, dt: float = DT) -> Radio:
-    return Radio(conditions, ranges, dt)
-
-
-def walks(n: int, steps: int, seed: int) -> np.ndarray:
+def draw_walks(robots: int, steps: int, seed: int) -> np.ndarray:
+    """Return random walks, (steps, robots, 2) m."""
     rng = np.random.default_rng(seed)
-    return np.asarray(
-        rng.uniform(2, 8, size=(n, 2)) + np.cumsum(rng.normal(scale=0.2, size=(steps, n, 2)), axis=0)
-    )
+    starts = rng.uniform(2, 8, size=(robots, 2))
+    return np.asarray(starts + np.cumsum(rng.normal(scale=0.2, size=(steps, robots, 2)), axis=0))
 
 
-def told_one_by_one(
-    conditions: Conditions, ranges: np.ndarray, places: np.ndarray, working: np.ndarray
-) -> list[dict[tuple[int, int], tuple[int, np.ndarray]]]:
-    """Return what each robot knows of each other at every step, by looking through all messages each time."""
-    chance = RandomStream(conditions.seed, LOSS)
-    messages, known, sent = [], [], 0
-    for step, now in enumerate(places):
-        rate = conditions.message_rate
-        if rate is None or step * DT + 1e-9 >= sent / rate:
-            sent += 1
-            for i in range(len(now)):
-                for j in range(len(now)):
-                    far = np.hypot(*(now[i] - now[j])) > min(ranges[i], ranges[j])
-                    if i == j or far or not (working[step, i] and working[step, j]):
-                        continue
-                    if chance.draw_uniform(step, np.array([i]), np.array([j]))[0] >= conditions.loss:
-                        messages.append((step * DT + conditions.delay, step, i, j, now[j].copy()))
-        found: dict[tuple[int, int], tuple[int, np.ndarray]] = {}
-        for arrives, when, i, j, place in messages:
-            # it is there at the first step not before it arrives
-            arrived = np.ceil(arrives / DT - 1e-9)
-            if (
-                arrived <= step
-                and (step - arrived) * DT <= conditions.forget_after + 1e-9
-                and working[step, i]
-            ):
-                found[i, j] = (when, place)
-        known.append(found)
-    return known
+class Message(NamedTuple):
+    arrives: float
+    step: int
+    receiver: int
+    sender: int
+    position: np.ndarray
+
+
+def simulate_messages(
+    conditions: Conditions, ranges: np.ndarray, walks: np.ndarray, working: np.ndarray
+) -> list[dict[tuple[int, int], Message]]:
+    """Return the message that each robot knows of each other one in each step, from a list of all."""
+    loss_stream = RandomStream(conditions.seed, LOSS)
+    rate = conditions.message_rate
+    messages = []
+    known_messages = []
+    broadcasts = 0
+    for step, positions in enumerate(walks):
+        is_working = working[step]
+        if rate is None or step * DT + 1e-9 >= broadcasts / rate:
+            broadcasts += 1
+            for receiver, sender in np.ndindex(len(positions), len(positions)):
+                distance = np.hypot(*(positions[receiver] - positions[sender]))
+                is_in_range = distance <= min(ranges[receiver], ranges[sender])
+                if receiver == sender or not (is_in_range and is_working[receiver] and is_working[sender]):
+                    continue
+                uniform = loss_stream.draw_uniform(step, np.array([receiver]), np.array([sender]))[0]
+                if uniform >= conditions.loss:
+                    arrives = step * DT + conditions.delay
+                    messages.append(Message(arrives, step, receiver, sender, positions[sender].copy()))
+        known = {}
+        for message in messages:
+            # A message is delivered in the first step that is not before its arrival.
+            arrival_step = np.ceil(message.arrives / DT - 1e-9)
+            is_recent = (step - arrival_step) * DT <= conditions.forget_after + 1e-9
+            if arrival_step <= step and is_recent and is_working[message.receiver]:
+                known[message.receiver, message.sender] = message
+        known_messages.append(known)
+    return known_messages
 
 
 @settings(max_examples=30)
 @given(
-    st.integers(2, 5),
-    st.sampled_from([0.0, 0.3, 0.9, 1.0]),
-    st.sampled_from([0.0, 0.05, 0.1, 0.34]),
-    st.sampled_from([None, 10.0, 4.0, 2.5]),
-    st.sampled_from([0.4, 1.0, 9.0]),
-    st.sampled_from([2.0, np.inf]),
-    st.integers(0, 2**20),
+    robots=st.integers(2, 5),
+    loss=st.sampled_from([0.0, 0.3, 0.9, 1.0]),
+    delay=st.sampled_from([0.0, 0.05, 0.1, 0.34]),
+    rate=st.sampled_from([None, 10.0, 4.0, 2.5]),
+    forget_after=st.sampled_from([0.4, 1.0, 9.0]),
+    communication_range=st.sampled_from([2.0, np.inf]),
+    seed=st.integers(0, 2**20),
 )
 def test_messages_agree_with_a_simulation_of_each_message(
-    n: int, loss: float, delay: float, rate: float | None, forget: float, reach: float, seed: int
+    robots: int,
+    loss: float,
+    delay: float,
+    rate: float | None,
+    forget_after: float,
+    communication_range: float,
+    seed: int,
 ) -> None:
-    conditions = Conditions(loss=loss, delay=delay, message_rate=rate, forget_after=forget, seed=seed)
-    places, ranges = walks(n, 25, seed), np.full(n, reach)
+    conditions = Conditions(loss=loss, delay=delay, message_rate=rate, forget_after=forget_after, seed=seed)
+    walks = draw_walks(robots, 25, seed)
+    ranges = np.full(robots, communication_range)
     ranges[0] *= 0.7
-    working = np.ones((25, n), dtype=bool)
+    working = np.ones((25, robots), dtype=bool)
     working[12:, 1] = False
-    radio, inbox = build_radio(conditions, ranges, DT), Inbox.create_empty(n)
-    expected = told_one_by_one(conditions, ranges, places, working)
-    for step, now in enumerate(places):
-        inbox = radio.exchange_messages(inbox, step, now, now, working[step])
-        neighbours, heard, ages = radio.read_reports(inbox, step, working[step])
+    radio = Radio(conditions, ranges, DT)
+    inbox = Inbox.create_empty(robots)
+    known_messages = simulate_messages(conditions, ranges, walks, working)
+    for step, positions in enumerate(walks):
+        inbox = radio.exchange_messages(inbox, step, positions, positions, working[step])
+        neighbours, reported, ages = radio.read_reports(inbox, step, working[step])
         robot, other = neighbours.list_pairs()
-        assert list(zip(robot.tolist(), other.tolist(), strict=True)) == sorted(expected[step])
-        for k, pair in enumerate(sorted(expected[step])):
-            when, place = expected[step][pair]
-            assert (heard[k] == place).all()
-            assert ages[k] == pytest.approx((step - when) * DT)
+        pairs = sorted(known_messages[step])
+        assert list(zip(robot.tolist(), other.tolist(), strict=True)) == pairs
+        for k, pair in enumerate(pairs):
+            message = known_messages[step][pair]
+            np.testing.assert_array_equal(reported[k], message.position)
+            assert ages[k] == pytest.approx((step - message.step) * DT)
 
 
 @pytest.mark.parametrize(("delay", "dt", "steps"), [(0.14, 0.02, 7), (0.7, DT, 7), (0.71, DT, 8)])
 def test_latency_and_silence_of_whole_steps_are_exact(delay: float, dt: float, steps: int) -> None:
-    """Also where 0.14 / 0.02 is more than 7, and 3 x 0.1 more than 0.3."""
-    radio = build_radio(Conditions(delay=delay, forget_after=round(3 * dt, 2)), np.ones(2), dt)
-    inbox, working, heard = Inbox.create_empty(2), np.ones(2, dtype=bool), []
+    """Also where 0.14 / 0.02 is more than 7, and 3 * 0.1 more than 0.3, by rounding."""
+    radio = Radio(Conditions(delay=delay, forget_after=round(3 * dt, 2)), np.ones(2), dt)
+    inbox = Inbox.create_empty(2)
+    working = np.ones(2, dtype=bool)
+    steps_with_report = []
     for step in range(16):
-        places = np.array([[0.0, 0.0], [9.0 * step, 0.0]])  # out of range after the first message
-        inbox = radio.exchange_messages(inbox, step, places, places, working)
-        heard.append(len(radio.read_reports(inbox, step, working)[1]) > 0)
-    assert np.flatnonzero(heard).tolist() == list(range(steps, steps + 4))
+        # The robots are out of range after the first message.
+        positions = np.array([[0.0, 0.0], [9.0 * step, 0.0]])
+        inbox = radio.exchange_messages(inbox, step, positions, positions, working)
+        _, reported, _ = radio.read_reports(inbox, step, working)
+        if len(reported) > 0:
+            steps_with_report.append(step)
+    assert steps_with_report == list(range(steps, steps + 4))
 
 
 @pytest.mark.parametrize(("dt", "rate"), [("0.03", 30), ("0.03", 15), ("0.1", 4)])
@@ -130,68 +152,69 @@ def test_messages_are_sent_whenever_a_period_has_passed(dt: str, rate: int) -> N
 
 
 def test_inboxes_are_immutable() -> None:
-    """So that a copy of a run can hold the same one."""
-    radio = build_radio(Conditions(delay=0.2, loss=0.2), np.full(3, np.inf), DT)
-    inbox, working = Inbox.create_empty(3), np.ones(3, dtype=bool)
-    for step, now in enumerate(walks(3, 12, 4)):
-        before = [
-            inbox.sent.tobytes(),
-            inbox.arrived.tobytes(),
-            inbox.places.tobytes(),
-            len(inbox.in_flight),
-        ]
-        once = radio.exchange_messages(inbox, step, now, now, working)
-        again = radio.exchange_messages(inbox, step, now, now, working)
-        assert once.places.tobytes() == again.places.tobytes()
-        assert [
-            inbox.sent.tobytes(),
-            inbox.arrived.tobytes(),
-            inbox.places.tobytes(),
-            len(inbox.in_flight),
-        ] == before
-        inbox = once
+    """A copy of a simulation shares its inbox."""
+    radio = Radio(Conditions(delay=0.2, loss=0.2), np.full(3, np.inf), DT)
+    inbox = Inbox.create_empty(3)
+    working = np.ones(3, dtype=bool)
+    for step, positions in enumerate(draw_walks(3, 12, 4)):
+        content = deepcopy(inbox)
+        first = radio.exchange_messages(inbox, step, positions, positions, working)
+        second = radio.exchange_messages(inbox, step, positions, positions, working)
+        np.testing.assert_array_equal(first.places, second.places)
+        np.testing.assert_array_equal(inbox.sent, content.sent)
+        np.testing.assert_array_equal(inbox.arrived, content.arrived)
+        np.testing.assert_array_equal(inbox.places, content.places)
+        assert len(inbox.in_flight) == len(content.in_flight)
+        inbox = first
 
 
 def test_messages_are_lost_with_the_given_probability() -> None:
-    n, steps = 40, 30
-    radio = build_radio(Conditions(loss=0.3, forget_after=0.01, seed=1), np.full(n, np.inf), DT)
-    inbox, working, got = Inbox.create_empty(n), np.ones(n, dtype=bool), 0
-    for step, now in enumerate(walks(n, steps, 1)):
-        inbox = radio.exchange_messages(inbox, step, now, now, working)
-        got += len(radio.read_reports(inbox, step, working)[1])
-    sent = steps * n * (n - 1)
-    assert abs(got / sent - 0.7) < 5 * np.sqrt(0.21 / sent)
+    """The bound is five standard errors wide."""
+    robots = 40
+    steps = 30
+    radio = Radio(Conditions(loss=0.3, forget_after=0.01, seed=1), np.full(robots, np.inf), DT)
+    inbox = Inbox.create_empty(robots)
+    working = np.ones(robots, dtype=bool)
+    received = 0
+    for step, positions in enumerate(draw_walks(robots, steps, 1)):
+        inbox = radio.exchange_messages(inbox, step, positions, positions, working)
+        _, reported, _ = radio.read_reports(inbox, step, working)
+        received += len(reported)
+    sent = steps * robots * (robots - 1)
+    assert abs(received / sent - 0.7) < 5 * np.sqrt(0.21 / sent)
 
 
-# what controllers make of it
-
-
-def seen_by(
-    kind: type, places: np.ndarray, neighbours: Neighbours, heard: np.ndarray | None, seed: int
+def build_observations(
+    controller: Controller,
+    positions: np.ndarray,
+    neighbours: Neighbours,
+    reported: np.ndarray | None,
+    seed: int,
 ) -> Observations:
+    """Build observations with random velocities, obstacle points and scans."""
     rng = np.random.default_rng(seed)
-    points = places + rng.normal(scale=0.8, size=places.shape)
-    scanning = getattr(kind(), "scanning", None)
+    obstacle_points = positions + rng.normal(scale=0.8, size=positions.shape)
+    scanning = getattr(controller, "scanning", None)
     scans = None
     if scanning is not None:
-        distances = rng.uniform(1.0, 3.0, size=(len(places), scanning.rays))
+        distances = rng.uniform(1.0, 3.0, size=(len(positions), scanning.rays))
         scans = Scans(distances, rng.random(distances.shape) < 0.3)
     return Observations(
-        places,
-        rng.normal(size=places.shape),
+        positions,
+        rng.normal(size=positions.shape),
         neighbours,
-        points,
+        obstacle_points,
         SQUARE,
-        max_speeds=np.ones(len(places)),
+        max_speeds=np.ones(len(positions)),
         scans=scans,
-        reported_positions=heard,
-        report_ages=None if heard is None else np.zeros(len(heard)),
+        reported_positions=reported,
+        report_ages=None if reported is None else np.zeros(len(reported)),
     )
 
 
-def made(kind: type) -> Controller:
-    """Return a controller, the informed ones with the map."""
-    controller: Controller = inform_controller(kind(), OPEN)
+def build_controller(controller_type: type) -> Controller:
+    """Build a controller, and inform it of the map if it needs it."""
+    controller: Controller = inform_controller(controller_type(), OPEN)
     return controller
 
 
@@ -202,61 +225,69 @@ PLANNING = ("atlas", *SHARING)
 LIGHT = tuple(kind for kind in CONTROLLERS.values() if kind.name not in PLANNING)
 
 
-@pytest.mark.parametrize("kind", LIGHT, ids=lambda kind: str(kind.name))
+@pytest.mark.parametrize("controller_type", LIGHT, ids=lambda controller_type: str(controller_type.name))
 @settings(max_examples=15)
-@given(n=st.integers(2, 14), seed=st.integers(0, 2**32), reach=st.floats(2.0, 12.0))
-def test_reports_of_true_positions_change_no_decision(kind: type, n: int, seed: int, reach: float) -> None:
-    """Bit for bit: where messages say what is, the decisions are those without messages."""
-    places = np.random.default_rng(seed).uniform(1, 9, size=(n, 2))
-    neighbours = Neighbours.from_ranges(places, np.full(n, reach))
-    controller = made(kind)
-    team = Team.homogeneous(n, communication_range=reach)
-    plain = controller.decide(seen_by(kind, places, neighbours, None, seed), controller.begin(SQUARE, team))
-    heard = places[neighbours.list_pairs()[1]]
-    told = controller.decide(seen_by(kind, places, neighbours, heard, seed), controller.begin(SQUARE, team))
-    assert told.forces.tobytes() == plain.forces.tobytes()
-    if plain.goals is not None and told.goals is not None:
-        assert told.goals.tobytes() == plain.goals.tobytes()
+@given(n=st.integers(2, 14), seed=st.integers(0, 2**32), communication_range=st.floats(2.0, 12.0))
+def test_reports_of_true_positions_change_no_decision(
+    controller_type: type, n: int, seed: int, communication_range: float
+) -> None:
+    positions = np.random.default_rng(seed).uniform(1, 9, size=(n, 2))
+    neighbours = Neighbours.from_ranges(positions, np.full(n, communication_range))
+    controller = build_controller(controller_type)
+    memory = controller.begin(SQUARE, Team.homogeneous(n, communication_range=communication_range))
+    _, other = neighbours.list_pairs()
+    ideal = controller.decide(build_observations(controller, positions, neighbours, None, seed), memory)
+    by_reports = controller.decide(
+        build_observations(controller, positions, neighbours, positions[other], seed), memory
+    )
+    assert by_reports.forces.tobytes() == ideal.forces.tobytes()
+    if ideal.goals is not None and by_reports.goals is not None:
+        assert by_reports.goals.tobytes() == ideal.goals.tobytes()
 
 
-@pytest.mark.parametrize("kind", LIGHT, ids=lambda kind: str(kind.name))
+@pytest.mark.parametrize("controller_type", LIGHT, ids=lambda controller_type: str(controller_type.name))
 @settings(max_examples=15)
 @given(n=st.integers(2, 14), seed=st.integers(0, 2**32))
-def test_robots_decide_by_reports_and_not_by_true_positions(kind: type, n: int, seed: int) -> None:
+def test_robots_decide_by_reports_and_not_by_true_positions(controller_type: type, n: int, seed: int) -> None:
+    """All other robots are elsewhere, and have received other reports: the force of one stays the same."""
     rng = np.random.default_rng(seed)
-    places = rng.uniform(1, 9, size=(n, 2))
-    pairs = [(i, j) for i in range(n) for j in range(n) if i != j and rng.random() < 0.7]
-    robot, other = (np.array([pair[k] for pair in pairs], dtype=np.intp) for k in (0, 1))
+    positions = rng.uniform(1, 9, size=(n, 2))
+    is_linked = (rng.random((n, n)) < 0.7) & ~np.eye(n, dtype=bool)
+    robot, other = np.nonzero(is_linked)
     neighbours = Neighbours.from_pairs(n, robot, other)
-    heard = places[other] + rng.normal(scale=0.5, size=(len(pairs), 2))
+    reported = positions[other] + rng.normal(scale=0.5, size=(len(robot), 2))
     i = int(rng.integers(n))
-    controller = made(kind)
-    team = Team.homogeneous(n)
-    seen = seen_by(kind, places, neighbours, heard, seed)
-    before = controller.decide(seen, controller.begin(SQUARE, team)).forces[i]
-    # all others are elsewhere, and have heard other things
-    elsewhere = np.where((np.arange(n) == i)[:, None], places, rng.uniform(1, 9, size=(n, 2)))
-    otherwise = np.where((robot == i)[:, None], heard, rng.uniform(1, 9, size=heard.shape))
-    moved = replace(seen, positions=elsewhere, reported_positions=otherwise)
-    after = controller.decide(moved, controller.begin(SQUARE, team)).forces[i]
-    assert before.tobytes() == after.tobytes()
+    controller = build_controller(controller_type)
+    memory = controller.begin(SQUARE, Team.homogeneous(n))
+    seen = build_observations(controller, positions, neighbours, reported, seed)
+    other_positions = rng.uniform(1, 9, size=(n, 2))
+    other_positions[i] = positions[i]
+    other_reports = rng.uniform(1, 9, size=reported.shape)
+    other_reports[robot == i] = reported[robot == i]
+    changed = replace(seen, positions=other_positions, reported_positions=other_reports)
+    force = controller.decide(seen, memory).forces[i]
+    assert controller.decide(changed, memory).forces[i].tobytes() == force.tobytes()
 
 
-@pytest.mark.parametrize("kind", CONTROLLERS.values(), ids=lambda kind: str(kind.name))
-def test_reports_affect_decisions(kind: type) -> None:
-    """The property above is not empty: what robot 1 is told is near makes a difference to it."""
-    places = np.array([[4.0, 4.0], [5.0, 4.5], [8.0, 6.0]])
-    neighbours = Neighbours.from_ranges(places, np.full(3, 20.0))
-    heard = places[neighbours.list_pairs()[1]]
-    nearer = heard.copy()
-    nearer[0] = [3.77, 4.0]
-    controller, team = made(kind), Team.homogeneous(3)
+@pytest.mark.parametrize(
+    "controller_type", CONTROLLERS.values(), ids=lambda controller_type: str(controller_type.name)
+)
+def test_reports_affect_decisions(controller_type: type) -> None:
+    """Robot 1 is told that robot 2 is close. Only robots that share maps notice that elsewhere."""
+    positions = np.array([[4.0, 4.0], [5.0, 4.5], [8.0, 6.0]])
+    neighbours = Neighbours.from_ranges(positions, np.full(3, 20.0))
+    _, other = neighbours.list_pairs()
+    true_reports = positions[other]
+    close_reports = true_reports.copy()
+    close_reports[0] = [3.77, 4.0]
+    controller = build_controller(controller_type)
+    memory = controller.begin(SQUARE, Team.homogeneous(3))
     forces = [
-        controller.decide(seen_by(kind, places, neighbours, told, 1), controller.begin(SQUARE, team)).forces
-        for told in (heard, nearer)
+        controller.decide(build_observations(controller, positions, neighbours, reports, 1), memory).forces
+        for reports in (true_reports, close_reports)
     ]
     assert not np.array_equal(forces[0][0], forces[1][0])
-    if kind.name not in SHARING:
+    if controller_type.name not in SHARING:
         assert forces[0][1:].tobytes() == forces[1][1:].tobytes()
 
 
@@ -264,49 +295,52 @@ def test_reports_affect_decisions(kind: type) -> None:
 @pytest.mark.parametrize("name", PLANNING)
 def test_planning_controllers_decide_by_reports(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(atlas, "_LISTENING_S", 0.0)
-    kind, team = CONTROLLERS[name], Team.homogeneous(4)
-    places = np.random.default_rng(5).uniform(1, 9, size=(4, 2))
-    neighbours = Neighbours.from_ranges(places, np.full(4, 20.0))
-    heard = places[neighbours.list_pairs()[1]]
-    plain, told, moved = (
-        made(kind).decide(seen_by(kind, *seen, 5), made(kind).begin(SQUARE, team)).forces
-        for seen in (
-            (places, neighbours, None),
-            (places, neighbours, heard),
-            (places, neighbours, np.where(np.arange(len(heard))[:, None] < 3, heard, heard + 0.7)),
-        )
-    )
-    assert told.tobytes() == plain.tobytes()
+    controller_type = CONTROLLERS[name]
+    positions = np.random.default_rng(5).uniform(1, 9, size=(4, 2))
+    neighbours = Neighbours.from_ranges(positions, np.full(4, 20.0))
+    robot, other = neighbours.list_pairs()
+    true_reports = positions[other]
+    # Reports to all robots but the first one are wrong.
+    wrong_reports = np.where(robot[:, None] == 0, true_reports, true_reports + 0.7)
+    forces = []
+    for reports in (None, true_reports, wrong_reports):
+        controller = build_controller(controller_type)
+        memory = controller.begin(SQUARE, Team.homogeneous(4))
+        seen = build_observations(controller, positions, neighbours, reports, 5)
+        forces.append(controller.decide(seen, memory).forces)
+    assert forces[1].tobytes() == forces[0].tobytes()
     if name == "atlas":
-        assert moved[0].tobytes() == told[0].tobytes()
+        assert forces[2][0].tobytes() == forces[1][0].tobytes()
 
 
-@given(st.integers(1, 20), st.integers(0, 2**32))
+@given(n=st.integers(1, 20), seed=st.integers(0, 2**32))
 def test_cells_by_reports_agree_with_a_partition_for_each_robot(n: int, seed: int) -> None:
-    """Row by row against a partition of that robot and the others where it believes them to be."""
     rng = np.random.default_rng(seed)
-    places = rng.uniform(0.5, 9.5, size=(n, 2))
+    positions = rng.uniform(0.5, 9.5, size=(n, 2))
     robot, other = np.nonzero((rng.random((n, n)) < 0.6) & ~np.eye(n, dtype=bool))
-    heard = rng.uniform(0, 10, size=(len(robot), 2))
-    cells = partition(places, SQUARE, Neighbours.from_pairs(n, robot, other), reported_positions=heard)
+    reported = rng.uniform(0, 10, size=(len(robot), 2))
+    neighbours = Neighbours.from_pairs(n, robot, other)
+    cells = partition(positions, SQUARE, neighbours, reported_positions=reported)
     for i in range(n):
-        picture = np.concatenate([places[i : i + 1], heard[robot == i]])
-        own = partition(picture, SQUARE, Neighbours(len(picture)))
-        assert cells.mass[i] == pytest.approx(own.mass[0], rel=1e-9, abs=1e-12)
-        np.testing.assert_allclose(cells.centroid[i], own.centroid[0], atol=1e-9)
-        assert set(cells.edges.beyond[cells.edges.cell == i].tolist()) <= {-1, *other[robot == i].tolist()}
+        known_positions = np.concatenate([positions[i : i + 1], reported[robot == i]])
+        own_cells = partition(known_positions, SQUARE)
+        assert cells.mass[i] == pytest.approx(own_cells.mass[0], rel=1e-9, abs=1e-12)
+        np.testing.assert_allclose(cells.centroid[i], own_cells.centroid[0], atol=1e-9)
+        beyond = cells.edges.beyond[cells.edges.cell == i]
+        assert set(beyond.tolist()) <= {-1, *other[robot == i].tolist()}
 
 
 @pytest.mark.parametrize("n", [3, 63, 66, 120])
 def test_cells_by_true_reports_equal_ordinary_cells(n: int) -> None:
-    """Bit for bit, also where only the nearest of those that a robot hears are sorted at first."""
-    places = np.random.default_rng(n).uniform(0.5, 9.5, size=(n, 2))
-    places[: n // 2] *= 0.05  # a crowd, whose far neighbours matter
-    neighbours = Neighbours.from_ranges(places, np.full(n, 20.0))
-    plain = partition(places, SQUARE, neighbours)
-    told = partition(places, SQUARE, neighbours, reported_positions=places[neighbours.list_pairs()[1]])
-    assert told.mass.tobytes() == plain.mass.tobytes()
-    assert told.centroid.tobytes() == plain.centroid.tobytes()
+    """Half of the robots are a crowd, whose distant neighbours matter."""
+    positions = np.random.default_rng(n).uniform(0.5, 9.5, size=(n, 2))
+    positions[: n // 2] *= 0.05
+    neighbours = Neighbours.from_ranges(positions, np.full(n, 20.0))
+    _, other = neighbours.list_pairs()
+    ordinary = partition(positions, SQUARE, neighbours)
+    by_reports = partition(positions, SQUARE, neighbours, reported_positions=positions[other])
+    assert by_reports.mass.tobytes() == ordinary.mass.tobytes()
+    assert by_reports.centroid.tobytes() == ordinary.centroid.tobytes()
 
 
 def test_reported_positions_without_neighbours_are_rejected() -> None:
@@ -315,15 +349,17 @@ def test_reported_positions_without_neighbours_are_rejected() -> None:
 
 
 def test_inboxes_can_be_selected_for_another_team() -> None:
-    radio, inbox = build_radio(Conditions(delay=0.2), np.full(3, np.inf), DT), Inbox.create_empty(3)
+    radio = Radio(Conditions(delay=0.2), np.full(3, np.inf), DT)
+    inbox = Inbox.create_empty(3)
     working = np.ones(3, dtype=bool)
-    for step, now in enumerate(walks(3, 6, 2)):
-        inbox = radio.exchange_messages(inbox, step, now, now, working)
-    other = inbox.select_robots(np.array([2, -1, 0]))
-    assert other.sent[0, 2] == inbox.sent[2, 0]
-    assert (other.places[0, 2] == inbox.places[2, 0]).all()
-    assert (other.sent[1] == -1).all()
-    assert (other.sent[:, 1] == -1).all()
-    assert len(other.in_flight) == len(inbox.in_flight) == 2
-    assert not other.in_flight[0].is_received[:, 1].any()
-    assert other.in_flight[0].is_received[0, 2]
+    for step, positions in enumerate(draw_walks(3, 6, 2)):
+        inbox = radio.exchange_messages(inbox, step, positions, positions, working)
+    # Robots 3 and 1 of the old team, with a new one between them.
+    selected = inbox.select_robots(np.array([2, -1, 0]))
+    assert selected.sent[0, 2] == inbox.sent[2, 0]
+    np.testing.assert_array_equal(selected.places[0, 2], inbox.places[2, 0])
+    assert (selected.sent[1] == NEVER).all()
+    assert (selected.sent[:, 1] == NEVER).all()
+    assert len(selected.in_flight) == len(inbox.in_flight) == 2
+    assert not selected.in_flight[0].is_received[:, 1].any()
+    assert selected.in_flight[0].is_received[0, 2]
