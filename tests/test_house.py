@@ -94,8 +94,7 @@ def test_every_public_name_loads_from_the_module_that_the_stub_says() -> None:
     for node in imports:
         module = importlib.import_module(f"robocov.{node.module}")
         for alias in node.names:
-            if alias.name != "CONTROLLERS":  # at the top it includes those of installed packages
-                assert getattr(robocov, alias.name) is getattr(module, alias.name)
+            assert getattr(robocov, alias.name) is getattr(module, alias.name)
 
 
 def test_public_names_can_be_listed_and_star_imported_and_misspelled() -> None:

@@ -41,8 +41,6 @@ def __getattr__(name: str) -> object:
             f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__]
         )
     value = getattr(importlib.import_module(_modules[name]), name)
-    if name == "CONTROLLERS":  # with those of installed packages
-        value = importlib.import_module("robocov.controllers").list_controller_classes()
     globals()[name] = value
     return value
 

@@ -7,7 +7,6 @@ first use, for which each name needs a line of its own: ``from .module import Na
 from .conditions import Conditions as Conditions
 from .conditions import Failure as Failure
 from .conditions import Join as Join
-from .controllers import CONTROLLERS as CONTROLLERS
 from .controllers import Atlas as Atlas
 from .controllers import AtlasShared as AtlasShared
 from .controllers import Controller as Controller
@@ -17,6 +16,7 @@ from .controllers import Lloyd as Lloyd
 from .controllers import OwnView as OwnView
 from .controllers import Rapf as Rapf
 from .controllers import Rpf as Rpf
+from .controllers import list_controller_classes as list_controller_classes
 from .controllers import make_controller as make_controller
 from .controllers.gains import choice as choice
 from .controllers.gains import gain as gain

@@ -149,6 +149,4 @@ def test_the_nearest_name_of_the_package_is_known_to_python() -> None:
 def test_controllers_of_packages_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
     theirs = EntryPoint("theirs", "robocov.controllers.lloyd:Lloyd", "robocov.controllers")
     monkeypatch.setattr("robocov.controllers.registry.entry_points", lambda group: [theirs])
-    monkeypatch.delitem(vars(rc), "CONTROLLERS", raising=False)
-    assert rc.CONTROLLERS["theirs"] is rc.Lloyd
-    monkeypatch.delitem(vars(rc), "CONTROLLERS")
+    assert rc.list_controller_classes()["theirs"] is rc.Lloyd

@@ -19,11 +19,10 @@ from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.geodesic_lloyd import GeodesicPlanner
 from robocov.controllers.route_following import follow_routes
-from robocov.environment import Environment
+from robocov.environment import Environment, find_nearest_inside
 from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.region import Region
-from robocov.optimum import find_nearest_inside
 from robocov.team import Team
 
 _COARSE = 8  # lattice of the plan, which is asked for ways only

@@ -12,9 +12,8 @@ from scipy.spatial import Delaunay
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.controllers.known_map import build_configuration_space
-from robocov.environment import Environment
+from robocov.environment import Environment, find_nearest_inside
 from robocov.observation.region import Region
-from robocov.optimum import find_nearest_inside
 
 _MAX_REFINEMENTS = 12
 """Number of times that pieces of walls are halved that are not edges of the mesh yet."""

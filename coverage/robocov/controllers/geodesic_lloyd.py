@@ -15,11 +15,10 @@ from robocov.controllers.driving import compute_approach_velocities, compute_dri
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.known_map import WholeMapController, build_configuration_space, is_plan_due
 from robocov.cost import CoverageCost
-from robocov.environment import Environment, PolygonObstacle
+from robocov.environment import Environment, PolygonObstacle, find_nearest_inside
 from robocov.geodesic import Geodesics
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
-from robocov.optimum import find_nearest_inside
 from robocov.team import Team
 
 _MIN_STEP_FRACTION = 0.25

@@ -5,7 +5,6 @@
 - `configuration_space`: positions at which robots fit
 """
 
-from robocov.environment import find_nearest_inside
 from robocov.optimum.configuration_space import ConfigurationSpace
 from robocov.optimum.descent import descend
 from robocov.optimum.search import MAX_RESTARTS, MAX_ROBOTS, Optimum, find_optimum
@@ -16,6 +15,5 @@ __all__ = [
     "ConfigurationSpace",
     "Optimum",
     "descend",
-    "find_nearest_inside",
     "find_optimum",
 ]

@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 from robocov.controllers import Diffeomorphism, Lloyd
 from robocov.controllers.convex_chart import ConvexChart
 from robocov.density import Gaussian, Gaussians
-from robocov.environment import Environment, PolygonObstacle, WallObstacle
+from robocov.environment import Environment, PolygonObstacle, WallObstacle, find_nearest_inside
 from robocov.errors import ParameterError
 from robocov.mapfile import load_map
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
-from robocov.optimum import find_nearest_inside
 from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_samples

@@ -21,14 +21,13 @@ from robocov.controllers import (
 from robocov.controllers.geodesic_lloyd import GeodesicPlanner
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians
-from robocov.environment import Environment, WallObstacle
+from robocov.environment import Environment, WallObstacle, find_nearest_inside
 from robocov.errors import ParameterError
 from robocov.generator import generate_map
 from robocov.mapfile import load_map
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
-from robocov.optimum import find_nearest_inside
 from robocov.simulation import Simulation, TeamState
 from robocov.team import Team
 
