@@ -1,14 +1,15 @@
-"""Gradient ascent on what is detected in view, with boosting functions that lead out of local optima."""
+"""Gradient ascent on the probability of detection in view, with boosts that lead out of local optima."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray, freeze
+from robocov.arrays import Array, freeze
 from robocov.compiled import kernel
 from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
@@ -21,9 +22,10 @@ from robocov.controllers.driving import (
     update_returns,
 )
 from robocov.controllers.gains import choice, gain, response_time_gain
-from robocov.observation import Decision, Observations, Scanning, compute_headings
+from robocov.observation import Decision, NearNeighbours, Observations, Scanning, compute_headings
 from robocov.observation.scanned_view import (
     View,
+    Windows,
     compute_step_fractions,
     compute_view,
     evaluate_density,
@@ -32,102 +34,182 @@ from robocov.observation.scanned_view import (
     is_path_clear,
 )
 
-_RINGS = 10  # places along each ray at which the integrals are sampled
-_SETTLED = 2.0  # seconds in which a robot that is at an optimum
-_STILL = 0.1  # moves less than this, m
-_CRUMB = 0.2  # metres between the places by which a robot goes back the way that it came
+_SAMPLES_PER_RAY = 10
+_SAMPLE_FRACTIONS = (np.arange(_SAMPLES_PER_RAY) + 0.5) / _SAMPLES_PER_RAY
+"""Points of each ray, as fractions of its length: samples of the integrals."""
+_SETTLE_TIME_S = 2.0
+"""A robot is at an optimum if for this time"""
+_REST_RADIUS_M = 0.1
+"""it has stayed within this distance."""
+_TRAIL_SPACING_M = 0.2
+"""Distance between the points of the trail on which a robot returns."""
+_RETURN_GAIN = 2.0
+"""Speed per metre of distance to the next point of the trail, 1/s."""
+_MIN_DISTANCE_M = 1e-3
+"""Distance that is used instead of a smaller one, by which is divided."""
+_MIN_DETECTION = 1e-3
+"""Probability of detection that is used instead of a smaller one, by which is divided."""
 
 
 class Mode(Enum):
-    """Objective that a robot follows."""
+    """What a robot follows."""
 
-    GRADIENT = "its gradient"
-    BOOSTED = "its boosted gradient"
-    BACK = "the way that it came, to the optimum before"
+    GRADIENT = "gradient"
+    BOOSTED = "boosted gradient"
+    RETURN = "trail back to the previous optimum"
+
+
+class BoostLimits(NamedTuple):
+    """Limits of the boosts of a robot."""
+
+    max_boosts: int
+    max_duration: float
+    """Maximum time of one boost, s."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Climb:
-    """Memory of one robot's ascent; places are (2,) m."""
+class Ascent:
+    """Ascent of one robot, part of its memory. Immutable."""
 
-    place: Array  # where it was
-    since: float  # at this time, s; it has hardly moved since
+    rest_position: Array
+    """(2,) m, position near which it has been since `rest_start`."""
+    rest_start: float
+    """s"""
     mode: Mode = Mode.GRADIENT
-    boosts: int = 0  # how often it was boosted
-    best: float = -math.inf  # m², what it added at the optimum before the boost
-    trail: tuple[Array, ...] = ()  # from that optimum to where it is
-    began: float = 0.0  # when the boost began, s
+    boosts: int = 0
+    """Number of boosts so far."""
+    best_value: float = -math.inf
+    """Contribution of the robot at the optimum before the boost, m²."""
+    trail: tuple[Array, ...] = ()
+    """Points from that optimum to the robot, (2,) m each."""
+    boost_start: float = 0.0
+    """s"""
 
-    def after(self, here: Array, time: float, added: float, most: int, longest: float) -> Climb:
-        """Return the climb when the robot is here at a time (s), and adds so much (m²) to what is detected.
+    def update(self, position: Array, time: float, value: float, limits: BoostLimits) -> Ascent:
+        """Return the ascent after a scan.
 
-        It is boosted so often at `most`, and no longer than so many seconds at once.
+        Parameters
+        ----------
+        position : (2,) array, m
+        time : float, s
+        value : float, m²
+            What the robot contributes to the objective at its position.
+        limits : BoostLimits
         """
-        climb = self
-        if math.dist(here, self.place) > _STILL:
-            climb = replace(climb, place=freeze(here), since=time)
-        if self.mode is Mode.BACK:
-            trail = self.trail[:-1] if math.dist(here, self.trail[-1]) < _CRUMB else self.trail
-            return replace(climb, trail=trail, mode=Mode.BACK if trail else Mode.GRADIENT)
-        if self.trail and math.dist(here, self.trail[-1]) > _CRUMB:
-            climb = replace(climb, trail=(*self.trail, freeze(here)))
-        settled = time - climb.since >= _SETTLED
-        if self.mode is Mode.BOOSTED:
-            done = settled or time - self.began >= longest
-            return replace(climb, mode=Mode.GRADIENT, since=time) if done else climb
-        if not settled:
-            return climb
-        if self.trail and added < self.best:
-            return replace(climb, mode=Mode.BACK, boosts=most, since=time)
-        if self.boosts >= most:
-            return replace(climb, trail=())
-        begun = replace(climb, mode=Mode.BOOSTED, boosts=self.boosts + 1, since=time, began=time)
-        return replace(begun, best=added, trail=(freeze(here),))
+        ascent = self
+        if math.dist(position, self.rest_position) > _REST_RADIUS_M:
+            ascent = replace(ascent, rest_position=freeze(position), rest_start=time)
+        if ascent.mode is Mode.RETURN:
+            return ascent._return(position)
+        if ascent.trail and math.dist(position, ascent.trail[-1]) > _TRAIL_SPACING_M:
+            ascent = replace(ascent, trail=(*ascent.trail, freeze(position)))
+        is_settled = time - ascent.rest_start >= _SETTLE_TIME_S
+        if ascent.mode is Mode.BOOSTED:
+            if is_settled or time - ascent.boost_start >= limits.max_duration:
+                return replace(ascent, mode=Mode.GRADIENT, rest_start=time)
+            return ascent
+        if is_settled:
+            return ascent._leave_optimum(position, time, value, limits.max_boosts)
+        return ascent
+
+    def _return(self, position: Array) -> Ascent:
+        """Return the ascent of a robot on its trail, without the point that it has reached."""
+        trail = self.trail
+        if math.dist(position, trail[-1]) < _TRAIL_SPACING_M:
+            trail = trail[:-1]
+        return replace(self, trail=trail, mode=Mode.RETURN if trail else Mode.GRADIENT)
+
+    def _leave_optimum(self, position: Array, time: float, value: float, max_boosts: int) -> Ascent:
+        """Return the ascent of a robot at an optimum: it returns to a better one, is boosted, or stays."""
+        if self.trail and value < self.best_value:
+            return replace(self, mode=Mode.RETURN, boosts=max_boosts, rest_start=time)
+        if self.boosts >= max_boosts:
+            return replace(self, trail=())
+        return replace(
+            self,
+            mode=Mode.BOOSTED,
+            boosts=self.boosts + 1,
+            rest_start=time,
+            boost_start=time,
+            best_value=value,
+            trail=(freeze(position),),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoostingMemory(Memory):
-    """Memory of the robots, with what they see, where that draws them, and their ascents."""
+    """Memory of the robots: their views in the last scan, and the motion that follows from these."""
 
     view: View | None = None
-    gradient: Array | None = None  # (n, 2) m, the one that each follows
-    step: Array | None = None  # (n,), the part of full speed with which it does
-    climbs: tuple[Climb, ...] = ()
+    gradient: Array | None = None
+    """(n, 2) m, gradient that each robot follows."""
+    step: Array | None = None
+    """(n,) Fraction of full speed with which each robot follows the gradient."""
+    ascents: tuple[Ascent, ...] = ()
+
+
+class Slopes(NamedTuple):
+    """Contribution of each robot to the objective, and how it changes with the robot's position."""
+
+    value: Array
+    """(n,) m²"""
+    gradient: Array
+    """(n, 2) m"""
+    boosted_gradient: Array
+    """(n, 2) m"""
+
+
+class _ViewSamples(NamedTuple):
+    """Samples of the views, (n, rays, k) each."""
+
+    depths: Array
+    """Distance from the robot, m."""
+    areas: Array
+    """Area that each sample stands for, m²."""
+    undetected: Array
+    """Φ, probability that no other robot detects the sample."""
+    detection: Array
+    """p, probability that the robot itself detects it."""
+    weight: Array
+    """w = φ Φ."""
 
 
 @dataclass(frozen=True)
 class Boosting(BaseController):
     """Coverage by joint detection, with boosting functions (Sun, Cassandras and Gokbayrak, CDC 2014).
 
-    A robot detects an event at x, in line of sight and at a distance d within its sensing range, with the
-    probability p_i = exp(-λ d); the team maximises
+    A robot detects an event at x, within its line of sight and its sensing range, with the probability
+    p_i = exp(-λ d) at the distance d. The team maximises
 
         H = ∫ φ(x) (1 - Π_i (1 - p_i(x))) dx
 
-    Robot i adds to it ∫ φ Φ_i p_i over what it sees, where Φ_i is the probability that none of the others
-    detects x. The gradient of that has three parts: w λ p_i towards each place in view, with w = φ Φ_i;
-    for each corner that hides something the integral of w p_i (s - ρ)/ρ along the edge of the view (see
-    `sight.Windows`); and, where the view ends for want of range, w p_i along that arc.
+    Notes
+    -----
+    Robot i contributes ∫ φ Φ_i p_i over its view, where Φ_i is the probability that no other robot detects x.
+    The gradient of that has three terms: w λ p_i towards each point in view, with w = φ Φ_i; for each corner
+    that hides something, the integral of w p_i (s - ρ)/ρ along the edge of the view (see `Windows`); and
+    w p_i along the arcs where the view ends at the sensing range.
 
-    At an optimum, where a robot comes to rest, the weight w is boosted, which makes another gradient:
+    At an optimum, where a robot comes to rest, the weight w is boosted, which gives another gradient:
 
-        phi         κ Φ_i^γ w: what nobody else detects counts more
-        p           κ (1 - Π (1 - p))^-γ w: so does what the whole team hardly detects
-        neighbours  w, and each neighbour in range pushes with κ / d^γ
+        phi         κ Φ_i^γ w: points that no other robot detects count more
+        p           κ (1 - Π (1 - p))^-γ w: points that the whole team hardly detects count more
+        neighbours  w, and each neighbour in range repels with κ / d^γ
 
-    A robot follows it until it rests again, or for `patience`, and then its own gradient to the next
-    optimum. If it adds less there than before, it goes back the way it came, and stays; so the process
-    ends no worse, but for what the others have changed meanwhile.
+    A robot follows it until it rests again, or for `patience`, and then its own gradient to the next optimum.
+    If it contributes less there than before, it returns on its trail, and stays. The result is therefore no
+    worse, apart from changes by the other robots in the meantime.
 
-    The objective is not the coverage cost: it counts detections in sight, decays exponentially and ends at
-    the sensing range, and nobody has to travel; robots gather where much is in view.
+    The objective is not the coverage cost: it counts detections within the line of sight, decays
+    exponentially and ends at the sensing range, and path lengths do not matter. Robots gather where much is
+    in view.
 
-    Taken from the paper's abstract and what is generally known of it (arXiv 1409.0776) and of its sequel by
-    Welikala and Cassandras (arXiv 1903.04133), not from their texts. Theirs know the map; here a robot goes
-    by its own scan, and a neighbour sees x for all it knows unless the line between them passes behind
-    something that the scan has met. Everybody boosts itself when it rests, without a
-    common beat. Decided here: the way back, the times, and that obstacles and robots are kept off. The
-    gains of the boost are of the kinds known, with values of ours.
+    The implementation follows the abstract of the paper (arXiv 1409.0776), that of its sequel by Welikala and
+    Cassandras (arXiv 1903.04133), and summaries of both, not their texts. There the map is known. Here a
+    robot uses its own scan, and assumes that a neighbour sees a point unless something that the scan has met
+    is in front of the line between them. Each robot boosts itself when it rests, without synchronisation. The
+    trail back, the times, and avoiding obstacles and robots are ours as well. The gains of the boosts are of
+    the known kinds, with our values.
     """
 
     name = "boosting"
@@ -136,104 +218,182 @@ class Boosting(BaseController):
     scanning = Scanning(rays=72, period=0.2)
     memory_type = BoostingMemory
 
-    decay: float = gain(0.1, "1/m", "λ, how fast detection falls with distance", low=1e-3, high=100.0)
-    boost: str = choice("phi", ("phi", "p", "neighbours"), "the boosting function")
-    kappa: float = gain(1.0, "1", "κ, its size; for neighbours in m^(1+γ)")
+    decay: float = gain(
+        0.1, "1/m", "λ, rate at which detection decreases with distance", low=1e-3, high=100.0
+    )
+    boost: str = choice("phi", ("phi", "p", "neighbours"), "boosting function")
+    kappa: float = gain(1.0, "1", "κ, its factor; for neighbours in m^(1+γ)")
     gamma: float = gain(2.0, "1", "γ, its exponent", high=20.0)
-    boosts: float = gain(3.0, "times", "how often a robot is boosted at most", whole=True, high=1e3)
-    patience: float = gain(8.0, "s", "longest time for which it is boosted at once")
-    k_grad: float = gain(0.3, "1/s", "wanted speed per metre of the gradient", high=100.0)
-    jump: float = gain(0.3, "m", "depth of a step in the view that is a window", low=0.01)
+    boosts: float = gain(3.0, "times", "maximum number of boosts of a robot", whole=True, high=1e3)
+    patience: float = gain(8.0, "s", "maximum duration of a boost")
+    k_grad: float = gain(0.3, "1/s", "desired speed per metre of the gradient", high=100.0)
+    jump: float = gain(0.3, "m", "minimum step of the depth in view at a window", low=0.01)
     clearance: float = gain(0.05, "m", "distance kept from obstacles and robots, rim to rim", high=10.0)
     response_time: float = response_time_gain()
 
     def decide(self, seen: Observations, memory: BoostingMemory) -> Decision:
-        team, gradient, step, climbs = memory.team, memory.gradient, memory.step, memory.climbs
+        team = memory.team
         reach = np.minimum(team.sensing_range, seen.region.diameter)
         view = compute_view(seen, memory.view, self.scanning, reach)
+        gradient = memory.gradient
+        step = memory.step
+        ascents = memory.ascents
         if gradient is None or step is None or seen.scans is not None:
-            before = gradient
-            climbs = climbs or tuple(Climb(freeze(place), seen.time) for place in seen.positions)
-            added, gradient, boosted = self.slopes(seen, view, reach)
-            now = zip(climbs, seen.positions, added.tolist(), strict=True)
-            often, longest = int(self.boosts), self.patience
-            climbs = tuple(own.after(here, seen.time, value, often, longest) for own, here, value in now)
-            follows = np.array([climb.mode is Mode.BOOSTED for climb in climbs])
-            gradient = np.where(follows[:, None], boosted, gradient)
-            step = compute_step_fractions(gradient, before, step)
-        wanted = compute_approach_velocities(gradient, self.k_grad, team.max_speed) * step[:, None]
-        for i, climb in enumerate(climbs):
-            if climb.mode is Mode.BACK:
-                wanted[i] = compute_approach_velocities(
-                    (climb.trail[-1] - seen.positions[i])[None], 2.0, team.max_speed[i]
-                )[0]
-        returns, keep = update_returns(seen, memory.returns), team.radius + self.clearance
-        points, apart = collect_obstacle_points(seen, returns), keep + float(team.radius.max())
-        wanted = avoid_collisions(wanted, seen, team, points, Margins(keep, apart, 4.0, 0.5))
-        forces = compute_drive_forces(wanted, seen, team, self.response_time)
-        memory = BoostingMemory(team, returns, None, view, gradient, step, climbs)
-        return Decision(forces, terms={"attraction": forces}, memory=memory)
+            slopes = self.compute_slopes(seen, view, reach)
+            ascents = self._update_ascents(ascents, seen, slopes.value)
+            is_boosted = np.array([ascent.mode is Mode.BOOSTED for ascent in ascents])
+            gradient = np.where(is_boosted[:, None], slopes.boosted_gradient, slopes.gradient)
+            step = compute_step_fractions(gradient, memory.gradient, step)
+        velocities = compute_approach_velocities(gradient, self.k_grad, team.max_speed) * step[:, None]
+        for robot, ascent in enumerate(ascents):
+            if ascent.mode is Mode.RETURN:
+                offset = (ascent.trail[-1] - seen.positions[robot])[None]
+                max_speed = team.max_speed[robot : robot + 1]
+                velocities[robot] = compute_approach_velocities(offset, _RETURN_GAIN, max_speed)[0]
+        returns = update_returns(seen, memory.returns)
+        margins = Margins.build_with_gap(team, self.clearance)
+        obstacle_points = collect_obstacle_points(seen, returns)
+        velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
+        forces = compute_drive_forces(velocities, seen, team, self.response_time)
+        return Decision(
+            forces=forces,
+            terms={"attraction": forces},
+            memory=BoostingMemory(
+                team=team, returns=returns, view=view, gradient=gradient, step=step, ascents=ascents
+            ),
+        )
 
-    def slopes(self, seen: Observations, view: View, reach: Array) -> tuple[Array, Array, Array]:
-        """Return what each robot adds to H, (n,) m², and its gradient and its boosted one, (n, 2) m each."""
-        n, rays = view.distances.shape
-        directions, turn = compute_headings(rays), 2.0 * np.pi / rays
-        robot, other, offset, distance = seen.find_near_neighbours(2.0 * float(reach.max()))
-        middle = (np.arange(_RINGS) + 0.5) / _RINGS
-        along = view.distances[..., None] * middle  # (n, rays, rings) m
-        places = seen.positions[:, None, None] + along[..., None] * directions[:, None]
-        walls = np.where(view.hit, view.distances, np.inf)
-        alone = undetected(along, walls, directions, robot, other, -offset, reach, self.decay)
-        own = np.exp(-self.decay * along)
-        weight = evaluate_density(seen.density, places) * alone
-        area = along * (view.distances / _RINGS * turn)[..., None]
-        added = (weight * own * area).sum(axis=(1, 2))
-        boosted = weight
-        if self.boost == "phi":
-            boosted = self.kappa * alone**self.gamma * weight
-        elif self.boost == "p":
-            detected = 1.0 - alone * (1.0 - own)
-            boosted = self.kappa * np.maximum(detected, 1e-3) ** -self.gamma * weight
+    def _update_ascents(
+        self, ascents: tuple[Ascent, ...], seen: Observations, values: Array
+    ) -> tuple[Ascent, ...]:
+        """Return the ascents after a scan."""
+        if not ascents:
+            ascents = tuple(Ascent(freeze(position), seen.time) for position in seen.positions)
+        limits = BoostLimits(int(self.boosts), self.patience)
+        return tuple(
+            ascent.update(position, seen.time, value, limits)
+            for ascent, position, value in zip(ascents, seen.positions, values.tolist(), strict=True)
+        )
 
-        edges = find_windows(view, directions, reach, self.jump)
-        ends = ~view.hit * np.exp(-self.decay * reach)[:, None] * reach[:, None] * turn
-        gradients = []
-        for each in (weight, boosted):
-            density = each * own
-            towards = self.decay * (density * area).sum(axis=2) + each[..., -1] * ends
-            past = np.maximum(along[edges.robot, edges.ray] - edges.corner[:, None], 0.0)
-            swept = (density[edges.robot, edges.ray] * past).sum(axis=1) / np.maximum(edges.corner, 1e-3)
-            swept *= view.distances[edges.robot, edges.ray] / _RINGS
-            gradients.append(
-                (towards[..., None] * directions).sum(axis=1)
-                + sum_by_robot(edges.robot, swept[:, None] * edges.across, n)
-            )
+    def compute_slopes(self, seen: Observations, view: View, reach: Array) -> Slopes:
+        """Compute what each robot contributes to H, with its gradient and its boosted gradient.
+
+        Parameters
+        ----------
+        seen : Observations
+        view : View
+        reach : (n,) array, m
+            Maximum distance of each robot's view.
+        """
+        directions = compute_headings(view.distances.shape[1])
+        pairs = seen.find_near_neighbours(2.0 * float(reach.max()))
+        samples = self._sample_views(seen, view, pairs, directions, reach)
+        windows = find_windows(view, directions, reach, self.jump)
+        boosted_gradient = self._compute_gradient(
+            self._boost_weight(samples), samples, view, windows, directions, reach
+        )
         if self.boost == "neighbours":
-            push = self.kappa / np.maximum(distance, 1e-3) ** (self.gamma + 1.0)
-            gradients[1] = gradients[1] + sum_by_robot(robot, push[:, None] * offset, n)
-        return added, gradients[0], gradients[1]
+            repulsion = self.kappa / np.maximum(pairs.distance, _MIN_DISTANCE_M) ** (self.gamma + 1.0)
+            boosted_gradient = boosted_gradient + sum_by_robot(
+                pairs.robot, repulsion[:, None] * pairs.offset, len(reach)
+            )
+        return Slopes(
+            value=(samples.weight * samples.detection * samples.areas).sum(axis=(1, 2)),
+            gradient=self._compute_gradient(samples.weight, samples, view, windows, directions, reach),
+            boosted_gradient=boosted_gradient,
+        )
+
+    def _sample_views(
+        self, seen: Observations, view: View, pairs: NearNeighbours, directions: Array, reach: Array
+    ) -> _ViewSamples:
+        """Sample the views of all robots."""
+        angle = 2.0 * np.pi / len(directions)
+        depths = view.distances[..., None] * _SAMPLE_FRACTIONS
+        points = seen.positions[:, None, None] + depths[..., None] * directions[:, None]
+        walls = np.where(view.hit, view.distances, np.inf)
+        undetected = compute_undetected(depths, walls, directions, pairs, reach, self.decay)
+        return _ViewSamples(
+            depths=depths,
+            areas=depths * (view.distances / _SAMPLES_PER_RAY * angle)[..., None],
+            undetected=undetected,
+            detection=np.exp(-self.decay * depths),
+            weight=evaluate_density(seen.density, points) * undetected,
+        )
+
+    def _boost_weight(self, samples: _ViewSamples) -> Array:
+        """Return the boosted weight of the samples, (n, rays, k)."""
+        if self.boost == "phi":
+            return np.asarray(self.kappa * samples.undetected**self.gamma * samples.weight)
+        if self.boost == "p":
+            detected = 1.0 - samples.undetected * (1.0 - samples.detection)
+            factor = self.kappa * np.maximum(detected, _MIN_DETECTION) ** -self.gamma
+            return np.asarray(factor * samples.weight)
+        return samples.weight
+
+    def _compute_gradient(
+        self,
+        weight: Array,
+        samples: _ViewSamples,
+        view: View,
+        windows: Windows,
+        directions: Array,
+        reach: Array,
+    ) -> Array:
+        """Return the gradient of the integral of a weight times p over the views, (n, 2) m."""
+        density = weight * samples.detection
+        angle = 2.0 * np.pi / len(directions)
+        arcs = ~view.hit * np.exp(-self.decay * reach)[:, None] * reach[:, None] * angle
+        inward = self.decay * (density * samples.areas).sum(axis=2) + weight[..., -1] * arcs
+        window_depths = samples.depths[windows.robot, windows.ray]
+        beyond_corner = np.maximum(window_depths - windows.corner[:, None], 0.0)
+        swept = (density[windows.robot, windows.ray] * beyond_corner).sum(axis=1)
+        swept /= np.maximum(windows.corner, _MIN_DISTANCE_M)
+        swept *= view.distances[windows.robot, windows.ray] / _SAMPLES_PER_RAY
+        window_terms = sum_by_robot(windows.robot, swept[:, None] * windows.across, len(reach))
+        return np.asarray((inward[..., None] * directions).sum(axis=1) + window_terms)
 
 
 @kernel
-def undetected(
-    along: Array, walls: Array, directions: Array, robot: IntArray, other: IntArray, towards: Array,
-    reach: Array, decay: float,
-) -> Array:  # fmt: skip
-    """Return the probability that no neighbour detects what is (n, rays, k) m along each ray, the same shape.
+def compute_undetected(
+    depths: Array, walls: Array, directions: Array, pairs: NearNeighbours, reach: Array, decay: float
+) -> Array:
+    """Compute the probability that no neighbour detects the points of each robot's view.
 
-    Pairs, (m,), are of robots and their neighbours, (m, 2) m off. A neighbour detects within its reach,
-    (n,) m, what is joined to it by a line in front of the walls that the robot sees, (n, rays) m.
+    Parameters
+    ----------
+    depths : (n, rays, k) array, m
+        Distances of the points along each ray.
+    walls : (n, rays) array, m
+        Distances of the walls in view; infinite where there is none.
+    directions : (rays, 2) array
+        Unit vectors along the rays.
+    pairs : NearNeighbours
+        The neighbours that may see points of the view: within their own reach, unless a wall that the robot
+        sees is in front of the line between neighbour and point.
+    reach : (n,) array, m
+        Maximum distance of each robot's view.
+    decay : float, 1/m
+        λ.
+
+    Returns
+    -------
+    (n, rays, k) array
     """
-    result = np.ones(along.shape)
-    for m in range(len(robot)):
-        i, far = robot[m], reach[other[m]]
-        if is_behind_wall(towards[m, 0], towards[m, 1], walls[i]):
+    undetected = np.ones(depths.shape)
+    for m in range(len(pairs.robot)):
+        i = pairs.robot[m]
+        neighbour_x = -pairs.offset[m, 0]
+        neighbour_y = -pairs.offset[m, 1]
+        neighbour_reach = reach[pairs.neighbour[m]]
+        if is_behind_wall(neighbour_x, neighbour_y, walls[i]):
             continue
         for r in range(len(directions)):
-            for c in range(along.shape[2]):
-                x, y = along[i, r, c] * directions[r, 0], along[i, r, c] * directions[r, 1]
-                dx, dy = towards[m, 0] - x, towards[m, 1] - y
+            for c in range(depths.shape[2]):
+                x = depths[i, r, c] * directions[r, 0]
+                y = depths[i, r, c] * directions[r, 1]
+                dx = neighbour_x - x
+                dy = neighbour_y - y
                 distance = math.sqrt(dx * dx + dy * dy)
-                if distance <= far and is_path_clear(x, y, dx, dy, walls[i]):
-                    result[i, r, c] *= 1.0 - math.exp(-decay * distance)
-    return result
+                if distance <= neighbour_reach and is_path_clear(x, y, dx, dy, walls[i]):
+                    undetected[i, r, c] *= 1.0 - math.exp(-decay * distance)
+    return undetected

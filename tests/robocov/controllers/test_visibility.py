@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.controllers import Boosting, Visibility
-from robocov.controllers.boosting import Climb, Mode, undetected
+from robocov.controllers.boosting import Ascent, BoostLimits, Mode, compute_undetected
 from robocov.controllers.visibility import find_cells_in_view
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, PolygonObstacle
-from robocov.observation import Observations, compute_headings
+from robocov.observation import NearNeighbours, Observations, compute_headings
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.observation.scanned_view import View, compute_step_fractions, find_windows
@@ -102,10 +102,10 @@ def test_the_gradient_is_that_of_the_probability_of_detection(
 ) -> None:
     seen = observe(np.array([position]), density)
     view = scan_room(seen.positions[0], 1440, 3.0)
-    added, gradient, _ = Boosting(jump=0.1, decay=0.5).slopes(seen, view, np.array([3.0]))
-    assert added[0] == pytest.approx(integrate_view(seen.positions[0], 3.0, 0.5, density), rel=0.01)
+    slopes = Boosting(jump=0.1, decay=0.5).compute_slopes(seen, view, np.array([3.0]))
+    assert slopes.value[0] == pytest.approx(integrate_view(seen.positions[0], 3.0, 0.5, density), rel=0.01)
     expected = differentiate_view(seen.positions[0], 3.0, 0.5, density)
-    np.testing.assert_allclose(gradient[0], expected, atol=0.06 * np.hypot(*expected) + 0.05)
+    np.testing.assert_allclose(slopes.gradient[0], expected, atol=0.06 * np.hypot(*expected) + 0.05)
 
 
 @settings(max_examples=25)
@@ -188,42 +188,46 @@ def test_steps_are_halved_when_the_gradient_turns_back() -> None:
 
 
 def test_a_neighbour_behind_a_wall_detects_nothing_here() -> None:
-    """What Φ counts: the product over those whose line to the place is in front of walls."""
+    """Φ is the product over the neighbours whose line to the point is in front of walls."""
     directions = compute_headings(72)
-    along = np.full((1, 72, 1), 1.0)
+    depths = np.full((1, 72, 1), 1.0)
     walls = np.full((1, 72), np.inf)
-    pair = np.array([0]), np.array([1]), np.array([[2.0, 0.0]])
+    pairs = NearNeighbours(np.array([0]), np.array([1]), np.array([[-2.0, 0.0]]), np.array([2.0]))
     reach = np.full(2, 3.0)
-    free = undetected(along, walls, directions, *pair, reach, 0.5)
+    undetected = compute_undetected(depths, walls, directions, pairs, reach, 0.5)
     distance = np.hypot(*(directions - [2.0, 0.0]).T)
     expected = np.where(distance <= 3.0, 1.0 - np.exp(-0.5 * distance), 1.0)
-    np.testing.assert_allclose(free[0, :, 0], expected)
-    walls[0, :5] = walls[0, -4:] = 1.5  # a wall between the two
-    assert (undetected(along, walls, directions, *pair, reach, 0.5) == 1.0).all()
+    np.testing.assert_allclose(undetected[0, :, 0], expected)
+    # A wall between the two robots.
+    walls[0, :5] = 1.5
+    walls[0, -4:] = 1.5
+    assert (compute_undetected(depths, walls, directions, pairs, reach, 0.5) == 1.0).all()
 
 
-def test_boosts_push_to_where_nobody_detects() -> None:
-    """Two robots side by side: either is boosted away from the other."""
+def test_boosts_lead_to_where_no_robot_detects() -> None:
+    """Two robots next to each other are boosted away from each other."""
     seen = observe(np.array([[4.0, 4.0], [4.8, 4.0]]))
     view = View(np.full((2, 72), 3.0), np.zeros((2, 72), dtype=bool))
-    for word in ("phi", "p", "neighbours"):
-        _, plain, boosted = Boosting(boost=word).slopes(seen, view, np.full(2, 3.0))
-        assert not np.allclose(plain, boosted)
-        assert boosted[0, 0] < 0.0 < boosted[1, 0]
+    for boost in ("phi", "p", "neighbours"):
+        slopes = Boosting(boost=boost).compute_slopes(seen, view, np.full(2, 3.0))
+        assert not np.allclose(slopes.gradient, slopes.boosted_gradient)
+        assert slopes.boosted_gradient[0, 0] < 0.0 < slopes.boosted_gradient[1, 0]
 
 
-def test_a_climb_is_boosted_from_rest_and_goes_back_when_it_adds_less() -> None:
-    climb, here, time = Climb(np.zeros(2), 0.0), np.zeros(2), 0.0
+def test_an_ascent_is_boosted_at_rest_and_returns_to_a_better_optimum() -> None:
+    ascent = Ascent(np.zeros(2), 0.0)
+    position = np.zeros(2)
+    time = 0.0
     modes = []
     for _ in range(200):
         time += 0.2
-        added = 5.0 - np.hypot(*here)
-        climb = climb.after(here, time, added, 1, 4.0)
-        modes.append(climb.mode)
-        if climb.mode is Mode.BOOSTED:
-            here = here + [0.1, 0.0]
-        elif climb.mode is Mode.BACK:
-            here = here + 0.5 * (climb.trail[-1] - here)
+        value = 5.0 - np.hypot(*position)
+        ascent = ascent.update(position, time, value, BoostLimits(max_boosts=1, max_duration=4.0))
+        modes.append(ascent.mode)
+        if ascent.mode is Mode.BOOSTED:
+            position = position + [0.1, 0.0]
+        elif ascent.mode is Mode.RETURN:
+            position = position + 0.5 * (ascent.trail[-1] - position)
     order = [mode for k, mode in enumerate(modes) if k == 0 or mode is not modes[k - 1]]
-    assert order == [Mode.GRADIENT, Mode.BOOSTED, Mode.GRADIENT, Mode.BACK, Mode.GRADIENT]
-    assert np.hypot(*here) < 0.2
+    assert order == [Mode.GRADIENT, Mode.BOOSTED, Mode.GRADIENT, Mode.RETURN, Mode.GRADIENT]
+    assert np.hypot(*position) < 0.2
