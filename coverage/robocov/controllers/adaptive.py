@@ -57,7 +57,7 @@ class Adaptive(BaseController):
     A robot measures the density at its own position, and nowhere else. Its estimate of the density is
     K(q)·a_i, with basis functions K, here Gaussians on a grid of `basis` by `basis`, divided by their sum, so
     that a constant density is represented exactly. All robots start with `prior` everywhere. Each moves to
-    the centroid C_i of its Voronoi cell V_i by its own estimate, and learns on the way:
+    the centroid C_i of its Voronoi cell V_i by its own estimate, and learns while it moves:
 
         dΛ_i/dt = w K K^T,  dλ_i/dt = w K φ,                        at its position p_i
         da_i/dt = γ (λ_i - Λ_i a_i) + k P_i (C_i - p_i) + ζ Σ_j (a_j - a_i) / deg_i,    a_i >= `least`
@@ -74,7 +74,7 @@ class Adaptive(BaseController):
     compute, robots are drawn to where no robot has been.
 
     The controller reads the density of the map at the positions of the robots, and nowhere else. Neighbours
-    exchange what they have learned, therefore its information is a shared map. A robot without neighbours
+    exchange their estimates, therefore its information is a shared map. A robot without neighbours
     learns alone, and takes the whole region for its cell. Obstacles are not known; the robot slides along
     them, as with `lloyd`.
 
@@ -120,6 +120,7 @@ class Adaptive(BaseController):
         )
 
     def decide(self, seen: Observations, memory: AdaptiveMemory) -> Decision:
+        """Compute the forces towards the centroids, after a new estimate if it is time for one."""
         next_plan_time = memory.plan_time + self.period - _TIME_TOLERANCE_S
         if memory.goals is None or not memory.plan_time <= seen.time < next_plan_time:
             memory = self._plan(seen, memory)

@@ -96,6 +96,7 @@ class Barrier(BaseController):
     cells: str = cells_choice()
 
     def decide(self, seen: Observations, memory: BarrierMemory) -> Decision:
+        """Compute the forces of the certified accelerations that are nearest to Lloyd's."""
         team = memory.team
         cells = compute_known_cells(seen, self.cells, memory.triangulation)
         velocities = compute_approach_velocities(cells.centroid - seen.positions, self.k_prop, team.max_speed)

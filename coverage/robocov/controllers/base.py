@@ -23,8 +23,8 @@ from the start ("whole map")."""
 class Controller(Protocol):
     """A controller of a whole team: a frozen dataclass of gains, without state of its own.
 
-    Row i of a decision may depend only on what robot i knows (see `robocov.observation`). Whatever the robots
-    remember is passed through `Decision.memory`; a run can therefore be copied, rewound and branched.
+    Row i of a decision may depend only on what robot i knows (see `robocov.observation`). The memory
+    of the robots is passed through `Decision.memory`; a run can therefore be copied, rewound and branched.
 
     Optional members are
 

@@ -52,7 +52,7 @@ _MIN_DETECTION = 1e-3
 
 
 class Mode(Enum):
-    """What a robot follows."""
+    """Objective that a robot follows."""
 
     GRADIENT = "gradient"
     BOOSTED = "boosted gradient"
@@ -93,7 +93,7 @@ class Ascent:
         position : (2,) array, m
         time : float, s
         value : float, m²
-            What the robot contributes to the objective at its position.
+            Contribution of the robot to the objective at its position.
         limits : BoostLimits
         """
         ascent = self
@@ -232,6 +232,7 @@ class Boosting(BaseController):
     response_time: float = response_time_gain()
 
     def decide(self, seen: Observations, memory: BoostingMemory) -> Decision:
+        """Compute the forces that drive each robot along its gradient, boosted gradient or trail."""
         team = memory.team
         reach = np.minimum(team.sensing_range, seen.region.diameter)
         view = compute_view(seen, memory.view, self.scanning, reach)

@@ -200,7 +200,7 @@ def get_gains(controller: Any) -> dict[str, Gain | Option]:
     Parameters
     ----------
     controller : object or type
-        A controller, or a class of controllers. What is no dataclass has no gains.
+        A controller, or a class of controllers. Only dataclasses have gains.
 
     Returns
     -------
@@ -273,15 +273,15 @@ def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any
     """
     gains = get_gains(kind)
     where = getattr(kind, "name", kind.__name__)
-    arguments = {}
+    checked_values = {}
     for name, value in values.items():
         if not gains:
             raise ParameterError(f"{where}.{name}: controller {where!r} has no gains")
         if name not in gains:
             raise ParameterError(f"{where}: {describe_unknown_name('gain', name, gains)}")
-        arguments[name] = gains[name].validate(value, where)
+        checked_values[name] = gains[name].validate(value, where)
     try:
-        return kind(**arguments)
+        return kind(**checked_values)
     except (RobocovError, KeyboardInterrupt):
         raise
     except BaseException as error:

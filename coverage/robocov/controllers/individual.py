@@ -40,7 +40,7 @@ class OwnView:
     heading: float | None = None
     """Heading of a unicycle, rad from +x; None in a team of points."""
     memory: Any = None
-    """Memory of the robot: what ``begin`` returned, or what was assigned here in the last step."""
+    """Memory of the robot: the value that ``begin`` returned, or that was assigned here in the last step."""
 
     @property
     def centroid(self) -> Array:

@@ -28,7 +28,7 @@ def compute_known_cells(
     metric : {"distance", "time"}
         Whether a point belongs to the nearest robot, or to the one that reaches it first. Cells by time are
         multiplicatively weighted by the maximum speeds. If all robots are equally fast, or no speeds are
-        known, they are the same as by distance, bit for bit.
+        known, they equal the cells by distance, bit for bit.
     triangulation : (2, 8 n + 4) int32 array or None
         `Cells.triangulation` of the previous step, which saves time.
 

@@ -329,7 +329,7 @@ class _TextFinder(importlib.abc.MetaPathFinder):
 
 @contextmanager
 def provide_modules(modules: Mapping[str, ModuleText]) -> Iterator[None]:
-    """Import modules from their texts while the context lasts, whatever else has their names.
+    """Import modules from their texts while the context lasts, in place of others of the same names.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,13 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.controllers import (
-    CONTROLLERS,
     GeodesicLloyd,
-    IndividualControllerAdapter,
     Lloyd,
-    Rapf,
-    get_information,
-    has_memory,
     inform_controller,
     make_controller,
 )
@@ -155,57 +150,6 @@ def test_a_simulation_informs_the_controller_and_keeps_the_original() -> None:
     goals = opened.observe_and_decide().decision.goals
     assert goals is not None
     np.testing.assert_allclose(goals, fresh.observe_and_decide().decision.goals, atol=0.05)
-
-
-def test_each_controller_states_its_information() -> None:
-    information = {name: get_information(kind) for name, kind in CONTROLLERS.items()}
-    whole_map = {name for name, stated in information.items() if stated == "whole map"}
-    shared_map = {name for name, stated in information.items() if stated == "shared map"}
-    assert whole_map == {"geodesic-lloyd", "diffeomorphism"}
-    assert shared_map == {
-        "adaptive",
-        "atlas-shared",
-        "frontier-median",
-        "greedy-submodular",
-        "voronoi-graph",
-    }
-    for name, kind in CONTROLLERS.items():
-        assert hasattr(kind, "inform") == (name in whole_map)
-
-
-def test_only_controllers_that_state_it_get_the_map() -> None:
-    class Cheat(Rapf):
-        def inform(self, environment: Environment) -> Rapf:
-            return self
-
-    assert inform_controller(Rapf(), SQUARE) == Rapf()
-    with pytest.raises(ParameterError, match=r"information: expected 'whole map', because .* got 'own'"):
-        inform_controller(Cheat(), SQUARE)
-
-
-def test_unknown_information_is_rejected() -> None:
-    class Vague(Rapf):
-        information = "everything"
-
-    with pytest.raises(ParameterError, match=r"information: expected one of own, .* got 'everything'"):
-        inform_controller(Vague(), SQUARE)
-
-
-def test_an_individual_controller_states_its_information() -> None:
-    @dataclass(frozen=True)
-    class Individual:
-        information = "shared map"
-
-        def force(self, own: object) -> list[float]:
-            return [0.0, 0.0]
-
-    assert get_information(IndividualControllerAdapter(Individual())) == "shared map"
-
-
-def test_controllers_that_decide_by_their_memory_are_known() -> None:
-    assert not has_memory(Rapf())
-    assert has_memory(GeodesicLloyd())
-    assert has_memory(make_controller("howard"))
 
 
 def test_robots_plan_by_the_robots_that_they_hear_and_the_density() -> None:

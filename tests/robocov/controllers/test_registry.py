@@ -1,0 +1,100 @@
+"""Controllers by name: built in, and in files of users."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robocov.controllers import (
+    CONTROLLERS,
+    RECOMMENDED_CONTROLLER,
+    Controller,
+    GeodesicLloyd,
+    Lloyd,
+    OwnView,
+    Rapf,
+    has_memory,
+    make_controller,
+)
+from robocov.controllers.individual import to_team_controller
+from robocov.errors import ParameterError
+from robocov.observation import Observations
+from robocov.observation.neighbours import Neighbours
+from robocov.observation.region import Region
+
+REGION = Region(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 8.0], [0.0, 8.0]]))
+
+
+def test_the_recommended_controller_is_built_in() -> None:
+    assert RECOMMENDED_CONTROLLER in CONTROLLERS
+
+
+def test_an_unknown_name_is_rejected_with_the_most_similar_one() -> None:
+    with pytest.raises(ParameterError, match=r"unknown controller 'raff': did you mean 'rapf'\?"):
+        make_controller("raff")
+
+
+def test_controllers_whose_memory_only_saves_time_have_none() -> None:
+    assert not has_memory(Rapf())
+    assert not has_memory(Lloyd())
+    assert has_memory(GeodesicLloyd())
+    assert has_memory(make_controller("howard"))
+
+
+def test_individual_controllers_may_assign_memory_also_without_begin() -> None:
+    class Homing:
+        def force(self, own: OwnView) -> np.ndarray:
+            return own.centroid - own.position
+
+    assert has_memory(to_team_controller(Homing()))
+
+
+@pytest.fixture
+def controller_file(tmp_path: Path) -> Path:
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "from dataclasses import dataclass\n"
+        "import robocov as rc\n"
+        "@dataclass(frozen=True)\n"
+        "class Mine:\n"
+        "    stiffness: float = rc.gain(0.5, 'N/m', 'pull')\n"
+        "    def force(self, own):\n"
+        "        return self.stiffness * (own.centroid - own.position)\n"
+        "class Plain:\n"
+        "    pass\n"
+        "class Thawed:\n"
+        "    def force(self, own):\n"
+        "        return [0.0, 0.0]\n"
+    )
+    return file
+
+
+def test_a_controller_in_a_file_is_made_with_its_gains(controller_file: Path) -> None:
+    controller = make_controller(f"{controller_file}:Mine", {"stiffness": 2})
+    assert isinstance(controller, Controller)
+    assert controller.name == "Mine"
+    positions = np.array([[4.0, 4.0], [6.0, 5.0]])
+    seen = Observations(positions, np.zeros((2, 2)), Neighbours(2), np.full((2, 2), np.nan), REGION)
+    decision = controller.decide(seen, None)
+    assert decision.goals is not None
+    np.testing.assert_allclose(decision.forces, 2.0 * (decision.goals - positions))
+
+
+def test_mistakes_in_the_name_of_a_file_or_class_are_explained(controller_file: Path) -> None:
+    for name, message in [
+        (f"{controller_file}:Nine", "did you mean 'Mine'"),
+        (f"{controller_file}:Plain", "Plain: expected a class with a method decide"),
+        (f"{controller_file}:Thawed", "Thawed: expected a frozen dataclass"),
+        (f"{controller_file.parent}/no.py:Mine", "file not found"),
+        (f"{controller_file}", "expected a file and a class"),
+    ]:
+        with pytest.raises(ParameterError, match=message):
+            make_controller(name)
+
+
+def test_errors_in_a_file_are_explained(controller_file: Path) -> None:
+    controller_file.write_text("1/0\n")
+    with pytest.raises(ParameterError, match=r"ZeroDivisionError: division by zero \(mine.py, line 1\)"):
+        make_controller(f"{controller_file}:Mine")
