@@ -1,7 +1,7 @@
-"""Safe velocities towards goals, and the forces that bring them about.
+"""Safe velocities towards goals, and the forces that track them.
 
-A controller computes a desired velocity, `avoid_collisions` returns the nearest velocity that is safe by what
-the robot senses and hears, and `compute_drive_forces` the force that tracks it.
+A controller computes a desired velocity, `avoid_collisions` returns the nearest velocity that is safe as far
+as the robot senses and hears, and `compute_drive_forces` returns the force that tracks it.
 """
 
 from __future__ import annotations

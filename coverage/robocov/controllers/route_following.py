@@ -21,30 +21,32 @@ from robocov.team import Team
 _WAYPOINT_RADIUS_M = 0.2
 """Distance from a waypoint at which it counts as reached."""
 _BRAKING_FRACTION = 0.4
-"""Fraction of the maximum acceleration that is counted on: less than half, for the lag of the drive."""
+"""Fraction of the maximum acceleration that is for braking: less than half, because the drive lags."""
 _STEERING_FRACTION = 0.7
-"""Fraction of the maximum acceleration that is spent on following the route; the rest avoids collisions."""
+"""Fraction of the maximum acceleration that is used to follow the route; the rest avoids collisions."""
 _WALL_GAP_M = 0.02
+"""Gap between a robot and walls."""
 _ROBOT_GAP_M = 0.04
+"""Gap between two robots."""
 _APPROACH_RATE = 10.0
 """Rate in 1/s at which a distance may fall to its gap."""
 _MIN_SPEED_LIMIT = 0.15
-"""Speed in m/s at which a robot may always move, however close it is to a wall."""
+"""Speed in m/s that a robot may reach even close to a wall."""
 _MAX_EVASION_SPEED = 0.3
-"""Maximum speed in m/s to the left of a robot that is in the way."""
+"""Maximum speed in m/s with which a robot passes another one on the left."""
 _EVASION_RANGE_M = 1.5
 """Distance from which robots pass each other on the left."""
 
 
 class RouteCommand(NamedTuple):
-    """How robots follow their routes in one step."""
+    """Forces that lead robots along their routes in one step."""
 
     forces: Array
     """(n, 2) N"""
     goals: Array
     """(n, 2) m, ends of the routes."""
     legs: IntArray
-    """(n,) Number of the waypoint that each robot heads for now."""
+    """(n,) Index of the waypoint that each robot heads for now."""
 
 
 def follow_routes(
@@ -65,7 +67,7 @@ def follow_routes(
     routes : sequence of (w, 2) arrays, m
         Waypoints of each robot; the last one is the goal.
     legs : (n,) int array
-        Number of the waypoint that each robot headed for.
+        Index of the waypoint that each robot headed for.
     returns : (n, rays, 2) array or None, m
         Points of the last scans, as `driving.update_returns` returns them.
     k_prop : float, 1/s
@@ -116,7 +118,7 @@ def _select_waypoints(routes: Sequence[Array], legs: IntArray) -> Array:
 def _compute_speed_limits(seen: Observations, team: Team) -> Array:
     """Return the speed, (n,) m/s, at which each robot can still stop before the nearest obstacle.
 
-    What is behind a corner comes into sight late: in a narrow passage nothing is far away.
+    Robots are slow in narrow passages, because obstacles behind a corner come into view late.
     """
     gap = np.maximum(np.hypot(*(seen.positions - seen.obstacle_points).T) - team.radius, 0.0)
     braking = _BRAKING_FRACTION * team.max_acceleration
@@ -125,7 +127,7 @@ def _compute_speed_limits(seen: Observations, team: Team) -> Array:
 
 
 def _compute_evasion(seen: Observations, team: Team, velocities: Array, separation: Array) -> Array:
-    """Return velocities, (n, 2) m/s, to the left of the robot that each approaches the most too fast."""
+    """Return velocities, (n, 2) m/s, to the left of the other robot that each one approaches too fast."""
     offsets = list_neighbour_offsets(seen, _EVASION_RANGE_M)
     if not offsets.shape[1]:
         return np.zeros_like(velocities)

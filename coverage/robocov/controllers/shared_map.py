@@ -1,4 +1,4 @@
-"""Base class of controllers that plan for their team on a map that robots share if they hear each other."""
+"""Base class of controllers that plan for the team on maps that robots within range share."""
 
 from __future__ import annotations
 
@@ -31,34 +31,35 @@ from robocov.planning.window import Window
 from robocov.team import Team
 
 MIN_CELL_SIZE_M = 0.05
-"""Side of the cells of maps; they are larger in very large regions."""
+"""Side of the cells of maps; cells are larger in very large regions."""
 MAX_MAP_CELLS = 1_000_000
+"""Maximum number of cells of a map."""
 MAX_SILENCE_S = 5.0
-"""A robot that is silent for longer, at a position from where it would be heard, is missed."""
+"""Time after which a silent robot that would be heard at its assumed position is missing."""
 CERTAIN_RANGE_FRACTION = 0.8
 """Fraction of the communication range within which a robot would certainly be heard."""
 
 
 class Group(NamedTuple):
-    """The k robots that one plans for: itself and those that it has heard."""
+    """The k robots that one robot plans for: itself and those that it has heard."""
 
     robots: IntArray
     """(k,) Their numbers, ascending."""
     positions: Array
-    """(k, 2) m, where they are, or are presumed to be."""
+    """(k, 2) m, their known or assumed positions."""
     heard_times: Array
-    """(k,) s, when they were heard."""
+    """(k,) s, when they were last heard."""
 
 
 class Placement(NamedTuple):
-    """What a controller decides for a group."""
+    """Goals of a group of robots."""
 
     goals: Array
     """(k, 2) m"""
     is_final: bool
-    """Whether it stays as long as map, density and robots stay the same."""
+    """Whether the goals stay the same until the map, the density or the group changes."""
     notes: Array
-    """(m, 2) m, points that the next plan gets to know."""
+    """(m, 2) m, points that are passed to the next plan."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,9 +82,9 @@ class Situation(NamedTuple):
     """Situation of a robot that plans for k robots, itself and those that it has heard."""
 
     positions: Array
-    """(k, 2) m, where they are, or are presumed to be."""
+    """(k, 2) m, their known or assumed positions."""
     former_goals: Array
-    """(k, 2) m, their goals in the last plan; nan for a robot that was not in it."""
+    """(k, 2) m, their goals in the last plan; nan for robots without one."""
     former_plan: Plan | None
     known_map: DiscoveredMap
     planner: GridPlanner
@@ -105,16 +106,16 @@ class Situation(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """Positions that a plan chooses among, with the table of `robocov.k_median`."""
+    """Candidate positions of a plan, with the table of `robocov.k_median`."""
 
     positions: Array
     """(c, 2) m"""
     table: Array
-    """(m, c) Weighted distances from what is to be covered."""
+    """(m, c) Weighted distances from the m nodes that are to be covered."""
 
     @classmethod
     def build_at_nodes(cls, situation: Situation, weights: Array, nodes: IntArray) -> Candidates:
-        """Build those of some nodes that a path leads to, for the weights of all nodes."""
+        """Build the candidates at those of some nodes that a path leads to, by the weights of all nodes."""
         targets = np.flatnonzero(weights > 0.0)
         nodes = nodes[weights[nodes] > 0.0]
         distances = situation.planner.compute_distance_table(nodes)[:, targets]
@@ -126,13 +127,13 @@ class Candidates(NamedTuple):
         return float(self.table[:, chosen].min(axis=1).sum())
 
     def find_nearest(self, positions: Array) -> IntArray:
-        """Find one candidate for each of (k, 2) positions, no two the same, by least squares."""
+        """Find a different candidate for each of (k, 2) positions, by least squares."""
         square = ((positions[:, None] - self.positions) ** 2).sum(axis=2)
         _, candidates = scipy.optimize.linear_sum_assignment(square)
         return np.asarray(candidates, dtype=np.intp)
 
     def refine(self, situation: Situation, weights: Array, chosen: IntArray) -> Array:
-        """Compute the positions, (k, 2) m, to which Lloyd's iteration leads on nodes close to some."""
+        """Refine chosen candidates by Lloyd's iteration on all nodes close to them; return (k, 2) m."""
         planner = situation.planner
         positions = self.positions[chosen]
         spacing = planner.spacing * math.sqrt(np.count_nonzero(weights) / len(self.positions))
@@ -145,7 +146,7 @@ class Candidates(NamedTuple):
 def assign_goals(situation: Situation, goals: Array) -> Array:
     """Assign goals to robots such that the sum of the squared path lengths is minimal.
 
-    The assignment stays the same on the way, as far as paths are straight.
+    The assignment stays the same while robots move along straight paths.
 
     Parameters
     ----------
@@ -173,36 +174,38 @@ class SharedMapMemory:
     team: Team
     """A robot knows its own limits."""
     maps: tuple[DiscoveredMap, ...]
-    """What each robot has discovered, or has been told."""
+    """The map of each robot: its own discoveries and those of others."""
     plans: tuple[Plan | None, ...]
     routes: tuple[Array, ...]
     """Waypoints of each robot, (w, 2) m, the last one the goal."""
     legs: IntArray
-    """(n,) Number of the waypoint that each robot heads for."""
+    """(n,) Index of the waypoint that each robot heads for."""
     next_plan_time: float = -math.inf
     """s"""
     returns: Array | None = None
-    """(n, rays, 2) m, what the last scan of each robot has met."""
+    """(n, rays, 2) m, obstacle points that the last scan of each robot has met; nan for none."""
 
 
 @dataclass(frozen=True)
 class SharedMapController(BaseController):
-    """Base class of controllers by which each robot plans for itself and all robots that it hears.
+    """Base class of controllers with which each robot plans for itself and all robots that it hears.
 
-    Robots scan and merge their maps with those of the robots that they hear (`DiscoveredMap`). Once in
-    `period` seconds all plan: robots that know the same make the same plan, and each goes to its own goal in
-    it by the shortest route. A robot that is not heard any more is presumed to be at its goal, and forgotten
-    when it is missed there; with short ranges plans differ, and two robots may go to the same position until
-    they hear each other.
+    Robots scan, and merge their maps with those of the robots that they hear (`DiscoveredMap`). Once in
+    `period` seconds all plan. Robots with the same knowledge make the same plan, and each moves to its own
+    goal in it by the shortest route. A robot that is no longer heard is assumed to be at its goal, and
+    forgotten if it is not heard there. With short ranges plans differ, and two robots may move to the same
+    position until they hear each other.
     """
 
     information: ClassVar[Information] = "shared map"
     scanning = Scanning(rays=240, period=0.5)
 
     period: float = gain(2.0, "s", "between two plans", low=0.05, high=60.0)
-    nodes: float = gain(1600.0, "nodes", "of the lattice of ways, at most", low=16.0, high=1e5, whole=True)
+    nodes: float = gain(
+        1600.0, "nodes", "maximum number of nodes of the planning lattice", low=16.0, high=1e5, whole=True
+    )
     clearance: float = gain(0.03, "m", "that routes keep between rim and walls", high=10.0)
-    k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the goal", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per metre of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
 
     @abstractmethod
@@ -210,7 +213,7 @@ class SharedMapController(BaseController):
         """Compute the goals of the robots of a group."""
 
     def begin(self, region: Region, team: Team) -> SharedMapMemory:
-        """Return the memory of robots that have seen nothing yet."""
+        """Return the memory of robots that know neither walls nor other robots."""
         n = len(team)
         return SharedMapMemory(
             team=team,
@@ -221,7 +224,7 @@ class SharedMapController(BaseController):
         )
 
     def decide(self, seen: Observations, memory: SharedMapMemory) -> Decision:
-        """Return the forces along the routes to the robots' own goals in their plans."""
+        """Compute the forces along the routes to the robots' own goals in their plans."""
         if seen.scans is not None:
             maps = update_maps(memory.maps, seen, seen.scans, list_circles(seen.neighbours))
             memory = replace(memory, maps=tuple(maps))
@@ -232,9 +235,9 @@ class SharedMapController(BaseController):
             seen, memory.team, memory.routes, memory.legs, returns, self.k_prop, self.response_time
         )
         return Decision(
-            command.forces,
-            command.goals,
-            {"attraction": command.forces},
+            forces=command.forces,
+            goals=command.goals,
+            terms={"attraction": command.forces},
             memory=replace(memory, legs=command.legs, returns=returns),
         )
 
@@ -254,7 +257,7 @@ class SharedMapController(BaseController):
         )
 
     def _make_plans(self, seen: Observations, memory: SharedMapMemory) -> tuple[Plan, ...]:
-        """Return the plan of each robot; robots that know the same share one."""
+        """Return the plan of each robot; robots with the same knowledge share one."""
         plans: list[Plan] = []
         plans_by_knowledge: dict[tuple[object, ...], Plan] = {}
         for robot, former_plan in enumerate(memory.plans):
@@ -318,7 +321,7 @@ def build_unknown_map(region: Region) -> DiscoveredMap:
 
 
 def _is_still_valid(plan: Plan, known_map: DiscoveredMap, density: Density | None, group: Group) -> bool:
-    """Return whether a plan is final, and map, density and robots are those that it was made for."""
+    """Return whether a plan is final, and was made for this map, density and group."""
     return (
         plan.placement.is_final
         and plan.known_map is known_map
@@ -328,7 +331,7 @@ def _is_still_valid(plan: Plan, known_map: DiscoveredMap, density: Density | Non
 
 
 Circle: TypeAlias = tuple[int, ...]
-"""A robot and those that it hears, ascending."""
+"""Numbers of a robot and of those that it hears, ascending."""
 
 
 def list_circles(neighbours: Neighbours) -> list[Circle]:
@@ -346,8 +349,8 @@ def update_maps(
 ) -> list[DiscoveredMap]:
     """Add the scan of each robot to the maps of all robots in its circle.
 
-    Robots that all hear each other share one map, to which all scans are added, and where the last one
-    counts: maps that are merged again and again would keep mistakes of one of them.
+    Robots that all hear each other share one map, to which all scans are added in turn; later scans correct
+    earlier ones. Maps that are merged again and again would keep an error of one of them for ever.
 
     Parameters
     ----------
@@ -384,7 +387,7 @@ def update_maps(
 
 
 def _build_group(seen: Observations, team: Team, former_plan: Plan | None, robot: int) -> Group:
-    """Return the robots that one robot plans for: itself, those that it hears, and those that it expects."""
+    """Return the group of a robot: itself, those that it hears, and those that it assumes at their goals."""
     position = seen.positions[robot : robot + 1]
     robots = np.append(seen.neighbours.list_neighbours(robot), robot)
     positions = np.vstack([seen.get_neighbour_positions(robot), position])

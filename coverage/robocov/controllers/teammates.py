@@ -1,4 +1,4 @@
-"""What one robot knows of the others: where they are, when they were heard, and how long they have rested."""
+"""Knowledge of one robot about the others: positions, when they were heard, and since when they rest."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 
 REST_RADIUS_M = 0.1
-"""A robot that stays within this distance is at rest."""
+"""Distance within which a robot at rest stays."""
 
 
 class Teammates(NamedTuple):
@@ -20,13 +20,13 @@ class Teammates(NamedTuple):
     robots: IntArray
     """(k,) Their numbers, ascending."""
     positions: Array
-    """(k, 2) m, where they are, or are presumed to be."""
+    """(k, 2) m, their known or assumed positions."""
     heard_times: Array
     """(k,) s, when they were last heard."""
     heard_distances: Array
-    """(k,) m, how far away they were then."""
+    """(k,) m, their distances then."""
     rest_times: Array
-    """(k,) s, since when they have been within `REST_RADIUS_M` of `rest_positions`."""
+    """(k,) s, the time since when they have been within `REST_RADIUS_M` of `rest_positions`."""
     rest_positions: Array
     """(k, 2) m"""
 
@@ -45,7 +45,7 @@ class Teammates(NamedTuple):
     def add_observation(
         self, robots: IntArray, positions: Array, own_position: Array, time: float, is_gone: BoolArray
     ) -> Teammates:
-        """Add where some robots are heard to be now.
+        """Add the positions of robots that are heard now.
 
         Parameters
         ----------
@@ -54,7 +54,7 @@ class Teammates(NamedTuple):
         own_position : (2,) array, m
         time : float, s
         is_gone : (k,) bool array
-            Robots known before that are left out unless they are heard.
+            Robots known so far that are removed unless they are heard.
         """
         now = np.full(len(robots), time)
         distances = np.sqrt(((positions - own_position) ** 2).sum(axis=1))
@@ -73,16 +73,16 @@ class Teammates(NamedTuple):
         return later
 
     def add_reports(self, reports: Sequence[Teammates], robot: int, gone: Mapping[int, float]) -> Teammates:
-        """Add what a robot is told of others that were heard later than it has heard them itself.
+        """Add reports about robots that were heard by others more recently.
 
         Parameters
         ----------
         reports : sequence of Teammates
-            Of several reports as late the first one counts.
+            Of several reports with the same time the first one counts.
         robot : int
-            The robot itself, of which reports tell nothing new.
+            The robot itself; reports about it are ignored.
         gone : mapping of int to float, s
-            When it took a robot for failed, or missed it: only later reports count.
+            Times at which it considered robots failed or missing: only later reports about these count.
         """
         sources: list[Sequence[Array | IntArray]] = [self]
         for report in reports:
@@ -90,7 +90,7 @@ class Teammates(NamedTuple):
                 math.inf if other == robot else gone.get(other, -1.0) for other in report.robots.tolist()
             ]
             is_new = report.heard_times > np.array(min_times)
-            # A robot that was never near cannot be missed for its silence.
+            # The robot cannot be considered failed because of its silence: it may never have been in range.
             report = report._replace(heard_distances=np.full(len(is_new), math.inf))
             sources.append([column[is_new] for column in report])
         columns = [np.concatenate(parts) for parts in zip(*sources, strict=True)]
