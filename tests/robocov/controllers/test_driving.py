@@ -1,11 +1,20 @@
-"""Safe velocities next to obstacles and other robots."""
+"""Velocities towards goals and next to obstacles and other robots, and the forces that track them."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from robocov.controllers.driving import Margins, avoid_collisions, limit_approach_speed
+from robocov.controllers.driving import (
+    Margins,
+    avoid_collisions,
+    compute_approach_velocities,
+    compute_drive_forces,
+    limit_approach_speed,
+    list_neighbour_offsets,
+)
 from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
@@ -56,3 +65,76 @@ def test_robots_leave_the_clearance_of_objects_if_they_can(
         max_speed=np.array([2.0]),
     )
     np.testing.assert_allclose(velocities, [expected], atol=1e-12)
+
+
+@given(seed=st.integers(0, 2**32), n=st.integers(1, 9))
+def test_approach_velocities_are_proportional_and_limited(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    offsets = rng.normal(size=(n, 2))
+    offsets[0] = 0.0
+    max_speed = rng.uniform(0.1, 2.0, n)
+    velocities = compute_approach_velocities(offsets, 2.0, max_speed)
+    expected_speed = np.minimum(2.0 * np.hypot(*offsets.T), max_speed)
+    np.testing.assert_allclose(np.hypot(*velocities.T), expected_speed, atol=1e-12)
+    assert ((velocities * offsets).sum(axis=1) >= 0.0).all()
+
+
+def test_drive_forces_compensate_viscosity() -> None:
+    """At the desired velocity, the force is that of viscosity alone."""
+    velocities = np.array([[0.5, 0.0]])
+    seen = Observations(np.zeros((1, 2)), velocities, Neighbours(1), np.full((1, 2), np.nan), REGION)
+    team = Team.homogeneous(1, viscosity=3.0)
+    np.testing.assert_allclose(compute_drive_forces(velocities, seen, team, 0.1), [[1.5, 0.0]])
+
+
+@given(seed=st.integers(0, 2**32))
+def test_only_the_velocity_towards_an_object_is_limited(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n = 20
+    desired = rng.normal(size=(n, 2))
+    desired *= np.minimum(1.0, 2.0 / np.hypot(*desired.T))[:, None]
+    offsets = rng.normal(size=(n, 1, 2))
+    velocities = limit_approach_speed(
+        desired,
+        offsets=offsets,
+        clearance=np.full((n, 1), 0.4),
+        rate=2.0,
+        braking=np.full((n, 1), 1.0),
+        max_speed=np.full(n, 9.0),
+    )
+    distance = np.hypot(*offsets[:, 0].T)
+    normals = offsets[:, 0] / distance[:, None]
+    tangents = np.column_stack([-normals[:, 1], normals[:, 0]])
+    gap = distance - 0.4
+    max_approach_speed = np.minimum(2.0 * gap, np.sqrt(2.0 * np.maximum(gap, 0.0)))
+    desired_approach_speed = -(desired * normals).sum(axis=1)
+    approach_speed = -(velocities * normals).sum(axis=1)
+    expected = np.minimum(desired_approach_speed, max_approach_speed)
+    np.testing.assert_allclose(approach_speed, expected, atol=1e-9)
+    np.testing.assert_allclose(
+        (velocities * tangents).sum(axis=1), (desired * tangents).sum(axis=1), atol=1e-9
+    )
+
+
+def test_without_objects_velocities_do_not_change() -> None:
+    desired = np.random.default_rng(0).normal(size=(5, 2))
+    velocities = limit_approach_speed(
+        desired,
+        offsets=np.full((5, 1, 2), np.nan),
+        clearance=np.full((5, 1), 0.4),
+        rate=2.0,
+        braking=np.full((5, 1), 1.0),
+        max_speed=np.full(5, 9.0),
+    )
+    np.testing.assert_allclose(velocities, desired, rtol=1e-12)
+
+
+def test_neighbour_offsets_are_those_within_reach() -> None:
+    n = 40
+    positions = np.random.default_rng(0).uniform(20, 30, size=(n, 2))
+    seen = Observations(positions, np.zeros((n, 2)), Neighbours(n), np.full((n, 2), np.nan), REGION)
+    offsets = list_neighbour_offsets(seen, 1.5)
+    for i in range(n):
+        expected = positions[i] - np.delete(positions, i, axis=0)
+        expected = expected[np.hypot(*expected.T) <= 1.5]
+        np.testing.assert_array_equal(offsets[i][~np.isnan(offsets[i, :, 0])], expected)
