@@ -10,7 +10,7 @@ from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Rapf, get_information, make_controller
 from robocov.controllers.frontier_median import FrontierMedian
 from robocov.controllers.greedy_submodular import GreedySubmodular
-from robocov.controllers.shared_map import Circle, Situation, assign_goals, list_circles, update_maps
+from robocov.controllers.shared_map import Situation, assign_goals, list_circles, update_maps
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, WallObstacle
@@ -36,29 +36,39 @@ ROOMS = Environment(
     ),
 )
 CORNER = [[0.8, 0.8], [1.3, 0.8], [0.8, 1.3], [1.3, 1.3]]
-LAWS = ("frontier-median", "greedy-submodular", "voronoi-graph")
+NAMES = ("frontier-median", "greedy-submodular", "voronoi-graph")
 RASTER = Raster(ROOMS.region, 0.1)
 
 
-def simulation(name: str, n: int = 4, **limits: float) -> Simulation:
-    law = make_controller(name, {"nodes": 400.0})
-    return Simulation(ROOMS, law, CORNER[:n], Team.homogeneous(n, **limits), dt=0.05)
+def build_simulation(name: str, conditions: Conditions | None = None, **limits: float) -> Simulation:
+    """Return a simulation of four robots that start in a corner of the two rooms."""
+    controller = make_controller(name, {"nodes": 400.0})
+    team = Team.homogeneous(len(CORNER), **limits)
+    return Simulation(ROOMS, controller, CORNER, team, dt=0.05, conditions=conditions or Conditions())
 
 
-def situation(state: np.ndarray, at: list[list[float]]) -> Situation:
-    known = DiscoveredMap(RASTER, state.astype(np.uint8))
+def build_situation(state: np.ndarray, positions: list[list[float]]) -> Situation:
+    """Return the situation of robots without a former plan on a map with given cells."""
+    known_map = DiscoveredMap(RASTER, state.astype(np.uint8))
     window = Window.build_around(RASTER, np.array([1.0, 1.0]), np.inf, 400)
-    ways = GridPlanner(known, window, 0.13)
-    places = np.array(at)
-    return Situation(places, np.full(places.shape, np.nan), None, known, ways, None, 3.0)
+    return Situation(
+        positions=np.array(positions),
+        former_goals=np.full((len(positions), 2), np.nan),
+        former_plan=None,
+        known_map=known_map,
+        planner=GridPlanner(known_map, window, 0.13),
+        density=None,
+        sensing_range=3.0,
+    )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", LAWS)
-def test_the_team_covers_both_rooms_touches_nothing_and_rests(name: str) -> None:
-    record = simulation(name).run(40.0)
+@pytest.mark.parametrize("name", NAMES)
+def test_the_team_covers_both_rooms_without_contacts_and_comes_to_rest(name: str) -> None:
+    record = build_simulation(name).run(40.0)
     clearance = compute_clearances(record)
-    assert count_contacts(record, clearance) == 0 and clearance.min() > 0.005
+    assert count_contacts(record, clearance) == 0
+    assert clearance.min() > 0.005
     cost = CoverageCost(ROOMS, lattice=32)
     rapf = Simulation(ROOMS, Rapf(), CORNER, dt=0.05).run(40.0)
     assert cost(record.positions[-1]).mean_distance < 0.9 * cost(rapf.positions[-1]).mean_distance
@@ -67,134 +77,179 @@ def test_the_team_covers_both_rooms_touches_nothing_and_rests(name: str) -> None
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("limits", [{"communication_range": 2.0}, {"sensing_range": 1.0}])
-def test_with_short_ranges_nothing_is_touched_and_all_come_to_rest(
+def test_with_short_ranges_the_team_comes_to_rest_without_contacts(
     name: str, limits: dict[str, float]
 ) -> None:
-    record = simulation(name, **limits).run(120.0)
+    record = build_simulation(name, **limits).run(120.0)
     assert count_contacts(record, compute_clearances(record)) == 0
     assert np.abs(record.positions[-1] - record.positions[-40]).max() < 0.02
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", LAWS)
-def test_copies_and_repeated_runs_go_on_identically(name: str) -> None:
-    one, other = simulation(name), simulation(name)
+@pytest.mark.parametrize("name", NAMES)
+def test_runs_are_reproducible_and_copies_continue_identically(name: str) -> None:
+    first = build_simulation(name)
+    second = build_simulation(name)
     for _ in range(50):
-        one.step()
-        other.step()
-    twin = one.copy()
-    for each in (one, other, twin):
+        first.step()
+        second.step()
+    copy = first.copy()
+    for simulation in (first, second, copy):
         for _ in range(50):
-            each.step()
-    assert one.positions.tobytes() == other.positions.tobytes() == twin.positions.tobytes()
+            simulation.step()
+    assert first.positions.tobytes() == second.positions.tobytes() == copy.positions.tobytes()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", LAWS)
-def test_who_fails_is_forgotten_and_its_place_taken(name: str) -> None:
-    some = Simulation(
-        ROOMS, make_controller(name, {"nodes": 400.0}), CORNER, dt=0.05,
-        conditions=Conditions(failures=((4, 2.0),)),
-    )  # fmt: skip
-    some.run(30.0)
-    assert some.memory.plans[0].group.robots.tolist() == [0, 1, 2]
+@pytest.mark.parametrize("name", NAMES)
+def test_failed_robots_are_forgotten(name: str) -> None:
+    simulation = build_simulation(name, Conditions(failures=((4, 2.0),)))
+    simulation.run(30.0)
+    assert simulation.memory.plans[0].group.robots.tolist() == [0, 1, 2]
 
 
-def test_what_they_go_by() -> None:
-    assert {get_information(CONTROLLERS[name]) for name in LAWS} == {"shared map"}
+@pytest.mark.parametrize("name", NAMES)
+def test_controllers_state_that_they_share_maps(name: str) -> None:
+    assert get_information(CONTROLLERS[name]) == "shared map"
+
+
+def test_the_number_of_nodes_is_checked() -> None:
     with pytest.raises(ParameterError, match=r"voronoi-graph.nodes: expected a whole number from 16"):
         make_controller("voronoi-graph", {"nodes": 3})
 
 
-def observed(
-    neighbours: Neighbours, distances: np.ndarray, hit: bool
-) -> tuple[Observations, Scans, list[Circle]]:
-    n, at = len(distances), np.tile([2.02, 2.02], (len(distances), 1))
-    scans, around = Scans(distances, np.full(distances.shape, hit)), list_circles(neighbours)
-    return (
-        Observations(at, np.zeros((n, 2)), neighbours, np.full((n, 2), np.nan), ROOMS.region),
-        scans,
-        around,
+def add_scans(
+    maps: list[DiscoveredMap], neighbours: Neighbours, distances: np.ndarray, is_hit: np.ndarray
+) -> list[DiscoveredMap]:
+    """Return the maps of robots at (2.02, 2.02) after scans, (n, rays)."""
+    n = len(distances)
+    seen = Observations(
+        np.tile([2.02, 2.02], (n, 1)), np.zeros((n, 2)), neighbours, np.full((n, 2), np.nan), ROOMS.region
     )
+    return update_maps(maps, seen, Scans(distances, is_hit), list_circles(neighbours))
 
 
-def test_maps_go_to_those_who_hear() -> None:
-    states = np.random.default_rng(0).choice([UNKNOWN, FREE, WALL], size=(4, *RASTER.shape)).astype(np.uint8)
-    maps, blind = [DiscoveredMap(RASTER, state) for state in states], np.zeros((4, 8))
-    first = states[(states != UNKNOWN).argmax(axis=0), *np.indices(RASTER.shape)]
-    together = update_maps(maps, *observed(Neighbours(4), blind, False))
-    assert np.array_equal(together[0].state, first) and len({id(known) for known in together}) == 1
-    # each knows best what it has seen itself; else the first counts that has
-    line = Neighbours.from_ranges(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [9.0, 0.0]]), np.full(4, 1.5))
-    told = update_maps(maps, *observed(line, blind, False))
-    assert np.array_equal(told[0].state, np.where(states[0] != UNKNOWN, states[0], states[1]))
-    assert np.array_equal(told[1].state == UNKNOWN, (states[:3] == UNKNOWN).all(axis=0))
-    assert told[3] is maps[3]
+def build_random_maps() -> list[DiscoveredMap]:
+    """Return the maps of four robots."""
+    rng = np.random.default_rng(0)
+    states = rng.choice([UNKNOWN, FREE, WALL], size=(4, *RASTER.shape)).astype(np.uint8)
+    return [DiscoveredMap(RASTER, state) for state in states]
 
 
-def test_what_one_has_mistaken_is_corrected_by_whoever_sees_it() -> None:
-    """Robot 1 takes for free what robot 2 sees to be a wall; two pairs do not hear each other."""
-    free, nothing = (DiscoveredMap(RASTER, np.full(RASTER.shape, each, np.uint8)) for each in (FREE, UNKNOWN))
-    pairs = Neighbours.from_ranges(
-        np.array([[0.0, 0.0], [1.0, 0.0], [8.0, 0.0], [9.0, 0.0]]), np.full(4, 1.5)
-    )
+BLIND = np.zeros((4, 8))
+"""Scans of four robots that see nothing."""
+
+
+def test_robots_that_all_hear_each_other_share_one_map() -> None:
+    maps = build_random_maps()
+    later = add_scans(maps, Neighbours(4), BLIND, BLIND > 0.0)
+    assert len({id(known_map) for known_map in later}) == 1
+    # The first robot that knows a cell counts.
+    states = np.array([known_map.state for known_map in maps])
+    first_known = (states != UNKNOWN).argmax(axis=0)
+    np.testing.assert_array_equal(later[0].state, states[first_known, *np.indices(RASTER.shape)])
+
+
+def test_robots_in_a_line_get_the_maps_of_their_neighbours() -> None:
+    """A robot trusts its own cells most; the last robot does not hear any other."""
+    maps = build_random_maps()
+    states = np.array([known_map.state for known_map in maps])
+    positions = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [9.0, 0.0]])
+    line = Neighbours.from_ranges(positions, np.full(4, 1.5))
+    later = add_scans(maps, line, BLIND, BLIND > 0.0)
+    np.testing.assert_array_equal(later[0].state, np.where(states[0] != UNKNOWN, states[0], states[1]))
+    np.testing.assert_array_equal(later[1].state == UNKNOWN, (states[:3] == UNKNOWN).all(axis=0))
+    assert later[3] is maps[3]
+
+
+def test_errors_of_a_map_are_corrected_by_scans_of_robots_that_share_it() -> None:
+    """Robot 1 believes a wall to be free that robot 2 sees; the pairs do not hear each other."""
+    free = DiscoveredMap(RASTER, np.full(RASTER.shape, FREE, np.uint8))
+    unknown = DiscoveredMap(RASTER, np.full(RASTER.shape, UNKNOWN, np.uint8))
+    positions = np.array([[0.0, 0.0], [1.0, 0.0], [8.0, 0.0], [9.0, 0.0]])
+    pairs = Neighbours.from_ranges(positions, np.full(4, 1.5))
     distances = np.array([[0.0], [1.0], [0.0], [0.0]])
-    seen, scans, around = observed(pairs, distances, False)
-    scans.hit[1] = True
-    told = update_maps([free, nothing, free, nothing], seen, scans, around)
-    assert told[0] is told[1] and told[2] is told[3] and told[0] is not told[2]
-    assert told[0].is_blocked[20, 30] and not told[2].is_blocked[20, 30]
-    assert (told[0].state >= WALL).sum() == 1
+    later = add_scans([free, unknown, free, unknown], pairs, distances, distances > 0.0)
+    assert later[0] is later[1]
+    assert later[2] is later[3]
+    assert later[0].is_blocked[20, 30]
+    assert not later[2].is_blocked[20, 30]
+    assert (later[0].state >= WALL).sum() == 1
 
 
-def test_the_sum_of_squared_ways_is_the_least() -> None:
+def test_goals_are_assigned_with_the_smallest_sum_of_squared_path_lengths() -> None:
     rng = np.random.default_rng(1)
-    now = situation(np.full(RASTER.shape, FREE), rng.uniform(1, 7, (5, 2)).tolist())
-    nodes = rng.choice(np.flatnonzero(now.planner.is_roomy), 5, replace=False)
-    places = now.planner.nodes[nodes]
-    away = np.array([now.planner.compute_distances_from(at[None])[nodes] for at in now.positions]) ** 2
-    best = min(permutations(range(5)), key=lambda order: away[range(5), order].sum())
-    assert np.array_equal(assign_goals(now, places), places[list(best)])
+    situation = build_situation(np.full(RASTER.shape, FREE), rng.uniform(1, 7, (5, 2)).tolist())
+    planner = situation.planner
+    nodes = rng.choice(np.flatnonzero(planner.is_roomy), 5, replace=False)
+    goals = planner.nodes[nodes]
+    path_lengths = np.array(
+        [planner.compute_distances_from(position[None])[nodes] for position in situation.positions]
+    )
+    best = min(permutations(range(5)), key=lambda order: (path_lengths[range(5), order] ** 2).sum())
+    np.testing.assert_array_equal(assign_goals(situation, goals), goals[list(best)])
 
 
-def test_robots_go_to_different_frontiers_and_to_none_on_a_whole_map() -> None:
-    law = FrontierMedian()
+THREE_ROBOTS = [[4.0, 3.0], [4.0, 5.0], [4.0, 4.0]]
+
+
+def test_on_a_complete_map_there_is_no_frontier() -> None:
     state = np.full(RASTER.shape, FREE)
-    at = [[4.0, 3.0], [4.0, 5.0], [4.0, 4.0]]
-    _, final, _ = law.compute_placement(situation(state, at))
-    assert final
-    # specks are no frontier
+    assert FrontierMedian().compute_placement(build_situation(state, THREE_ROBOTS)).is_final
+
+
+def test_single_unknown_cells_are_no_frontier() -> None:
+    state = np.full(RASTER.shape, FREE)
     state[20:60:5, 10:70:4] = UNKNOWN
-    assert law.compute_placement(situation(state, at)).is_final
-    state[:, :20] = state[:, 60:] = UNKNOWN
-    goals, final, _ = law.compute_placement(situation(state, at))
-    assert not final
-    assert np.ptp(goals[:, 0]) > 3.0
-    columns = np.sort(goals[:, 0])
-    assert columns[0] == pytest.approx(2.05) and columns[-1] == pytest.approx(5.95)
-    # behind a wall there is nothing to look for
-    state[:, 20] = state[:, 59] = WALL
-    assert law.compute_placement(situation(state, at)).is_final
+    assert FrontierMedian().compute_placement(build_situation(state, THREE_ROBOTS)).is_final
 
 
-def test_a_frontier_that_stays_is_left_alone() -> None:
-    """Who stands where it was to go has looked; so has who does not get on."""
-    law = FrontierMedian()
-    simulated = simulation("frontier-median")
+def test_robots_move_to_different_frontiers() -> None:
+    """Both sides of the map are unknown."""
+    state = np.full(RASTER.shape, FREE)
+    state[:, :20] = UNKNOWN
+    state[:, 60:] = UNKNOWN
+    placement = FrontierMedian().compute_placement(build_situation(state, THREE_ROBOTS))
+    assert not placement.is_final
+    x = np.sort(placement.goals[:, 0])
+    assert x[0] == pytest.approx(2.05)
+    assert x[-1] == pytest.approx(5.95)
+
+
+def test_unknown_space_behind_a_wall_has_no_frontier() -> None:
+    state = np.full(RASTER.shape, FREE)
+    state[:, :20] = UNKNOWN
+    state[:, 60:] = UNKNOWN
+    state[:, 20] = WALL
+    state[:, 59] = WALL
+    assert FrontierMedian().compute_placement(build_situation(state, THREE_ROBOTS)).is_final
+
+
+@pytest.mark.parametrize("is_stuck", [False, True], ids=["inspected", "out of reach"])
+def test_targets_are_not_visited_again(is_stuck: bool) -> None:
+    """A target is done when a robot has arrived, and given up when its robot has not moved."""
+    simulation = build_simulation("frontier-median")
     for _ in range(5):
-        simulated.step()
-    plan = simulated.memory.plans[0]
+        simulation.step()
+    plan = simulation.memory.plans[0]
     assert not plan.placement.is_final
-    for at in (plan.placement.goals, plan.group.positions):
-        now = Situation(at, plan.placement.goals, plan, plan.known_map, plan.planner, None, 3.0)
-        looked = law.compute_placement(now).notes
-        assert all((np.hypot(*(looked - place).T) < 1e-9).any() for place in plan.placement.goals)
+    situation = Situation(
+        positions=plan.group.positions if is_stuck else plan.placement.goals,
+        former_goals=plan.placement.goals,
+        former_plan=plan,
+        known_map=plan.known_map,
+        planner=plan.planner,
+        density=None,
+        sensing_range=3.0,
+    )
+    notes = FrontierMedian().compute_placement(situation).notes
+    for goal in plan.placement.goals:
+        assert (np.hypot(*(notes - goal).T) < 1e-9).any()
 
 
-def test_a_final_plan_is_made_again_for_another_density() -> None:
-    """A plan that stays while nothing changes depends on the density, too."""
+def test_a_final_plan_is_computed_again_for_another_density() -> None:
     controller = GreedySubmodular(nodes=100.0)
     density = Gaussians((Gaussian((7.0, 7.0), 50.0, 0.5),), floor=0.01)
     seen = Observations(
