@@ -208,7 +208,7 @@ class Radio:
 
     def _find_receivers(self, step: int, positions: Array, working: BoolArray) -> BoolArray:
         """Find the receivers of the messages of each robot, (receiver, sender) bool."""
-        links = Neighbours.from_ranges(positions, self._ranges).keep_working(working)
+        links = Neighbours.from_ranges(positions, self._ranges).restrict_to_working(working)
         receiver, sender = links.list_pairs()
         is_received = np.zeros((len(positions), len(positions)), dtype=bool)
         is_received[receiver, sender] = True

@@ -81,7 +81,7 @@ class Perception:
             scans=self._add_scanning_noise(step, truth.scans),
         )
         if inbox is None or not self._conditions.uses_messages:
-            neighbours = truth.neighbours.keep_working(working)
+            neighbours = truth.neighbours.restrict_to_working(working)
             return replace(observations, neighbours=neighbours), None
         inbox = self._radio.exchange_messages(inbox, step, positions, truth.positions, working)
         neighbours, places, ages = self._radio.read_reports(inbox, step, working)

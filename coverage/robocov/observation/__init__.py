@@ -1,15 +1,15 @@
-"""Observations and decisions: the types between the world and the controllers.
+"""Observations and decisions: the types that the world and the controllers exchange.
 
 Row i of `Observations` belongs to robot i: its own state, its neighbours, the nearest obstacle point that it
 senses, and the convex region. A controller computes all rows at once for speed, but row i of its `Decision`
-may depend only on row i and on the known positions of the neighbours of robot i. Thus the types themselves
-say that control is distributed and that obstacles are unknown.
+may depend only on row i and on the known positions of the neighbours of robot i. The types thus reflect that
+control is distributed and that the obstacles are unknown.
 
-- `observations`, `scans`, `region`: all that robots know
+- `observations`, `scans`, `region`: everything that the robots know
 - `neighbours`: the communication graph
 - `decisions`, `cells`: the decision of a controller, and the cells that it uses
-- `snapshot`: observations and decision of one step
-- `scanned_view`: the free space in view of a scan
+- `snapshot`: the observations and the decision of one step
+- `scanned_view`: the free space that is visible in a scan
 - `close_pairs`, `bins`: pairs of points that are close to each other
 """
 

@@ -1,4 +1,4 @@
-"""Square bins of points, so that points close to one are found in its own and the adjacent bins."""
+"""Square bins: the points close to a given one are in its own bin and the adjacent ones."""
 
 from typing import NamedTuple
 
@@ -8,18 +8,18 @@ from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 
 _MIN_BINNED_POINTS = 24
-"""Number of points from which bins save time; fewer are all in one bin."""
+"""Minimum number of points for which bins save time; fewer points all go into one bin."""
 _SIDE_MARGIN = 1.000001
-"""Side of a bin relative to the reach: larger by more than rounding."""
+"""Minimum side of a bin divided by the reach; slightly above 1 to allow for rounding."""
 
 
 class Bins(NamedTuple):
-    """Rows and columns of square bins over points."""
+    """A grid of square bins that covers a set of points."""
 
     left: float
-    """x where the first column begins, m."""
-    low: float
-    """y where the first row begins, m."""
+    """x at which the first column begins, m."""
+    bottom: float
+    """y at which the first row begins, m."""
     scale: float
     """Bins per metre."""
     columns: int
@@ -28,18 +28,19 @@ class Bins(NamedTuple):
 
 @kernel
 def find_bin(offset: float, scale: float) -> int:
-    """Return the row or column of bins at an offset from the first one.
+    """Return the index of the row or column of bins at an offset.
 
     Parameters
     ----------
     offset : float, m
+        Distance from where the first row or column begins.
     scale : float, 1/m
         Bins per metre.
 
     Returns
     -------
     int
-        0 if the offset is not a number.
+        0 if the offset is nan.
     """
     return int(offset * scale) if offset * scale > 0.0 else 0
 
@@ -48,13 +49,15 @@ def find_bin(offset: float, scale: float) -> int:
 def sort_into_bins(
     points: Array, first: int, stop: int, reach: float, starts: IntArray, order: IntArray
 ) -> Bins:
-    """Sort points into square bins, row by row; points in reach of each other are in adjacent bins.
+    """Sort points into square bins, which are numbered row by row.
+
+    Points within reach of each other are in the same bin or in adjacent ones.
 
     Parameters
     ----------
     points : (n, 2) array, m
     first, stop : int
-        The rows of the points that are sorted, ``points[first:stop]``.
+        Only ``points[first:stop]`` are sorted.
     reach : float, m
         May be infinite.
     starts : (2 (stop - first) + 8,) int array
@@ -69,30 +72,32 @@ def sort_into_bins(
     count = stop - first
     left = points[first, 0]
     right = points[first, 0]
-    low = points[first, 1]
-    high = points[first, 1]
+    bottom = points[first, 1]
+    top = points[first, 1]
     for i in range(first, stop):
         left = min(left, points[i, 0])
         right = max(right, points[i, 0])
-        low = min(low, points[i, 1])
-        high = max(high, points[i, 1])
+        bottom = min(bottom, points[i, 1])
+        top = max(top, points[i, 1])
     width = right - left
-    height = high - low
-    # Not more bins than points.
+    height = top - bottom
+    # The number of bins is limited in proportion to the number of points.
     side = max(_SIDE_MARGIN * reach, np.sqrt(width * height / count), max(width, height) / count)
     scale = 1.0 / side if count >= _MIN_BINNED_POINTS and 0.0 < side < np.inf else 0.0
     columns = find_bin(width, scale) + 1
     rows = find_bin(height, scale) + 1
-    # A counting sort: sizes two bins ahead, then begins one bin ahead, which advance as the bins fill.
+    # A counting sort. First, starts[b + 2] is the number of points in bin b.
     for b in range(columns * rows + 2):
         starts[b] = 0
     for i in range(first, stop):
-        b = find_bin(points[i, 1] - low, scale) * columns + find_bin(points[i, 0] - left, scale)
+        b = find_bin(points[i, 1] - bottom, scale) * columns + find_bin(points[i, 0] - left, scale)
         starts[b + 2] += 1
+    # Summed up, starts[b + 1] is where bin b begins.
     for b in range(columns * rows):
         starts[b + 2] += starts[b + 1]
+    # As bin b fills, starts[b + 1] advances to its end, which is where bin b + 1 begins.
     for i in range(first, stop):
-        b = find_bin(points[i, 1] - low, scale) * columns + find_bin(points[i, 0] - left, scale)
+        b = find_bin(points[i, 1] - bottom, scale) * columns + find_bin(points[i, 0] - left, scale)
         order[starts[b + 1]] = i
         starts[b + 1] += 1
-    return Bins(left, low, scale, columns, rows)
+    return Bins(left, bottom, scale, columns, rows)

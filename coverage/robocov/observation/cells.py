@@ -1,4 +1,4 @@
-"""The interface of all kinds of cells that robots can divide a region into."""
+"""The base class of all kinds of cells into which robots can divide a region."""
 
 from __future__ import annotations
 
@@ -16,32 +16,32 @@ from robocov.density.cell_edges import CellEdges
 
 @dataclass(eq=False)
 class Cells(ABC):
-    """The cells of robots within the region; most of it is computed when it is first used."""
+    """The cells of the robots in a region. Edges, outlines and moments are computed on first use."""
 
     generators: Array
-    """(n, 2) m"""
+    """(n, 2) m, the points to which the cells belong."""
     mass: Array
     """(n,) m², M of equation (2): the area of each cell if the density is 1."""
     centroid: Array
-    """(n, 2) m, C of equation (2). That of an empty cell is its generator."""
+    """(n, 2) m, C of equation (2). The centroid of an empty cell is its generator."""
     density: Density | None = None
-    """φ of mass, centroid and moments; None for 1."""
+    """φ, with which mass, centroid and moments are computed. None: 1 everywhere."""
     triangulation: NDArray[np.int32] | None = None
-    """Triangulation from which the next partition of slowly moving generators starts, if there is one."""
+    """Triangulation from which the partition of slightly moved generators can start, or None."""
 
     @property
     @abstractmethod
     def edges(self) -> CellEdges:
-        """The edges of all cells, and what lies beyond them."""
+        """The edges of all cells, and what is beyond each."""
 
     @property
     @abstractmethod
     def outlines(self) -> tuple[list[Array], IntArray]:
-        """The outlines of the cells, (k, 2) m each, and the cell of each, in an order to paint them in."""
+        """The outlines, (k, 2) m each, in the order in which to paint them, and the cell of each outline."""
 
     @cached_property
     def adjacency(self) -> IntArray:
-        """The pairs (i, j), i < j, of cells with a border between them, (m, 2), ascending.
+        """The pairs (i, j), i < j, of cells that share a border, (m, 2), ascending.
 
         If communication is limited, cells may overlap: i and j are then a pair if the border between them is
         an edge of at least one of them.

@@ -10,16 +10,16 @@ from robocov.compiled import kernel
 from robocov.observation.bins import find_bin, sort_into_bins
 
 _INITIAL_NEIGHBOURS = 8
-"""Number of neighbours of each point for which there is room at first."""
+"""Number of neighbours per point for which memory is allocated at first."""
 
 
 class ClosePairs(NamedTuple):
     """Directed pairs of points, sorted by first, then second."""
 
     first: IntArray
-    """(m,)"""
+    """(m,) Index of the first point of each pair."""
     second: IntArray
-    """(m,)"""
+    """(m,) Index of the second point."""
     distance: Array
     """(m,) m"""
 
@@ -59,7 +59,7 @@ def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePa
     Returns
     -------
     indptr : (n + 1,) int array
-        ``pairs.second[indptr[i]:indptr[i + 1]]`` belong to point i.
+        ``pairs.second[indptr[i]:indptr[i + 1]]`` are the points in range of point i.
     pairs : ClosePairs
     """
     n = len(points)
@@ -80,13 +80,13 @@ def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePa
             second = _enlarge(second, total, room)
             distance = _enlarge(distance, total, room)
         begin = total
-        row = find_bin(points[i, 1] - bins.low, bins.scale)
+        row = find_bin(points[i, 1] - bins.bottom, bins.scale)
         column = find_bin(points[i, 0] - bins.left, bins.scale)
         for r in range(max(row - 1, 0), min(row + 2, bins.rows)):
-            # The bins of adjacent columns follow each other.
-            low = starts[r * bins.columns + max(column - 1, 0)]
-            high = starts[r * bins.columns + min(column + 2, bins.columns)]
-            for k in range(low, high):
+            # The bins of adjacent columns are contiguous in `order`.
+            first_in_row = starts[r * bins.columns + max(column - 1, 0)]
+            stop_in_row = starts[r * bins.columns + min(column + 2, bins.columns)]
+            for k in range(first_in_row, stop_in_row):
                 j = order[k]
                 dx = points[j, 0] - points[i, 0]
                 dy = points[j, 1] - points[i, 1]
@@ -101,7 +101,7 @@ def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePa
 
 @kernel
 def _enlarge(values: NDArray[Any], used: int, room: int) -> NDArray[Any]:
-    """Return a longer array that begins with the used values."""
+    """Return an array of length `room` that begins with the used values."""
     larger = np.empty(room, values.dtype)
     larger[:used] = values[:used]
     return larger
@@ -109,7 +109,7 @@ def _enlarge(values: NDArray[Any], used: int, room: int) -> NDArray[Any]:
 
 @kernel
 def _insert(second: IntArray, distance: Array, begin: int, end: int, point: int, separation: float) -> None:
-    """Insert a point into the ascending points of one row, from `begin` to `end`."""
+    """Insert a point and its distance into ``second[begin:end]``, which stays ascending."""
     k = end
     while k > begin and second[k - 1] > point:
         second[k] = second[k - 1]

@@ -16,22 +16,22 @@ from robocov.observation.cells import Cells
 
 @dataclass(slots=True, eq=False)
 class Decision:
-    """Forces that a controller commands, and the quantities that explain them."""
+    """The forces that a controller commands, and the quantities that explain them."""
 
     forces: Array
     """(n, 2) N, the driving force of each robot before any limit; viscosity is added by the world."""
     goals: Array | None = None
-    """(n, 2) m, where each robot heads for; nan without a goal. None if the controller knows no goals."""
+    """(n, 2) m, the goal of each robot; nan if it has none. None if the controller does not use goals."""
     terms: Mapping[str, Array] = field(default_factory=dict)
     """The forces by cause (``attraction``, ``repulsion_robots``, ``repulsion_obstacle``, ...), (n, 2) N."""
     cells: Cells | None = None
     """The cells that the controller used."""
     memory: Any = None
-    """Memory of the robots; the controller gets it back at the next decision."""
+    """Memory of the robots, which the controller receives again at its next decision."""
 
 
 def check_decision(returned: Any, count: int, controller: str, time: float, source: str = "") -> Decision:
-    """Check that a decision can be carried out and recorded, and return it with its arrays as floats.
+    """Check that a decision can be executed and recorded, and return it with float arrays.
 
     Parameters
     ----------
@@ -40,20 +40,20 @@ def check_decision(returned: Any, count: int, controller: str, time: float, sour
     count : int
         Number of robots.
     controller : str
-        Its name, for messages.
+        Name of the controller, for messages.
     time : float, s
     source : str
-        File and line of its ``decide``, for messages, as " (mine.py, line 12)".
+        File and line of ``decide``, for messages, such as " (mine.py, line 12)".
 
     Returns
     -------
     Decision
-        The same object if its arrays are floats already.
+        The same object if its arrays are already floats.
 
     Raises
     ------
     ParameterError
-        If it is no decision, or its forces are not finite numbers of shape (count, 2).
+        If it is not a `Decision`, or its forces are not finite numbers of shape (count, 2).
     """
     where = f"controller {controller!r}: decide(seen, memory)"
     when = f" at {time:.3f} s{source}"
@@ -75,12 +75,12 @@ def check_decision(returned: Any, count: int, controller: str, time: float, sour
 
 
 def copy_decision(decision: Decision, controller: str, source: str = "") -> Decision:
-    """Copy the arrays of a checked decision, because a user's controller may reuse its own.
+    """Copy the arrays of a checked decision, because a user's controller may overwrite its own.
 
     Parameters
     ----------
     decision : Decision
-        As `check_decision` returns it.
+        Returned by `check_decision`.
     controller, source : str
         As for `check_decision`.
 
@@ -91,7 +91,7 @@ def copy_decision(decision: Decision, controller: str, source: str = "") -> Deci
     Raises
     ------
     ParameterError
-        If its terms are no forces of all robots, or its cells are no cells.
+        If `terms` is not a mapping of names to forces of all robots, or `cells` is not a `Cells` object.
     """
     where = f"controller {controller!r}: decide(seen, memory) returned"
     if not isinstance(decision.terms, Mapping):
@@ -129,14 +129,14 @@ def check_forces(values: Any, count: int, name: str) -> Array:
     """
     forces = _to_rows(values, count, name)
     if not _is_finite(forces):
-        raise ParameterError(f"{name}: expected finite newtons, got {quote(forces.tolist())}")
+        raise ParameterError(f"{name}: expected finite forces in newtons, got {quote(forces.tolist())}")
     return forces
 
 
 def to_numbers(values: object) -> Array | None:
     """Convert real numbers to an array of floats.
 
-    Complex numbers, strings and objects are not real numbers, even if they can be converted to floats.
+    Complex numbers, strings and objects are rejected even if they can be converted to floats.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def to_numbers(values: object) -> Array | None:
     Returns
     -------
     array or None
-        An array of floats is returned as it is; None if the values are not real numbers.
+        The same object if it is an array of floats; None if the values are not real numbers.
     """
     if isinstance(values, np.ndarray) and values.dtype == np.float64:
         return values
@@ -157,12 +157,12 @@ def to_numbers(values: object) -> Array | None:
 
 
 def _is_finite(forces: Array) -> bool:
-    # A sum of squares is faster, and is finite if all forces are, unless they are huge.
+    # The sum of squares is faster. It is finite if all forces are, unless huge forces make it overflow.
     return isfinite(np.vdot(forces, forces)) or bool(np.isfinite(forces).all())
 
 
 def _to_rows(values: Any, count: int, name: str, when: str = "") -> Array:
-    """Convert two numbers for each robot to an array, which is returned as it is if it is one already."""
+    """Convert two numbers for each robot to a (count, 2) array; an array of floats is not copied."""
     array = to_numbers(values)
     if array is None:
         raise ParameterError(f"{name} {quote(values)}{when}, expected numbers of shape {(count, 2)}")

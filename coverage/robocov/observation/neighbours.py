@@ -17,14 +17,14 @@ _NO_POSITIONS: Array = np.empty((0, 2))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Neighbours:
-    """Communication graph: compressed rows, or a complete graph without its n² entries."""
+    """A communication graph in compressed sparse rows; a complete graph is stored without its n² entries."""
 
     count: int
     """Number of robots n."""
     ranges: Array | None = None
     """(n,) m, communication ranges; None if all robots communicate at any distance."""
     indptr: IntArray | None = None
-    """(n + 1,) ``indices[indptr[i]:indptr[i + 1]]``, ascending, are the neighbours of robot i. None: the
+    """(n + 1,) ``indices[indptr[i]:indptr[i + 1]]``, ascending, are the neighbours of robot i. None if the
     graph is complete."""
     indices: IntArray | None = None
     """(m,) See `indptr`."""
@@ -37,7 +37,7 @@ class Neighbours:
         ----------
         positions : (n, 2) array, m
         ranges : (n,) array, m
-            If all are infinite the graph is complete, and its entries are not stored.
+            If all are infinite, the graph is complete.
 
         Returns
         -------
@@ -58,7 +58,7 @@ class Neighbours:
     def from_pairs(
         cls, count: int, robot: IntArray, neighbour: IntArray, ranges: Array | None = None
     ) -> Neighbours:
-        """Build the graph of directed pairs.
+        """Build the graph from its directed pairs.
 
         Parameters
         ----------
@@ -78,7 +78,7 @@ class Neighbours:
 
     @classmethod
     def combine(cls, graphs: Sequence[Neighbours]) -> Neighbours:
-        """Combine the graphs of separate runs, whose robots follow each other; runs are not linked.
+        """Combine the graphs of separate runs into one.
 
         Parameters
         ----------
@@ -87,6 +87,7 @@ class Neighbours:
         Returns
         -------
         Neighbours
+            Graph of the robots of all runs, in the order of `graphs`, without links between runs.
         """
         if len(graphs) == 1:
             return graphs[0]
@@ -134,7 +135,7 @@ class Neighbours:
             return robot, neighbour
         return np.repeat(np.arange(self.count), np.diff(self.indptr)), self.indices
 
-    def keep_working(self, working: BoolArray) -> Neighbours:
+    def restrict_to_working(self, working: BoolArray) -> Neighbours:
         """Return the graph without the links of robots that have failed or have not joined yet.
 
         Parameters
@@ -149,20 +150,20 @@ class Neighbours:
         if working.all():
             return self
         robot, neighbour = self.list_pairs()
-        is_kept = working[robot] & working[neighbour]
-        return Neighbours.from_pairs(self.count, robot[is_kept], neighbour[is_kept], self.ranges)
+        both_work = working[robot] & working[neighbour]
+        return Neighbours.from_pairs(self.count, robot[both_work], neighbour[both_work], self.ranges)
 
 
 class NeighbourPositions(NamedTuple):
-    """The neighbours of each robot, and where it knows them to be, in the form that kernels use."""
+    """The neighbours of each robot, and their positions as far as it knows, as plain arrays for kernels."""
 
     indptr: IntArray
-    """(n + 1,) or (0,) ``indices[indptr[i]:indptr[i + 1]]`` are the neighbours of robot i. Empty: all other
-    robots are."""
+    """(n + 1,) or (0,) ``indices[indptr[i]:indptr[i + 1]]`` are the neighbours of robot i. Empty if all other
+    robots are its neighbours."""
     indices: IntArray
     """(m,)"""
     positions: Array
-    """(m, 2) or (0, 2) m, in the order of `indices`. Empty: all robots know where the others are."""
+    """(m, 2) or (0, 2) m, in the order of `indices`. Empty if robots know their neighbours' own positions."""
 
     @classmethod
     def from_graph(cls, neighbours: Neighbours, reported_positions: Array | None) -> NeighbourPositions:
@@ -187,11 +188,12 @@ class NeighbourPositions(NamedTuple):
 
     @classmethod
     def build_empty(cls, robots: int) -> NeighbourPositions:
-        """Build the positions for a number of robots without any neighbours.
+        """Build the positions for robots that have no neighbours.
 
         Parameters
         ----------
         robots : int
+            Number of robots n.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Observations of the robots at a step, on which alone a controller bases its decision."""
+"""Observations of the robots in a step: the only input of a controller's decision."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class NearNeighbours(NamedTuple):
 
 @dataclass(slots=True, eq=False)
 class Observations:
-    """All that the robots know, as a structure of arrays; row i belongs to robot i alone.
+    """Everything that the robots know, as a structure of arrays. Only robot i knows row i.
 
-    Nothing changes them in place. They are not frozen only because creating a frozen object takes three times
-    as long, which for six robots is a tenth of a step.
+    Treat observations as immutable. The class is not frozen because creating a frozen object takes three
+    times as long; for six robots, that is a tenth of a step.
     """
 
     positions: Array
@@ -45,21 +45,21 @@ class Observations:
     region: Region
     """The known convex outer boundary."""
     time: float = 0.0
-    """s"""
+    """Simulation time, s."""
     max_speeds: Array | None = None
-    """(n,) m/s, the maximum speed of each robot, which its neighbours know as well. None: not known."""
+    """(n,) m/s, the maximum speed of each robot, which its neighbours know as well. None if unknown."""
     reported_positions: Array | None = None
-    """(m, 2) m, where robots know their neighbours to be, in the order of ``neighbours.indices``: the content
-    of the last message that arrived. None: they know where their neighbours are."""
+    """(m, 2) m, the positions of the neighbours in the newest messages that robots received, in the order of
+    ``neighbours.indices``. None: robots know the current positions of their neighbours."""
     report_ages: Array | None = None
-    """(m,) s, the age of these messages."""
+    """(m,) s, the ages of these messages."""
     density: Density | None = None
     """φ, the importance of each point: part of the task, known to all. None: 1 everywhere."""
     scans: Scans | None = None
     """A range scan of each robot, in the steps in which the controller requests one."""
     steering: Array | None = None
-    """(n, 2) rad from +x and rad/s, heading and turning rate of unicycles: a robot knows its own. None in a
-    team of points."""
+    """(n, 2) Heading of each unicycle, rad from +x, and its turning rate, rad/s; a robot knows its own. None
+    in a team of points."""
 
     def get_neighbour_positions(self, robot: int) -> Array:
         """Return the known positions of a robot's neighbours.
@@ -89,8 +89,7 @@ class Observations:
         Returns
         -------
         NearNeighbours
-            Sorted, so that sums over the neighbours of a robot do not depend, to the last bit, on robots that
-            are not its neighbours.
+            Sorted, so that sums over the neighbours of a robot are bit-for-bit independent of other robots.
         """
         if self.reported_positions is None and self.neighbours.is_complete:
             pairs = find_close_pairs(self.positions, reach)

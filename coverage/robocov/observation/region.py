@@ -1,4 +1,4 @@
-"""The convex region: the outer boundary as the robots know it."""
+"""The convex region: what the robots know of the outer boundary."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,12 +11,12 @@ from robocov.arrays import Array, BoolArray, compute_lengths, freeze
 from robocov.errors import InputError
 
 _MIN_BEND = 1e-9
-"""Angle in rad below which a vertex does not bend the boundary."""
+"""Change of direction at a vertex, rad, up to which it counts as collinear with its neighbours."""
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """A convex polygon, with what controllers need of it computed once.
+    """A convex polygon with its edges, normals, area and centroid, which are computed once.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Region:
     """
 
     vertices: Array
-    """(k, 2) m, counter-clockwise, no three on a line, the first not repeated."""
+    """(k, 2) m, counter-clockwise; no three are collinear, and the first is not repeated at the end."""
     edges: Array = field(init=False)
     """(k, 2) m, ``vertices[e + 1] - vertices[e]``."""
     normals: Array = field(init=False)
@@ -44,7 +44,7 @@ class Region:
     offsets: Array = field(init=False)
     """(k,) m, ``normals[e] @ vertices[e]``: a point q is inside iff ``normals @ q <= offsets``."""
     sides: Array = field(init=False)
-    """(k, 5) Columns of the vertices, the normals and the offsets, for kernels."""
+    """(k, 5) The vertex, the normal and the offset of each edge in one row, for kernels."""
     area: float = field(init=False)
     """m²"""
     centroid: Array = field(init=False)
@@ -53,9 +53,9 @@ class Region:
     def __post_init__(self) -> None:
         hull = shapely.convex_hull(shapely.MultiPoint(np.asarray(self.vertices, dtype=float)))
         if not isinstance(hull, Polygon) or hull.area <= 0.0:
-            raise InputError("region: expected an outer boundary with an area, got one with no area")
+            raise InputError("region: expected an outer boundary with an area above 0, got area 0")
         ring = np.asarray(shapely.orient_polygons(hull).exterior.coords)[:-1]
-        # A vertex on the line between its neighbours would give an edge without a direction of its own.
+        # A collinear vertex would divide an edge into two with the same normal.
         ring = _remove_collinear_vertices(ring)
         edges = np.roll(ring, -1, axis=0) - ring
         lengths = compute_lengths(edges)
@@ -86,7 +86,7 @@ class Region:
 
     @cached_property
     def diameter(self) -> float:
-        """Diagonal of the bounding box, m: a length that no distance inside exceeds."""
+        """Diagonal of the bounding box, m: an upper bound of the distance between two points inside."""
         low_x, low_y, high_x, high_y = self.bounds
         return float(np.hypot(high_x - low_x, high_y - low_y))
 
@@ -108,7 +108,7 @@ class Region:
 
 
 def _remove_collinear_vertices(ring: Array) -> Array:
-    """Return a convex ring, (k, 2), without the vertices that do not bend it."""
+    """Return a convex ring, (k, 2), without its collinear vertices."""
     before = ring - np.roll(ring, 1, axis=0)
     after = np.roll(ring, -1, axis=0) - ring
     cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]

@@ -1,4 +1,4 @@
-"""The free space in view of a range scan: its extent, and the corners that hide more of it."""
+"""The free space that is visible in a range scan, and the corners that hide more of it."""
 
 import math
 from typing import NamedTuple
@@ -12,37 +12,36 @@ from robocov.observation.observations import Observations
 from robocov.observation.scans import Scanning
 
 _PATH_PARTS = 4
-"""Number of parts of a path between which it is checked for walls."""
+"""Number of equal parts of a path; the points between them are checked for walls."""
 _MIN_DISTANCE_M = 1e-9
-"""Distance that is used instead of a smaller one, by which is divided."""
+"""Lower limit of distances in divisions."""
 _STEP_DECREASE = 0.5
-"""Factor of the step if the gradient has turned by more than a right angle."""
+"""Factor by which the step changes if the gradient has turned by more than a right angle."""
 _STEP_INCREASE = 1.2
-"""Factor of the step otherwise."""
+"""Factor by which the step changes otherwise."""
 
 
 class View(NamedTuple):
-    """Points at which the rays of each robot ended in its last scan."""
+    """How far each robot sees along the rays of its last scan."""
 
     distances: Array
     """(n, rays) m, at most the sensing range."""
     hit: BoolArray
-    """(n, rays) Whether there is an obstacle."""
+    """(n, rays) Whether the ray ends at an obstacle."""
 
 
 class Windows(NamedTuple):
     """Edges of views that begin at a corner and turn about it when the robot moves; sorted by robot.
 
-    Seen from a position p, a corner v at the distance ρ hides the space behind it. When p moves by d, the
-    point of the edge at the distance s from p moves by -(d · t) (s - ρ)/ρ, where t is the unit vector across
-    the edge, away from the obstacle. The view thus grows by t (s - ρ)/ρ per metre of the edge and of the
-    motion.
+    Seen from a position p, a corner v at distance ρ hides the space behind it. When p moves by d, the point
+    of the edge at distance s from p moves by -(d · t) (s - ρ)/ρ, where t is the unit vector across the edge,
+    away from the obstacle. The view thus grows by t (s - ρ)/ρ per metre of edge and per metre of motion.
     """
 
     robot: IntArray
     """(w,)"""
     ray: IntArray
-    """(w,) The first ray that passes the corner."""
+    """(w,) Index of the first ray that passes the corner."""
     across: Array
     """(w, 2) t, the direction in which the robot has to move to see more."""
     corner: Array
@@ -55,9 +54,9 @@ def compute_view(seen: Observations, previous: View | None, scanning: Scanning, 
     Parameters
     ----------
     seen : Observations
-        Their scan, if there is one, is the last.
+        If they contain scans, these are the last ones.
     previous : View or None
-        The view at the previous step. None: there was no scan yet, and all in range is taken to be free.
+        The view at the previous step. None if there was no scan yet: everything in range is assumed free.
     scanning : Scanning
         Settings of the scans.
     reach : (n,) array, m
@@ -76,10 +75,11 @@ def compute_view(seen: Observations, previous: View | None, scanning: Scanning, 
 
 
 def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Windows:
-    """Find where views become deeper from one ray to the next.
+    """Find where views become abruptly deeper from one ray to the next.
 
-    The view of a wall at a low angle becomes deeper as well. Along a wall 1/distance is a sinusoid of the
-    angle, so that two rays predict where the next one meets it: only a view beyond that counts.
+    Seen at a low angle, a wall also becomes deeper from ray to ray. Along a straight wall, 1/distance is a
+    sinusoid of the angle, so two rays predict where the next one meets the wall. Only a ray that goes
+    further than predicted is a window.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
     reach : (n,) array, m
         Maximum distance of each robot's view.
     jump : float, m
-        Minimum increase of the depth.
+        Minimum distance by which a ray exceeds the predicted depth.
 
     Returns
     -------
@@ -120,7 +120,7 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
 
 
 def _predict_depth(view: View, reach: Array, side: int) -> Array:
-    """Return the depth of each ray, (n, rays) m, on the straight line through the two points before it."""
+    """Predict the depth of each ray, (n, rays) m, on the line through the end points of the two before it."""
     inverse = 1.0 / np.maximum(view.distances, _MIN_DISTANCE_M)
     factor = 2.0 * np.cos(2.0 * np.pi / view.distances.shape[1])
     predicted = factor * np.roll(inverse, side, axis=1) - np.roll(inverse, 2 * side, axis=1)
@@ -131,11 +131,12 @@ def _predict_depth(view: View, reach: Array, side: int) -> Array:
 
 
 def evaluate_density(density: Density | None, points: Array) -> Array:
-    """Evaluate a density, or 1 without one.
+    """Evaluate a density at points.
 
     Parameters
     ----------
     density : Density or None
+        None: 1 everywhere.
     points : (..., 2) array, m
 
     Returns
@@ -148,17 +149,19 @@ def evaluate_density(density: Density | None, points: Array) -> Array:
 
 
 def compute_step_fractions(gradient: Array, previous: Array | None, step: Array | None) -> Array:
-    """Compute the fraction of full speed with which robots follow gradients that jump.
+    """Compute the fraction of full speed with which robots follow discontinuous gradients.
 
-    Areas in view have ridges, such as doors, to which the gradient leads back from both sides. The step is
-    halved each time when the gradient turns by more than a right angle, and grows again otherwise.
+    The visible area has ridges, for example at doors, to which the gradient leads back from both sides. The
+    step is halved whenever the gradient turns by more than a right angle, and grows again otherwise.
 
     Parameters
     ----------
-    gradient, previous : (n, 2) arrays
-        The gradients after this scan and after the scan before; None if there was none.
+    gradient : (n, 2) array
+        Gradients after this scan.
+    previous : (n, 2) array or None
+        Gradients after the previous scan; None if there was none.
     step : (n,) array or None
-        The fractions after the scan before; None if there was none.
+        Fractions after the previous scan; None if there was none.
 
     Returns
     -------
@@ -192,14 +195,14 @@ def is_behind_wall(x: float, y: float, walls: Array) -> bool:
 
 @kernel
 def is_path_clear(x: float, y: float, dx: float, dy: float, walls: Array) -> bool:
-    """Return whether no wall that the robot sees is in front of a straight path.
+    """Return whether a straight path stays in front of the walls that the robot sees.
 
     Parameters
     ----------
     x, y : float, m
         Start of the path, in view of the robot and relative to it.
     dx, dy : float, m
-        Length of the path.
+        Displacement from the start to the end of the path.
     walls : (rays,) array, m
         As for `is_behind_wall`.
 

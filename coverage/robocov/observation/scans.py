@@ -17,14 +17,14 @@ _MAX_PERIOD_S = 1e6
 
 @dataclass(frozen=True, slots=True)
 class Scanning:
-    """Settings of range scans, which a controller requests by its attribute ``scanning``.
+    """Settings of range scans, which a controller requests with its attribute ``scanning``.
 
     Parameters
     ----------
     rays : int
-        Number of rays, evenly spread round a full turn; the first points along +x.
+        Number of rays, evenly spaced over a full turn; the first points along +x.
     period : float, s
-        Time between two scans, rounded to whole steps. The first scan is at the start.
+        Time between two scans, rounded to whole steps. The first scan is taken at the start.
 
     Raises
     ------
@@ -61,7 +61,7 @@ class Scanning:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scans:
-    """One scan of each robot, by its own range sensor; row i belongs to robot i alone."""
+    """One scan of each robot by its own range sensor. Only robot i knows row i."""
 
     distances: Array
     """(n, rays) m, to the first obstacle along each ray; the robot's sensing range if there is none."""

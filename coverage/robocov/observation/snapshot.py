@@ -20,9 +20,9 @@ class Snapshot:
     truth: Array | None = None
     """(n, 2) m, the true positions, if they differ from those that the robots observe."""
     working: BoolArray | None = None
-    """(n,) Which robots have joined and have not failed; None: all."""
+    """(n,) Mask of the robots that have joined and have not failed. None: all."""
     inbox: Any = None
-    """The messages that the robots then have; None if they know the others as they are."""
+    """The messages that the robots have received so far; None if communication is ideal."""
 
     def __repr__(self) -> str:
         return f"<Snapshot at {self.time:.2f} s, {format_count(len(self.positions), 'robot')}>"

@@ -180,7 +180,7 @@ class Record(Drawable):
         observations = Observations(
             positions=self.positions[k],
             velocities=self.velocities[k],
-            neighbours=neighbours if working is None else neighbours.keep_working(working),
+            neighbours=neighbours if working is None else neighbours.restrict_to_working(working),
             obstacle_points=self.obstacle_points[k],
             region=self.environment.region,
             time=float(self.time[k]),

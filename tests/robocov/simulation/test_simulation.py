@@ -503,7 +503,7 @@ class TestChanges:
             simulation.with_changes(velocities=np.full((6, 2), np.nan))
         with pytest.raises(ParameterError, match=r"external_forces of shape \(2, 2\)"):
             simulation.step(np.zeros((2, 2)))
-        with pytest.raises(ParameterError, match=r"external_forces: .* finite newtons"):
+        with pytest.raises(ParameterError, match=r"external_forces: .* finite forces in newtons"):
             simulation.step(np.full((6, 2), np.inf))
 
     def test_external_forces_move_only_their_robot(self) -> None:
@@ -528,7 +528,7 @@ class TestChanges:
         assert driven.velocities.tobytes() != original.velocities.tobytes()
         with pytest.raises(ParameterError, match=r"forces of shape \(2, 2\)"):
             driven.step(forces=np.zeros((2, 2)))
-        with pytest.raises(ParameterError, match=r"forces: .* finite newtons"):
+        with pytest.raises(ParameterError, match=r"forces: .* finite forces in newtons"):
             driven.step(forces=np.full((6, 2), np.inf))
 
 
