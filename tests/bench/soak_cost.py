@@ -18,7 +18,7 @@ import shapely
 sys.path.insert(0, str(Path(__file__).parents[1] / "robocov"))
 
 import brute_force_geodesic as brute
-from cost_cases import compared
+from cost_cases import compute_distance_error
 from drawn_maps import KINDS, SIDE, drawn_map, drawn_places
 
 from robocov.cost import CoverageCost
@@ -59,7 +59,7 @@ def main(seconds: float, seed: int) -> None:
                 continue
             places = drawn_places(environment, robots, seed)
             try:
-                worst = max(worst, compared(environment, lattice, places))
+                worst = max(worst, compute_distance_error(environment, lattice, places))
                 maps += 1
                 if len(shapely.get_coordinates(environment.free)) < 100:
                     slow_worst = max(slow_worst, by_brute_force(environment, places))

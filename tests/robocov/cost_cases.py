@@ -10,22 +10,22 @@ from robocov.environment import CircleObstacle, Environment, PolygonObstacle, Wa
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 
 
-def box(x0, y0, x1, y1):
+def build_ring(x0, y0, x1, y1):
     return ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
 
 
-def environment(*obstacles, boundary=SQUARE):
+def build_environment(*obstacles, boundary=SQUARE):
     return Environment("test", boundary, tuple(PolygonObstacle(ring) for ring in obstacles))
 
 
-PILLAR = environment(box(3 / 8, 3 / 8, 5 / 8, 5 / 8))
-CUP = environment(
+PILLAR = build_environment(build_ring(3 / 8, 3 / 8, 5 / 8, 5 / 8))
+CUP = build_environment(
     (
         *((1 / 4, 1 / 4), (3 / 4, 1 / 4), (3 / 4, 3 / 4), (5 / 8, 3 / 4)),
         *((5 / 8, 3 / 8), (3 / 8, 3 / 8), (3 / 8, 3 / 4), (1 / 4, 3 / 4)),
     )
 )
-L_ROOM = environment(box(1 / 2, 1 / 2, 1, 1))
+L_ROOM = build_environment(build_ring(1 / 2, 1 / 2, 1, 1))
 OFFICE = Environment(
     "office",
     ((0, 0), (12, 0), (12, 5), (9, 5), (9, 8), (0, 8)),
@@ -38,40 +38,49 @@ OFFICE = Environment(
 )
 
 
-def compared(environment, lattice, robots):
-    """Return the largest error of any distance, as a part of the map's size, having checked the rest."""
+def compute_lengths(vectors):
+    return np.hypot(vectors[:, 0], vectors[:, 1])
+
+
+def compute_distance_error(environment, lattice, robots):
+    """Return the largest error of a distance, relative to the map's size; check owners and corners."""
     cost = CoverageCost(environment, lattice)
     result = cost(robots)
-    everything = cost.geodesics.compute_distances(robots, cost.points)
-    nearest = everything.min(axis=0)
     size = cost.geodesics.size
-    reached = np.isfinite(nearest)
-    np.testing.assert_array_equal(np.isfinite(result.distances), reached)
-    np.testing.assert_array_equal(result.owner >= 0, reached)
-    site = np.nonzero(reached)[0]
-    # the owner is as near as the nearest
-    own = everything[result.owner[site], site]
-    assert np.abs(own - nearest[site]).max(initial=0.0) < 1e-12 * size
-    # the first way-point is on a shortest way, and so is the last
-    straight = np.hypot(*(result.first_waypoints[site] - robots[result.owner[site]]).T)
-    assert (straight <= nearest[site] * (1 + 1e-12) + 1e-12 * size).all()
-    bent = site[result.first_corner[site] >= 0]
-    corners, number = np.unique(result.first_corner[bent], return_inverse=True)
-    if len(bent):
-        rest = cost.geodesics.compute_distances(cost.corners[corners], cost.points[bent])[
-            number, np.arange(len(bent))
-        ]
-        total = np.hypot(*(result.first_waypoints[bent] - robots[result.owner[bent]]).T) + rest
-        # a corner at a pinch belongs to both sides at once, and would be a short cut
-        assert (total <= nearest[bent] + 1e-12 * size).all()
-    last = (
-        np.where(
-            result.last_corner[site, None] >= 0,
-            cost.corners[result.last_corner[site]],
-            robots[result.owner[site]],
-        )
-        if len(cost.corners)
-        else robots[result.owner[site]]
-    )
-    assert (np.hypot(*(cost.points[site] - last).T) <= nearest[site] * (1 + 1e-12) + 1e-12 * size).all()
+    tolerance = 1e-12 * size
+    distances = cost.geodesics.compute_distances(robots, cost.points)
+    nearest = distances.min(axis=0)
+    is_reached = np.isfinite(nearest)
+    np.testing.assert_array_equal(np.isfinite(result.distances), is_reached)
+    np.testing.assert_array_equal(result.owner >= 0, is_reached)
+    # The owner is one of the nearest robots.
+    site = np.flatnonzero(is_reached)
+    owner = result.owner[site]
+    assert np.abs(distances[owner, site] - nearest[site]).max(initial=0.0) < tolerance
+    check_first_corners(cost, result, robots, site, nearest, tolerance)
+    check_last_corners(cost, result, robots, site, nearest, tolerance)
     return float(np.abs(result.distances[site] - nearest[site]).max(initial=0.0)) / size
+
+
+def check_first_corners(cost, result, robots, site, nearest, tolerance):
+    """Check that the first waypoint of each site is on a shortest path."""
+    to_first = compute_lengths(result.first_waypoints[site] - robots[result.owner[site]])
+    assert (to_first <= nearest[site] * (1 + 1e-12) + tolerance).all()
+    is_bent = result.first_corner[site] >= 0
+    bent = site[is_bent]
+    if len(bent) == 0:
+        return
+    corners, number = np.unique(result.first_corner[bent], return_inverse=True)
+    from_corners = cost.geodesics.compute_distances(cost.corners[corners], cost.points[bent])
+    total = to_first[is_bent] + from_corners[number, np.arange(len(bent))]
+    # A corner at a pinch belongs to both of its sides, and may be a short cut: the total is not exact.
+    assert (total <= nearest[bent] + tolerance).all()
+
+
+def check_last_corners(cost, result, robots, site, nearest, tolerance):
+    """Check that the last corner of each site is no farther away than its owner."""
+    last_points = robots[result.owner[site]]
+    is_bent = result.last_corner[site] >= 0
+    last_points[is_bent] = cost.corners[result.last_corner[site[is_bent]]]
+    from_last = compute_lengths(cost.points[site] - last_points)
+    assert (from_last <= nearest[site] * (1 + 1e-12) + tolerance).all()

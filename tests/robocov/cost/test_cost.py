@@ -1,3 +1,5 @@
+"""The coverage cost: known values, sites, components without a robot, gradients and messages."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -5,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from cost_cases import CUP, L_ROOM, OFFICE, PILLAR, box, environment
+from cost_cases import CUP, L_ROOM, OFFICE, PILLAR, build_environment, build_ring
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,35 +17,35 @@ from robocov.errors import InputError, ParameterError
 
 
 @pytest.mark.parametrize(
-    ("where", "positions", "expected"),
+    ("environment", "positions", "expected"),
     [
         (PILLAR, [[1 / 8, 1 / 2]], 0.485117942024),
         (PILLAR, [[1 / 8, 1 / 2], [7 / 8, 1 / 2]], 0.298875152962),
         (CUP, [[1 / 2, 1 / 2]], 0.576781074789),
     ],
 )
-def test_distances_add_up_to_known_sums(where, positions, expected):
-    cost = CoverageCost(where, lattice=64)
+def test_distances_add_up_to_known_sums(environment, positions, expected):
+    cost = CoverageCost(environment, lattice=64)
     assert cost(positions).distances.sum() * cost.spacing**2 == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize(
-    ("where", "position", "expected"),
+    ("environment", "position", "expected"),
     [
-        (environment(), [1 / 2, 1 / 2], 0.382597858232),
+        (build_environment(), [1 / 2, 1 / 2], 0.382597858232),
         (L_ROOM, [1 / 2, 1 / 2], 0.286948393674),
         (L_ROOM, [1 / 2, 1], 0.517266172593),
     ],
 )
-def test_the_value_tends_to_the_integral_with_the_square_of_the_spacing(where, position, expected):
-    errors = [abs(CoverageCost(where, lattice=n)([position]).value - expected) for n in (32, 64, 128)]
+def test_the_value_tends_to_the_integral_with_the_square_of_the_spacing(environment, position, expected):
+    errors = [abs(CoverageCost(environment, lattice=n)([position]).value - expected) for n in (32, 64, 128)]
     assert errors[-1] < 1e-5
     assert errors[0] > 3 * errors[1] > 9 * errors[2]
 
 
 def test_sites_are_the_free_cell_centres_of_the_square_over_the_bounding_box():
-    where = environment(box(2, 1, 4, 2), boundary=((1, 1), (5, 1), (5, 3), (1, 3)))
-    cost = CoverageCost(where, lattice=8)
+    environment = build_environment(build_ring(2, 1, 4, 2), boundary=((1, 1), (5, 1), (5, 3), (1, 3)))
+    cost = CoverageCost(environment, lattice=8)
     assert cost.spacing == 0.5
     expected = [
         (x, y)
@@ -56,12 +58,12 @@ def test_sites_are_the_free_cell_centres_of_the_square_over_the_bounding_box():
 
 
 def test_sites_on_walls_are_left_out():
-    where = environment(box(1, 0, 3, 2), boundary=box(0, 0, 4, 4))
-    assert CoverageCost(where, lattice=4).points.tolist() == [
+    environment = build_environment(build_ring(1, 0, 3, 2), boundary=build_ring(0, 0, 4, 4))
+    assert CoverageCost(environment, lattice=4).points.tolist() == [
         *([0.5, 0.5], [3.5, 0.5], [0.5, 1.5], [3.5, 1.5]),
         *([x, y] for y in (2.5, 3.5) for x in (0.5, 1.5, 2.5, 3.5)),
     ]
-    shifted = environment(box(0.5, 0, 3, 2.5), boundary=box(0, 0, 4, 4))
+    shifted = build_environment(build_ring(0.5, 0, 3, 2.5), boundary=build_ring(0, 0, 4, 4))
     assert CoverageCost(shifted, lattice=4).points.tolist() == [
         *([3.5, 0.5], [3.5, 1.5], [3.5, 2.5]),
         *([x, 3.5] for x in (0.5, 1.5, 2.5, 3.5)),
@@ -69,9 +71,10 @@ def test_sites_on_walls_are_left_out():
 
 
 def test_rooms_without_a_robot_are_reported_as_uncovered():
-    where = environment(box(3, 0, 4, 8), boundary=box(0, 0, 8, 8))
-    cost = CoverageCost(where, lattice=16)
-    left, both = cost([[1.0, 1.0]]), cost([[1.0, 1.0], [6.0, 6.0]])
+    environment = build_environment(build_ring(3, 0, 4, 8), boundary=build_ring(0, 0, 8, 8))
+    cost = CoverageCost(environment, lattice=16)
+    left = cost([[1.0, 1.0]])
+    both = cost([[1.0, 1.0], [6.0, 6.0]])
     assert left.uncovered_area == pytest.approx(32.0)
     assert both.uncovered_area == 0.0
     in_left = cost.points[:, 0] < 3.0
@@ -84,8 +87,12 @@ def test_rooms_without_a_robot_are_reported_as_uncovered():
 
 
 def test_a_room_too_small_for_a_site_has_no_mean():
-    where = environment(box(0.5, 0.5, 3, 8), box(0, 0.5, 1, 1), boundary=box(0, 0, 8, 8))
-    tiny = Environment("tiny", where.boundary, (*where.obstacles, PolygonObstacle(box(0.125, 0, 1, 1))))
+    environment = build_environment(
+        build_ring(0.5, 0.5, 3, 8), build_ring(0, 0.5, 1, 1), boundary=build_ring(0, 0, 8, 8)
+    )
+    tiny = Environment(
+        "tiny", environment.boundary, (*environment.obstacles, PolygonObstacle(build_ring(0.125, 0, 1, 1)))
+    )
     cost = CoverageCost(tiny, lattice=4)
     result = cost([[0.05, 0.05]])
     assert np.isnan(result.mean_distance)
@@ -99,10 +106,10 @@ def test_owner_and_distance_agree_with_the_matrix_of_all_distances(n):
     cost = CoverageCost(OFFICE, lattice=24)
     robots = cost.points[np.random.default_rng(n).choice(len(cost.points), n)]
     result = cost(robots)
-    everything = cost.geodesics.compute_distances(robots, cost.points)
-    np.testing.assert_allclose(result.distances, everything.min(axis=0), rtol=0, atol=1e-12)
-    own = everything[result.owner, np.arange(len(cost.points))]
-    np.testing.assert_allclose(own, result.distances, rtol=0, atol=1e-12)
+    distances = cost.geodesics.compute_distances(robots, cost.points)
+    np.testing.assert_allclose(result.distances, distances.min(axis=0), rtol=0, atol=1e-12)
+    distances_of_owners = distances[result.owner, np.arange(len(cost.points))]
+    np.testing.assert_allclose(distances_of_owners, result.distances, rtol=0, atol=1e-12)
 
 
 def test_first_waypoints_are_those_of_the_shortest_paths():
@@ -110,25 +117,23 @@ def test_first_waypoints_are_those_of_the_shortest_paths():
     robots = np.array([[1.0, 1.0], [11.0, 1.0]])
     result = cost(robots)
     for site in range(len(cost.points)):
-        way = cost.find_path(robots, cost.points[site])
-        np.testing.assert_allclose(way[-1], robots[result.owner[site]], atol=1e-12)
-        np.testing.assert_allclose(way[-2], result.first_waypoints[site], atol=1e-12)
+        path = cost.find_path(robots, cost.points[site])
+        np.testing.assert_allclose(path[-1], robots[result.owner[site]], atol=1e-12)
+        np.testing.assert_allclose(path[-2], result.first_waypoints[site], atol=1e-12)
 
 
 def test_the_gradient_is_that_of_the_value():
     cost = CoverageCost(OFFICE, lattice=40)
     rng = np.random.default_rng(8)
-    room = OFFICE.free.buffer(-0.05)
     robots = rng.uniform((0, 0), (12, 8), (60, 2))
-    robots = robots[shapely.contains_xy(room, *robots.T)][:6]
+    robots = robots[shapely.contains_xy(OFFICE.free.buffer(-0.05), *robots.T)][:6]
     gradient = cost(robots).gradient
     step = 1e-6
     for i in range(len(robots)):
         for k in range(2):
-            ahead, behind = robots.copy(), robots.copy()
-            ahead[i, k] += step
-            behind[i, k] -= step
-            slope = (cost(ahead).value - cost(behind).value) / (2 * step)
+            shift = np.zeros_like(robots)
+            shift[i, k] = step
+            slope = (cost(robots + shift).value - cost(robots - shift).value) / (2 * step)
             assert slope == pytest.approx(gradient[i, k], abs=1e-5 * cost(robots).value)
     assert np.abs(gradient).max() > 1.0
 
@@ -147,37 +152,39 @@ def test_order_and_repetition_of_robots_do_not_matter(robots, random):
     result = cost(robots)
     shuffled = [*robots, *robots]
     random.shuffle(shuffled)
-    again = cost(shuffled)
-    np.testing.assert_array_equal(again.distances, result.distances)
+    np.testing.assert_array_equal(cost(shuffled).distances, result.distances)
     if len(robots) > 1:
         assert (cost(robots[1:]).distances >= result.distances - 1e-12).all()
 
 
 def test_results_do_not_depend_on_earlier_calls():
     rng = np.random.default_rng(0)
-    one, other = CoverageCost(OFFICE, lattice=32), CoverageCost(OFFICE, lattice=32)
-    runs = [one.points[rng.choice(len(one.points), 5)] for _ in range(6)]
-    first = [one(robots) for robots in runs]
-    second = [other(robots) for robots in reversed(runs)][::-1]
-    for a, b in zip(first, second, strict=True):
-        assert a.value == b.value
+    cost = CoverageCost(OFFICE, lattice=32)
+    teams = [cost.points[rng.choice(len(cost.points), 5)] for _ in range(6)]
+    results = [cost(team) for team in teams]
+    other_cost = CoverageCost(OFFICE, lattice=32)
+    other_results = [other_cost(team) for team in reversed(teams)]
+    for result, other in zip(results, reversed(other_results), strict=True):
+        assert result.value == other.value
         for name in ("distances", "owner", "first_waypoints", "gradient"):
-            np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+            np.testing.assert_array_equal(getattr(result, name), getattr(other, name))
 
 
 @pytest.mark.parametrize(("scale", "shift"), [(1e-2, (0, 0)), (1e3, (5e5, -4e6)), (1.0, (-77.7, 31.1))])
 def test_the_cost_scales_and_moves_with_the_map(scale, shift):
-    rings = [box(2, 0, 3, 5), ((4.03, 8), (5.01, 3), (6.1, 8))]
+    rings = [build_ring(2, 0, 3, 5), ((4.03, 8), (5.01, 3), (6.1, 8))]
     robots = np.array([[1.0, 1.0], [7.0, 7.0], [3.5, 2.0]])
-    whole = CoverageCost(environment(*rings, boundary=box(0, 0, 8, 8)), lattice=32)(robots)
+    original = CoverageCost(build_environment(*rings, boundary=build_ring(0, 0, 8, 8)), lattice=32)(robots)
 
-    def moved(ring):
+    def transform(ring):
         return tuple(map(tuple, (np.array(ring) * scale + shift).tolist()))
 
-    there = environment(*map(moved, rings), boundary=moved(box(0, 0, 8, 8)))
-    result = CoverageCost(there, lattice=32)(robots * scale + shift)
-    # the map is laid on a grid of a micrometre
-    assert result.mean_distance == pytest.approx(whole.mean_distance * scale, rel=1e-4 if scale < 1 else 1e-7)
+    transformed = build_environment(*map(transform, rings), boundary=transform(build_ring(0, 0, 8, 8)))
+    result = CoverageCost(transformed, lattice=32)(robots * scale + shift)
+    # Coordinates are rounded to a grid of a micrometre.
+    assert result.mean_distance == pytest.approx(
+        original.mean_distance * scale, rel=1e-4 if scale < 1 else 1e-7
+    )
 
 
 def test_coincident_robots_give_the_site_to_the_first():
@@ -202,35 +209,32 @@ def test_the_lattice_must_be_a_whole_number_in_range(lattice):
 
 
 def test_building_reports_progress_and_can_be_cancelled():
-    told = []
-    CoverageCost(OFFICE, lattice=64, progress=told.append)
-    assert told == sorted(told)
-    assert 0.0 <= told[0] <= told[-1] < 1.0
+    fractions = []
+    CoverageCost(OFFICE, lattice=64, progress=fractions.append)
+    assert fractions == sorted(fractions)
+    assert 0.0 <= fractions[0] <= fractions[-1] < 1.0
 
-    class UnwantedError(Exception):
-        pass
+    def cancel(fraction):
+        raise InterruptedError
 
-    def refuse(done):
-        raise UnwantedError
-
-    with pytest.raises(UnwantedError):
-        CoverageCost(OFFICE, lattice=64, progress=refuse)
+    with pytest.raises(InterruptedError):
+        CoverageCost(OFFICE, lattice=64, progress=cancel)
 
 
 def test_sealed_rooms_without_a_corner():
-    # the nearest robot is behind the wall, and no way bends anywhere
-    where = environment(box(3, 0, 5, 8), boundary=((0, 0), (8, 0), (8, 8), (0, 8)))
-    cost = CoverageCost(where, lattice=16)
+    """The robot that is nearest in a straight line may be behind the wall, and no path bends."""
+    environment = build_environment(build_ring(3, 0, 5, 8), boundary=((0, 0), (8, 0), (8, 8), (0, 8)))
+    cost = CoverageCost(environment, lattice=16)
     assert len(cost.corners) == 0
     robots = np.array([[2.9, 4.0], [7.0, 7.0]])
     result = cost(robots)
-    left = cost.points[:, 0] < 4.0
-    np.testing.assert_array_equal(result.owner, np.where(left, 0, 1))
+    is_left = cost.points[:, 0] < 4.0
+    np.testing.assert_array_equal(result.owner, np.where(is_left, 0, 1))
     expected = np.hypot(*(cost.points - robots[result.owner]).T)
     np.testing.assert_allclose(result.distances, expected, rtol=0, atol=1e-12)
-    alone = cost(robots[:1])
-    assert alone.uncovered_area == pytest.approx(24.0)
-    assert (alone.owner == np.where(left, 0, -1)).all()
+    result = cost(robots[:1])
+    assert result.uncovered_area == pytest.approx(24.0)
+    np.testing.assert_array_equal(result.owner, np.where(is_left, 0, -1))
 
 
 def test_results_have_a_short_repr(empty: Environment) -> None:

@@ -58,6 +58,6 @@ def test_an_array_of_another_shape_is_rejected(positions):
         CoverageCost(TWO_ROOMS, 8).evaluate_teams(positions)
 
 
-def test_a_robot_inside_an_obstacle_is_named():
+def test_errors_name_a_robot_inside_an_obstacle():
     with pytest.raises(InputError, match=r"positions\[3\]: .* outside the free space"):
         CoverageCost(TWO_ROOMS, 8).evaluate_teams([[[1.0, 1.0], [2.0, 2.0]], [[7.0, 7.0], [4.0, 4.0]]])

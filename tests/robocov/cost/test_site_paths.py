@@ -1,3 +1,5 @@
+"""Owners and distances of sites, with many robots, equal distances, and around corners."""
+
 from __future__ import annotations
 
 import os
@@ -17,26 +19,28 @@ from robocov.environment import Environment
 SQUARE = Environment("square", ((0, 0), (1, 0), (1, 1), (0, 1)))
 
 
-def checked_owners(side, places):
-    """Return the owner of each site, having checked that it is the first of the robots nearest to it."""
+def compute_owners(side, positions):
+    """Return the owner of each site, and check that it is the first of the robots nearest to it."""
     cost = CoverageCost(SQUARE, side)
-    result = cost(np.asarray(places, dtype=float))
-    sites, robots = (cost.geodesics.grid.snap(points) for points in (cost.points, result.positions))
-    table = ((sites[:, None] - robots) ** 2).sum(axis=2)
-    np.testing.assert_array_equal(result.owner, table.argmin(axis=1))
-    np.testing.assert_array_equal(result.distances, np.sqrt(table.min(axis=1)) * cost.geodesics.grid.unit)
+    result = cost(np.asarray(positions, dtype=float))
+    grid = cost.geodesics.grid
+    offsets = grid.snap(cost.points)[:, None] - grid.snap(result.positions)
+    squares = (offsets**2).sum(axis=2)
+    np.testing.assert_array_equal(result.owner, squares.argmin(axis=1))
+    np.testing.assert_array_equal(result.distances, np.sqrt(squares.min(axis=1)) * grid.unit)
     return result.owner
 
 
-coarse = st.tuples(st.integers(0, 8), st.integers(0, 8)).map(lambda place: np.array(place) / 8)
-fine = st.tuples(st.floats(0, 1), st.floats(0, 1))
-crowd = st.tuples(st.floats(0, 1e-9), st.floats(0, 1e-9)).map(lambda place: np.array(place) + 0.4)
+lattice_points = st.tuples(st.integers(0, 8), st.integers(0, 8)).map(lambda point: np.array(point) / 8)
+any_points = st.tuples(st.floats(0, 1), st.floats(0, 1))
+crowded_points = st.tuples(st.floats(0, 1e-9), st.floats(0, 1e-9)).map(lambda point: np.array(point) + 0.4)
+points = st.one_of(lattice_points, any_points, crowded_points)
 
 
 @settings(max_examples=250)
-@given(st.integers(1, 33), st.lists(st.one_of(coarse, fine, crowd), min_size=1, max_size=30))
-def test_the_first_of_the_nearest_robots_owns_a_site(side, places):
-    checked_owners(side, places)
+@given(st.integers(1, 33), st.lists(points, min_size=1, max_size=30))
+def test_the_first_of_the_nearest_robots_owns_a_site(side, positions):
+    compute_owners(side, positions)
 
 
 @settings(max_examples=60)
@@ -45,50 +49,51 @@ def test_the_first_of_the_nearest_robots_owns_a_site(side, places):
 )
 @example(15, [(1, 3), (4, 7), (9, 2), (4, 8), (1, 14)])
 def test_owners_are_exact_for_robots_at_sites(side, cells):
-    places = (np.array(cells) % side + 0.5) / side
-    checked_owners(side, places)
+    compute_owners(side, (np.array(cells) % side + 0.5) / side)
 
 
 @pytest.mark.parametrize("count", [2, 8, 9, 30])
-@pytest.mark.parametrize("shape", ["row", "column", "slant", "circle", "one place", "two places"])
+@pytest.mark.parametrize("shape", ["row", "column", "diagonal", "circle", "one point", "two points"])
 def test_owners_are_exact_for_degenerate_teams(count, shape):
-    turn = 2.0 * np.pi * np.arange(count) / count
-    step = np.arange(count) / count
-    places = {
-        "row": np.column_stack([step, np.full(count, 0.3)]),
-        "column": np.column_stack([np.full(count, 0.3), step]),
-        "slant": np.column_stack([step, 0.1 + 0.7 * step]),
-        "circle": 0.5 + 0.4 * np.column_stack([np.cos(turn), np.sin(turn)]),
-        "one place": np.full((count, 2), 0.6),
-        "two places": np.where((np.arange(count) % 2 == 0)[:, None], 0.2, 0.7) * np.ones(2),
-    }[shape]
-    checked_owners(40, places)
+    angle = 2.0 * np.pi * np.arange(count) / count
+    fraction = np.arange(count) / count
+    is_even = np.arange(count) % 2 == 0
+    positions = {
+        "row": np.column_stack([fraction, np.full(count, 0.3)]),
+        "column": np.column_stack([np.full(count, 0.3), fraction]),
+        "diagonal": np.column_stack([fraction, 0.1 + 0.7 * fraction]),
+        "circle": 0.5 + 0.4 * np.column_stack([np.cos(angle), np.sin(angle)]),
+        "one point": np.full((count, 2), 0.6),
+        "two points": np.where(is_even[:, None], 0.2, 0.7) * np.ones(2),
+    }
+    compute_owners(40, positions[shape])
 
 
 @pytest.mark.parametrize("count", [1, 4, 12])
 def test_the_first_of_coincident_robots_owns_their_sites(count):
-    places = np.random.default_rng(3).random((count, 2))
-    alone = checked_owners(16, places)
-    doubled = checked_owners(16, np.concatenate([places, places]))
-    np.testing.assert_array_equal(doubled, alone)
+    positions = np.random.default_rng(3).random((count, 2))
+    owners = compute_owners(16, positions)
+    owners_of_doubled_team = compute_owners(16, np.concatenate([positions, positions]))
+    np.testing.assert_array_equal(owners_of_doubled_team, owners)
 
 
 @pytest.mark.parametrize("count", [50, 1000])
 def test_owners_are_exact_for_many_robots(count):
     rng = np.random.default_rng(count)
-    checked_owners(60, rng.random((count, 2)))
+    compute_owners(60, rng.random((count, 2)))
 
 
 def test_the_first_of_coincident_robots_owns_sites_around_corners():
     cost = CoverageCost(OFFICE, 24)
-    places = cost.points[np.random.default_rng(3).choice(len(cost.points), 5)]
-    alone, doubled = cost(places), cost(np.concatenate([places, places]))
-    assert (alone.first_corner >= 0).any()
+    positions = cost.points[np.random.default_rng(3).choice(len(cost.points), 5)]
+    result = cost(positions)
+    doubled = cost(np.concatenate([positions, positions]))
+    assert (result.first_corner >= 0).any()
     for name in ("owner", "distances", "first_corner", "last_corner"):
-        np.testing.assert_array_equal(getattr(doubled, name), getattr(alone, name))
+        np.testing.assert_array_equal(getattr(doubled, name), getattr(result, name))
 
 
-SAME_BITS = """
+PRINT_RESULTS = """
 import sys
 sys.path.insert(0, {folder!r})
 import numpy as np
@@ -101,25 +106,29 @@ office = Environment("office", OFFICE.boundary, OFFICE.obstacles, density=densit
 cost = CoverageCost(office, 12)
 for speeds in (None, np.array([0.3, 0.7, 0.3])):
     result = cost(np.array([[1.0, 1.0], [10.0, 1.0], [5.5, 7.3]]), speeds)
-    numbers = result.value, result.mean_distance, *result.distances, *result.gradient.ravel(), *result.owner
+    numbers = [result.value, result.mean_distance, *result.distances, *result.gradient.ravel(), *result.owner]
     print(*(float(number).hex() for number in numbers))
 """
 
 
 @pytest.mark.slow
 def test_bits_are_the_same_without_the_compiler_and_on_any_processor():
-    script = SAME_BITS.format(folder=str(Path(__file__).parents[1]))
-    settings = (
+    script = PRINT_RESULTS.format(folder=str(Path(__file__).parents[1]))
+    environments = [
         {},
         {"NUMBA_DISABLE_JIT": "1"},
         {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "OPENBLAS_CORETYPE": "Prescott"},
-    )
-    answers = [
-        subprocess.run(
-            [sys.executable, "-c", script], env=os.environ | each, capture_output=True, text=True, check=True
-        ).stdout
-        for each in settings
     ]
-    assert len(answers[0].split()) > 100
-    assert answers[1] == answers[0]
-    assert answers[2] == answers[0]
+    outputs = []
+    for variables in environments:
+        process = subprocess.run(
+            [sys.executable, "-c", script],
+            env=os.environ | variables,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        outputs.append(process.stdout)
+    assert len(outputs[0].split()) > 100
+    assert outputs[1] == outputs[0]
+    assert outputs[2] == outputs[0]

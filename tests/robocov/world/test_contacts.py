@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from robocov.team import Team
 from robocov.world import MAX_PENETRATION, World
@@ -27,6 +28,19 @@ def test_robots_without_contact_move_as_if_they_were_alone() -> None:
         assert team.positions[1].tobytes() == alone.positions[0].tobytes()
         assert team.velocities[1].tobytes() == alone.velocities[0].tobytes()
     assert team._list_touching() == [0, 2, 3]
+
+
+@pytest.mark.parametrize("ratio", [100.0, 1000.0])
+def test_a_light_robot_between_a_heavy_one_and_a_wall_is_not_squeezed(ratio: float) -> None:
+    pair = Team.homogeneous(2, max_speed=2.0, max_acceleration=20.0)
+    team = replace(pair, mass=np.array([1.0, ratio]))
+    world = World(Obstacles((WALL,)), team, np.array([[0.85, 0.0], [0.5, 0.0]]))
+    for _ in range(60):
+        world.step(np.array([[0.0, 0.0], [50.0 * ratio, 0.0]]), DT)
+        light_x, heavy_x = world.positions[:, 0]
+        assert light_x <= 0.9 + MAX_PENETRATION
+        assert light_x - heavy_x >= 0.2 - MAX_PENETRATION
+    assert light_x == pytest.approx(0.9, abs=MAX_PENETRATION)
 
 
 def test_pushes_are_passed_on_along_a_row_of_robots() -> None:

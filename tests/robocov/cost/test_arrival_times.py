@@ -1,8 +1,10 @@
+"""The coverage cost of robots of different speeds: times until the first robot arrives."""
+
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from cost_cases import OFFICE, environment
+from cost_cases import OFFICE, build_environment
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -10,36 +12,39 @@ from robocov.cost import CoverageCost
 from robocov.errors import InputError
 
 COST = CoverageCost(OFFICE, lattice=24)
-ROOM = CoverageCost(environment(), lattice=32)
+ROOM = CoverageCost(build_environment(), lattice=32)
 seeds = st.integers(0, 2**32 - 1)
 
 
-def somewhere(n: int, rng: np.random.Generator) -> np.ndarray:
+def draw_positions(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Return positions close to sites, no two at the same one."""
     return COST.points[rng.choice(len(COST.points), n, replace=False)] + rng.uniform(-1e-3, 1e-3, (n, 2))
 
 
 @settings(max_examples=25)
 @given(seeds, st.integers(1, 7), st.sampled_from([(1.0, 0.4), (1.0,), (0.3, 0.5, 0.9, 1.1)]))
 def test_times_are_the_minimum_of_path_length_over_speed(seed: int, n: int, speeds: tuple) -> None:
-    """The ways come from the point-to-point search here, which shares no code with the sites' one."""
+    """The expected distances come from the search from point to point, which shares no code with this one."""
     rng = np.random.default_rng(seed)
-    robots, speed = somewhere(n, rng), rng.choice(speeds, n)
+    robots = draw_positions(n, rng)
+    speed = rng.choice(speeds, n)
     result = COST(robots, speeds=speed)
-    some = rng.choice(len(COST.points), 30, replace=False)
-    ways = COST.geodesics.compute_distances(COST.points[some], robots)
-    times = ways / speed
-    np.testing.assert_allclose(result.times[some], times.min(axis=1), rtol=1e-6)
-    owner = result.owner[some]
+    sites = rng.choice(len(COST.points), 30, replace=False)
+    distances = COST.geodesics.compute_distances(COST.points[sites], robots)
+    times = distances / speed
+    np.testing.assert_allclose(result.times[sites], times.min(axis=1), rtol=1e-6)
+    owner = result.owner[sites]
     np.testing.assert_allclose(times[np.arange(30), owner], times.min(axis=1), rtol=1e-6)
-    np.testing.assert_allclose(result.distances[some], ways[np.arange(30), owner], rtol=1e-6)
+    np.testing.assert_allclose(result.distances[sites], distances[np.arange(30), owner], rtol=1e-6)
     assert result.mean_time == pytest.approx(result.times.mean(), rel=1e-12)
     assert result.value == pytest.approx(result.mean_time * OFFICE.free.area, rel=1e-12)
 
 
 @given(seeds, st.integers(1, 6), st.floats(0.1, 5.0))
 def test_equal_speeds_only_change_the_unit(seed: int, n: int, speed: float) -> None:
-    robots = somewhere(n, np.random.default_rng(seed))
-    plain, timed = COST(robots), COST(robots, speeds=np.full(n, speed))
+    robots = draw_positions(n, np.random.default_rng(seed))
+    plain = COST(robots)
+    timed = COST(robots, speeds=np.full(n, speed))
     np.testing.assert_array_equal(timed.owner, plain.owner)
     np.testing.assert_array_equal(timed.distances, plain.distances)
     assert timed.mean_distance == plain.mean_distance
@@ -51,12 +56,16 @@ def test_equal_speeds_only_change_the_unit(seed: int, n: int, speed: float) -> N
 @given(seeds)
 def test_the_gradient_is_that_of_the_value(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    robots, speeds = somewhere(4, rng), np.array([1.0, 0.4, 1.0, 0.7])
-    result, step = COST(robots, speeds=speeds), 1e-6
-    i, axis = int(rng.integers(4)), int(rng.integers(2))
+    robots = draw_positions(4, rng)
+    speeds = np.array([1.0, 0.4, 1.0, 0.7])
+    result = COST(robots, speeds=speeds)
+    i = int(rng.integers(4))
+    axis = int(rng.integers(2))
+    step = 1e-6
     shift = np.zeros((4, 2))
     shift[i, axis] = step
-    low, high = (COST(robots + sign * shift, speeds=speeds) for sign in (-1, 1))
+    low = COST(robots - shift, speeds=speeds)
+    high = COST(robots + shift, speeds=speeds)
     if (low.owner == high.owner).all() and (low.first_corner == high.first_corner).all():
         slope = (high.value - low.value) / (2 * step)
         assert slope == pytest.approx(result.gradient[i, axis], abs=1e-4)
@@ -82,7 +91,7 @@ def test_a_fast_robot_owns_sites_that_are_nearer_to_a_slow_one() -> None:
 
 
 def test_rooms_without_a_robot_are_uncovered_whatever_the_speed() -> None:
-    halves = CoverageCost(environment(((0.45, 0.0), (0.55, 0.0), (0.55, 1.0), (0.45, 1.0))), lattice=20)
+    halves = CoverageCost(build_environment(((0.45, 0.0), (0.55, 0.0), (0.55, 1.0), (0.45, 1.0))), lattice=20)
     result = halves([[0.2, 0.5], [0.3, 0.5]], speeds=[1.0, 2.0])
     assert np.isinf(result.times[result.owner < 0]).all()
     assert result.uncovered_area == pytest.approx(0.45)
