@@ -28,7 +28,7 @@ from robocov.errors import (
     quote,
     to_one_line,
 )
-from robocov.files.strictjson import parse, parse_toml, read_bytes
+from robocov.files.strictjson import parse_json, parse_toml, read_bytes
 from robocov.team import KINEMATICS, MAX_ROBOTS, PARAMETERS, Team
 
 TeamDefaults: TypeAlias = Mapping[str, float | str | None]
@@ -64,7 +64,7 @@ def read_team(path: Path | str, defaults: TeamDefaults | None = None) -> Team:
     file_name = to_one_line(path)
     content = read_bytes(path)
     if path.suffix.lower() == ".json":
-        document = parse(content, file_name)
+        document = parse_json(content, file_name)
     else:
         document = parse_toml(content, file_name)
     if not isinstance(document, dict):

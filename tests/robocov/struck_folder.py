@@ -16,7 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from robocov.errors import OutputError
-from robocov.files.result_folder import extended, results, settle
+from robocov.files.result_folder import complete_commit, create_result, extend_result
 
 OLD = {"run.json": "old", "record.npz": "old", "run.mp4": "old"} | {
     f"frames/{k:06d}.png": "old" for k in range(3)
@@ -46,15 +46,15 @@ def content(folder: Path) -> dict[str, str]:
 
 
 def made(folder: Path) -> None:
-    with results(folder, overwrite=True) as result:
-        write(result.new, NUMBERS)
-        result.keep()
-        write(result.new, NEW)
+    with create_result(folder, overwrite=True) as result:
+        write(result.staging, NUMBERS)
+        result.save_progress()
+        write(result.staging, NEW)
 
 
 def added(folder: Path) -> None:
-    with extended(folder) as result:
-        write(result.new, {"metrics.csv": "new"})
+    with extend_result(folder) as result:
+        write(result.staging, {"metrics.csv": "new"})
 
 
 def fresh(folder: Path) -> None:
@@ -63,8 +63,8 @@ def fresh(folder: Path) -> None:
 
 def replaced(folder: Path) -> None:
     """There is a result, and files of somebody else."""
-    with results(folder, overwrite=False) as result:
-        write(result.new, OLD)
+    with create_result(folder, overwrite=False) as result:
+        write(result.staging, OLD)
     write(folder, FOREIGN)
 
 
@@ -122,7 +122,7 @@ def main() -> None:
         before(folder)
         statuses.append(struck(act, folder, len(statuses), fail=outcome == "fail"))
         if folder.exists():
-            settle(folder)
+            complete_commit(folder)
             if content(folder) not in states:
                 states.append(content(folder))
         act(folder)

@@ -1,10 +1,11 @@
-"""Folders of results: the old result or the new one at any moment, and nothing else touched.
+"""Folders of results that contain either the old result or the new one, and are otherwise not touched.
 
-A result is made in a hidden staging folder inside its folder. To commit it, a journal is written that lists
-the files of the new result, and those of the old one that go. From the moment when the journal has its name,
-the new result counts: whoever opens the folder next does what is left to be done (`settle`). In the end the
-journal becomes the manifest, the list of the files that the result consists of. What the manifest does not
-name is somebody else's, and neither replaced nor removed. Links inside the folder are not followed.
+A result is written to a hidden staging folder inside its folder. To commit it, a journal is written that
+lists the files of the new result, and those of the old one that are to be removed. As soon as the journal has
+its name, the new result counts: the next process that opens the folder completes what is left to be done
+(`complete_commit`). At the end the journal becomes the manifest, the list of the files of the result. Files
+that are not in the manifest belong to somebody else, and are neither replaced nor removed. Links inside the
+folder are not followed.
 """
 
 import json
@@ -20,259 +21,400 @@ from robocov.errors import InputError, OutputError, describe_error, quote
 from robocov.files.folder_lock import lock_folder
 from robocov.files.writing import flush_to_disk, replace_file
 
-Kind: TypeAlias = Literal["run", "comparison", "replay", "story"]
-REPORT = "report.html"
-"""A page about the result, which goes with it."""
-MANIFEST, _JOURNAL = ".robocov.json", ".robocov-commit.json"
-_STAGING, _LOCK = ".robocov-new", ".robocov.lock"
-_HEAD = {"format": "robocov-folder", "version": 1}
-_PICTURES = ("trajectories.png", "trajectories.svg", "cost.png", "cost.svg")
-_FILES: dict[Kind, tuple[str, ...]] = {
-    "comparison": ("comparison.json", "comparison.csv", "comparison.mp4", *_PICTURES),
-    "run": ("run.json", "record.npz", "cost.csv", "run.mp4", *_PICTURES),
+ResultKind: TypeAlias = Literal["run", "comparison", "replay", "story"]
+REPORT_FILE = "report.html"
+"""Report on a result, which belongs to it."""
+MANIFEST_FILE = ".robocov.json"
+_JOURNAL_FILE = ".robocov-commit.json"
+_STAGING_FOLDER = ".robocov-new"
+_LOCK_FILE = ".robocov.lock"
+_HEADER = {"format": "robocov-folder", "version": 1}
+_METRICS_FILE = "metrics.csv"
+_FRAMES_FOLDER = "frames"
+_FIGURE_FILES = ("trajectories.png", "trajectories.svg", "cost.png", "cost.svg")
+_FILES: dict[ResultKind, tuple[str, ...]] = {
+    "comparison": ("comparison.json", "comparison.csv", "comparison.mp4", *_FIGURE_FILES),
+    "run": ("run.json", "record.npz", "cost.csv", "run.mp4", *_FIGURE_FILES),
     "replay": ("replay.json", "run.mp4", "comparison.mp4"),
     "story": ("story.json", "session.robocov", "cost.csv", "run.mp4", "comparison.mp4"),
 }
-"""Files of a result of each kind, beside ``frames/`` and the folders of a comparison's runs."""
-_NAMES = {MANIFEST, "metrics.csv", REPORT, *(name for names in _FILES.values() for name in names)}
-_FRAME = re.compile(r"\d{6}\.png")
-_BEGINNINGS = {
-    **{f"{kind}.json": re.compile(rf'"format":\s*"robocov-{kind}"'.encode()) for kind in _FILES},
-    "metrics.csv": re.compile(rb"time_s,sensed_area_m2,"),
-    REPORT: re.compile(rb'<meta name="generator" content="robocov'),
+"""Files of a result of each kind, in addition to ``frames/`` and the folders of a comparison's runs."""
+_KNOWN_NAMES = {
+    MANIFEST_FILE,
+    _METRICS_FILE,
+    REPORT_FILE,
+    *(name for names in _FILES.values() for name in names),
 }
-"""By what files of ours are known, in their first 4096 bytes."""
+_FRAME_NAME = re.compile(r"\d{6}\.png")
+_FILE_NAME = re.compile(r"(?!\.{1,2}$)[^/\\:\0]+")
+_SIGNATURES = {
+    **{f"{kind}.json": re.compile(rf'"format":\s*"robocov-{kind}"'.encode()) for kind in _FILES},
+    _METRICS_FILE: re.compile(rb"time_s,sensed_area_m2,"),
+    REPORT_FILE: re.compile(rb'<meta name="generator" content="robocov'),
+}
+"""Patterns that identify files of robocov by their first bytes."""
+_SIGNATURE_BYTES = 4096
 
 
 class ResultFolder:
-    """A folder while its result is being made: the files go to the hidden folder `new`."""
+    """A folder whose result is being written; see `create_result` and `extend_result`.
 
-    def __init__(self, path: Path, owned: set[str], *, replaces: bool, part: str = "") -> None:
-        self.path, self.new = path, path / _STAGING / part
+    Attributes
+    ----------
+    path : Path
+        The folder.
+    staging : Path
+        Hidden folder to which the files of the result are written.
+    """
+
+    def __init__(self, path: Path, owned_files: set[str], *, replaces: bool, part: str = "") -> None:
+        self.path = path
+        self.staging = path / _STAGING_FOLDER / part
         self._prefix = f"{part}/" if part else ""
-        self._owned, self._replaces = owned, replaces
-        with for_results(path):
-            self.new.mkdir(parents=True)
+        self._owned_files = owned_files
+        self._replaces = replaces
+        with report_folder_errors(path):
+            self.staging.mkdir(parents=True)
 
-    def claim(self, name: str) -> None:
-        """Count a file that is there as one of the result's, so that it may be replaced."""
-        self._owned.add(self._prefix + name)
+    def claim_file(self, name: str) -> None:
+        """Count an existing file as one of the result, so that it may be replaced.
 
-    def keep(self) -> None:
-        """Commit what is made so far, unless it is to replace a result: that is done once all is made."""
+        Parameters
+        ----------
+        name : str
+        """
+        self._owned_files.add(self._prefix + name)
+
+    def save_progress(self) -> None:
+        """Commit the files so far, unless they replace an earlier result: that waits until all are complete.
+
+        Raises
+        ------
+        OutputError
+            If the folder cannot be written to, or a file of somebody else is in the way.
+        """
         if not self._replaces:
             self.commit()
 
     def commit(self) -> None:
-        """Put what is made in the place of the earlier result; or beside it, where it replaces none."""
-        with for_results(self.path):
-            staging = self.path / _STAGING
-            made = {path.relative_to(staging).as_posix() for path in staging.rglob("*") if not path.is_dir()}
-            if not made:
+        """Move the files to the folder, in place of the earlier result or in addition to it.
+
+        Raises
+        ------
+        OutputError
+            If the folder cannot be written to, or a file of somebody else is in the way.
+        """
+        with report_folder_errors(self.path):
+            staging = self.path / _STAGING_FOLDER
+            new_files = {
+                path.relative_to(staging).as_posix() for path in staging.rglob("*") if not path.is_dir()
+            }
+            if not new_files:
                 return
-            for name in made:
-                _require_free(self.path, name, self._owned)
-            for folder in {(self.path / name).parent for name in made}:
+            for name in new_files:
+                _require_replaceable(self.path, name, self._owned_files)
+            for folder in {(self.path / name).parent for name in new_files}:
                 folder.mkdir(parents=True, exist_ok=True)
                 if not os.access(folder, os.W_OK | os.X_OK):
                     raise OutputError(f"{folder}: cannot be written to: Permission denied")
-            files = made if self._replaces else made | self._owned
-            journal = {**_HEAD, "files": sorted(files), "removed": sorted(self._owned - files)}
-            with replace_file(staging / _JOURNAL) as part:
-                part.write_text(json.dumps(journal, indent=0) + "\n", encoding="utf-8")
-            (staging / _JOURNAL).replace(self.path / _JOURNAL)  # from here on the new result counts
-            _carry_out(self.path)
-            self._owned, self._replaces = files, False
-            self.new.mkdir(parents=True)
+            files = new_files if self._replaces else new_files | self._owned_files
+            removed_files = self._owned_files - files
+            journal = {**_HEADER, "files": sorted(files), "removed": sorted(removed_files)}
+            with replace_file(staging / _JOURNAL_FILE) as temporary:
+                temporary.write_text(json.dumps(journal, indent=0) + "\n", encoding="utf-8")
+            # From here on the new result counts.
+            (staging / _JOURNAL_FILE).replace(self.path / _JOURNAL_FILE)
+            _carry_out_journal(self.path)
+            self._owned_files = files
+            self._replaces = False
+            self.staging.mkdir(parents=True)
 
 
 @contextmanager
-def results(
-    folder: Path, kind: Kind = "run", *, overwrite: bool, parts: Iterable[str] = ()
+def create_result(
+    folder: Path, kind: ResultKind = "run", *, overwrite: bool, parts: Iterable[str] = ()
 ) -> Iterator[ResultFolder]:
-    """Give a folder for a result, which is committed at the end; where the work fails, it is not.
+    """Create a result in a folder, which is committed at the end of the ``with`` block.
 
-    A missing folder is made; if nothing comes into it, it goes again. `overwrite` replaces the result that is
-    there; `parts` names the folders of a comparison's runs.
+    If the block raises, nothing is committed. A missing folder is created, and removed again if it remains
+    empty.
 
-    Raises `InputError` when what is in the folder may not be replaced, `OutputError` when it cannot be used,
-    another process is at work in it, or a file of somebody else is in the way.
+    Parameters
+    ----------
+    folder : Path
+    kind : {"run", "comparison", "replay", "story"}
+    overwrite : bool
+        Replace a result that is already there.
+    parts : iterable of str
+        Names of the folders of a comparison's runs.
+
+    Yields
+    ------
+    ResultFolder
+
+    Raises
+    ------
+    InputError
+        If the content of the folder must not be replaced.
+    OutputError
+        If the folder cannot be used, another process is using it, or a file of somebody else is in the way.
     """
-    with for_results(folder):
+    with report_folder_errors(folder):
         existed = folder.exists()
         folder.mkdir(parents=True, exist_ok=True)
     try:
-        with _held(folder):
-            with for_results(folder):
-                earlier = _replaceable(folder, overwrite=overwrite)
-                owned = earlier or set()
-                own = (*_FILES[kind], "frames/000000.png", *_frames(folder))
-                inner = (f"{part}/{name}" for part in parts for name in _FILES["run"])
-                for name in sorted({*owned, *own, *inner}):
-                    _require_free(folder, name, owned)
-            result = ResultFolder(folder, owned, replaces=earlier is not None)
+        with _open_folder(folder):
+            with report_folder_errors(folder):
+                replaced_files = _find_replaced_files(folder, overwrite=overwrite)
+                owned_files = replaced_files or set()
+                names = {*owned_files, *_FILES[kind], f"{_FRAMES_FOLDER}/000000.png", *_list_frames(folder)}
+                for part in parts:
+                    names.update(f"{part}/{name}" for name in _FILES["run"])
+                for name in sorted(names):
+                    _require_replaceable(folder, name, owned_files)
+            result = ResultFolder(folder, owned_files, replaces=replaced_files is not None)
             yield result
             result.commit()
     finally:
         if not existed:
             with suppress(OSError):
-                folder.rmdir()  # fails, as it should, where there is something in it
+                folder.rmdir()  # Fails, as it should, if the folder is not empty.
 
 
 @contextmanager
-def extended(folder: Path) -> Iterator[ResultFolder]:
-    """Give the folder of a result, or of one run of a comparison, to which files are added."""
-    home, part = _home(folder)
-    with _held(home):
-        with for_results(home):
-            owned = _owned(home)
-        if owned is None:
+def extend_result(folder: Path) -> Iterator[ResultFolder]:
+    """Add files to the result in a folder, which are committed at the end of the ``with`` block.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of a result, or of one run of a comparison.
+
+    Yields
+    ------
+    ResultFolder
+
+    Raises
+    ------
+    InputError
+        If there is no result in the folder.
+    OutputError
+        If the folder cannot be used, another process is using it, or a file of somebody else is in the way.
+    """
+    home, part = _find_home(folder)
+    with _open_folder(home):
+        with report_folder_errors(home):
+            owned_files = _list_owned_files(home)
+        if owned_files is None:
             raise InputError(f"{folder}: there is no result of robocov in it")
-        result = ResultFolder(home, owned, replaces=False, part=part)
+        result = ResultFolder(home, owned_files, replaces=False, part=part)
         yield result
         result.commit()
 
 
-def settle(folder: Path) -> None:
-    """Complete the commit of a result that was interrupted; to be called before the result is read.
+def complete_commit(folder: Path) -> None:
+    """Complete the commit of a result if it was interrupted; to be called before the result is read.
 
-    Raises `InputError` when it cannot be known what is left to be done, `OutputError` when it cannot be done.
+    Parameters
+    ----------
+    folder : Path
+        Folder of a result, or of one run of a comparison.
+
+    Raises
+    ------
+    InputError
+        If the journal is damaged, or that of the comparison to which the folder belongs is not carried out.
+    OutputError
+        If the commit cannot be completed.
     """
-    if os.path.lexists(folder / _JOURNAL):
-        with lock_folder(folder, _LOCK, remove=True), for_results(folder):
-            _carry_out(folder)
-    home, part = _home(folder, _JOURNAL)
+    if os.path.lexists(folder / _JOURNAL_FILE):
+        with lock_folder(folder, _LOCK_FILE, remove=True), report_folder_errors(folder):
+            _carry_out_journal(folder)
+    home, part = _find_home(folder, _JOURNAL_FILE)
     if part:
         raise InputError(f"{folder}: its replacement was interrupted; open {home} to have it completed")
 
 
 def is_report(path: Path) -> bool:
-    """Return whether a file is a page that ``robocov report`` has written."""
-    return _is_ours(path, REPORT)
+    """Return whether a file is a page that ``robocov report`` has written.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    bool
+    """
+    return _has_signature(path, REPORT_FILE)
 
 
-def _listing(path: Path) -> tuple[set[str], set[str]] | None:
-    """Return the files that a manifest or a journal names, and those that go; None where there is none."""
+@contextmanager
+def report_folder_errors(folder: Path) -> Iterator[None]:
+    """Convert errors of the operating system to errors of one line about a folder of results.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Raises
+    ------
+    OutputError
+        If the ``with`` block raises an OSError.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be used for results: {describe_error(error)}") from error
+
+
+def _read_file_lists(path: Path) -> tuple[set[str], set[str]] | None:
+    """Return the files in a manifest or journal, and the removed ones; None if there is no such file."""
     if not os.path.lexists(path):
         return None
     try:
         if path.is_symlink() or not path.is_file():
-            raise ValueError("it is no regular file")
+            raise ValueError("not a regular file")
         content = json.loads(path.read_bytes())
-        if {key: content[key] for key in _HEAD} != _HEAD:
+        if {key: content[key] for key in _HEADER} != _HEADER:
             raise ValueError(f"{quote(content['format'])}, version {quote(content['version'])}")
-        files, removed = set(content["files"]), set(content.get("removed", ()))
-        for name in files | removed:
-            *_, own = steps = name.split("/")
-            if not all(re.fullmatch(r"(?!\.{1,2}$)[^/\\:\0]+", step) for step in steps):
-                raise ValueError(f"{quote(name)}, but a file in the folder was wanted")
-            # or whoever sends a folder might have any file replaced or removed
-            if own not in _NAMES and not _FRAME.fullmatch(own):
-                raise ValueError(f"{quote(name)}, but a file of a result was wanted")
-        return files, removed
+        files = set(content["files"])
+        removed_files = set(content.get("removed", ()))
+        for name in files | removed_files:
+            _require_result_file(name)
+        return files, removed_files
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path}: cannot be used: {error}") from error
 
 
-def _carry_out(folder: Path) -> None:
-    """Do what a journal says, or the rest of it; then it is the manifest."""
-    journal = _listing(folder / _JOURNAL)
+def _require_result_file(name: str) -> None:
+    """Raise ValueError unless a name is that of a file of a result, in its folder or below it.
+
+    Otherwise, a folder from somebody else could have any file replaced or removed.
+    """
+    steps = name.split("/")
+    if not all(_FILE_NAME.fullmatch(step) for step in steps):
+        raise ValueError(f"expected a file in the folder, got {quote(name)}")
+    if steps[-1] not in _KNOWN_NAMES and not _FRAME_NAME.fullmatch(steps[-1]):
+        raise ValueError(f"expected a file of a result, got {quote(name)}")
+
+
+def _carry_out_journal(folder: Path) -> None:
+    """Do what is left to be done according to the journal of a folder, which then becomes the manifest."""
+    journal = _read_file_lists(folder / _JOURNAL_FILE)
     if journal is None:
         return
-    files, removed = journal
+    files, removed_files = journal
     flush_to_disk([folder])
-    for name in removed:
-        path = _inside(folder, name)
-        if _is_file(path):
+    for name in removed_files:
+        path = _resolve_inside(folder, name)
+        if _is_file_or_link(path):
             path.unlink()
     for name in files:
-        source = _inside(folder, f"{_STAGING}/{name}")
-        if _is_file(source):
-            target = _inside(folder, name)
+        source = _resolve_inside(folder, f"{_STAGING_FOLDER}/{name}")
+        if _is_file_or_link(source):
+            target = _resolve_inside(folder, name)
             target.parent.mkdir(parents=True, exist_ok=True)
             source.replace(target)
-    parents = {parent for name in removed for parent in PurePosixPath(name).parents[:-1]}
-    for parent in sorted(parents, key=lambda each: len(each.parts), reverse=True):
+    parents = {parent for name in removed_files for parent in PurePosixPath(name).parents[:-1]}
+    for parent in sorted(parents, key=lambda parent: len(parent.parts), reverse=True):
         with suppress(OSError):
-            (folder / parent).rmdir()  # fails, as it should, where there is something in it
+            (folder / parent).rmdir()  # Fails, as it should, if the folder is not empty.
     _discard_staging(folder)
-    (folder / _JOURNAL).replace(folder / MANIFEST)
+    (folder / _JOURNAL_FILE).replace(folder / MANIFEST_FILE)
 
 
 @contextmanager
-def _held(folder: Path) -> Iterator[None]:
-    """Lock a folder and put it in order; afterwards discard what was made and not committed."""
-    with lock_folder(folder, _LOCK, remove=True):
-        with for_results(folder):
-            _carry_out(folder)
+def _open_folder(folder: Path) -> Iterator[None]:
+    """Lock a folder and complete its last commit; at the end, discard what has not been committed."""
+    with lock_folder(folder, _LOCK_FILE, remove=True):
+        with report_folder_errors(folder):
+            _carry_out_journal(folder)
             _discard_staging(folder)
         try:
             yield
         finally:
-            if not os.path.lexists(folder / _JOURNAL):
+            if not os.path.lexists(folder / _JOURNAL_FILE):
                 with suppress(OSError):
                     _discard_staging(folder)
 
 
 def _discard_staging(folder: Path) -> None:
-    if os.path.lexists(folder / _STAGING):
-        shutil.rmtree(folder / _STAGING)
+    if os.path.lexists(folder / _STAGING_FOLDER):
+        shutil.rmtree(folder / _STAGING_FOLDER)
 
 
-def _replaceable(folder: Path, *, overwrite: bool) -> set[str] | None:
-    """Return the files of the result that is to be replaced, None where the folder is empty."""
-    if not {path.name for path in folder.iterdir()} - {_LOCK, _STAGING, MANIFEST}:
+def _find_replaced_files(folder: Path, *, overwrite: bool) -> set[str] | None:
+    """Return the files of the result that is to be replaced; None if the folder is empty."""
+    if not {path.name for path in folder.iterdir()} - {_LOCK_FILE, _STAGING_FOLDER, MANIFEST_FILE}:
         return None
     if not overwrite:
-        raise InputError(f"{folder}: the folder is not empty; another --out, or --overwrite, was wanted")
-    home, part = _home(folder)
+        raise InputError(f"{folder}: the folder is not empty; choose another --out or pass --overwrite")
+    home, part = _find_home(folder)
     if part:
-        raise InputError(f"{folder}: belongs to the comparison in {home}; another --out was wanted")
-    owned = _owned(folder)
-    if owned is None:
-        what = "what is in the folder is no result of robocov, so --overwrite leaves it alone"
-        raise InputError(f"{folder}: {what}; another --out was wanted")
-    return owned
+        raise InputError(f"{folder}: belongs to the comparison in {home}; choose another --out")
+    owned_files = _list_owned_files(folder)
+    if owned_files is None:
+        raise InputError(
+            f"{folder}: the content of the folder is no result of robocov, so --overwrite leaves it alone; "
+            "choose another --out"
+        )
+    return owned_files
 
 
-def _home(folder: Path, name: str = MANIFEST) -> tuple[Path, str]:
-    """Return the folder whose manifest (or journal) names files in this one, and the way from there."""
-    if not os.path.lexists(folder / name):
-        real = Path(os.path.realpath(folder))  # which takes links that go round in circles
-        with suppress(InputError):
-            files, _ = _listing(real.parent / name) or ((), ())
-            if any(each.startswith(f"{real.name}/") for each in files):
-                return real.parent, real.name
+def _find_home(folder: Path, list_name: str = MANIFEST_FILE) -> tuple[Path, str]:
+    """Return the folder whose manifest or journal lists the files of a folder, and the name of that part.
+
+    For the run of a comparison these are the comparison and the run; otherwise the folder itself and "".
+    """
+    if os.path.lexists(folder / list_name):
+        return folder, ""
+    real_folder = Path(os.path.realpath(folder))  # Unlike `resolve`, this accepts circular links.
+    with suppress(InputError):
+        lists = _read_file_lists(real_folder.parent / list_name)
+        if lists is not None and any(name.startswith(f"{real_folder.name}/") for name in lists[0]):
+            return real_folder.parent, real_folder.name
     return folder, ""
 
 
-def _owned(folder: Path) -> set[str] | None:
-    """Return the files of the result in a folder, None where there is none.
+def _list_owned_files(folder: Path) -> set[str] | None:
+    """Return the files of the result in a folder; None if there is no result.
 
-    Without a manifest that can be read, as in a copy without hidden files, those that have the names of ours.
+    Without a readable manifest, as in a copy without hidden files, they are identified by their names.
     """
-    with suppress(InputError):  # one that is damaged still says whose folder it is
-        if manifest := _listing(folder / MANIFEST):
-            return manifest[0]
-    kind = next((kind for kind in _FILES if _is_ours(folder / f"{kind}.json", f"{kind}.json")), None)
-    if kind is None and not os.path.lexists(folder / MANIFEST):
+    # A damaged manifest still tells that the folder is one of robocov.
+    with suppress(InputError):
+        lists = _read_file_lists(folder / MANIFEST_FILE)
+        if lists is not None:
+            return lists[0]
+    kind = _identify_kind(folder)
+    if kind is None and not os.path.lexists(folder / MANIFEST_FILE):
         return None
-    names = {name for name in _FILES[kind or "run"] if _is_file(folder / name)}
-    names |= {name for name in ("metrics.csv", REPORT) if _is_ours(folder / name, name)}
-    for part in _parts(folder) if kind == "comparison" else ():
-        inner = (*(_owned(part) or ()), MANIFEST)
-        names |= {f"{part.name}/{name}" for name in inner if _is_file(part / name)}
-    return names | _frames(folder)
+    names = {name for name in _FILES[kind or "run"] if _is_file_or_link(folder / name)}
+    names |= {name for name in (_METRICS_FILE, REPORT_FILE) if _has_signature(folder / name, name)}
+    if kind == "comparison":
+        for part in _list_parts(folder):
+            part_names = {*(_list_owned_files(part) or ()), MANIFEST_FILE}
+            names |= {f"{part.name}/{name}" for name in part_names if _is_file_or_link(part / name)}
+    return names | _list_frames(folder)
 
 
-def _frames(folder: Path) -> set[str]:
-    frames = folder / "frames"
+def _identify_kind(folder: Path) -> ResultKind | None:
+    """Return the kind of the result in a folder without a manifest; None if there is none."""
+    for kind in _FILES:
+        if _has_signature(folder / f"{kind}.json", f"{kind}.json"):
+            return kind
+    return None
+
+
+def _list_frames(folder: Path) -> set[str]:
+    frames = folder / _FRAMES_FOLDER
     if frames.is_symlink() or not frames.is_dir():
         return set()
-    return {f"frames/{path.name}" for path in frames.iterdir() if _FRAME.fullmatch(path.name)}
+    return {f"{_FRAMES_FOLDER}/{path.name}" for path in frames.iterdir() if _FRAME_NAME.fullmatch(path.name)}
 
 
-def _parts(folder: Path) -> list[Path]:
+def _list_parts(folder: Path) -> list[Path]:
     """Return the folders of the runs of a comparison without a manifest."""
     try:
         names = [str(name) for name in json.loads((folder / "comparison.json").read_bytes())["folders"]]
@@ -282,46 +424,37 @@ def _parts(folder: Path) -> list[Path]:
     return [part for part in parts if part.is_dir() and not part.is_symlink()]
 
 
-def _is_ours(path: Path, name: str) -> bool:
-    """Return whether a file begins like ours of that name."""
+def _has_signature(path: Path, name: str) -> bool:
+    """Return whether a file starts like robocov's file of some name."""
     try:
         if not path.is_file():
             return False
         with path.open("rb") as file:
-            return _BEGINNINGS[name].search(file.read(4096)) is not None
+            return _SIGNATURES[name].search(file.read(_SIGNATURE_BYTES)) is not None
     except OSError:
         return False
 
 
-def _is_file(path: Path) -> bool:
-    """Return whether there is a file, or a link."""
+def _is_file_or_link(path: Path) -> bool:
     return path.is_symlink() or path.is_file()
 
 
-def _require_free(folder: Path, name: str, owned: set[str]) -> None:
-    """Make sure that a file of the result may be written or removed: that it is nobody else's."""
-    path = _inside(folder, name)
-    if os.path.lexists(path) and not (name in owned and _is_file(path)):
-        what = "is in the way, and does not belong to the result"
-        raise OutputError(f"{path}: {what}; another --out was wanted")
+def _require_replaceable(folder: Path, name: str, owned_files: set[str]) -> None:
+    """Raise an error if the file of a result would replace a file of somebody else."""
+    path = _resolve_inside(folder, name)
+    if not os.path.lexists(path):
+        return
+    if name not in owned_files or not _is_file_or_link(path):
+        raise OutputError(f"{path}: is in the way, and does not belong to the result; choose another --out")
 
 
-def _inside(folder: Path, name: str) -> Path:
-    """Return the path of a file in a folder; the way to it must lead through folders, and no links."""
+def _resolve_inside(folder: Path, name: str) -> Path:
+    """Return the path of a file in a folder; raise an error if a link or a file is in the way."""
     path = folder
     for step in name.split("/")[:-1]:
         path /= step
         if path.is_symlink():
-            raise OutputError(f"{path}: is a link, which is not followed; another --out was wanted")
+            raise OutputError(f"{path}: is a link, which is not followed; choose another --out")
         if os.path.lexists(path) and not path.is_dir():
-            raise OutputError(f"{path}: is in the way of a folder; another --out was wanted")
+            raise OutputError(f"{path}: is in the way of a folder; choose another --out")
     return folder / name
-
-
-@contextmanager
-def for_results(folder: Path) -> Iterator[None]:
-    """Turn errors of the system into one line about the folder."""
-    try:
-        yield
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be used for results: {describe_error(error)}") from error

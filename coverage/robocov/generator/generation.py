@@ -31,7 +31,7 @@ from robocov.generator.mazes import build_maze
 from robocov.generator.polygons import scatter_polygons
 from robocov.generator.request import AREA_TOLERANCE, MAX_SIDE_M, MIN_SIDE_M, Request
 from robocov.generator.rooms import build_building
-from robocov.mapfile.check import check_rules
+from robocov.mapfile.rules import check_rules
 
 Layout: TypeAlias = Callable[[Request, DiscStart, np.random.Generator], list[Obstacle] | None]
 """Returns obstacles that keep the disc of the start in the corner free; None if an attempt fails."""

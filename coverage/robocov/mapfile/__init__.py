@@ -1,9 +1,10 @@
 """Map files: the map JSON, version 1, to and from `Environment`, and the bundled maps.
 
 - `reading`, `writing`: files, texts and JSON documents of maps
-- `density_pictures`: pictures of densities
-- `check`: the rules of valid maps, and a report on a map
-- `models`: the structure of a map file, and its JSON Schema
+- `density_pictures`: image files of densities
+- `models`: the keys of a map file, and its JSON Schema
+- `structure`, `rules`: validation of documents, and of the geometry of maps
+- `check`: a report on a valid map
 """
 
 from robocov.mapfile.density_pictures import MAX_PICTURE_BYTES

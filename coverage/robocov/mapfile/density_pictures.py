@@ -1,4 +1,4 @@
-"""Pictures that densities are read from."""
+"""Image files from which densities are read."""
 
 import io
 from pathlib import Path, PureWindowsPath
@@ -10,11 +10,11 @@ from robocov.density import MAX_RASTER_SIZE
 from robocov.errors import InputError, describe_error, to_one_line
 
 MAX_PICTURE_BYTES = 8_000_000
-"""Largest file of a picture."""
+"""Largest image file."""
 
 
 def read_picture_file(name: str, folder: Path | None) -> bytes:
-    """Read the file of a picture in a folder or below it.
+    """Read an image file in a folder or below it.
 
     Parameters
     ----------
@@ -33,15 +33,8 @@ def read_picture_file(name: str, folder: Path | None) -> bytes:
         If the file cannot be read, is too large, or is not in the folder.
     """
     if folder is None:
-        raise InputError("a map that is no file has no folder, but rows of numbers were wanted")
-    # a drive, a root or a backslash means something on some system
-    strange = "\0" in name or "\\" in name or PureWindowsPath(name).anchor
-    try:
-        path = None if strange else (folder / name).resolve()
-    except (OSError, RuntimeError):  # as of links in a circle
-        path = None
-    if path is None or not path.is_relative_to(folder.resolve()):
-        raise InputError("leaves the folder of the map, but a file in it was wanted")
+        raise InputError("image densities require a map loaded from a file; use rows of numbers instead")
+    path = _resolve_inside(name, folder)
     try:
         if not path.is_file():
             raise InputError("no such file")
@@ -50,12 +43,26 @@ def read_picture_file(name: str, folder: Path | None) -> bytes:
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be read: {describe_error(error)}") from None
     if len(content) > MAX_PICTURE_BYTES:
-        raise InputError(f"larger than {MAX_PICTURE_BYTES / 1e6:g} MB, but a smaller file was wanted")
+        raise InputError(f"expected at most {MAX_PICTURE_BYTES / 1e6:g} MB, got more")
     return content
 
 
+def _resolve_inside(name: str, folder: Path) -> Path:
+    """Return the path of a file in a folder; raise an error if it is elsewhere."""
+    path = None
+    # On some system, a drive, a root or a backslash leads out of the folder.
+    if "\0" not in name and "\\" not in name and not PureWindowsPath(name).anchor:
+        try:
+            path = (folder / name).resolve()
+        except (OSError, RuntimeError):  # Circular links.
+            path = None
+    if path is None or not path.is_relative_to(folder.resolve()):
+        raise InputError("expected a file in the folder of the map, got a path out of it")
+    return path
+
+
 def read_gray_levels(content: bytes) -> Array:
-    """Read the gray levels of a PNG or PGM picture.
+    """Read the gray levels of a PNG or PGM image.
 
     Parameters
     ----------
@@ -69,21 +76,22 @@ def read_gray_levels(content: bytes) -> Array:
     Raises
     ------
     InputError
-        If the content is no such picture, or has too many pixels.
+        If the content is no such image, or has too many pixels.
     """
     from PIL import Image
 
     try:
         with Image.open(io.BytesIO(content), formats=("PNG", "PPM")) as image:
             width, height = image.size
-            if not 1 <= min(width, height) <= max(width, height) <= MAX_RASTER_SIZE:
-                found = f"{width} x {height} pixels"
-                raise InputError(f"{found}, but at most {MAX_RASTER_SIZE} each way were wanted")
-            if image.mode.startswith("I"):  # 16 bits
+            if min(width, height) < 1 or max(width, height) > MAX_RASTER_SIZE:
+                raise InputError(
+                    f"expected at most {MAX_RASTER_SIZE} x {MAX_RASTER_SIZE} pixels, got {width} x {height}"
+                )
+            if image.mode.startswith("I"):  # Gray levels of 16 bits.
                 return np.clip(np.asarray(image, dtype=float) / 65535.0, 0.0, 1.0)
             return np.asarray(image.convert("L"), dtype=float) / 255.0
     except InputError:
         raise
-    except Exception as error:  # whatever a damaged picture makes of a decoder
-        why = to_one_line(error) or type(error).__name__
-        raise InputError(f"cannot be read as PNG or PGM: {why}") from None
+    except Exception as error:  # Damaged images raise various errors in decoders.
+        reason = to_one_line(error) or type(error).__name__
+        raise InputError(f"cannot be read as PNG or PGM: {reason}") from None

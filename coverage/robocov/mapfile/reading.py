@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from robocov.arrays import Array
 from robocov.density import Density, Raster
 from robocov.environment import Environment, Ring
 from robocov.errors import (
@@ -20,10 +21,11 @@ from robocov.errors import (
     quote_json,
     to_one_line,
 )
-from robocov.files.strictjson import located, parse, read_bytes, require_json
-from robocov.mapfile.check import check_rules
+from robocov.files.strictjson import locate_mistakes, parse_json, read_bytes, require_json
 from robocov.mapfile.density_pictures import read_gray_levels, read_picture_file
-from robocov.mapfile.models import HEAD, LIGHTEST, NOTHING, DensityModel, RasterModel, validate
+from robocov.mapfile.models import HEADER, MIN_WEIGHT, DensityModel, RasterModel
+from robocov.mapfile.rules import check_rules
+from robocov.mapfile.structure import NO_WEIGHT, validate_document
 
 _GRAY_DIGITS = 6
 """Decimal places of the weights of gray levels, so that a map that is saved again stays short."""
@@ -120,11 +122,11 @@ def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Envi
     MapError
         As `load_map`.
     """
-    document = parse(text, where)
+    document = parse_json(text, where)
     try:
         return _build_environment(document, to_one_line(where), folder)
     except MapError as error:
-        raise located(error, text, where) from None
+        raise locate_mistakes(error, text, where) from None
 
 
 def from_json(document: dict[str, Any], where: str = "map", folder: Path | None = None) -> Environment:
@@ -175,14 +177,15 @@ def parse_density(value: object, boundary: Ring, where: str = "map", folder: Pat
     MapError
         If the value is no valid density.
     """
-    rest = {"name": "map", "boundary": [[0, 0], [1, 0], [1, 1]]}
-    model = validate({**HEAD, **rest, "density": value}, where)
+    # The density is validated as part of a map.
+    document = {**HEADER, "name": "map", "boundary": [[0, 0], [1, 0], [1, 1]], "density": value}
+    model = validate_document(document, where)
     density: Density = _build_density(model.density, boundary, folder, where)
     return density
 
 
 def _build_environment(document: object, where: str, folder: Path | None) -> Environment:
-    model = validate(document, where)
+    model = validate_document(document, where)
     boundary: Any = model.boundary
     density = None
     if model.density is not None:
@@ -190,8 +193,8 @@ def _build_environment(document: object, where: str, folder: Path | None) -> Env
     environment = Environment(
         name=model.name,
         boundary=boundary,
-        obstacles=tuple(obstacle.built() for obstacle in model.obstacles),
-        starts={name: start.built() for name, start in model.starts.items()},
+        obstacles=tuple(obstacle.build() for obstacle in model.obstacles),
+        starts={name: start.build() for name, start in model.starts.items()},
         description=model.description,
         extra=json.loads(json.dumps(model.extra)),
         schema=model.schema_,
@@ -204,25 +207,31 @@ def _build_environment(document: object, where: str, folder: Path | None) -> Env
 def _build_density(model: DensityModel, boundary: Ring, folder: Path | None, where: str) -> Any:
     """Return the density that a model describes; a raster without an extent covers the boundary's box.
 
-    `folder` is that of the map and its picture; None if the map did not come from a file.
+    The folder is that of the map and its picture; None if the map did not come from a file.
     """
     if not isinstance(model, RasterModel):
-        return model.built()
+        return model.build()
     if model.rows is not None:
         values = np.array(model.rows, dtype=float)
-        values[values < LIGHTEST] = 0.0
+        values[values < MIN_WEIGHT] = 0.0
     else:
-        black = model.black or 0.0
-        white = 1.0 if model.white is None else model.white
-        path = ("density", "picture")
-        try:
-            gray_levels = read_gray_levels(read_picture_file(str(model.picture), folder))
-        except InputError as error:
-            mistake = Mistake.at_path(path, f"{quote_json(model.picture)}: {error}")
-            raise MapError.from_mistakes(where, [mistake]) from None
-        values = np.round(black + (white - black) * gray_levels, _GRAY_DIGITS)
-        if not values.max() > 0.0:
-            raise MapError.from_mistakes(where, [Mistake.at_path(path, NOTHING)])
+        values = _read_weights(model, folder, where)
     x, y = zip(*boundary, strict=True)
     x_min, y_min, x_max, y_max = model.extent or (min(x), min(y), max(x), max(y))
     return Raster(values[::-1], (x_min, y_min, x_max, y_max), model.interpolation)
+
+
+def _read_weights(model: RasterModel, folder: Path | None, where: str) -> Array:
+    """Return the weights of the pixels of a picture, (rows, columns), the top row first."""
+    path = ("density", "picture")
+    black = 0.0 if model.black is None else model.black
+    white = 1.0 if model.white is None else model.white
+    try:
+        gray_levels = read_gray_levels(read_picture_file(str(model.picture), folder))
+    except InputError as error:
+        mistake = Mistake.at_path(path, f"{quote_json(model.picture)}: {error}")
+        raise MapError.from_mistakes(where, [mistake]) from None
+    weights = np.round(black + (white - black) * gray_levels, _GRAY_DIGITS)
+    if not weights.max() > 0.0:
+        raise MapError.from_mistakes(where, [Mistake.at_path(path, NO_WEIGHT)])
+    return np.asarray(weights)

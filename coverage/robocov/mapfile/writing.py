@@ -10,19 +10,22 @@ from robocov.density import Density, Raster
 from robocov.environment import Environment
 from robocov.files.strictjson import require_json
 from robocov.files.writing import replace_file
-from robocov.mapfile.check import check_rules
-from robocov.mapfile.models import HEAD, plain, validate
+from robocov.mapfile.models import HEADER, to_json_value
 from robocov.mapfile.reading import from_json
+from robocov.mapfile.rules import check_rules
+from robocov.mapfile.structure import validate_document
 
 _MAX_LINE_CHARACTERS = 100
 """Objects up to this length are written on one line, counting two characters for each number."""
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _NUMERIC_KEYS = ("boundary", "obstacles", "starts", "density")
 """Keys of numbers that `dump_map` writes short."""
+_EXPANDED_KEYS = ("obstacles", "starts")
+"""Keys whose items are written on lines of their own."""
 _DIGITS = 9
-"""Digits after the point of a coordinate in metres that may be meant: nobody means parts of a nanometre."""
-_NOISE = 16
-"""Largest rounding error of a few sums and a rotation, in units of the last place (of 1 m at least)."""
+"""Decimal places of coordinates in metres: nobody means fractions of a nanometre."""
+_MAX_ERROR_ULPS = 16
+"""Largest rounding error of a few sums and a rotation, in units in the last place, of 1 m at least."""
 
 
 def to_json(environment: Environment) -> dict[str, Any]:
@@ -36,22 +39,25 @@ def to_json(environment: Environment) -> dict[str, Any]:
     -------
     dict
     """
-    density = environment.density
-    return {
-        **({} if environment.schema is None else {"$schema": environment.schema}),
-        **HEAD,
-        "name": environment.name,
-        **({"description": environment.description} if environment.description else {}),
-        "boundary": plain(environment.boundary),
-        "obstacles": plain(environment.obstacles),
-        "starts": {name: plain(spec) for name, spec in environment.starts.items()},
-        **({} if density is None else {"density": _build_density_document(density)}),
-        **({"extra": dict(environment.extra)} if environment.extra else {}),
-    }
+    document: dict[str, Any] = {}
+    if environment.schema is not None:
+        document["$schema"] = environment.schema
+    document.update(HEADER)
+    document["name"] = environment.name
+    if environment.description:
+        document["description"] = environment.description
+    document["boundary"] = to_json_value(environment.boundary)
+    document["obstacles"] = to_json_value(environment.obstacles)
+    document["starts"] = {name: to_json_value(start) for name, start in environment.starts.items()}
+    if environment.density is not None:
+        document["density"] = _build_density_document(environment.density)
+    if environment.extra:
+        document["extra"] = dict(environment.extra)
+    return document
 
 
 def save_map(environment: Environment, path: str | Path) -> None:
-    """Save a map, whole or not at all.
+    """Save a map; the file is written completely or not at all.
 
     Parameters
     ----------
@@ -65,34 +71,53 @@ def save_map(environment: Environment, path: str | Path) -> None:
     OutputError
         If the file cannot be written.
     """
-    exact = to_json(environment)
-    document = _shorten_numbers(exact)
-    if document == exact and environment.density is None:
-        # what is written is the map itself, whose free space may be known already
+    exact_document = to_json(environment)
+    document = _shorten_numbers(exact_document)
+    if document == exact_document and environment.density is None:
+        # The file describes the map itself, whose free space may already have been computed.
         require_json(document, str(path))
-        validate(document, str(path))
+        validate_document(document, str(path))
         check_rules(environment, str(path))
     else:
         from_json(document, str(path))
-    with replace_file(Path(path)) as part:
-        part.write_bytes(dump_document(document).encode())
+    with replace_file(Path(path)) as temporary:
+        temporary.write_bytes(dump_document(document).encode())
 
 
 def dump_map(environment: Environment) -> str:
-    """Return the text of a map file: keys in a fixed order, one list of vertices on a line.
+    """Format a map as the text of a map file: keys in a fixed order, a list of vertices on one line.
 
-    What is the result of a sum, as 0.30000000000000004, is written as the decimal that it misses by rounding
-    errors alone, 0.3. What was written by hand stays as it is.
+    Parameters
+    ----------
+    environment : Environment
+
+    Returns
+    -------
+    str
+
+    Notes
+    -----
+    A number that differs from a short decimal only by rounding errors, such as 0.30000000000000004, is
+    written as the decimal, 0.3.
     """
     return dump_document(to_json(environment))
 
 
 def dump_document(document: dict[str, Any]) -> str:
-    """Return the text of a map file with this document, which may be a draft that no map can be made of.
+    """Format a JSON document as the text of a map file.
 
-    Line breaks do not depend on the lengths of numbers: a vertex that has moved changes one line of the file.
+    Line breaks do not depend on the lengths of numbers, so that moving a vertex changes one line of the file.
+
+    Parameters
+    ----------
+    document : dict
+        It need not be valid as a map.
+
+    Returns
+    -------
+    str
     """
-    return _format_value(_shorten_numbers(document), "", 0, expanded=True) + "\n"
+    return _format_members(_shorten_numbers(document), "", is_document=True) + "\n"
 
 
 def _shorten_numbers(document: dict[str, Any]) -> dict[str, Any]:
@@ -100,11 +125,11 @@ def _shorten_numbers(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def _shorten(value: Any) -> Any:
-    """Return a JSON value with numbers as `dump_map` writes them."""
+    """Return a JSON value with its numbers as `dump_map` writes them."""
     if isinstance(value, float):
         decimal = round(value, _DIGITS)
-        noise = _NOISE * math.ulp(max(abs(value), 1.0))
-        return plain(decimal if abs(decimal - value) <= noise else value)
+        max_error = _MAX_ERROR_ULPS * math.ulp(max(abs(value), 1.0))
+        return to_json_value(decimal if abs(decimal - value) <= max_error else value)
     if isinstance(value, list):
         return [_shorten(item) for item in value]
     if isinstance(value, dict):
@@ -112,26 +137,40 @@ def _shorten(value: Any) -> Any:
     return value
 
 
-def _format_value(value: Any, indent: str, used: int, *, expanded: bool = False) -> str:
-    """Return `value` on one line where it fits or is a list of points, else one item on a line."""
-    whole = not isinstance(value, (dict, list)) or not value
-    if whole or not expanded:
-        line = json.dumps(value, ensure_ascii=False, allow_nan=False)
-        points = isinstance(value, list) and all(isinstance(x, list) and not _is_ring(x) for x in value)
-        if whole or points or used + len(_NUMBER.sub("00", line)) <= _MAX_LINE_CHARACTERS:
-            return line
-    inner = indent + "  "
-    items = []
-    for key, item in value.items() if isinstance(value, dict) else enumerate(value):
-        head = f"{json.dumps(key, ensure_ascii=False)}: " if isinstance(value, dict) else ""
-        # things stand on lines of their own, and so do the rows of a raster, which are no points
-        rows = key == "rows" and isinstance(item, list) and len(item) > 1
-        things = not indent and key in ("obstacles", "starts")
-        items.append(
-            inner + head + _format_value(item, inner, len(inner) + len(head), expanded=rows or things)
-        )
-    left, right = "[]" if isinstance(value, list) else "{}"
-    return left + "\n" + ",\n".join(items) + f"\n{indent}{right}"
+def _format_members(value: Any, indent: str, *, is_document: bool = False) -> str:
+    """Return a list or object, which is not empty, with its members on lines of their own."""
+    inner_indent = indent + "  "
+    if isinstance(value, list):
+        items = [inner_indent + _format_value(item, inner_indent, len(inner_indent)) for item in value]
+        return "[\n" + ",\n".join(items) + f"\n{indent}]"
+    lines = []
+    for key, item in value.items():
+        head = f"{inner_indent}{json.dumps(key, ensure_ascii=False)}: "
+        # Each row of a raster has a line of its own; unlike lists of points, rows are long.
+        has_several_rows = key == "rows" and isinstance(item, list) and len(item) > 1
+        if _is_container(item) and (has_several_rows or (is_document and key in _EXPANDED_KEYS)):
+            lines.append(head + _format_members(item, inner_indent))
+        else:
+            lines.append(head + _format_value(item, inner_indent, len(head)))
+    return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+
+
+def _format_value(value: Any, indent: str, column: int) -> str:
+    """Return a value on one line if it fits there or is a list of points, otherwise on several lines."""
+    line = json.dumps(value, ensure_ascii=False, allow_nan=False)
+    if not _is_container(value):
+        return line
+    is_point_list = isinstance(value, list) and all(
+        isinstance(item, list) and not _is_ring(item) for item in value
+    )
+    if is_point_list or column + len(_NUMBER.sub("00", line)) <= _MAX_LINE_CHARACTERS:
+        return line
+    return _format_members(value, indent)
+
+
+def _is_container(value: object) -> bool:
+    """Return whether a value is a list or object that is not empty."""
+    return isinstance(value, (dict, list)) and bool(value)
 
 
 def _is_ring(value: object) -> bool:
@@ -139,12 +178,12 @@ def _is_ring(value: object) -> bool:
 
 
 def _build_density_document(density: Density) -> Any:
-    """Return a density as a JSON document that `_density` makes an equal one of; it names no picture."""
+    """Return the JSON document of a density, with the values of an image instead of its name."""
     if not isinstance(density, Raster):
-        return plain(density)
+        return to_json_value(density)
     return {
         "kind": "raster",
-        "extent": plain(density.extent),
+        "extent": to_json_value(density.extent),
         "interpolation": density.interpolation,
-        "rows": plain(density.values[::-1].tolist()),
+        "rows": to_json_value(density.values[::-1].tolist()),
     }

@@ -18,8 +18,8 @@ from robocov.controllers.gains import Value
 from robocov.drawing import Drawable
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, describe_error, format_count, quote
-from robocov.files.result_folder import settle
-from robocov.files.strictjson import read_document
+from robocov.files.documents import read_document
+from robocov.files.result_folder import complete_commit
 from robocov.files.writing import replace_file
 from robocov.mapfile import from_json, to_json
 from robocov.observation import Decision, Observations, Snapshot
@@ -346,7 +346,7 @@ class Record(Drawable):
             If the folder or a file cannot be written.
         """
         folder = Path(folder)
-        settle(folder)
+        complete_commit(folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -379,7 +379,7 @@ class Record(Drawable):
             If it is not the folder of a run, or a file in it cannot be used.
         """
         folder = Path(folder)
-        settle(folder)
+        complete_commit(folder)
         for file in ("run.json", "record.npz"):
             if not (folder / file).is_file():
                 raise InputError(f"{folder}: not the folder of a run (there is no {file})")

@@ -7,20 +7,20 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import Field, create_model
 
 from robocov.conditions import PARAMETERS
-from robocov.files.strictjson import Document, wanted
+from robocov.files.documents import Document, expect
 from robocov.team import MAX_ROBOTS
 
-Seconds: TypeAlias = Annotated[float, Field(gt=0, le=1e6), wanted("a number above 0 (s)")]
+Seconds: TypeAlias = Annotated[float, Field(gt=0, le=1e6), expect("a number above 0 (s)")]
 """A duration above 0, s."""
-Time: TypeAlias = Annotated[float, Field(ge=0, le=1e9), wanted("a number from 0 (s)")]
+Time: TypeAlias = Annotated[float, Field(ge=0, le=1e9), expect("a number from 0 (s)")]
 """A simulation time, s."""
-Number: TypeAlias = Annotated[int, Field(ge=1, le=MAX_ROBOTS), wanted("the number of a robot, from 1,")]
+Number: TypeAlias = Annotated[int, Field(ge=1, le=MAX_ROBOTS), expect("the number of a robot, from 1")]
 """The number of a robot, from 1."""
-Key: TypeAlias = Annotated[str, Field(pattern=r"^[1-9]\d{0,8}$"), wanted("the number of a robot")]
+Key: TypeAlias = Annotated[str, Field(pattern=r"^[1-9]\d{0,8}$"), expect("the number of a robot")]
 """The number of a robot as the key of an object."""
-Point: TypeAlias = Annotated[list[float], Field(min_length=2, max_length=2), wanted("a point [x, y]")]
+Point: TypeAlias = Annotated[list[float], Field(min_length=2, max_length=2), expect("a point [x, y]")]
 """x and y, m."""
-Seed: TypeAlias = Annotated[int, Field(ge=0), wanted("a whole number from 0")]
+Seed: TypeAlias = Annotated[int, Field(ge=0), expect("a whole number from 0")]
 """The seed of a random start."""
 
 
@@ -36,7 +36,7 @@ class _Join(_Failure):
 def _build_number_field(low: float, high: float, *, allow_null: bool) -> Any:
     """Return the field of a model for a number in a range, or null."""
     null = " or null" if allow_null else ""
-    description = wanted(f"a number from {low:g} to {high:g}{null}")
+    description = expect(f"a number from {low:g} to {high:g}{null}")
     number: Any = Annotated[float, Field(ge=low, le=high)]
     return Annotated[number | None if allow_null else number, description], ...
 
@@ -59,8 +59,8 @@ _Conditions: Any = _build_conditions_model()
 
 
 class _Controller(Document):
-    name: Annotated[str, Field(min_length=1), wanted("a name")]
-    gains: dict[str, Annotated[float | str | bool | None, wanted("a number, a word or null")]]
+    name: Annotated[str, Field(min_length=1), expect("a name")]
+    gains: dict[str, Annotated[float | str | bool | None, expect("a number, a word or null")]]
 
 
 class _Touch(Document):
@@ -107,12 +107,12 @@ class RunDocument(Document):
     map: dict[str, Any]
     controller: _Controller
     team: dict[str, Any]
-    start: Annotated[str | None, wanted("the name of a start, or null,")]
+    start: Annotated[str | None, expect("the name of a start, or null")]
     starts_m: list[Point] = Field([])
-    seed: Annotated[Seed | None, wanted("a whole number from 0, or null,")]
+    seed: Annotated[Seed | None, expect("a whole number from 0, or null")]
     dt_s: Seconds
     duration_s: Time = 0.0
-    lattice: Annotated[int | None, Field(ge=2, le=2048), wanted("a whole number from 2 to 2048")] = None
+    lattice: Annotated[int | None, Field(ge=2, le=2048), expect("a whole number from 2 to 2048")] = None
     conditions: _Conditions | None = None
     events: list[JoinEvent] = Field([])
     session: _Session = _Session()

@@ -38,7 +38,10 @@ def test_conditions_are_ideal_by_default() -> None:
         ({"delay": -1}, "conditions.delay: expected a number from 0 to 1000 s, got -1"),
         ({"delay": math.nan}, "conditions.delay: expected a number from 0 to 1000 s, got nan"),
         ({"message_rate": 0}, r"conditions.message_rate: expected .* Hz or null, got 0"),
-        ({"position_noise": "much"}, "conditions.position_noise: expected a number from"),
+        (
+            {"position_noise": "much"},
+            "conditions.position_noise: expected a number from 0 to 1000 m, got 'much'",
+        ),
         (
             {"message_rate": 0.1},
             "conditions.forget_after: expected at least the 10 s between two messages, got 3 s",

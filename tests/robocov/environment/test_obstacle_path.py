@@ -129,24 +129,33 @@ def test_a_file_keeps_it() -> None:
 @pytest.mark.parametrize(
     ("path", "message"),
     [
-        (3, r"obstacles\[0\].path: 3, but an object with points and speed was wanted"),
+        (3, r"obstacles\[0\].path: expected an object with points and speed, got 3"),
         (
             {"points": [[0, 0], [1, 0]]},
-            r"path.speed: missing, but a number from 0.001 to 10 \(m/s\)",
+            r"path.speed: missing, expected a number from 0.001 to 10 \(m/s\)",
         ),
-        ({"points": [[0, 0], [1, 0]], "speed": 0}, r"path.speed: 0, but"),
-        ({"points": [[0, 0], [1, 0]], "speed": 11}, r"path.speed: 11, but"),
-        ({"points": [[0, 0], [1, 0]], "speed": "1"}, r'path.speed: "1", but'),
-        ({"points": [[0, 0]], "speed": 1}, r"path.points: .*, but a list of at least 2 points"),
-        ({"points": [[0, 0], [1]], "speed": 1}, r"path.points\[1\]: \[1\], but a point \[x, y\] in metres"),
-        ({"points": [[0, 0], [1, 1e9]], "speed": 1}, r"path.points\[1\]\[1\]: 1e\+09|1000000000"),
-        ({"points": [[0, 0], [0, 0]], "speed": 1}, r"path.points: a path 0 m wide, but at least 1 mm"),
-        ({"points": [[0, 0], [20000, 0]], "speed": 1}, r"path.points: 20000 x 0 m, but at most 10 km"),
-        ({"points": [[0, 0], [1, 0]], "speed": 1, "repeat": "twice"}, r'path.repeat: "twice", but "loop" or'),
+        ({"points": [[0, 0], [1, 0]], "speed": 0}, r"path.speed: expected .*, got 0"),
+        ({"points": [[0, 0], [1, 0]], "speed": 11}, r"path.speed: expected .*, got 11"),
+        ({"points": [[0, 0], [1, 0]], "speed": "1"}, r'path.speed: expected .*, got "1"'),
+        ({"points": [[0, 0]], "speed": 1}, r"path.points: expected a list of at least 2 points"),
+        (
+            {"points": [[0, 0], [1]], "speed": 1},
+            r"path.points\[1\]: expected a point \[x, y\] in metres, got \[1\]",
+        ),
+        ({"points": [[0, 0], [1, 1e9]], "speed": 1}, r"path.points\[1\]\[1\]: expected .*, got 1000000000"),
+        ({"points": [[0, 0], [0, 0]], "speed": 1}, r"path.points: expected a path of at least 1 mm, got 0 m"),
+        (
+            {"points": [[0, 0], [20000, 0]], "speed": 1},
+            r"path.points: expected at most 10 km, got 20000 x 0 m",
+        ),
+        (
+            {"points": [[0, 0], [1, 0]], "speed": 1, "repeat": "twice"},
+            r'path.repeat: expected "loop" or "back-and-forth", got "twice"',
+        ),
         ({"points": [[0, 0], [1, 0]], "spede": 1}, r"path: unknown key 'spede': did you mean 'speed'\?"),
     ],
 )
-def test_what_is_wrong_with_a_path_is_named(path: object, message: str) -> None:
+def test_mistakes_in_a_path_are_reported(path: object, message: str) -> None:
     obstacle = {"kind": "circle", "center": [5, 3], "radius": 0.5, "path": path}
     document = {"format": "robocov-map", "version": 1, "name": "m", "boundary": [*map(list, HALL)]}
     with pytest.raises(MapError, match=message) as caught:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from struck_folder import FOREIGN, NEW, NUMBERS, OLD, content, write
 
 from robocov.errors import InputError, OutputError, RobocovError
-from robocov.files.result_folder import extended, results, settle
+from robocov.files.result_folder import complete_commit, create_result, extend_result
 
 SCRIPT = Path(__file__).parents[1] / "struck_folder.py"
 
@@ -33,8 +33,8 @@ def no_power_failure() -> Iterator[None]:
 
 
 def saved(folder: Path, files: dict[str, str], *, kind: Any = "run", overwrite: bool = True) -> None:
-    with results(folder, kind, overwrite=overwrite) as result:
-        write(result.new, files)
+    with create_result(folder, kind, overwrite=overwrite) as result:
+        write(result.staging, files)
 
 
 def names(folder: Path) -> list[str]:
@@ -71,21 +71,21 @@ def test_after_any_call_there_is_the_old_result_or_the_new_one(
 
 def test_a_failure_leaves_the_old_result_and_an_interruption_what_was_kept(tmp_path: Path) -> None:
     saved(tmp_path, OLD)
-    with pytest.raises(KeyboardInterrupt), results(tmp_path, overwrite=True) as result:
-        write(result.new, NEW)
-        result.keep()
+    with pytest.raises(KeyboardInterrupt), create_result(tmp_path, overwrite=True) as result:
+        write(result.staging, NEW)
+        result.save_progress()
         raise KeyboardInterrupt
     assert content(tmp_path) == OLD
-    with pytest.raises(KeyboardInterrupt), results(tmp_path / "new", overwrite=True) as result:
-        write(result.new, NUMBERS)
-        result.keep()
-        write(result.new, NEW)
+    with pytest.raises(KeyboardInterrupt), create_result(tmp_path / "new", overwrite=True) as result:
+        write(result.staging, NUMBERS)
+        result.save_progress()
+        write(result.staging, NEW)
         raise KeyboardInterrupt
     assert content(tmp_path / "new") == NUMBERS
 
 
 def test_a_folder_that_nothing_comes_into_goes_again(tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError), results(tmp_path / "a" / "b", overwrite=False):
+    with pytest.raises(RuntimeError), create_result(tmp_path / "a" / "b", overwrite=False):
         raise RuntimeError
     assert names(tmp_path / "a") == []
 
@@ -95,9 +95,9 @@ def test_a_part_of_a_comparison_whose_replacement_was_interrupted_is_not_read(tm
     saved(tmp_path, {"comparison.json": "", "rapf/run.json": "old"}, kind="comparison")
     (tmp_path / ".robocov-commit.json").write_bytes((tmp_path / ".robocov.json").read_bytes())
     with pytest.raises(InputError, match=f"open {tmp_path} to have it completed"):
-        settle(tmp_path / "rapf")
-    settle(tmp_path)
-    settle(tmp_path / "rapf")
+        complete_commit(tmp_path / "rapf")
+    complete_commit(tmp_path)
+    complete_commit(tmp_path / "rapf")
 
 
 # one process at a time
@@ -106,13 +106,14 @@ def test_a_part_of_a_comparison_whose_replacement_was_interrupted_is_not_read(tm
 @posix
 def test_a_second_process_is_told_that_the_folder_is_in_use(tmp_path: Path) -> None:
     script = (
-        "import sys\nfrom pathlib import Path\nfrom robocov.files.result_folder import results\n"
-        "with results(Path(sys.argv[1]), overwrite=True):\n    print('at it', flush=True)\n    input()\n"
+        "import sys\nfrom pathlib import Path\nfrom robocov.files.result_folder import create_result\n"
+        "with create_result(Path(sys.argv[1]), overwrite=True):\n"
+        "    print('started', flush=True)\n    input()\n"
     )
     command = [sys.executable, "-c", script, str(tmp_path / "x")]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdin is not None and process.stdout is not None
-        assert process.stdout.readline() == "at it\n"
+        assert process.stdout.readline() == "started\n"
         with pytest.raises(OutputError, match="another process is at work in this folder"):
             saved(tmp_path / "x", NEW)
         process.stdin.write("\n")
@@ -126,7 +127,7 @@ def test_a_second_process_is_told_that_the_folder_is_in_use(tmp_path: Path) -> N
 
 def test_a_folder_in_use_needs_overwrite(tmp_path: Path) -> None:
     (tmp_path / "x").touch()
-    with pytest.raises(InputError, match="not empty; another --out, or --overwrite, was wanted"):
+    with pytest.raises(InputError, match="not empty; choose another --out or pass --overwrite"):
         saved(tmp_path, NEW, overwrite=False)
 
 
@@ -166,7 +167,7 @@ def test_what_is_in_the_way_is_named_before_any_work_is_done(tmp_path: Path, nam
     blocker = tmp_path / name
     blocker.parent.mkdir(parents=True, exist_ok=True)
     blocker.write_text("mine")
-    with pytest.raises(OutputError, match="is in the way"), results(tmp_path, overwrite=True):
+    with pytest.raises(OutputError, match="is in the way"), create_result(tmp_path, overwrite=True):
         pytest.fail("it has begun")
     assert content(tmp_path) == NUMBERS | {name: "mine"}
 
@@ -183,9 +184,9 @@ def test_links_in_the_folder_are_not_followed(tmp_path: Path, link: str) -> None
     (out / link).symlink_to(outside)
     with (
         pytest.raises(OutputError, match="link"),
-        results(out, "comparison", overwrite=True, parts=["rapf"]) as result,
+        create_result(out, "comparison", overwrite=True, parts=["rapf"]) as result,
     ):
-        pytest.fail(f"it has begun in {result.new}")
+        pytest.fail(f"it has begun in {result.staging}")
     assert content(outside) == files
 
 
@@ -213,7 +214,7 @@ def test_no_list_of_whoever_sent_a_folder_has_other_files_removed(tmp_path: Path
     (tmp_path / "thesis.docx").write_text("mine")
     listed = {"format": "robocov-folder", "version": 1, "removed": ["thesis.docx"]}
     (tmp_path / which).write_text(json.dumps(listed | {"files": ["thesis.docx", *OLD]}))
-    for act in (settle, lambda folder: saved(folder, NEW)):
+    for act in (complete_commit, lambda folder: saved(folder, NEW)):
         with suppress(RobocovError):
             act(tmp_path)
         assert (tmp_path / "thesis.docx").read_text() == "mine"
@@ -235,13 +236,13 @@ ACTIONS: dict[str, Callable[[Path], None]] = {
 
 
 def compared(folder: Path) -> None:
-    with results(folder, "comparison", overwrite=True, parts=["rapf"]) as result:
-        write(result.new, {"comparison.json": '{"format": "robocov-comparison"}', "rapf/run.json": "new"})
+    with create_result(folder, "comparison", overwrite=True, parts=["rapf"]) as result:
+        write(result.staging, {"comparison.json": '{"format": "robocov-comparison"}', "rapf/run.json": "new"})
 
 
 def measured(folder: Path) -> None:
-    with extended(folder) as result:
-        write(result.new, {"metrics.csv": METRICS, "report.html": ""})
+    with extend_result(folder) as result:
+        write(result.staging, {"metrics.csv": METRICS, "report.html": ""})
 
 
 @settings(max_examples=60, deadline=None)
@@ -268,19 +269,19 @@ def test_files_of_others_survive_whatever_is_done(tmp_path_factory: Any, steps: 
 
 def test_a_run_is_replaced_with_what_was_added_to_it_and_not_with_what_others_have(tmp_path: Path) -> None:
     saved(tmp_path, NUMBERS)
-    with extended(tmp_path) as result:
-        write(result.new, {"metrics.csv": METRICS})
+    with extend_result(tmp_path) as result:
+        write(result.staging, {"metrics.csv": METRICS})
     (tmp_path / "report.html").write_text("mine")
-    with pytest.raises(OutputError, match=r"report.html: is in the way"), extended(tmp_path) as result:
-        write(result.new, {"report.html": "ours"})
+    with pytest.raises(OutputError, match=r"report.html: is in the way"), extend_result(tmp_path) as result:
+        write(result.staging, {"report.html": "ours"})
     saved(tmp_path, NEW)
     assert content(tmp_path) == NEW | {"report.html": "mine"}
 
 
 def test_a_run_of_a_comparison_is_extended_there_and_not_replaced_alone(tmp_path: Path) -> None:
     saved(tmp_path, {"comparison.json": "", "rapf/run.json": "old"}, kind="comparison")
-    with extended(tmp_path / "rapf") as result:
-        write(result.new, {"metrics.csv": METRICS})
+    with extend_result(tmp_path / "rapf") as result:
+        write(result.staging, {"metrics.csv": METRICS})
     assert names(tmp_path / "rapf") == ["metrics.csv", "run.json"]
     with pytest.raises(InputError, match="belongs to the comparison in"):
         saved(tmp_path / "rapf", NEW)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.files.strictjson import depth_offset, line_and_column, offset_of
+from robocov.files.json_positions import find_deep_nesting, find_line_and_column, find_offset
 
 texts = st.text(st.characters(exclude_categories=("Cs",)), max_size=4) | st.sampled_from(
     ["[", '"', "{]", "\\"]
@@ -62,24 +62,24 @@ def test_everything_is_found_where_it_was_written(document: Any, data: st.DataOb
     writer = Writer(data)
     writer.write(document)
     for path, offset in writer.values.items():
-        assert offset_of(writer.text, path) == offset
+        assert find_offset(writer.text, path) == offset
     for path, offset in writer.keys.items():
-        assert offset_of(writer.text, path, at_key=True) == offset
+        assert find_offset(writer.text, path, at_key=True) == offset
     for path, offset in writer.values.items():
         for missing in ("no such key", 99):
-            assert offset_of(writer.text, (*path, missing)) == offset
-            assert offset_of(writer.text, (*path, missing, 0), at_key=True) == offset
+            assert find_offset(writer.text, (*path, missing)) == offset
+            assert find_offset(writer.text, (*path, missing, 0), at_key=True) == offset
 
 
 def test_of_a_key_given_twice_the_last_counts() -> None:
     text = '{"a": {"b": 1}, "a": {"b": 2}}'
-    assert text[offset_of(text, ("a", "b")) :] == "2}}"
-    assert text[offset_of(text, ("a",), at_key=True) :] == '"a": {"b": 2}}'
+    assert text[find_offset(text, ("a", "b")) :] == "2}}"
+    assert text[find_offset(text, ("a",), at_key=True) :] == '"a": {"b": 2}}'
 
 
 @pytest.mark.parametrize("number", ["9" * 10_000, "1e999", "NaN", "-Infinity", "0.1"])
 def test_numbers_are_skipped_whatever_they_are(number: str) -> None:
-    assert offset_of(f"[{number}, 1]", (1,)) == len(number) + 3
+    assert find_offset(f"[{number}, 1]", (1,)) == len(number) + 3
 
 
 @given(st.text("ab\r\n", max_size=30), st.data())
@@ -89,7 +89,7 @@ def test_lines_end_as_editors_end_them(text: str, data: st.DataObject) -> None:
         return  # in the middle of an end of line
     # an x marks the place; it is in one line of those that Python sees
     lines = (text[:offset] + "x" + text[offset:]).splitlines()
-    line, column = line_and_column(text, offset)
+    line, column = find_line_and_column(text, offset)
     assert lines[line - 1][column - 1] == "x"
 
 
@@ -105,4 +105,4 @@ def test_lines_end_as_editors_end_them(text: str, data: st.DataObject) -> None:
     ],
 )
 def test_the_place_that_is_too_deep(text: str, offset: int) -> None:
-    assert depth_offset(text, 2) == offset
+    assert find_deep_nesting(text, 2) == offset

@@ -12,7 +12,7 @@ from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment
 from robocov.errors import StartError
 from robocov.mapfile import from_json
-from robocov.mapfile.check import MapReport, check_map, many_vertices
+from robocov.mapfile.check import MapReport, check_map, describe_vertex_count
 
 
 def room(*obstacles: dict[str, Any], boundary: Any = None, starts: Any = None) -> Environment:
@@ -51,10 +51,10 @@ def test_measures() -> None:
 
 
 @pytest.mark.parametrize(
-    ("count", "wanted"), [(5000, "about 2 seconds"), (10_891, "7 seconds"), (50_000, "about 3 minutes")]
+    ("count", "expected"), [(5000, "about 2 seconds"), (10_891, "7 seconds"), (50_000, "about 3 minutes")]
 )
-def test_what_many_vertices_cost(count: int, wanted: str) -> None:
-    assert wanted in many_vertices(count)
+def test_the_warning_about_many_vertices_has_the_time(count: int, expected: str) -> None:
+    assert expected in describe_vertex_count(count)
 
 
 def test_many_vertices_are_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -68,77 +68,77 @@ def test_a_clean_map_has_no_warnings() -> None:
     assert check_map(room(block(4, 2, 2, 2))).warnings == ()
 
 
-def warned(environment: Environment) -> list[str]:
+def list_warnings(environment: Environment) -> list[str]:
     return list(check_map(environment).warnings)
 
 
 def test_a_gap_that_no_robot_passes() -> None:
     environment = room(block(4, 0, 1, 2.9), block(4, 3.05, 1, 3))
-    assert warned(environment) == [
+    assert list_warnings(environment) == [
         "the gap between [4, 2.9] and [4, 3.05] is 0.15 m wide: a robot of radius 0.1 m does not pass"
     ]
     assert check_map(environment, radius=0.07).warnings == ()
 
 
 def test_sealed_rooms_and_pockets() -> None:
-    # the wall leaves 24 m² in the west and 30 m² in the east; the pocket is 0.05 m by 1 m, half of it filled
+    # The wall leaves 24 m² in the west and 30 m² in the east. Half of the pocket of 0.05 m by 1 m is filled.
     environment = room(block(4, 0, 1, 6), block(0.05, 0, 1, 1), block(0, 1, 1.05, 1), block(0, 0, 0.05, 0.5))
-    first, second = warned(environment)
+    first, second = list_warnings(environment)
     assert first.startswith("sealed room of 21.9 m² around [")
     assert second == "1 sealed pocket smaller than a robot, 0.025 m² together"
 
 
 def test_an_obstacle_outside() -> None:
     outside = {"kind": "circle", "center": [20, 2], "radius": 0.5, "name": "tree"}
-    assert warned(room(block(4, 2, 1, 1), outside)) == [
+    assert list_warnings(room(block(4, 2, 1, 1), outside)) == [
         "obstacles[1] (tree) is entirely outside the boundary"
     ]
-    assert warned(room(block(10, 2, 1, 1))) == ["obstacles[0] is entirely outside the boundary"]
-    assert warned(room(block(9.5, 2, 1, 1))) == []
+    assert list_warnings(room(block(10, 2, 1, 1))) == ["obstacles[0] is entirely outside the boundary"]
+    assert list_warnings(room(block(9.5, 2, 1, 1))) == []
 
 
-def test_paths_through_what_stands() -> None:
+def test_paths_through_fixed_obstacles() -> None:
     def moving(*points: tuple[float, float], **others: Any) -> dict[str, Any]:
         path = {"points": points, "speed": 0.5, **others}
         return {"kind": "circle", "center": [1, 1], "radius": 0.3, "name": "cart", "path": path}
 
     racks = [block(3, 0.5, 0.5, 1), block(5, 0.5, 0.5, 1) | {"name": "rack"}]
-    assert warned(room(*racks, moving((1, 1), (1, 5)))) == []
-    assert warned(room(*racks, moving((1, 1), (2.6, 1)))) == []  # not as far as the first
-    assert warned(room(*racks, moving((1, 1), (9, 1)))) == [
+    assert list_warnings(room(*racks, moving((1, 1), (1, 5)))) == []
+    assert list_warnings(room(*racks, moving((1, 1), (2.6, 1)))) == []  # The path ends before the first rack.
+    assert list_warnings(room(*racks, moving((1, 1), (9, 1)))) == [
         "obstacles[2] (cart) moves through obstacles[0], obstacles[1] (rack)"
     ]
-    # straight back from the last point, as a loop does
+    # A loop goes straight back from the last point.
     around = moving((1, 1), (1, 3), (9, 3), (9, 1))
-    assert warned(room(*racks, around)) == [
+    assert list_warnings(room(*racks, around)) == [
         "obstacles[2] (cart) moves through obstacles[0], obstacles[1] (rack)"
     ]
     there_and_back = moving((1, 1), (1, 3), (9, 3), (9, 1), repeat="back-and-forth")
-    assert warned(room(*racks, there_and_back)) == []
-    assert warned(room(moving((1, 1), (9.8, 1)))) == ["obstacles[0] (cart) moves through the boundary"]
+    assert list_warnings(room(*racks, there_and_back)) == []
+    assert list_warnings(room(moving((1, 1), (9.8, 1)))) == ["obstacles[0] (cart) moves through the boundary"]
     many = [block(x, 0.5, 0.5, 1) for x in (2, 3, 4, 5, 6)]
-    assert warned(room(*many, moving((1, 1), (9, 1)))) == [
+    assert list_warnings(room(*many, moving((1, 1), (9, 1)))) == [
         "obstacles[5] (cart) moves through obstacles[0], obstacles[1], obstacles[2] and 2 more"
     ]
-    # what moves itself may have gone when it comes
-    assert warned(room(moving((1, 1), (9, 1)), moving((1, 1), (8, 1)))) == []
+    # An obstacle that moves itself may have gone by then.
+    assert list_warnings(room(moving((1, 1), (9, 1)), moving((1, 1), (8, 1)))) == []
 
 
 def test_vertices_given_twice() -> None:
     twice = block(4, 2, 1, 1)
     twice["vertices"].insert(2, list(twice["vertices"][2]))
     closed = [[0, 0], [10, 0], [10, 6], [0, 6], [0, 0]]
-    assert warned(room(twice, boundary=closed)) == [
-        "boundary[4] and the next vertex are the same place",
-        "obstacles[0].vertices[2] and the next vertex are the same place",
+    assert list_warnings(room(twice, boundary=closed)) == [
+        "boundary[4] and the next vertex are at the same position",
+        "obstacles[0].vertices[2] and the next vertex are at the same position",
     ]
     loop = {"kind": "wall", "points": [[4, 2], [5, 2], [5, 3], [4, 2]], "width": 0.1}
-    assert not any("same place" in line for line in warned(room(loop)))
+    assert not any("same position" in line for line in list_warnings(room(loop)))
 
 
 def test_given_positions_without_room() -> None:
     starts = {"tight": {"kind": "points", "positions": [[1, 1], [1.1, 1]]}}
-    (line,) = warned(room(starts=starts))
+    (line,) = list_warnings(room(starts=starts))
     assert "start 'tight': positions[0] and positions[1] are 0.1 m apart" in line
 
 
@@ -168,7 +168,7 @@ def test_the_report_is_json() -> None:
     assert json.loads(json.dumps(check_map(room()).to_dict()))["narrowest_gap_m"] is None
 
 
-def test_overlapping_peaks_are_told_by_their_largest_value_not_by_a_bound():
+def test_the_range_of_overlapping_peaks_ends_at_their_largest_value():
     near = Gaussians((Gaussian((3.0, 3.0), 2.0, sigma=1.0), Gaussian((4.0, 3.0), 2.0, sigma=1.0)), 0.5)
     x = np.linspace(0.0, 10.0, 1001)
     points = np.column_stack([x, np.full(1001, 3.0)])

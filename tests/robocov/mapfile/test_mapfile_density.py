@@ -62,38 +62,41 @@ AREA = {"vertices": [[1, 1], [2, 1], [2, 3]], "weight": 5}
 @pytest.mark.parametrize(
     ("density", "words"),
     [
-        (3, "density: 3, but an object whose kind is one of uniform, gaussians, polygons, raster was"),
+        (3, "density: expected an object whose kind is one of uniform, gaussians, polygons, raster, got 3"),
         ({}, "density.kind: missing"),
-        ({"kind": "gaussian"}, "density.kind: \"gaussian\", but one of .* (did you mean 'gaussians'?)"),
-        ({"kind": "uniform", "weight": 0}, "density.weight: all places count 0"),
-        ({"kind": "uniform", "weight": -1}, "density.weight: -1, but a number from 0 to 1000000 was"),
-        ({"kind": "uniform", "weight": True}, "density.weight: true, but a number"),
+        ({"kind": "gaussian"}, "density.kind: expected one of .* (did you mean 'gaussians'?)"),
+        ({"kind": "uniform", "weight": 0}, "density.weight: expected at least one weight above 0, got none"),
+        ({"kind": "uniform", "weight": -1}, "density.weight: expected a number from 0 to 1000000, got -1"),
+        ({"kind": "uniform", "weight": True}, "density.weight: expected a number"),
         ({"kind": "gaussians"}, "density.peaks: missing"),
-        ({"kind": "gaussians", "peaks": [3]}, "density.peaks[0]: 3, but an object was"),
-        ({"kind": "gaussians", "peaks": []}, "density: all places count 0"),
+        ({"kind": "gaussians", "peaks": [3]}, "density.peaks[0]: expected an object, got 3"),
+        ({"kind": "gaussians", "peaks": []}, "density: expected at least one weight above 0, got none"),
         (
             {"kind": "gaussians", "peaks": [PEAK, {**PEAK, "wight": 1}]},
             "density.peaks[1]: unknown key 'wight': did you mean 'weight'?",
         ),
-        ({"kind": "gaussians", "floor": "x", "peaks": [PEAK]}, 'density.floor: "x", but a number from 0'),
-        ({"kind": "gaussians", "peaks": [{**PEAK, "center": [1]}]}, "density.peaks[0].center: [1], but a"),
-        ({"kind": "gaussians", "peaks": [{**PEAK, "sigma": 0}]}, "density.peaks[0].sigma: 0, but a number"),
+        ({"kind": "gaussians", "floor": "x", "peaks": [PEAK]}, "density.floor: expected a number from 0"),
+        ({"kind": "gaussians", "peaks": [{**PEAK, "center": [1]}]}, "density.peaks[0].center: expected a"),
+        ({"kind": "gaussians", "peaks": [{**PEAK, "sigma": 0}]}, "density.peaks[0].sigma: expected a number"),
         (
             {"kind": "gaussians", "peaks": [{"center": [1, 2], "weight": 1}]},
-            "density.peaks[0]: neither of sigma and covariance",
+            "density.peaks[0]: expected one of sigma and covariance, got neither",
         ),
         (
             {"kind": "gaussians", "peaks": [{**PEAK, "covariance": [[1, 0], [0, 1]]}]},
-            "density.peaks[0]: both of sigma and covariance",
+            "density.peaks[0]: expected one of sigma and covariance, got both",
         ),
         (
             {"kind": "gaussians", "peaks": [{"center": [1, 2], "weight": 1, "covariance": [[1, 2], [2, 1]]}]},
-            "density.peaks[0].covariance: [[1.0, 2.0], [2.0, 1.0]], but a symmetric, positive definite",
+            "density.peaks[0].covariance: expected a symmetric, positive definite",
         ),
-        ({"kind": "polygons", "background": 0, "areas": []}, "density: all places count 0"),
+        (
+            {"kind": "polygons", "background": 0, "areas": []},
+            "density: expected at least one weight above 0, got none",
+        ),
         (
             {"kind": "polygons", "areas": [{**AREA, "vertices": [[1, 1], [2, 1]]}]},
-            "density.areas[0].vertices: [[1, 1], [2, 1]], but a list of at least 3 points",
+            "density.areas[0].vertices: expected a list of at least 3 points",
         ),
         (
             {"kind": "polygons", "areas": [{**AREA, "vertices": [[1, 1], [3, 3], [3, 1], [1, 3]]}]},
@@ -109,26 +112,47 @@ AREA = {"vertices": [[1, 1], [2, 1], [2, 3]], "weight": 5}
                 "background": 0,
                 "areas": [{**AREA, "vertices": [[90, 1], [92, 1], [92, 3]]}],
             },
-            "density: all places in the free space count 0",
+            "density: expected at least one weight above 0, got none in the free space",
         ),
-        ({"kind": "raster"}, "density: neither of rows and picture"),
-        ({"kind": "raster", "rows": [[1]], "picture": "a.png"}, "density: both of rows and picture"),
-        ({"kind": "raster", "rows": []}, f"density.rows: [], but a list of 1 to {MAX_RASTER_SIZE} rows"),
+        ({"kind": "raster"}, "density: expected one of rows and picture, got neither"),
+        (
+            {"kind": "raster", "rows": [[1]], "picture": "a.png"},
+            "density: expected one of rows and picture, got both",
+        ),
+        (
+            {"kind": "raster", "rows": []},
+            f"density.rows: expected a list of 1 to {MAX_RASTER_SIZE} rows, got []",
+        ),
         (
             {"kind": "raster", "rows": [[1] * (MAX_RASTER_SIZE + 1)]},
-            f"but a list of 1 to {MAX_RASTER_SIZE} numbers was",
+            f"density.rows[0]: expected a list of 1 to {MAX_RASTER_SIZE} numbers, got",
         ),
-        ({"kind": "raster", "rows": [[1, 2], [1]]}, "density.rows[1]: 1 numbers, but 2, as in the first"),
-        ({"kind": "raster", "rows": [[1, -1]]}, "density.rows[0][1]: -1, but a number from 0"),
-        ({"kind": "raster", "rows": [[0, 0]]}, "density.rows: all places count 0"),
-        ({"kind": "raster", "rows": [[1]], "extent": [0, 0, 0, 1]}, "density.extent: [0.0, 0.0, 0.0, 1.0]"),
-        ({"kind": "raster", "rows": [[1]], "interpolation": "cubic"}, 'density.interpolation: "cubic"'),
+        (
+            {"kind": "raster", "rows": [[1, 2], [1]]},
+            "density.rows[1]: expected 2 numbers as in the first row, got 1",
+        ),
+        ({"kind": "raster", "rows": [[1, -1]]}, "density.rows[0][1]: expected a number from 0"),
+        (
+            {"kind": "raster", "rows": [[0, 0]]},
+            "density.rows: expected at least one weight above 0, got none",
+        ),
+        (
+            {"kind": "raster", "rows": [[1]], "extent": [0, 0, 0, 1]},
+            "density.extent: expected [x_min, y_min, x_max, y_max]",
+        ),
+        (
+            {"kind": "raster", "rows": [[1]], "interpolation": "cubic"},
+            'density.interpolation: expected "bilinear" or "cells", got "cubic"',
+        ),
         ({"kind": "raster", "rows": [[1]], "white": 2}, "density.white: is for a picture"),
-        ({"kind": "raster", "picture": "a.png"}, 'density.picture: "a.png": a map that is no file'),
+        (
+            {"kind": "raster", "picture": "a.png"},
+            'density.picture: "a.png": image densities require a map loaded from a file',
+        ),
     ],
     ids=lambda value: str(value)[:40],
 )
-def test_what_is_wrong_is_told_with_its_place(density, words):
+def test_mistakes_are_reported_with_their_path(density, words):
     with pytest.raises(MapError) as caught:
         from_json(with_density(density), "mine.json")
     start, _, end = words.partition(".* ")
@@ -145,14 +169,14 @@ def test_in_a_file_with_line_and_column():
     assert '"sigma": -1' in line and str(caught.value).startswith(f"mine.json:{caught.value.line}:")
 
 
-def test_what_is_nearly_nothing_is_nothing():
-    """Else it would be nothing once it has been written and read again."""
+def test_tiny_weights_are_read_as_zero():
+    """Otherwise they would be zero after having been written and read again."""
     for density in (
         {"kind": "uniform", "weight": 1e-16},
         {"kind": "raster", "rows": [[1e-12, 0]]},
         {"kind": "gaussians", "floor": 1e-300, "peaks": []},
     ):
-        with pytest.raises(MapError, match="all places count 0"):
+        with pytest.raises(MapError, match="expected at least one weight above 0, got none"):
             from_json(with_density(density))
     tiny = from_json(with_density({"kind": "raster", "rows": [[1e-12, 1]]}))
     assert tiny.density.min_value == 0.0 and parse_map(dump_map(tiny), "again") == tiny
@@ -174,7 +198,7 @@ def grey(path: Path, rows, mode: str = "L") -> None:
     Image.fromarray(np.array(rows, dtype=kind)).save(path)
 
 
-def test_a_picture_beside_the_map(tmp_path):
+def test_a_picture_next_to_the_map(tmp_path):
     grey(tmp_path / "phi.png", [[0, 255], [51, 102]])
     density = load_map(map_with(tmp_path, "phi.png", black=1, white=6)).density
     assert isinstance(density, Raster)
@@ -189,7 +213,7 @@ def test_a_picture_beside_the_map(tmp_path):
     assert load_map(map_with(tmp_path, "phi.pgm")).density.values.tolist() == [[0.0, 1.0]]
 
 
-def test_what_was_a_picture_is_written_as_rows(tmp_path):
+def test_pictures_are_written_as_rows(tmp_path):
     grey(tmp_path / "phi.png", [[0, 200], [7, 102]])
     environment = load_map(map_with(tmp_path, "phi.png", black=0.1, white=5))
     document = to_json(environment)
@@ -206,16 +230,16 @@ def test_a_picture_stays_in_the_folder(tmp_path, name):
     folder = tmp_path / "inner"
     folder.mkdir()
     grey(tmp_path / "phi.png", [[1, 2]])
-    with pytest.raises(MapError, match="leaves the folder of the map"):
+    with pytest.raises(MapError, match="expected a file in the folder of the map"):
         load_map(map_with(folder, name))
 
 
-def test_nor_does_a_link_lead_out_of_it(tmp_path):
+def test_links_out_of_the_folder_are_not_followed(tmp_path):
     folder = tmp_path / "inner"
     folder.mkdir()
     grey(tmp_path / "phi.png", [[1, 2]])
     (folder / "link.png").symlink_to(tmp_path / "phi.png")
-    with pytest.raises(MapError, match="leaves the folder of the map"):
+    with pytest.raises(MapError, match="expected a file in the folder of the map"):
         load_map(map_with(folder, "link.png"))
 
 
@@ -233,13 +257,15 @@ def test_pictures_that_cannot_be_used(tmp_path):
     (tmp_path / "cut.png").write_bytes((tmp_path / "whole.png").read_bytes()[:-2000])
     assert "cannot be read as PNG or PGM" in refused("cut.png")
     (tmp_path / "wide.pgm").write_bytes(b"P5 1025 1 255\n" + bytes(1025))
-    assert f"1025 x 1 pixels, but at most {MAX_RASTER_SIZE} each way" in refused("wide.pgm")
+    assert f"expected at most {MAX_RASTER_SIZE} x {MAX_RASTER_SIZE} pixels, got 1025 x 1" in refused(
+        "wide.pgm"
+    )
     (tmp_path / "bomb.pgm").write_bytes(b"P5 100000 100000 255\n")
-    assert "100000 x 100000 pixels" in refused("bomb.pgm") or "PNG or PGM" in refused("bomb.pgm")
+    assert "got 100000 x 100000" in refused("bomb.pgm") or "PNG or PGM" in refused("bomb.pgm")
     with (tmp_path / "heavy.png").open("wb") as file:
         file.truncate(MAX_PICTURE_BYTES + 1)
-    assert "larger than 8 MB" in refused("heavy.png")
+    assert "expected at most 8 MB, got more" in refused("heavy.png")
     grey(tmp_path / "black.png", [[0, 0]])
-    assert "density.picture: all places count 0" in refused("black.png")
+    assert "density.picture: expected at least one weight above 0, got none" in refused("black.png")
     (tmp_path / "folder.png").mkdir()
     assert "no such file" in refused("folder.png")

@@ -99,7 +99,7 @@ def test_teams_survive_the_way_to_json_and_back(groups: list[dict[str, float]]) 
         ("[[group]]\ncount = 1\nradius = 'big'", r"group\[0\].radius: expected a number, got 'big'"),
         ("[[group]]\ncount = 1\nradius = 'null'", r"group\[0\].radius: expected a number, got 'null'"),
         ("[[group]]\ncount = 9000\n[[group]]\ncount = 9000", "expected at most 10000 robots, got 18000"),
-        ("[[group]]\ncount = 1\nmass = 1" + 400 * "0", r"group\[0\].mass: 1000.* a number was wanted"),
+        ("[[group]]\ncount = 1\nmass = 1" + 400 * "0", r"group\[0\].mass: expected a number, got 1000"),
         ("[[groups]]\ncount = 1", "unknown key 'groups': did you mean 'group'"),
         ("[[group]\n", "team.toml: not TOML"),
     ],

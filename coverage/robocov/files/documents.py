@@ -1,0 +1,176 @@
+"""JSON documents that robocov has written, read through models of their content."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError, WrapValidator
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from robocov.errors import MapError, Mistake, quote_json
+from robocov.files.strictjson import parse_json, read_bytes
+
+_EXPECTED_ERROR = "expected"
+"""Type of pydantic's error that `expect` raises; its message describes the expected value."""
+_EXPECTED_BY_ERROR_TYPE = {
+    "string_type": "a text",
+    "bool_type": "true or false",
+    "list_type": "a list",
+    "dict_type": "an object",
+    "model_type": "an object",
+}
+
+
+class Document(BaseModel):
+    """An object in a file of results: known keys are checked strictly, unknown ones are kept unread."""
+
+    model_config = ConfigDict(extra="allow", strict=True)
+
+
+DocumentType = TypeVar("DocumentType", bound=Document)
+
+
+def expect(description: str) -> WrapValidator:
+    """Build a validator that describes the expected value of a field in messages.
+
+    Parameters
+    ----------
+    description : str
+        Such as ``a number above 0 (s)``.
+
+    Returns
+    -------
+    WrapValidator
+    """
+
+    def validate(value: Any, handler: Callable[[Any], Any]) -> Any:
+        try:
+            return handler(value)
+        except ValidationError:
+            raise PydanticCustomError(_EXPECTED_ERROR, description) from None
+
+    return WrapValidator(validate)
+
+
+def read_document(path: Path, model: type[DocumentType], format_name: str, version: int) -> DocumentType:
+    """Read a JSON file that robocov has written.
+
+    Parameters
+    ----------
+    path : Path
+    model : type
+        Model of the content, a subclass of `Document`.
+    format_name : str
+        Expected value of the key ``format``.
+    version : int
+        Expected value of the key ``version``.
+
+    Returns
+    -------
+    Document
+        An instance of the model.
+
+    Raises
+    ------
+    MapError
+        If the file cannot be read, or is no such document.
+    """
+    where = str(path)
+    document = parse_json(read_bytes(path), where)
+    check_header(document, where, format_name, version)
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        raise build_document_error(error, where, _build_mistake) from None
+
+
+def check_header(document: object, where: str, format_name: str, version: int) -> None:
+    """Check the format and the version of a document.
+
+    Parameters
+    ----------
+    document : object
+    where : str
+        Name of the document in messages.
+    format_name : str
+        Expected value of the key ``format``.
+    version : int
+        Expected value of the key ``version``.
+
+    Raises
+    ------
+    MapError
+        If the document is no object, or has another format or version.
+    """
+    if not isinstance(document, dict):
+        expected = f"a JSON object with a {format_name.removeprefix('robocov-')}"
+        mistake = Mistake((), f"expected {expected}, got {quote_json(document)}")
+        raise MapError.from_mistakes(where, [mistake])
+    for key, expected_value in (("format", format_name), ("version", version)):
+        value = document.get(key)
+        if type(value) is type(expected_value) and value == expected_value:
+            continue
+        message = describe_mismatch(quote_json(expected_value), value, is_missing=key not in document)
+        if key == "version" and type(value) is int and value > version:
+            message += "; it was written by a newer robocov"
+        raise MapError.from_mistakes(where, [Mistake.at_path((key,), message)])
+
+
+def describe_mismatch(expected: str, value: object, *, is_missing: bool = False) -> str:
+    """Return the message for a JSON value that is not as expected.
+
+    Parameters
+    ----------
+    expected : str
+        Description of the expected value.
+    value : object
+    is_missing : bool
+        Whether there is no value.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> describe_mismatch("a number", "abc"), describe_mismatch("a number", None, is_missing=True)
+    ('expected a number, got "abc"', 'missing, expected a number')
+    """
+    return f"missing, expected {expected}" if is_missing else f"expected {expected}, got {quote_json(value)}"
+
+
+def build_document_error(
+    error: ValidationError, where: str, build_mistake: Callable[[ErrorDetails], Mistake]
+) -> MapError:
+    """Build the error of a document that does not fit its model.
+
+    Parameters
+    ----------
+    error : ValidationError
+    where : str
+        Name of the document in messages.
+    build_mistake : callable
+        Returns the mistake for an error of pydantic.
+
+    Returns
+    -------
+    MapError
+    """
+    details = error.errors(include_url=False, include_context=False)
+    # A misspelt key is also a missing one. Naming the key that is there helps more.
+    details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
+    mistakes = [build_mistake(detail) for detail in details[: MapError.MAX_LISTED]]
+    return MapError.from_mistakes(where, mistakes, len(details) - len(mistakes))
+
+
+def _build_mistake(detail: ErrorDetails) -> Mistake:
+    path = tuple(step for step in detail["loc"] if step != "[key]")
+    if detail["type"] == "missing":
+        return Mistake.at_path(path, "missing")
+    if detail["type"] == _EXPECTED_ERROR:
+        expected = detail["msg"]
+    else:
+        expected = _EXPECTED_BY_ERROR_TYPE.get(detail["type"], "another value")
+    return Mistake.at_path(path, describe_mismatch(expected, detail["input"]))

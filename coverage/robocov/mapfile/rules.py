@@ -1,0 +1,212 @@
+"""Geometric rules of valid maps, beyond the structure of their files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+from shapely import Polygon
+
+from robocov.arrays import Array, compute_lengths
+from robocov.density import WeightedArea, WeightedPolygons
+from robocov.environment import (
+    MIN_START_GAP_RADII,
+    DiscStart,
+    Environment,
+    PointsStart,
+    PolygonObstacle,
+    Ring,
+    UniformStart,
+    WallObstacle,
+)
+from robocov.errors import JsonPath, MapError, Mistake, StartError, format_path
+from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
+from robocov.mapfile.structure import NO_WEIGHT
+from robocov.team import DEFAULT_RADIUS
+
+_MAX_FLATNESS = 1e-9
+"""A ring whose hull has a smaller area, relative to the square of its extent, is a line."""
+_MEETING_DISTANCE_M = 1e-6
+"""Largest distance of an edge from a point at which it meets another one."""
+_MAX_MEETING_EDGES = 6
+"""Nearest edges among which the two that meet are searched."""
+_START_MARGIN_M = 0.01
+"""Clearance beyond that of a start, so that sampling certainly succeeds."""
+
+
+def check_rules(environment: Environment, where: str) -> None:
+    """Check the geometric rules of a map.
+
+    Parameters
+    ----------
+    environment : Environment
+    where : str
+        Name of the map in messages.
+
+    Raises
+    ------
+    MapError
+        With the mistakes in obstacles, boundary and density; if there are none, with those of the map as a
+        whole.
+    """
+    mistakes = list(_find_ring_mistakes(("boundary",), environment.boundary))
+    for k, obstacle in enumerate(environment.obstacles):
+        path = ("obstacles", k)
+        if isinstance(obstacle, PolygonObstacle):
+            mistakes += _find_polygon_mistakes(path, obstacle)
+        elif isinstance(obstacle, WallObstacle):
+            mistakes += _find_line_mistakes((*path, "points"), obstacle.points, "wall")
+        if obstacle.path is not None:
+            mistakes += _find_line_mistakes((*path, "path", "points"), obstacle.path.points, "path")
+    if isinstance(environment.density, WeightedPolygons):
+        for k, area in enumerate(environment.density.areas):
+            mistakes += _find_polygon_mistakes(("density", "areas", k), area)
+    if not mistakes:
+        mistakes = list(_find_space_mistakes(environment))
+    if mistakes:
+        raise MapError.from_mistakes(where, mistakes)
+
+
+def _find_ring_mistakes(path: JsonPath, ring: Ring) -> Iterator[Mistake]:
+    """Yield the mistake of a closed ring of at least 3 points."""
+    points = np.asarray(ring, dtype=float)
+    extent = np.ptp(points, axis=0)
+    size = f"{extent[0]:g} x {extent[1]:g} m"
+    count = len(set(map(tuple, ring)))
+    if count < 3:
+        yield Mistake.at_path(path, f"expected at least 3 different points, got {count}")
+        return
+    if extent.max() > MAX_SIZE_M:
+        yield Mistake.at_path(path, f"expected at most {MAX_SIZE_M / 1000:g} km, got {size}")
+        return
+    if extent.min() < MIN_SIZE_M:
+        message = f"expected at least {MIN_SIZE_M * 1000:g} mm in both directions, got {size}"
+        yield Mistake.at_path(path, message)
+        return
+    polygon = Polygon(points)
+    # The area of the hull decides, because that of a ring that crosses itself may vanish.
+    if shapely.convex_hull(polygon).area <= _MAX_FLATNESS * float(extent.max()) ** 2:
+        message = f"expected points that are not on one line, got an area of {polygon.area:g} m²"
+        yield Mistake.at_path(path, message)
+    elif not polygon.is_valid:
+        yield _build_crossing_mistake(path, points, polygon)
+
+
+def _find_line_mistakes(path: JsonPath, line: Ring, noun: str) -> Iterator[Mistake]:
+    """Yield the mistake in the points of a wall or a path."""
+    points = np.asarray(line, dtype=float)
+    extent = np.ptp(points, axis=0)
+    if extent.max() > MAX_SIZE_M:
+        message = f"expected at most {MAX_SIZE_M / 1000:g} km, got {extent[0]:g} x {extent[1]:g} m"
+        yield Mistake.at_path(path, message)
+    elif extent.max() < MIN_SIZE_M:
+        length = float(compute_lengths(np.diff(points, axis=0)).sum())
+        message = f"expected a {noun} of at least {MIN_SIZE_M * 1000:g} mm, got {length:g} m"
+        yield Mistake.at_path(path, message)
+
+
+def _build_crossing_mistake(path: JsonPath, points: Array, polygon: Polygon) -> Mistake:
+    """Return the mistake of a ring that crosses or touches itself, with the two edges."""
+    reason = shapely.is_valid_reason(polygon)
+    # Such as "Self-intersection[5 5]".
+    x, y = (float(number) for number in reason[reason.index("[") + 1 : -1].split())
+    ends = np.roll(points, -1, axis=0)
+    edges = shapely.linestrings(np.stack([points, ends], axis=1))
+    distances = shapely.distance(edges, shapely.Point(x, y))
+    distances[(points == ends).all(axis=1)] = np.inf
+    nearest_edges = np.argsort(distances, kind="stable")[:_MAX_MEETING_EDGES].tolist()
+    first = nearest_edges[0]
+    second = nearest_edges[1]
+    # Neighbours in the ring always meet. If another edge passes through the point as well, it is named.
+    for edge in nearest_edges:
+        is_neighbour = (edge - first) % len(points) in (0, 1, len(points) - 1)
+        if not is_neighbour and distances[edge] <= _MEETING_DISTANCE_M:
+            second = edge
+            break
+    first, second = sorted((first, second))
+    other_edge = format_path((*path, second))
+    message = f"the edge from here meets the edge from {other_edge} near [{x:g}, {y:g}]"
+    return Mistake.at_path((*path, first), f"{message}, expected a ring that does not meet itself")
+
+
+def _find_polygon_mistakes(path: JsonPath, shape: PolygonObstacle | WeightedArea) -> Iterator[Mistake]:
+    mistakes = list(_find_ring_mistakes((*path, "vertices"), shape.vertices))
+    for k, hole in enumerate(shape.holes):
+        mistakes += _find_ring_mistakes((*path, "holes", k), hole)
+    if mistakes or shape.polygon.is_valid:
+        yield from mistakes
+        return
+    # Each ring is valid by itself, but not all of them together.
+    outline = Polygon(shape.vertices)
+    valid_holes: list[Ring] = []
+    for k, hole in enumerate(shape.holes):
+        hole_path = (*path, "holes", k)
+        if not outline.covers(Polygon(hole)):
+            message = f"sticks out of {format_path((*path, 'vertices'))}, expected a hole inside it"
+            yield Mistake.at_path(hole_path, message)
+        elif not Polygon(shape.vertices, [*valid_holes, hole]).is_valid:
+            message = "meets the outline or another hole, expected a hole apart from them"
+            yield Mistake.at_path(hole_path, message)
+        else:
+            valid_holes.append(hole)
+
+
+def _find_space_mistakes(environment: Environment) -> Iterator[Mistake]:
+    """Yield the mistakes of a map as a whole, each part of which is valid."""
+    if len(environment.region.vertices) < 3:
+        yield Mistake.at_path(("boundary",), "expected a region with an area, got a line as its convex hull")
+        return
+    if environment.free.is_empty:
+        yield Mistake.at_path(("obstacles",), "no free space is left inside the boundary")
+        return
+    density = environment.density
+    # Integrals are computed only if necessary, because loading what they need takes a second.
+    if density is not None and not (density.min_value > 0.0 or environment.free_masses.sum() > 0.0):
+        yield Mistake.at_path(("density",), f"{NO_WEIGHT} in the free space")
+    for name, start in environment.starts.items():
+        if isinstance(start, PointsStart):
+            yield from _find_position_mistakes(environment, name, start)
+        else:
+            yield from _find_room_mistakes(environment, name, start)
+
+
+def _find_position_mistakes(environment: Environment, name: str, start: PointsStart) -> Iterator[Mistake]:
+    """Yield the mistakes in the positions of a start."""
+    path = ("starts", name, "positions")
+    points = np.asarray(start.positions, dtype=float)
+    is_free = shapely.contains_properly(environment.free, shapely.points(points))
+    for k in np.flatnonzero(~is_free).tolist():
+        position = f"[{points[k, 0]:g}, {points[k, 1]:g}]"
+        message = f"{position} is inside an obstacle or outside the boundary, expected a free position"
+        yield Mistake.at_path((*path, k), message)
+    if len(np.unique(points, axis=0)) < len(points):
+        yield Mistake.at_path(path, "duplicate position, expected one for each robot")
+
+
+def _find_room_mistakes(
+    environment: Environment, name: str, start: DiscStart | UniformStart
+) -> Iterator[Mistake]:
+    """Yield the mistake of a disc or free space without room for a robot of the default size."""
+    if _certainly_has_room(environment, start):
+        return
+    try:
+        environment.start(name).sample(1, radius=DEFAULT_RADIUS)
+    except StartError:
+        place = "the free space"
+        if isinstance(start, DiscStart):
+            x, y = start.center
+            place = f"the disc of radius {start.radius:g} m at [{x:g}, {y:g}]"
+        message = f"{place} has no room for a robot of radius {DEFAULT_RADIUS:g} m"
+        yield Mistake.at_path(("starts", name), message)
+
+
+def _certainly_has_room(environment: Environment, start: DiscStart | UniformStart) -> bool:
+    """Return whether a robot fits at the centre of a disc, which is faster than sampling."""
+    starts = [start] if isinstance(start, DiscStart) else environment.starts.values()
+    centers = [disc.center for disc in starts if isinstance(disc, DiscStart)]
+    points = shapely.points(np.reshape(centers, (-1, 2)))
+    is_free = shapely.contains_properly(environment.free, points)
+    clearances = shapely.distance(environment.free.boundary, points)
+    min_clearance = DEFAULT_RADIUS * (1 + MIN_START_GAP_RADII) + _START_MARGIN_M
+    return bool((is_free & (clearances > min_clearance)).any())

@@ -1,0 +1,209 @@
+"""Validation of the structure of a map JSON: keys, types, ranges, and the weights of densities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from difflib import get_close_matches
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from robocov.density import MAX_RASTER_SIZE
+from robocov.errors import JsonPath, MapError, Mistake, describe_unknown_name, format_path
+from robocov.files.documents import build_document_error, check_header, describe_mismatch
+from robocov.mapfile.models import (
+    COORDINATE_EXPECTED,
+    FORMAT,
+    KEYS,
+    LABEL_EXPECTED,
+    MAX_DESCRIPTION_CHARACTERS,
+    MAX_SIZE_M,
+    MIN_SIZE_M,
+    MIN_WEIGHT,
+    MODELS_BY_KIND,
+    PARTS,
+    RING_EXPECTED,
+    VERSION,
+    WEIGHT_EXPECTED,
+    DensityModel,
+    MapModel,
+    Model,
+    RasterModel,
+)
+
+NO_WEIGHT = "expected at least one weight above 0, got none"
+_MIN_KIND_SIMILARITY = 0.5
+"""Similarity, as `difflib` measures it, from which a kind is suggested."""
+_MIN_RELATIVE_DETERMINANT = 1e-9
+"""Smallest determinant of a covariance matrix, relative to the product of its diagonal."""
+_BASE_WEIGHTS = {"uniform": "weight", "gaussians": "floor", "polygons": "background"}
+"""Keys of the weight that all points have, by the kind of the density."""
+_EXPECTED = {name: key.expected for name, key in KEYS.items()} | {
+    "boundary": RING_EXPECTED,
+    "description": (f"a text of at most {MAX_DESCRIPTION_CHARACTERS} characters",),
+    "extra": ("an object",),
+    "$schema": ("a text",),
+    "obstacles": ("a list of obstacles",),
+    "starts": ("an object of named starts",),
+    "extent": ("[x_min, y_min, x_max, y_max] in metres", COORDINATE_EXPECTED),
+    "interpolation": ('"bilinear" or "cells"',),
+    "rows": (
+        f"a list of 1 to {MAX_RASTER_SIZE} rows",
+        f"a list of 1 to {MAX_RASTER_SIZE} numbers",
+        WEIGHT_EXPECTED,
+    ),
+    "picture": ("the name of a file",),
+    "black": (WEIGHT_EXPECTED,),
+    "white": (WEIGHT_EXPECTED,),
+}
+"""Descriptions of the expected values of keys, of their items, of the items of these, and so on."""
+
+
+def validate_document(document: object, where: str) -> MapModel:
+    """Validate the structure of a map JSON.
+
+    Parameters
+    ----------
+    document : object
+    where : str
+        Name of the document in messages.
+
+    Returns
+    -------
+    MapModel
+
+    Raises
+    ------
+    MapError
+        With the mistakes in structure and density.
+    """
+    check_header(document, where, FORMAT, VERSION)
+    try:
+        model = MapModel.model_validate(document)
+    except ValidationError as error:
+        raise build_document_error(error, where, _build_mistake) from None
+    if model.density is None:
+        return model
+    if isinstance(model.density, RasterModel):
+        mistakes = list(_find_raster_mistakes(model.density))
+    else:
+        mistakes = list(_find_weight_mistakes(model.density))
+    if mistakes:
+        raise MapError.from_mistakes(where, mistakes)
+    return model
+
+
+def _build_mistake(detail: ErrorDetails) -> Mistake:
+    """Return the mistake for an error of pydantic."""
+    path = list(detail["loc"])
+    value = detail["input"]
+    key = str(path[0])
+    if key == "starts" and path[2:] == ["[key]"]:
+        text = f"starts: name: {describe_mismatch(LABEL_EXPECTED, value)}"
+        return Mistake(tuple(path[:-1]), text, at_key=True)
+    model: type[Model] = MapModel
+    kinds = MODELS_BY_KIND.get(key, {})
+    # Length of the path of an object with a kind: of the density itself, or of an item of a list.
+    object_length = 1 if key == "density" else 2
+    if kinds and len(path) == object_length:
+        return _build_kind_mistake(tuple(path), value, list(kinds))
+    if kinds and len(path) > object_length:
+        # The path of pydantic contains the kind after the object.
+        model = kinds[str(path.pop(object_length))]
+    if detail["type"] == "extra_forbidden":
+        if kinds and len(path) > object_length + 1:
+            model = PARTS.get(str(path[object_length]), model)
+        return _build_unknown_key_mistake(path, model)
+    last_key = max(k for k, step in enumerate(path) if isinstance(step, str))
+    expected = _EXPECTED[str(path[last_key])][len(path) - 1 - last_key]
+    message = describe_mismatch(expected, value, is_missing=detail["type"] == "missing")
+    return Mistake.at_path(tuple(path), message)
+
+
+def _build_unknown_key_mistake(path: list[Any], model: type[Model]) -> Mistake:
+    *parent, key = path
+    known = [field.alias or name for name, field in model.model_fields.items()]
+    place = f"{format_path(parent)}: " if parent else ""
+    return Mistake(tuple(path), f"{place}{describe_unknown_name('key', str(key), known)}", at_key=True)
+
+
+def _build_kind_mistake(path: JsonPath, value: object, kinds: list[str]) -> Mistake:
+    """Return the mistake of an obstacle, a start or a density whose kind is unknown."""
+    expected = f"one of {', '.join(kinds)}"
+    if not isinstance(value, dict):
+        return Mistake.at_path(path, describe_mismatch(f"an object whose kind is {expected}", value))
+    path = (*path, "kind")
+    if "kind" not in value:
+        return Mistake.at_path(path, describe_mismatch(expected, None, is_missing=True))
+    message = describe_mismatch(expected, value["kind"])
+    name = str(value["kind"]).lower()
+    for similar_kind in get_close_matches(name, kinds, n=1, cutoff=_MIN_KIND_SIMILARITY):
+        message += f" (did you mean {similar_kind!r}?)"
+    return Mistake.at_path(path, message)
+
+
+def _find_weight_mistakes(model: DensityModel) -> Iterator[Mistake]:
+    """Yield the mistakes in a density other than a raster."""
+    peaks = getattr(model, "peaks", [])
+    areas = getattr(model, "areas", [])
+    for k, peak in enumerate(peaks):
+        path: JsonPath = ("density", "peaks", k)
+        choice_message = _describe_choice(peak, "sigma", "covariance")
+        if choice_message is not None:
+            yield Mistake.at_path(path, choice_message)
+        elif peak.covariance is not None and not _is_covariance(peak.covariance):
+            min_variance = f"({MIN_SIZE_M * 1000:g} mm)²"
+            expected = f"a symmetric, positive definite matrix of at least {min_variance} in all directions"
+            yield Mistake.at_path((*path, "covariance"), describe_mismatch(expected, peak.covariance))
+    has_base_weight = getattr(model, _BASE_WEIGHTS[model.kind]) > 0.0
+    if not has_base_weight and not any(feature.weight > 0.0 for feature in (*peaks, *areas)):
+        yield Mistake.at_path(("density", "weight") if model.kind == "uniform" else ("density",), NO_WEIGHT)
+
+
+def _is_covariance(matrix: list[list[float]]) -> bool:
+    """Return whether a matrix is symmetric, and its eigenvalues are large enough."""
+    (a, b), (c, d) = matrix
+    smaller_eigenvalue = 0.5 * (a + d) - math.hypot(0.5 * (a - d), b)
+    is_regular = a * d - b * c > _MIN_RELATIVE_DETERMINANT * a * d
+    return b == c and smaller_eigenvalue >= MIN_SIZE_M**2 and is_regular
+
+
+def _describe_choice(model: Model, first: str, second: str) -> str | None:
+    """Return the message for a model that has not exactly one of two keys; None if it has."""
+    has_first = getattr(model, first) is not None
+    has_second = getattr(model, second) is not None
+    if has_first != has_second:
+        return None
+    return f"expected one of {first} and {second}, got {'both' if has_first else 'neither'}"
+
+
+def _find_raster_mistakes(model: RasterModel) -> Iterator[Mistake]:
+    choice_message = _describe_choice(model, "rows", "picture")
+    if choice_message is not None:
+        yield Mistake.at_path(("density",), choice_message)
+        return
+    if model.extent is not None and not _is_extent(model.extent):
+        expected = f"[x_min, y_min, x_max, y_max] with sides from {MIN_SIZE_M:g} to {MAX_SIZE_M:.0f} m"
+        yield Mistake.at_path(("density", "extent"), describe_mismatch(expected, model.extent))
+    if model.rows is None:
+        return
+    for key in ("black", "white"):
+        if getattr(model, key) is not None:
+            yield Mistake.at_path(("density", key), "is for a picture, but there are rows of numbers")
+    width = len(model.rows[0])
+    for k, row in enumerate(model.rows):
+        if len(row) != width:
+            message = f"expected {width} numbers as in the first row, got {len(row)}"
+            yield Mistake.at_path(("density", "rows", k), message)
+            return
+    if not max(max(row) for row in model.rows) >= MIN_WEIGHT:
+        yield Mistake.at_path(("density", "rows"), NO_WEIGHT)
+
+
+def _is_extent(extent: list[float]) -> bool:
+    x_min, y_min, x_max, y_max = extent
+    width = x_max - x_min
+    height = y_max - y_min
+    return min(width, height) >= MIN_SIZE_M and max(width, height) <= MAX_SIZE_M
