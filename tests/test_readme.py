@@ -26,7 +26,7 @@ def block(language: str, part: str) -> str:
 def test_the_map_is_valid_and_its_mistakes_are_named_as_it_says() -> None:
     text = block("json", "desk")
     assert parse_map(text, "README").free_area < 60.0
-    with pytest.raises(MapError, match=r"^mine.json:8:54: obstacles\[2\].radius: -1, but "):
+    with pytest.raises(MapError, match=r"^mine.json:8:54: obstacles\[2\].radius: expected "):
         parse_map(text.replace('"radius": 0.5', '"radius": -1'), "mine.json")
 
 

@@ -101,7 +101,7 @@ def plot_result(
     _checked(axes)
     environment, sites, n = result.environment, result.sites, len(result.positions)
     if environment is None or sites is None:
-        raise ParameterError("result: it does not know its map; one that a CoverageCost returned was wanted")
+        raise ParameterError("result: it does not know its map; expected one that a CoverageCost returned")
     team = Team.homogeneous(n)
     if radius is not None:
         team = replace(team, radius=np.broadcast_to(np.asarray(radius, dtype=float), (n,)))
@@ -219,7 +219,7 @@ def _checked(axes: Any) -> Any:
 
     flat = isinstance(axes, Axes) and axes.transData.is_separable and not hasattr(axes, "get_zlim")
     if axes is not None and not flat:
-        raise ParameterError(f"axes: {quote(axes)}, but one matplotlib Axes with straight x and y was wanted")
+        raise ParameterError(f"axes: expected one matplotlib Axes with straight x and y, got {quote(axes)}")
     return axes
 
 

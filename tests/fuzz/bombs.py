@@ -177,7 +177,7 @@ BOMBS: dict[str, tuple[Callable[[], Case], Job, str]] = {
     "argos: quantity": (_one("a.argos", lambda: _ARGOS), _READ, "a number within 1e7"),
     "argos: a file": (lambda: _external("argos-configuration", "a.argos"), _READ, "for another file"),
     "irsim: aliases": (_one("a.yaml", lambda: _aliases("world: {}")), _READ, "more than 50000 values"),
-    "irsim: parts": (_one("a.yaml", _many_parts), _READ, "shapes, but at most 20000"),
+    "irsim: parts": (_one("a.yaml", _many_parts), _READ, "expected at most 20000"),
     "irsim: itself": (_one("a.yaml", lambda: b"world: {obstacle_map: a.yaml}"), _READ, "begins with"),
     "ros: aliases": (_one("map.yaml", lambda: _aliases(_ROS)), _READ, "more than 50000 values"),
     "ros: itself": (_one("map.yaml", _ROS.encode), _READ, "begins with"),
@@ -185,10 +185,10 @@ BOMBS: dict[str, tuple[Callable[[], Case], Job, str]] = {
     "svg: entities": (_one("a.svg", lambda: _entities("svg")), _READ, "for other entities"),
     "svg: a file": (lambda: _external("svg", "a.svg"), _READ, "for another file"),
     "dxf: blocks": (_one("a.dxf", _blocks), Job("import", None, {"scale": 1.0}), "blocks and all"),
-    "osm: relations": (_one("a.osm", _relations), _READ, "vertices, but at most 500000"),
+    "osm: relations": (_one("a.osm", _relations), _READ, "expected at most 500000"),
     "osm: entities": (_one("a.osm", lambda: _entities("osm")), Job("import", "osm"), "no document type"),
     "geojson: collections": (_one("a.geojson", _collections), _READ, "nested too deeply"),
-    "geojson: records": (_one("a.geojsonl", lambda: _POINT * 600_000), _READ, "vertices, but at most"),
+    "geojson: records": (_one("a.geojsonl", lambda: _POINT * 600_000), _READ, "expected at most"),
     "wkt: collections": (_one("a.wkt", lambda: b"GEOMETRYCOLLECTION(" * 9000), _READ, "nested too deeply"),
     "imdf: unpacked": (
         _one("a.zip", lambda: _zip({"unit.geojson": b" " * 200_000_000})), _READ, "50 MB when unpacked",
@@ -197,7 +197,7 @@ BOMBS: dict[str, tuple[Callable[[], Case], Job, str]] = {
         _one("a.zip", lambda: _zip({f"{k}/unit.geojson": b"" for k in range(5000)})), _READ, "1000 files",
     ),
     "imdf: levels": (lambda: Case(imdf_files(_LEVELS)), Job("folder"), "objects"),
-    "picture: unpacked": (_one("a.png", _png), Job("import", None, {"cell": 1.0}), "million were wanted"),
+    "picture: unpacked": (_one("a.png", _png), Job("import", None, {"cell": 1.0}), "million"),
     "study: runs": (_one("study.toml", _study), Job("study"), "expected at most 100000, got 1e+12"),
 }
 # fmt: on

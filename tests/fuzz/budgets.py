@@ -235,7 +235,7 @@ def read(place: Path, seconds: float) -> Cost:
         said = f"{shaped(foreign, Shaping(), place.name)[1].vertices_kept} vertices"
     except RobocovError as error:
         said = f"refused: {str(error).partition(': ')[2]}"
-        good = good or (kind.name == "dxf" and "shapes, but" in said)  # layers are known once ezdxf read it
+        good = good or (kind.name == "dxf" and " shapes" in said)  # layers are known once ezdxf read it
     spent = time.process_time() - began
     return Cost(spent, peak() - before, said, good)
 

@@ -68,7 +68,7 @@ def _finding(kind: str, error: BaseException) -> dict[str, Any]:
 
 def _require_one_line(message: str) -> None:
     if not message.isprintable() or not message or len(message) > 2000:
-        raise WrongError(f"a message of one line was wanted: {message[:300]!r}")
+        raise WrongError(f"expected a message of one line: {message[:300]!r}")
 
 
 def _require_map(environment: Any) -> str:
@@ -78,7 +78,7 @@ def _require_map(environment: Any) -> str:
     from robocov.mapfile.check import check_map
 
     if not isinstance(environment, Environment):
-        raise WrongError(f"a map was wanted: {type(environment).__name__}")
+        raise WrongError(f"expected a map: {type(environment).__name__}")
     if from_json(to_json(environment)) != environment:
         raise WrongError("the map is another one after it was written and read")
     text = dump_map(environment)

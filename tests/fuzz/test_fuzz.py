@@ -62,7 +62,7 @@ def outcome_of(word: str, reader: Reader) -> Outcome:
         ("refused", "refused", "word.txt: refused"),
         ("error", "error", "KeyError: 'error'"),
         ("warning", "error", "RuntimeWarning: something is odd"),
-        ("lines", "error", "WrongError: a message of one line was wanted"),
+        ("lines", "error", "WrongError: expected a message of one line"),
         ("memory", "memory", "MemoryError"),
         ("crash", "crash", "status -6"),
     ],
@@ -89,8 +89,8 @@ def test_the_same_fault_is_one_finding_however_often() -> None:
     tally = importers.Tally("map")
     for k in range(3):
         tally.note(Case({"a": b"x"}), Job("map"), Outcome("error", f"KeyError: {k}", "error-here"))
-    assert tally.note(Case({"a": b"x"}), Job("map"), Outcome("refused", "a: name: 3, but a text"))
-    assert not tally.note(Case({"a": b"x"}), Job("map"), Outcome("refused", "b: name: 4, but a text"))
+    assert tally.note(Case({"a": b"x"}), Job("map"), Outcome("refused", "a: name: expected a text"))
+    assert not tally.note(Case({"a": b"x"}), Job("map"), Outcome("refused", "b: name: expected a text"))
     assert list(tally.findings) == ["error-here"]
     assert tally.counts == {"error": 3, "refused": 2}
 

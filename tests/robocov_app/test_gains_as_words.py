@@ -87,7 +87,7 @@ def test_a_study_takes_lists_of_words(study: Path) -> None:
         ('target = ["median", "median"]', r"gains\.rapf\.target\[1\]: 'median' is given already at"),
         (
             "target = {low = 0, high = 1}",
-            r"gains\.rapf\.target: a range, but one of centroid, sensing, median",
+            r"gains\.rapf\.target: expected one of centroid, sensing, median",
         ),
         ('target = "null"', r"gains\.rapf\.target: unknown choice 'null'"),
     ],

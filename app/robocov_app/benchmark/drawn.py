@@ -46,7 +46,7 @@ def drawn_map(kind: str, seed: int) -> Environment:
         with suppress(MapError):
             return from_json(document, plan.name)
     none = f"no plan of {_ATTEMPTS} is in one piece"
-    raise ParameterError(f"map {kind}-{seed}: {none}; another seed was wanted")
+    raise ParameterError(f"map {kind}-{seed}: {none}; expected another seed")
 
 
 def _rounded(points: Array | list[tuple[float, float]]) -> Ring:

@@ -16,7 +16,7 @@ from robocov.controllers import get_information, make_controller
 from robocov.controllers.gains import Value
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, quote
-from robocov.files.strictjson import parse, read_bytes
+from robocov.files.strictjson import parse_json, read_bytes
 from robocov.files.writing import replace_file
 from robocov_app.benchmark import suite
 from robocov_app.sweep.executors import LocalPool
@@ -117,7 +117,7 @@ def run_benchmark(
     """
     foreign = {path.name for path in out.iterdir()} - {RESULT, TRACKS} if out.is_dir() else set()
     if foreign or (out.exists() and not out.is_dir()):
-        raise InputError(f"{out}: it holds something else than a benchmark; another --out was wanted")
+        raise InputError(f"{out}: it holds something else than a benchmark; choose another --out")
     studies = dict(contender.studies(selection))
     rows: list[Row] = []
     for track, study in studies.items():
@@ -199,12 +199,12 @@ def read_result(path: Path) -> dict[str, Any]:
         try:
             data = gzip.decompress(data)
         except (OSError, EOFError, zlib.error) as error:
-            raise InputError(f"{path}: {error}, but a packed result was wanted") from None
-    result = parse(data, str(path))
+            raise InputError(f"{path}: cannot be unpacked: {error}") from None
+    result = parse_json(data, str(path))
     if not isinstance(result, dict) or {name: result.get(name) for name in _FORMAT} != _FORMAT:
-        raise InputError(f"{path}: it is no result of robocov benchmark, which was wanted")
+        raise InputError(f"{path}: expected a result of robocov benchmark")
     if (found := result.get("suite")) != _suite():
-        raise InputError(f"{path}: suite: {found}, but that of {suite.FILE.name} here was wanted")
+        raise InputError(f"{path}: suite: expected that of {suite.FILE.name} here, got {found}")
     parts = {**dict.fromkeys(("entry", "selection", "versions"), dict), "rows": list, "method": list}
     _require(result, parts, path)
     words = {**dict.fromkeys(("controller", "label", "information"), str), "gains": dict, "set": dict}
@@ -231,9 +231,9 @@ def bundled_results(others: Sequence[Mapping[str, Any]] = ()) -> list[dict[str, 
 def _require(given: Any, kinds: Mapping[str, Any], where: object) -> None:
     for name, kind in kinds.items():
         if not isinstance(given, dict) or name not in given:
-            raise InputError(f"{where}: {name}: missing, but a whole result was wanted")
+            raise InputError(f"{where}: {name}: missing, expected a whole result")
         if not isinstance(given[name], kind):
-            raise InputError(f"{where}: {name}: {quote(given[name])}, but another kind of value was wanted")
+            raise InputError(f"{where}: {name}: expected another kind of value, got {quote(given[name])}")
 
 
 def verify(
@@ -255,7 +255,7 @@ def verify(
     entry, chosen = result["entry"], result["selection"]
     name = controller or entry["controller"]
     if entry["source_sha256"] and controller is None and name != "oracle":
-        raise InputError(f"{path}: its controller {name} is a file; --controller FILE.py:CLASS was wanted")
+        raise InputError(f"{path}: its controller {name} is a file; pass --controller FILE.py:CLASS")
     contender = Contender(name, entry["set"])
     selection = Selection(chosen["quick"], tuple(chosen["tracks"]), tuple(chosen["maps"]))
     studies = dict(contender.studies(selection))
@@ -265,7 +265,7 @@ def verify(
     told = {(row["track"], row["map"], row["seed"]): row for row in result["rows"]}
     every = ((track, task) for track, study in studies.items() for task in tasks_of(study))
     tasks = {(track, task.map, task.seed): task for track, task in every}
-    found += [f"{_where(key)}: no row, but one was wanted" for key in tasks.keys() - told.keys()]
+    found += [f"{_where(key)}: missing row" for key in tasks.keys() - told.keys()]
     found += [f"{_where(key)}: a row of a run that was not selected" for key in told.keys() - tasks.keys()]
     for key, row in told.items():
         found += _differences(key, row, {} if "error" in row else rated(row["track"], row["map"], row))
@@ -291,7 +291,7 @@ def _where(key: tuple[str, str, int]) -> str:
 
 def _differences(key: tuple[str, str, int], told: Row, right: Mapping[str, Any]) -> list[str]:
     return [
-        f"{_where(key)}: {name}: {told.get(name)}, but {value} was found"
+        f"{_where(key)}: {name}: expected {value}, got {told.get(name)}"
         for name, value in right.items()
         if name != "deciding_s" and told.get(name) != value
     ]

@@ -125,7 +125,7 @@ def suite_map(name: str) -> Environment:
     environment = made_map(name)
     if name not in frozen() or hash_of(environment) != frozen()[name]["sha256"]:
         changed = f"it is not the one of suite {VERSION}: its file or its generator has changed"
-        raise InputError(f"map {name}: {changed}; the map whose hash is in {FILE.name} was wanted")
+        raise InputError(f"map {name}: {changed}; expected the map whose hash is in {FILE.name}")
     return environment
 
 
@@ -142,7 +142,7 @@ def chosen(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> dict[s
             own = tuple({FAMILY_OF[each]: each for each in reversed(own)}.values())[::-1]
         found[name] = tuple(each for each in own if not maps or each in maps)
     if not any(found.values()):
-        raise ParameterError(f"--maps: {', '.join(maps)}, but a map of {', '.join(found)} was wanted")
+        raise ParameterError(f"--maps: expected a map of {', '.join(found)}, got {', '.join(maps)}")
     return {name: own for name, own in found.items() if own}
 
 

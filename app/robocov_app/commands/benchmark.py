@@ -79,11 +79,11 @@ class Arguments(JsonOption):
                     option = "DIR" if name == "paths" else f"--{name}"
                     raise ParameterError(f"{option}: robocov benchmark {self.action} has no such option")
         if self.action == "run" and self.controller is None:
-            raise ParameterError("--controller: none, but the name of one, or FILE.py:CLASS, was wanted")
+            raise ParameterError("--controller: expected the name of one, or FILE.py:CLASS, got none")
         verify, paths = self.action == "verify", format_count(len(self.paths), "path")
         if (verify and len(self.paths) != 1) or (self.action == "page" and self.alone and not self.paths):
             wanted = "one result" if verify else "results"
-            raise ParameterError(f"DIR: {paths}, but {wanted} of a benchmark was wanted")
+            raise ParameterError(f"DIR: expected {wanted} of a benchmark, got {paths}")
 
 
 def command(options: Arguments) -> int:
@@ -174,7 +174,7 @@ def _references(options: Arguments) -> int:
 
     target, workers = options.out or suite.FILE, options.workers or processors()
     if target.is_dir():
-        raise InputError(f"--out: {target}: a folder, but a file for the references was wanted")
+        raise InputError(f"--out: {target}: expected a file for the references, got a folder")
     with Interruption() as stop:
         held, left = make_references(target, workers=workers, quiet=options.json, stop=stop)
     answer = {"path": str(target), "references_and_bounds": held, "left": left}

@@ -48,9 +48,9 @@ def command(options: Arguments) -> int:
 
     names = options.controllers
     if not names:
-        raise ParameterError("--controllers: none given, but at least one was wanted")
+        raise ParameterError("--controllers: expected at least one, got none")
     if len(set(names)) < len(names):
-        raise ParameterError(f"--controllers: {' '.join(names)}: each once was wanted")
+        raise ParameterError(f"--controllers: {' '.join(names)}: duplicate value")
     gains = gains_for(names, parsed_gains(options.gains))
     # everything that the user gave is checked before a folder is made
     environment = load_map(options.map)

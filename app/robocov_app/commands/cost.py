@@ -81,11 +81,11 @@ def speeds_of(given: tuple[float, ...], robots: int) -> Array | None:
     if not given:
         return None
     if len(given) not in (1, robots):
-        wanted = f"one, or one for each of {robots} robots, was wanted"
-        raise ParameterError(f"--speeds: {len(given)} numbers, but {wanted}")
+        wanted = f"expected one, or one for each of {robots} robots"
+        raise ParameterError(f"--speeds: {wanted}, got {len(given)} numbers")
     for speed in given:
         if not 0.0 < speed < np.inf:
-            raise ParameterError(f"--speeds: {speed!r} m/s, but a number above 0 was wanted")
+            raise ParameterError(f"--speeds: expected a number above 0, got {speed!r} m/s")
     return np.array(given if len(given) == robots else given * robots)
 
 
@@ -98,10 +98,10 @@ def read_positions(path: Path) -> Array:
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not JSON: {error}") from error
     if not isinstance(content, list) or not content:
-        raise InputError(f"{path}: {quote(content)}, but a list of [x, y] in metres was wanted")
+        raise InputError(f"{path}: expected a list of [x, y] in metres, got {quote(content)}")
     for k, pair in enumerate(content):
         fits = isinstance(pair, list) and len(pair) == 2
         if not fits or not all(is_number(value) and abs(value) < 1e300 for value in pair):
-            wanted = "[x, y], two finite numbers in metres, was wanted"
-            raise InputError(f"{path}: [{k}]: {quote(pair)}, but {wanted}")
+            wanted = "expected [x, y], two finite numbers in metres"
+            raise InputError(f"{path}: [{k}]: {wanted}, got {quote(pair)}")
     return np.array(content, dtype=float)

@@ -62,17 +62,17 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
         if self.frames is not None:
             require_number("--frames", self.frames, 1, 1_000_000)
         if not 1 <= len(self.controllers) <= 4:
-            raise ParameterError(f"--controllers: {len(self.controllers)}, but 1 to 4 were wanted")
+            raise ParameterError(f"--controllers: expected 1 to 4, got {len(self.controllers)}")
         if self.out is not None and self.frames is None:
-            raise ParameterError("--out: nothing to write there; --frames N was wanted beside it")
+            raise ParameterError("--out: nothing to write there; requires --frames N")
         if self.frames is not None and self.out is None and self.video is None:
-            raise ParameterError("--frames: --out DIR or --video FILE was wanted beside it")
+            raise ParameterError("--frames: requires --out DIR or --video FILE")
         if self.video is not None and self.frames is None and not self.tour:
-            raise ParameterError("--video: --frames N or --tour was wanted beside it")
+            raise ParameterError("--video: requires --frames N or --tour")
         if self.serve and (self.frames is not None or self.video is not None):
-            raise ParameterError("--serve: neither --frames nor --video was wanted beside it")
+            raise ParameterError("--serve: cannot be combined with --frames or --video")
         if self.video is not None and self.video.suffix.lower() != ".mp4":
-            raise ParameterError(f"--video: {str(self.video)!r}, but a name ending in .mp4 was wanted")
+            raise ParameterError(f"--video: expected a name ending in .mp4, got {str(self.video)!r}")
 
 
 def command(options: Arguments) -> int:
@@ -149,7 +149,7 @@ def session_of(options: Arguments) -> Session:
 
 
 def rendered(opening: Launcher, options: Arguments) -> int:
-    from robocov.files.result_folder import results
+    from robocov.files.result_folder import create_result
     from robocov.files.writing import resolve_target
     from robocov_app.runs.encoding import encoder, save_moving_picture
     from robocov_app.viewer.film import pixels
@@ -158,7 +158,7 @@ def rendered(opening: Launcher, options: Arguments) -> int:
     if options.video is not None:
         resolve_target(options.video)
         encoder()
-    made = nullcontext() if options.out is None else results(options.out, overwrite=False)
+    made = nullcontext() if options.out is None else create_result(options.out, overwrite=False)
     with made as result, opening.window() as window, Interruption() as stop:
         _begin_lesson(window, options)
         count = options.frames
@@ -175,7 +175,7 @@ def rendered(opening: Launcher, options: Arguments) -> int:
                     yield pixels(window.screen)
                     update(done + 1)
 
-            out = None if result is None else result.new
+            out = None if result is None else result.staging
             save_moving_picture(frames(), out, options.video, HEADLESS_FPS)
     for target in filter(None, (options.out, options.video)):
         echo(f"saved {target}")

@@ -34,10 +34,10 @@ class Arguments(WindowOptions):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.serve and self.screenshot is not None:
-            raise ParameterError("--serve: no --screenshot was wanted beside it")
+            raise ParameterError("--serve: cannot be combined with --screenshot")
         if self.screenshot is not None and self.screenshot.suffix.lower() != ".png":
-            wanted = "a name ending in .png was wanted"
-            raise ParameterError(f"--screenshot: {str(self.screenshot)!r}, but {wanted}")
+            wanted = "expected a name ending in .png"
+            raise ParameterError(f"--screenshot: {wanted}, got {str(self.screenshot)!r}")
 
 
 def command(options: Arguments) -> int:

@@ -71,7 +71,7 @@ def sources() -> Path:
 def built(folder: Path) -> None:
     """Put the pages into a new folder; InputError where it is none, RobocovError where Sphinx complains."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder}: exists already; a new or an empty folder was wanted")
+        raise InputError(f"{folder}: exists already; expected a new or an empty folder")
     if _BROUGHT.is_dir():
         shutil.copytree(_BROUGHT, folder, dirs_exist_ok=True)
         return

@@ -35,7 +35,7 @@ class Arguments(PlotOptions):
 
 
 def command(options: Arguments) -> None:
-    from robocov.files.result_folder import extended
+    from robocov.files.result_folder import extend_result
     from robocov.metrics.run_metrics import COLUMNS, compute_run_metrics, find_time_near_final
     from robocov.record import select_nearest_moments
     from robocov_app.figures.runs import Measured
@@ -44,13 +44,13 @@ def command(options: Arguments) -> None:
     measured, runs = [], load_saved(options.folder)
     answers: list[dict[str, Any]] = []
     folder = options.folder if options.folder.is_dir() else options.folder.parent
-    with extended(folder) as result:
+    with extend_result(folder) as result:
         for saved in runs:
             record, history = saved.record, saved.history
             total = len(select_nearest_moments(record.time, options.rate))
             with progress(f"measuring {record.label}", total, quiet=options.json) as update:
                 metrics = compute_run_metrics(record, options.rate, counting(update))
-            target = result.new / saved.folder.relative_to(folder)
+            target = result.staging / saved.folder.relative_to(folder)
             target.mkdir(exist_ok=True)
             write_csv(target / "metrics.csv", ",".join(COLUMNS.values()), metrics.rows())
             measured.append(Measured(record.label, record.controller, metrics))

@@ -62,7 +62,7 @@ class Arguments(PlotOptions):
 
     def __post_init__(self) -> None:
         if (self.map is None) == (self.run is None):
-            raise InputError("MAP or --run DIR: one of the two was wanted")
+            raise InputError("MAP or --run DIR: expected one of the two")
         for name, value in (("--robots", self.robots), ("--radius", self.radius)):
             if self.run is not None and value is not None:
                 raise InputError(f"{name}: {value}, but with --run it is that of the run")
@@ -71,7 +71,7 @@ class Arguments(PlotOptions):
         require_number("--lattice", self.lattice, 2, 2048, whole=True)
         require_number("--precision", self.precision, MIN_PRECISION, 1.0)
         if self.seed < 0:
-            raise ParameterError(f"--seed: {self.seed}, but a whole number of at least 0 was wanted")
+            raise ParameterError(f"--seed: expected a whole number of at least 0, got {self.seed}")
         if self.positions is not None:
             require_fresh(self.positions, "another name", overwrite=self.overwrite)
         super().__post_init__()

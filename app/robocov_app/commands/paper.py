@@ -46,7 +46,7 @@ class Arguments(JsonOption):
         if self.workers is not None:
             require_number("--workers", self.workers, 1, 1024)
         if len(self.parts) > 1:
-            raise InputError(f"{self.parts[0]} and {self.parts[1]}: one of them was wanted")
+            raise InputError(f"{self.parts[0]} and {self.parts[1]}: expected one of them")
 
     @property
     def parts(self) -> list[str]:

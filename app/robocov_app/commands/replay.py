@@ -44,17 +44,17 @@ class Arguments(JsonOption, WebOptions):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.each:
-            raise ParameterError("--each: robocov demo with a session file was wanted for that")
+            raise ParameterError("--each: requires a session file, opened by robocov demo")
         if self.headless and self.serve:
-            raise ParameterError("--serve: neither --frames nor --video was wanted beside it")
+            raise ParameterError("--serve: cannot be combined with --frames or --video")
         if self.headless and self.out is None:
-            raise ParameterError("--out: a folder for frames and film was wanted")
+            raise ParameterError("--out: expected a folder for the frames and the video")
         if self.headless and self.controller:
-            raise ParameterError("--controller: neither --frames nor --video was wanted beside it")
+            raise ParameterError("--controller: cannot be combined with --frames or --video")
         if not self.headless:
             for name in ("out", "json"):
                 if getattr(self, name):
-                    raise ParameterError(f"--{name}: --frames or --video was wanted beside it")
+                    raise ParameterError(f"--{name}: requires --frames or --video")
             window_size(self.film.size)
 
     @property
@@ -98,8 +98,8 @@ def _replay(options: Arguments) -> int:
         load_controller_class(controller)
         names = [each.record.controller for each in saved]
         if controller.rpartition(":")[2] not in (name.rpartition(":")[2] for name in names):
-            wanted = f"the controller of a run was wanted: {summarize_names(names)}"
-            raise ParameterError(f"--controller: {controller}, but {wanted}")
+            wanted = f"expected the controller of a run: {summarize_names(names)}"
+            raise ParameterError(f"--controller: {wanted}, got {controller}")
     try:
         session = replayed_session(saved, options.controller)
     except InputError as error:
@@ -127,7 +127,7 @@ def open_window(options: Arguments, session: Session, file: Path | None = None) 
 def make_film(options: Arguments, saved: list[Saved]) -> int:
     import numpy as np
 
-    from robocov.files.result_folder import results
+    from robocov.files.result_folder import create_result
     from robocov.metrics import CostHistory
     from robocov_app.runs.film import save_moving
     from robocov_app.runs.run import Run
@@ -137,15 +137,15 @@ def make_film(options: Arguments, saved: list[Saved]) -> int:
     out = options.out
     for folder in (options.run, *(each.folder for each in saved)):  # no run is replaced by its own film
         if Path(os.path.realpath(folder)).is_relative_to(os.path.realpath(out)):
-            raise InputError(f"--out: {out}: another folder than that of the run was wanted")
+            raise InputError(f"--out: {out}: expected another folder than that of the run")
     runs = [Run(each.record, each.history or CostHistory(*np.empty((4, 0))), {}) for each in saved]
     # robots may have failed at other places in each run: distances are to one map, that without them
     bare = [replace(run, record=replace(run.record, environment=roster_of(run.record)[0])) for run in runs]
     content = {"format": "robocov-replay", "version": 1, "of": str(options.run)}
-    with results(out, "replay", overwrite=options.overwrite) as result, Interruption() as stop:
-        output.write_json(result.new / "replay.json", content)
+    with create_result(out, "replay", overwrite=options.overwrite) as result, Interruption() as stop:
+        output.write_json(result.staging / "replay.json", content)
         same = bare if len(runs) > 1 else None
-        save_moving(runs, None, result.new, options.film, stop, quiet=options.json, bare=same)
+        save_moving(runs, None, result.staging, options.film, stop, quiet=options.json, bare=same)
     done = "stopped; what was done is in" if stop.requested else "saved in"
     answer = {"out": str(out), "interrupted": stop.requested}
     output.tell(options, answer, f"{done} {out}/: {output.listed(out)}")

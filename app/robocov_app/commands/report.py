@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import tyro
 
 from robocov.errors import InputError, OutputError, ParameterError, format_count
-from robocov.files.result_folder import REPORT, extended, is_report
+from robocov.files.result_folder import REPORT_FILE, extend_result, is_report
 from robocov.files.writing import replace_file, resolve_target
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import Interruption
@@ -43,9 +43,9 @@ class Arguments(JsonOption):
 
 def command(options: Arguments) -> None:
     if not options.folders:
-        raise ParameterError("DIR: the folder of a run, a comparison or a sweep was wanted")
+        raise ParameterError("DIR: expected the folder of a run, a comparison or a sweep")
     first = options.folders[0]
-    target = options.out or (first.with_suffix(".html") if first.suffix == SESSION else first / REPORT)
+    target = options.out or (first.with_suffix(".html") if first.suffix == SESSION else first / REPORT_FILE)
     if options.out is not None or first.suffix == SESSION:
         check_target(target, overwrite=options.overwrite)
     with TemporaryDirectory(prefix="robocov-") as temporary:
@@ -98,10 +98,10 @@ def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: 
     page = report(results, title=options.title, theme=options.theme)
     data = page.html.encode("utf-8", "replace")
     with ExitStack() as stack:
-        if target == options.folders[0] / REPORT and results[0].kind != "sweep":
-            more = stack.enter_context(extended(options.folders[0]))
-            more.claim(REPORT)
-            stack.enter_context(replace_file(more.new / REPORT)).write_bytes(data)
+        if target == options.folders[0] / REPORT_FILE and results[0].kind != "sweep":
+            more = stack.enter_context(extend_result(options.folders[0]))
+            more.claim_file(REPORT_FILE)
+            stack.enter_context(replace_file(more.staging / REPORT_FILE)).write_bytes(data)
         else:
             stack.enter_context(replace_file(target)).write_bytes(data)
     counts, lines = [], []
@@ -123,5 +123,5 @@ def check_target(target: Path, *, overwrite: bool) -> None:
     if not target.parent.is_dir():
         raise OutputError(f"{target}: cannot be written: there is no folder {target.parent}")
     if target.exists() and not overwrite and not is_report(target):
-        wanted = "another --out, or --overwrite, was wanted"
+        wanted = "choose another --out or pass --overwrite"
         raise InputError(f"{target}: the file is no report of robocov; {wanted}")

@@ -90,7 +90,7 @@ def remade(options: Arguments) -> int:
 def saved_stories(options: Arguments, stop: Interruption) -> Iterator[dict[str, Any]]:
     """Make the stories of a session that the options name again, each in its folder; yield what was saved."""
     from robocov.errors import InputError
-    from robocov.files.result_folder import results
+    from robocov.files.result_folder import create_result
     from robocov.kernel_compilation import compile_kernels
     from robocov_app.viewer.headless import save_story
     from robocov_app.viewer.session.file import load_session, save_session
@@ -106,13 +106,13 @@ def saved_stories(options: Arguments, stop: Interruption) -> Iterator[dict[str, 
     compile_kernels()
     for node, step, suffix in stories:
         out = Path(f"{options.out or path.stem}{suffix}")
-        with results(out, "story", overwrite=options.overwrite) as result:
-            save_session(result.new / f"session{path.suffix}", document, node, step, saved.view)
+        with create_result(out, "story", overwrite=options.overwrite) as result:
+            save_session(result.staging / f"session{path.suffix}", document, node, step, saved.view)
             try:
                 answer = {"out": str(out), **save_story(document, node, step, result, options, stop)}
             except InputError as error:
                 raise InputError(f"{path}: {error}") from None
-            result.keep()
+            result.save_progress()
         yield answer
         if stop.requested:
             return

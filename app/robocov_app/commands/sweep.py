@@ -51,7 +51,7 @@ class Arguments(JsonOption):
         if self.workers is not None:
             require_number("--workers", self.workers, 1, 1024)
             if self.scheduler is not None:
-                raise ParameterError("--workers: those of a cluster are its own, so one of both was wanted")
+                raise ParameterError("--workers: cannot be combined with --scheduler")
 
 
 def command(options: Arguments) -> int:

@@ -89,5 +89,5 @@ def figure_kind(path: Path) -> str:
     """Return ``png``, ``svg`` or ``pdf``, by a path's suffix; raises ParameterError when that is another."""
     kind = path.suffix.lower().lstrip(".")
     if kind not in _METADATA:
-        raise ParameterError(f"{path}: suffix {quote(path.suffix)}, but .png, .svg or .pdf was wanted")
+        raise ParameterError(f"{path}: expected .png, .svg or .pdf, got suffix {quote(path.suffix)}")
     return kind

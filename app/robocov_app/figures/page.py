@@ -33,7 +33,7 @@ def figure_of(axes: Axes) -> Figure:
 
 def check_some(what: str, items: Sequence[object]) -> None:
     if not items:
-        raise ParameterError(f"{what}: none were given, but at least one was wanted")
+        raise ParameterError(f"{what}: expected at least one, got none")
 
 
 def quiet_axes(axes: Axes, theme: Theme, x: str = "", y: str = "", grid: Literal["x", "y", ""] = "") -> None:

@@ -62,7 +62,7 @@ def plot_trajectories(
     `mean_distance`, m, and `mean_time`, s, of the final positions are for the title.
     """
     if colours not in ("paper", "robots"):
-        raise ParameterError(f"colours: {quote(colours)}, but 'paper' or 'robots' was wanted")
+        raise ParameterError(f"colours: expected 'paper' or 'robots', got {quote(colours)}")
     theme = theme_named(theme)
     if axes is None:
         facts = _line(*_facts(record, mean_distance, mean_time))
@@ -147,7 +147,7 @@ def plot_cost(
         if len(time) != len(values) or not np.isfinite(values).any():
             raise ParameterError(
                 f"curve {quote(label)}: {len(time)} times, {int(np.isfinite(values).sum())} finite values, "
-                f"but a value for each time and a finite one was wanted"
+                f"expected a value for each time and a finite one"
             )
     theme = theme_named(theme)
     if axes is None:

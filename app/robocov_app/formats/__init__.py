@@ -129,8 +129,8 @@ def detect(path: str | Path) -> Importer:
     named = [each for each in IMPORTERS.values() if path.suffix.lower() in each.suffixes]
     if len(named) == 1:  # its reader says best what is missing
         return named[0]
-    wanted = f"one of {', '.join(IMPORTERS)} was wanted"
-    raise MapError(f"{to_one_line(path)}: unknown format ({described(head)}), but {wanted}")
+    wanted = f"expected one of {', '.join(IMPORTERS)}"
+    raise MapError(f"{to_one_line(path)}: unknown format ({described(head)}), {wanted}")
 
 
 def import_map(
@@ -171,9 +171,7 @@ def exporter(path: str | Path, name: str | None = None) -> Exporter:
         if candidate.name == name or (name is None and suffix in candidate.suffixes):
             return candidate
     known = ", ".join(suffix for candidate in EXPORTERS.values() for suffix in candidate.suffixes)
-    raise ParameterError(
-        f"{to_one_line(path)}: unknown format, but a file ending in one of {known} was wanted"
-    )
+    raise ParameterError(f"{to_one_line(path)}: unknown format, expected a file ending in one of {known}")
 
 
 def export_map(

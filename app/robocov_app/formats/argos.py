@@ -17,7 +17,7 @@ from shapely import MultiPolygon
 
 from robocov.arrays import Array
 from robocov.errors import quote, to_one_line
-from robocov.mapfile.models import LARGEST
+from robocov.mapfile.models import MAX_SIZE_M
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
 from robocov_app.formats.geometry.shapes import Shapes
@@ -31,7 +31,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     root = read_xml_tree(path, "argos-configuration", "an experiment of ARGoS")
     arena = root.child("arena")
     if arena is None:
-        root.refuse("no <arena>, but one was wanted")
+        root.refuse("no <arena>")
     shapes = Shapes(root.where, options)
     size = _lengths(arena, "size")[:2]
     corner = arena.numbers("center", count=3, default="0,0,0")[:2] - size / 2
@@ -49,7 +49,7 @@ def _distribute(element: Element, shapes: Shapes) -> None:
     parts = {tag: element.child(tag) for tag in ("position", "orientation", "entity")}
     position, orientation, entity = parts.values()
     if position is None or orientation is None or entity is None or not entity.children:
-        element.refuse("<position>, <orientation> and <entity> with something in it were wanted")
+        element.refuse("expected <position>, <orientation> and <entity> with something in it")
     quantity = int(entity.numbers("quantity", count=1)[0])
     thing = entity.children[0]
     methods = [part.attributes.get("method", "") for part in (position, orientation)]
@@ -57,14 +57,14 @@ def _distribute(element: Element, shapes: Shapes) -> None:
         shapes.leave_out(to_one_line(thing.tag)[:30], "that ARGoS places at random", max(quantity, 0))
         return
     if not 0 <= quantity <= MOST_PLACED:
-        entity.refuse(f"quantity {quantity}, but a number from 0 to {MOST_PLACED} was wanted")
+        entity.refuse(f"expected a number from 0 to {MOST_PLACED}, got quantity {quantity}")
     turn = orientation.numbers("values", count=3)
     if methods[0] == "constant":
         places = [position.numbers("values", count=3)] * quantity
     else:
         layout = position.numbers("layout", count=3).astype(int)
         if not (layout > 0).all() or math.prod(layout.tolist()) < quantity:
-            position.refuse(f"layout {layout.tolist()}, but one for {quantity} was wanted")
+            position.refuse(f"expected one for {quantity}, got layout {layout.tolist()}")
         gaps = position.numbers("distances", count=3)
         first = position.numbers("center", count=3) + (layout - 1) * gaps / 2
         k = np.arange(quantity)
@@ -95,6 +95,6 @@ def _place(element: Element, position: Array, turn: Array, shapes: Shapes) -> No
 
 def _lengths(element: Element, name: str, count: int = 3) -> Array:
     values = element.numbers(name, count=count)
-    if not (values[:2].min() >= 1e-6 and values[:2].max() <= LARGEST):
-        element.refuse(f"{name} {quote(element.attributes[name])}, but lengths above 0 were wanted")
+    if not (values[:2].min() >= 1e-6 and values[:2].max() <= MAX_SIZE_M):
+        element.refuse(f"expected lengths above 0, got {name} {quote(element.attributes[name])}")
     return values

@@ -156,7 +156,7 @@ class Options:
             if value is not None and name in ranges:
                 require_number(name, value, *ranges[name])
             if value is not None and words and value not in words:
-                raise ParameterError(f"{name}: {quote(value)}, but one of {', '.join(words)} was wanted")
+                raise ParameterError(f"{name}: expected one of {', '.join(words)}, got {quote(value)}")
 
     def require_known(self, chosen: Importer | Exporter) -> None:
         """Raise ParameterError where something is given that means nothing to a format."""
@@ -314,8 +314,8 @@ class WriteOptions(Options):
     def __post_init__(self) -> None:
         self.require(cell=_LENGTH, scale=_LENGTH, digits=(0, 12, ""))
         if self.origin is not None and not (abs(self.origin[0]) <= 180.0 and abs(self.origin[1]) <= 89.0):
-            wanted = "a longitude from -180 to 180 and a latitude from -89 to 89 were wanted"
-            raise ParameterError(f"origin: {quote(self.origin)}, but {wanted}")
+            wanted = "expected a longitude from -180 to 180 and a latitude from -89 to 89"
+            raise ParameterError(f"origin: {wanted}, got {quote(self.origin)}")
 
 
 @dataclass(frozen=True)

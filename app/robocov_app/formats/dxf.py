@@ -21,7 +21,7 @@ from scipy.interpolate import BSpline
 
 from robocov.arrays import Array
 from robocov.errors import MapError, RobocovError, quote, to_one_line
-from robocov.mapfile.models import FARTHEST
+from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov.optional_imports import import_optional
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
@@ -57,7 +57,7 @@ def polyline(points: Array, bulges: Array, tolerance: float) -> Array:
             centre, begin, end, radius = arcs.bulge_to_arc(a, b, bulge)
             left -= 4 * math.atan(abs(bulge)) * math.sqrt(radius / tolerance / 8)
             if not left > 0.0:
-                raise ValueError(f"more than {MOST_POINTS} points, but fewer were wanted")
+                raise ValueError(f"expected at most {MOST_POINTS} points, got more")
             arc = arcs.ConstructionArc(centre, radius, *np.degrees([begin, end]))
             curve = flat(list(arc.flattening(min(tolerance, radius / 8))))
             drawn.append((curve if bulge > 0.0 else curve[::-1])[1:-1])
@@ -75,7 +75,7 @@ def spline(entity: Any, tolerance: float) -> Array:
     control, knots, degree = flat(tool.control_points), np.array(tool.knots(), dtype=float), tool.degree
     weights = np.array(tool.weights() or np.ones(len(control)), dtype=float)
     if not np.isfinite(knots).all() or not (np.isfinite(weights).all() and (weights > 0.0).all()):
-        raise ValueError("knots and weights of a spline, but finite ones were wanted")
+        raise ValueError("expected finite knots and weights of a spline")
     rational = BSpline(knots, np.column_stack([control, np.ones(len(control))]) * weights[:, None], degree)
 
     def curve(t: Array) -> Array:
@@ -120,10 +120,10 @@ class DxfDrawing:
         def count_insert(insert: Any) -> int:
             name = str(insert.dxf.get("name", "")).casefold()
             if name in inside:
-                what = "is inserted within itself, but an end was wanted"
+                what = "is inserted into itself"
                 raise MapError(f"{where}: block {quote(name)} {what}")
             if len(inside) >= deepest:
-                raise MapError(f"{where}: blocks nested deeper than {deepest}, but less was wanted")
+                raise MapError(f"{where}: blocks are nested deeper than {deepest}")
             if name not in counted:
                 block = self.document.blocks.get(name)
                 inside.append(name)
@@ -136,14 +136,14 @@ class DxfDrawing:
         if total > MOST_DRAWN:
             # of blocks in blocks it may be too many for a float
             found = f"{min(total, 10**300):.3g} entities to be drawn, blocks and all"
-            raise MapError(f"{where}: {found}, but at most {MOST_DRAWN} were wanted")
+            raise MapError(f"{where}: expected at most {MOST_DRAWN}, got {found}")
 
     def _draw(self, entities: Iterable[Any], layer: str, blocks: tuple[str, ...]) -> None:
         """Add entities; those on layer 0 of a block are on the layer that it is inserted on."""
         for entity in entities:
             self.drawn += 1
             if self.drawn > MOST_DRAWN:
-                raise MapError(f"{self.where}: more than {MOST_DRAWN} entities, but fewer were wanted")
+                raise MapError(f"{self.where}: expected at most {MOST_DRAWN} entities, got more")
             try:
                 own = str(entity.dxf.get("layer", "0"))
                 self._one(entity, layer if own == "0" and blocks else own, blocks)
@@ -201,8 +201,8 @@ class DxfDrawing:
 
     def _require_near(self, points: Array) -> None:
         """Make sure that a curve ends, by its (k, 2) control points."""
-        if not (np.abs(points) * self.scale <= FARTHEST).all():
-            raise MapError(f"{self.where}: a curve beyond {FARTHEST:.0f} m, but a nearer one was wanted")
+        if not (np.abs(points) * self.scale <= MAX_COORDINATE_M).all():
+            raise MapError(f"{self.where}: a curve beyond {MAX_COORDINATE_M:.0f} m")
 
     def _radius(self, entity: Any) -> float:
         radius = abs(float(entity.dxf.radius))
@@ -284,8 +284,8 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     elif code in UNITS:
         unit, scale = f"in {UNITS[code][0]}", UNITS[code][1]
     else:
-        wanted = "a unit was wanted: --scale METRES says what it is, as in --scale 0.001 for millimetres"
-        raise MapError(f"{where}: $INSUNITS: {code}, but {wanted}")
+        hint = "--scale METRES says what it is, as in --scale 0.001 for millimetres"
+        raise MapError(f"{where}: $INSUNITS: expected a unit, got {code}: {hint}")
     shapes = Shapes(where, options)
     shapes.notes.append(unit)
     DxfDrawing(document, shapes, scale).draw()
@@ -299,13 +299,15 @@ def _document(path: Path, where: str) -> Any:
     content = files.content(path, files.MAX_TEXT_BYTES)
     if not content.startswith(BINARY):
         if not TEXT.match(content):
-            raise MapError(f"{where}: begins with {content[:20]!r}, but a DXF with sections was wanted")
+            raise MapError(
+                f"{where}: expected a DXF with sections, got a file that begins with {content[:20]!r}"
+            )
         if sum(1 for _ in islice(_ENTITY.finditer(content), MOST_ENTITIES + 1)) > MOST_ENTITIES:
-            raise MapError(f"{where}: more than {MOST_ENTITIES} entities, but fewer layers were wanted")
+            raise MapError(f"{where}: expected at most {MOST_ENTITIES} entities, got more")
         points = islice(_POINT.finditer(content), files.MAX_VERTICES + 1)
         files.require_vertices(sum(1 for _ in points), where)
     if (lines := content.count(b"\n")) > MOST_LINES:
-        raise MapError(f"{where}: {lines} lines, but at most {MOST_LINES} were wanted")
+        raise MapError(f"{where}: expected at most {MOST_LINES}, got {lines} lines")
     try:
         ezdxf, recover = import_optional("ezdxf", "dxf"), import_optional("ezdxf.recover", "dxf")
     except RobocovError as error:

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from robocov.arrays import Array
 from robocov.errors import JsonPath as Steps
 from robocov.errors import MapError, Mistake, describe_error, quote, quote_json, to_one_line
-from robocov.files.strictjson import located, parse
-from robocov.mapfile.models import FARTHEST, LARGEST
+from robocov.files.strictjson import locate_mistakes, parse_json
+from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M
 
 MAX_BYTES = 256_000_000  # largest file of a raster, in bytes: `MAX_CELLS` in plain text
 MAX_TEXT_BYTES = 50_000_000  # largest file of a vector format, in bytes; as of the project's own maps
@@ -46,9 +46,9 @@ def head(path: Path, most: int = HEAD) -> bytes:
     try:
         mode = path.stat().st_mode
         if stat.S_ISDIR(mode):
-            raise MapError(f"{where}: is a folder, but a file was wanted")
+            raise MapError(f"{where}: expected a file, got a folder")
         if not stat.S_ISREG(mode):  # opening a pipe would wait for ever
-            raise MapError(f"{where}: is a pipe or a device, but a file was wanted")
+            raise MapError(f"{where}: expected a file, got a pipe or a device")
         with path.open("rb") as file:
             return file.read(most)
     except FileNotFoundError:
@@ -61,7 +61,7 @@ def content(path: Path, most: int = MAX_BYTES) -> bytes:
     """Return the content of a file; a MapError where it is larger than `most` bytes, or as `head`."""
     head(path, 0)
     if path.stat().st_size > most or len(data := head(path, most + 1)) > most:
-        raise MapError(f"{to_one_line(path)}: larger than {most / 1e6:g} MB, but a smaller file was wanted")
+        raise MapError(f"{to_one_line(path)}: expected at most {most / 1e6:g} MB, got more")
     return data
 
 
@@ -111,30 +111,30 @@ class IncludeBudget:
 
 def require_cells(width: int, height: int, where: str) -> None:
     if width < 1 or height < 1:
-        raise MapError(f"{where}: {width} x {height} cells, but at least 1 x 1 was wanted")
+        raise MapError(f"{where}: expected at least 1 x 1, got {width} x {height} cells")
     if width * height > MAX_CELLS:
         most = MAX_CELLS // 1_000_000
-        raise MapError(f"{where}: {width} x {height} cells, but at most {most} million were wanted")
+        raise MapError(f"{where}: expected at most {most} million, got {width} x {height} cells")
 
 
 def require_vertices(count: int, where: str) -> None:
     if count > MAX_VERTICES:
-        raise MapError(f"{where}: some {count} vertices, but at most {MAX_VERTICES} were wanted")
+        raise MapError(f"{where}: expected at most {MAX_VERTICES}, got about {count} vertices")
 
 
 def require_shapes(count: int, where: str) -> None:
     if count > MAX_SHAPES:
-        raise MapError(f"{where}: {count:.6g} shapes, but at most {MAX_SHAPES} were wanted")
+        raise MapError(f"{where}: expected at most {MAX_SHAPES}, got {count:.6g} shapes")
 
 
-def require_length(value: float, where: str, smallest: float = 1e-6, largest: float = LARGEST) -> None:
+def require_length(value: float, where: str, smallest: float = 1e-6, largest: float = MAX_SIZE_M) -> None:
     if not smallest <= value <= largest:
-        wanted = f"a number from {smallest:.10g} to {largest:.10g} (m) was wanted"
-        raise MapError(f"{where}: {quote(value)}, but {wanted}")
+        wanted = f"expected a number from {smallest:.10g} to {largest:.10g} (m)"
+        raise MapError(f"{where}: {wanted}, got {quote(value)}")
 
 
 def require_coordinate(value: float, where: str) -> None:
-    require_length(value, where, -FARTHEST, FARTHEST)
+    require_length(value, where, -MAX_COORDINATE_M, MAX_COORDINATE_M)
 
 
 def read_text(path: Path, separator: bytes) -> tuple[str, str]:
@@ -146,7 +146,7 @@ def read_text(path: Path, separator: bytes) -> tuple[str, str]:
     try:
         return data[len(mark) :].decode(encoding), where
     except UnicodeDecodeError as error:
-        raise MapError(f"{where}: byte {error.start}: not {encoding.upper()}, but text was wanted") from None
+        raise MapError(f"{where}: byte {error.start}: not {encoding.upper()}, expected text") from None
 
 
 def name_of_map(path: Path) -> str:
@@ -160,9 +160,9 @@ def named_file(path: Path, name: str, what: str, at: str, notes: list[str], anyw
     was saved, and it may have moved with the file: one of the same name beside it is as good, as `notes` say.
     """
     if not name:
-        raise MapError(f"{at}: empty, but the name of a {what} was wanted")
+        raise MapError(f"{at}: empty, expected the name of a {what}")
     if len(name) > _LONG:
-        raise MapError(f"{at}: {quote(name)}: {len(name)} characters, but a shorter name was wanted")
+        raise MapError(f"{at}: {quote(name)}: expected a shorter name, got {len(name)} characters")
     named = path.parent / name
     beside = path.parent / PureWindowsPath(name).name
     try:
@@ -176,8 +176,8 @@ def named_file(path: Path, name: str, what: str, at: str, notes: list[str], anyw
         why = error.strerror if isinstance(error, OSError) and error.strerror else "no name of a file"
         raise MapError(f"{at}: {quote(name)}: {why}") from None
     if not allowed:
-        wanted = f"a {what} in it was wanted (--anywhere allows it)"
-        raise MapError(f"{at}: {quote(name)} is outside of the file's folder, but {wanted}")
+        wanted = f"expected a {what} in it (--anywhere allows it)"
+        raise MapError(f"{at}: {quote(name)} is outside the folder of the file, {wanted}")
     return named
 
 
@@ -229,21 +229,21 @@ class JsonFile:
         self._content = content(path, MAX_TEXT_BYTES) if text is None else text
         # each point is a list of two or three: to count takes a moment, to parse minutes
         require_vertices(max(self._content.count(b"["), self._content.count(b",") // 3), self.where)
-        self.document: Any = parse(self._content, self.where)
+        self.document: Any = parse_json(self._content, self.where)
 
     def refused(self, at: Steps, value: object, wanted: str) -> MapError:
-        """Return the error of a value at a place: what is there, what was wanted."""
-        mistake = Mistake.at_path(at, f"{quote_json(value)}, but {wanted} wanted")
-        return located(MapError.from_mistakes(self.where, [mistake]), self._content, self.where)
+        """Return the error of a value at a place: what was expected, and what is there."""
+        mistake = Mistake.at_path(at, f"expected {wanted}, got {quote_json(value)}")
+        return locate_mistakes(MapError.from_mistakes(self.where, [mistake]), self._content, self.where)
 
     def positions(self, value: Any, at: Steps, least: int, fewest: int, most: int) -> Array:
         """Return the points of a list as (k, d), d from `fewest` to `most`; missing dimensions are nan."""
         if not isinstance(value, list) or len(value) < least:
             points = "point" if least == 1 else "points"
-            raise self.refused(at, value, f"a list of at least {least} {points} [x, y] was")
+            raise self.refused(at, value, f"a list of at least {least} {points} [x, y]")
         for k, point in enumerate(value):
             if not (isinstance(point, list) and fewest <= len(point) <= most and all(map(is_number, point))):
-                raise self.refused((*at, k), point, "a point [x, y] of finite numbers was")
+                raise self.refused((*at, k), point, "a point [x, y] of finite numbers")
         wide = max(map(len, value))
         if min(map(len, value)) < wide:
             value = [[*point, *[np.nan] * (wide - len(point))] for point in value]
@@ -274,11 +274,11 @@ def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
         or more than `MAX_YAML_VALUES` values once its aliases are followed.
     """
     if len(text) > MAX_YAML_BYTES:
-        raise MapError(f"{where}: larger than {MAX_YAML_BYTES // 1024} kB, but the YAML of a map was wanted")
+        raise MapError(f"{where}: expected at most {MAX_YAML_BYTES // 1024} kB of YAML, got more")
     try:
         decoded = text.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise MapError(f"{where}: byte {error.start}: not UTF-8, but YAML in UTF-8 was wanted") from None
+        raise MapError(f"{where}: byte {error.start}: not UTF-8") from None
     try:
         return _YamlReader(decoded, where).read()
     except yaml.MarkedYAMLError as error:
@@ -309,10 +309,10 @@ class _YamlReader:
         result: dict[str, Value] = {}
         for event in self.events:
             if isinstance(event, yaml.DocumentStartEvent) and result:
-                raise MapError(f"{self._line(event)}: a second document, but one was wanted")
+                raise MapError(f"{self._line(event)}: expected one document, got a second one")
             if isinstance(event, yaml.SequenceStartEvent | yaml.ScalarEvent):
                 found = quote(event.value) if isinstance(event, yaml.ScalarEvent) else "a list"
-                raise MapError(f"{self._line(event)}: {found}, but a mapping (name: value) was wanted")
+                raise MapError(f"{self._line(event)}: expected a mapping (name: value), got {found}")
             if isinstance(event, yaml.NodeEvent):
                 value = self._build(event, depth=1).value
                 assert isinstance(value, dict)
@@ -332,7 +332,7 @@ class _YamlReader:
             self._require_few(event, found.size, depth - 1 + found.depth)
             return found
         if event.tag is not None:
-            raise MapError(f"{self._line(event)}: the tag {quote(event.tag)}, but a plain value was wanted")
+            raise MapError(f"{self._line(event)}: expected a plain value, got the tag {quote(event.tag)}")
         before = self.count
         if isinstance(event, yaml.ScalarEvent):
             self._require_few(event, 1, 0)
@@ -354,9 +354,7 @@ class _YamlReader:
             many = f"more than {MAX_YAML_VALUES} values, aliases followed"
             raise MapError(f"{self._line(event)}: expected a smaller file, got {many}")
         if depth > DEEPEST:
-            raise MapError(
-                f"{self._line(event)}: nested too deeply, but at most {DEEPEST} levels were wanted"
-            )
+            raise MapError(f"{self._line(event)}: nested too deeply, expected at most {DEEPEST} levels")
 
     def _inside(self) -> Iterator[Any]:
         """Yield the events up to the end of the list or mapping that has begun."""
@@ -373,7 +371,7 @@ class _YamlReader:
         for event in self._inside():
             if not isinstance(event, yaml.ScalarEvent):
                 kind = "an alias" if isinstance(event, yaml.AliasEvent) else "a collection"
-                raise MapError(f"{self._line(event)}: a name that is {kind}, but a word was wanted")
+                raise MapError(f"{self._line(event)}: expected a word as the name, got {kind}")
             name = self._build(event, depth).value
             assert isinstance(name, str)
             item = self._build(next(self.events), depth + 1)
@@ -381,7 +379,7 @@ class _YamlReader:
             if name == "<<" and event.style is None:
                 merged += self._merged(item.value, event)
             elif name in found:
-                raise MapError(f"{self._line(event)}: {to_one_line(name)}: given twice, but once was wanted")
+                raise MapError(f"{self._line(event)}: {to_one_line(name)}: duplicate key")
             else:
                 found[name] = item.value
         for other in merged:

@@ -61,11 +61,11 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     document = file.document if isinstance(file.document, dict) else {}
     units, origin = document.get("units"), document.get("origin")
     if units not in (None, "metres", "degrees") and options.units is None:
-        raise file.refused(("units",), units, "metres or degrees was")
+        raise file.refused(("units",), units, "metres or degrees")
     if origin is not None:
         good = isinstance(origin, list) and len(origin) == 2 and all(map(is_number, origin))
         if not good or not (abs(origin[0]) <= 360.0 and abs(origin[1]) <= 90.0):
-            raise file.refused(("origin",), origin, "longitude and latitude in degrees were")
+            raise file.refused(("origin",), origin, "longitude and latitude in degrees")
         origin = float(origin[0]), float(origin[1])
     shapes.options = replace(options, units=options.units or units)
     shapes.add_all(in_metres(found.figures, shapes, found.crs, globe=True, origin=origin))
@@ -137,24 +137,24 @@ class FigureCollector:
         if kind == "FeatureCollection":
             features = text.get("features")
             if not isinstance(features, list):
-                raise self.file.refused((*at, "features"), features, "a list of features was")
+                raise self.file.refused((*at, "features"), features, "a list of features")
             self._see_system(text, at)
             for k, feature in enumerate(features):
                 self._feature(feature, (*at, "features", k))
         elif kind == "Feature":
             self._feature(text, at)
         elif kind == "Topology":
-            raise self.file.refused((*at, "type"), kind, "GeoJSON, not TopoJSON, was")
+            raise self.file.refused((*at, "type"), kind, "GeoJSON, not TopoJSON")
         else:
             self.add_geometry(text, at, ())
 
     def _feature(self, feature: Any, at: Steps) -> None:
         if not isinstance(feature, dict) or feature.get("type") != "Feature":
-            raise self.file.refused(at, feature, "a Feature was")
+            raise self.file.refused(at, feature, "a Feature")
         self._see_system(feature, at)
         properties = feature.get("properties") or {}
         if not isinstance(properties, dict):
-            raise self.file.refused((*at, "properties"), properties, "an object was")
+            raise self.file.refused((*at, "properties"), properties, "an object")
         given = [*(properties.get(name) for name in _NAMES), feature.get("id")]
         labels = [to_one_line(label).strip() for label in given if type(label) in (str, int)]
         kind = properties.get("kind")
@@ -171,14 +171,14 @@ class FigureCollector:
         kind = geometry.get("type") if isinstance(geometry, dict) else None
         if kind not in _GEOMETRIES:
             value, where = (geometry, at) if kind is None else (kind, (*at, "type"))
-            raise self.file.refused(where, value, f"one of {', '.join(_GEOMETRIES)} was")
+            raise self.file.refused(where, value, f"one of {', '.join(_GEOMETRIES)}")
         self._see_system(geometry, at)
         if kind != "GeometryCollection":
             self._coordinates(kind, geometry.get("coordinates"), (*at, "coordinates"), labels)
             return
         parts = geometry.get("geometries")
         if not isinstance(parts, list):
-            raise self.file.refused((*at, "geometries"), parts, "a list of geometries was")
+            raise self.file.refused((*at, "geometries"), parts, "a list of geometries")
         for k, part in enumerate(parts):
             self.add_geometry(part, (*at, "geometries", k), labels)
 
@@ -187,7 +187,7 @@ class FigureCollector:
     ) -> None:
         if kind in _PLURAL:
             if not isinstance(value, list):
-                raise self.file.refused(at, value, "a list was")
+                raise self.file.refused(at, value, "a list")
             for k, part in enumerate(value):
                 self._coordinates(_PLURAL[kind], part, (*at, k), labels, whole=format_path(at))
         elif value == []:
@@ -197,7 +197,7 @@ class FigureCollector:
         elif kind == "LineString":
             self.figures.append(Figure("line", (self._points(value, at, 2),), labels, format_path(at)))
         elif not isinstance(value, list):
-            raise self.file.refused(at, value, "a list of rings was")
+            raise self.file.refused(at, value, "a list of rings")
         else:
             rings = [self._points(ring, (*at, k), 1) for k, ring in enumerate(value)]
             self.figures.append(self.shapes.polygon(rings, labels, format_path(at), whole))
@@ -213,9 +213,9 @@ class FigureCollector:
         properties = given.get("properties") if isinstance(given, dict) else None
         name = properties.get("name") if isinstance(properties, dict) else None
         if not isinstance(name, str):
-            raise self.file.refused((*at, "crs"), given, "the name of a reference system was")
+            raise self.file.refused((*at, "crs"), given, "the name of a reference system")
         if self.crs not in (None, name):
-            raise self.file.refused((*at, "crs"), given, f"the same system as before, {self.crs}, was")
+            raise self.file.refused((*at, "crs"), given, f"the same system as before, {self.crs}")
         self.crs = name
 
 
@@ -268,6 +268,6 @@ def _plane(environment: Environment, origin: tuple[float, float]) -> LocalPlane:
     except RobocovError as error:
         raise ParameterError(f"origin: degrees need more: {error}") from None
     if np.ptp(plane.degrees(np.array(environment.boundary, dtype=float))[:, 0]) >= 180.0:
-        wanted = "a place farther from the pole was wanted"
-        raise ParameterError(f"origin: {quote(origin)}: longitudes run all around on the map, but {wanted}")
+        wanted = "expected a place farther from the pole"
+        raise ParameterError(f"origin: {quote(origin)}: longitudes run all around on the map, {wanted}")
     return plane

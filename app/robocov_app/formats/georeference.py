@@ -12,7 +12,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.environment import Point
 from robocov.errors import MapError, RobocovError, quote
-from robocov.mapfile.models import LARGEST
+from robocov.mapfile.models import MAX_SIZE_M
 from robocov.optional_imports import import_optional
 from robocov_app.formats.files import require_shapes
 from robocov_app.formats.geometry.shapes import Figure, Shapes
@@ -67,7 +67,7 @@ def _on_globe(figures: Sequence[Figure], possible: bool) -> bool:
         return False
     width, height = np.ptp(_unwrapped(points, points[0, 0]), axis=0)
     shrunk = math.cos(math.radians(float(np.abs(points[:, 1]).max())))
-    return bool(max(width * shrunk, height) * math.radians(1.0) * _EARTH <= LARGEST)
+    return bool(max(width * shrunk, height) * math.radians(1.0) * _EARTH <= MAX_SIZE_M)
 
 
 def _unwrapped(points: Array, about: float) -> Array:
@@ -79,8 +79,8 @@ def _authority(crs: str, where: str) -> str:
     """Return a name as AUTHORITY:CODE: only codes are looked up, as definitions in full may name files."""
     match = _URN.fullmatch(crs.strip()) or _ADDRESS.fullmatch(crs.strip())
     if match is None or match[1].upper() not in _AUTHORITIES:
-        wanted = f"a code as EPSG:25832 was wanted ({_AS_THEY_ARE})"
-        raise MapError(f"{where}: reference system {quote(crs)}, but {wanted}")
+        wanted = f"expected a code as EPSG:25832 ({_AS_THEY_ARE})"
+        raise MapError(f"{where}: {wanted}, got reference system {quote(crs)}")
     return f"{match[1].upper()}:{match[2].upper()}"
 
 
@@ -104,7 +104,7 @@ def _projected(figures: Sequence[Figure], name: str, shapes: Shapes, origin: Poi
     if not good.all():
         x, y = _points(figures)[int(np.argmin(good))].tolist()
         wanted = "longitude and latitude in degrees" if name in _IN_DEGREES else f"coordinates of {name}"
-        raise MapError(f"{where}: a point at [{x:g}, {y:g}], but {wanted} were wanted ({_AS_THEY_ARE})")
+        raise MapError(f"{where}: expected {wanted}, got a point at [{x:g}, {y:g}] ({_AS_THEY_ARE})")
     points = _unwrapped(points, points[0, 0])
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     longitude, latitude = origin or (float(middle[0]), float(middle[1]))

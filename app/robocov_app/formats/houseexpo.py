@@ -10,7 +10,7 @@ import numpy as np
 from shapely import MultiPolygon, Polygon
 
 from robocov.errors import MapError, format_count, to_one_line
-from robocov.mapfile.models import FARTHEST
+from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.files import JsonFile
 from robocov_app.formats.geometry.polygons import Crossings, enclosed
@@ -22,22 +22,24 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     file = JsonFile(path)
     document = file.document
     if not isinstance(document, dict) or "verts" not in document:
-        raise MapError(f'{file.where}: not a HouseExpo plan, but an object with "verts" was wanted')
+        raise MapError(f'{file.where}: not a HouseExpo plan, expected an object with "verts"')
     given = document["verts"]
     if not isinstance(given, list) or len(given) < 3:
-        raise file.refused(("verts",), given, "a list of at least 3 points [x, y] was")
+        raise file.refused(("verts",), given, "a list of at least 3 points [x, y]")
     for k, point in enumerate(given):
         good = isinstance(point, list) and len(point) == 2
-        if not good or not all(type(value) in (int, float) and abs(value) <= FARTHEST for value in point):
-            raise file.refused(("verts", k), point, "a point [x, y] in metres was")
+        if not good or not all(
+            type(value) in (int, float) and abs(value) <= MAX_COORDINATE_M for value in point
+        ):
+            raise file.refused(("verts", k), point, "a point [x, y] in metres")
     vertices = np.array(given, dtype=float)
     ring = vertices[(vertices != np.roll(vertices, 1, axis=0)).any(axis=1)]
     repeated = len(vertices) - len(ring)
     if len(ring) < 3:
-        raise MapError(f"{file.where}: verts: {len(ring)} different points, but at least 3 were wanted")
+        raise MapError(f"{file.where}: verts: expected at least 3 different points, got {len(ring)}")
     area, reason, _ = enclosed([ring], crossings=Crossings(file.where))
     if area.is_empty:
-        raise MapError(f"{file.where}: verts: area 0 m², but an outline with an area was wanted")
+        raise MapError(f"{file.where}: verts: expected an outline with an area, got 0 m²")
     repaired = [f"{repeated} repeated vertices taken out"] if repeated else []
     repaired += [] if reason is None else [f"the outline met itself: {reason}"]
     holes = [[Polygon(hole) for hole in part.interiors] for part in area.geoms]

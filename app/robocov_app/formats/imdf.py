@@ -65,10 +65,10 @@ class _Archive:
         document = file.document
         found = document.get("features") if isinstance(document, dict) else None
         if not isinstance(found, list):
-            raise file.refused(("features",), found, "a list of features was")
+            raise file.refused(("features",), found, "a list of features")
         for k, feature in enumerate(found):
             if not isinstance(feature, dict) or not isinstance(feature.get("properties"), dict):
-                raise file.refused(("features", k), feature, "a feature with properties was")
+                raise file.refused(("features", k), feature, "a feature with properties")
         return found
 
 
@@ -167,9 +167,9 @@ def _read_levels(archive: _Archive) -> dict[str, _Level]:
         ordinal = properties.get("ordinal")
         file = archive.files["level"]
         if not isinstance(number, str):
-            raise file.refused(("features", k, "id"), number, "a text was")
+            raise file.refused(("features", k, "id"), number, "a text")
         if not is_number(ordinal):
-            raise file.refused(("features", k, "properties", "ordinal"), ordinal, "the number of a floor was")
+            raise file.refused(("features", k, "properties", "ordinal"), ordinal, "the number of a floor")
         names = (number, *_names(properties.get("short_name")), *_names(properties.get("name")))
         levels[number] = _Level(float(ordinal), names)
     return levels

@@ -23,7 +23,7 @@ from shapely import MultiPolygon
 
 from robocov.arrays import Array, BoolArray
 from robocov.errors import MapError, format_count, quote, to_one_line
-from robocov.mapfile.models import FARTHEST
+from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
@@ -93,7 +93,7 @@ def _picture(world: _Node, path: Path, shapes: Shapes) -> BoolArray:
     if isinstance(source.value, dict):
         if source["name"].text() != "image":
             name = quote(source["name"].value)
-            raise MapError(f"{source.at}: {name}, which IR-SIM generates, but a picture was wanted")
+            raise MapError(f"{source.at}: expected a picture, got {name}, which IR-SIM generates")
         source = source["path"]
     notes, anywhere = shapes.notes, shapes.options.anywhere
     file = files.named_file(path, source.text(), "picture", source.at, notes, anywhere)
@@ -235,7 +235,7 @@ class _Node:
 
     def number(self, default: float) -> float:
         value = files.number(self.text(str(default)))
-        if not abs(value) <= FARTHEST:
+        if not abs(value) <= MAX_COORDINATE_M:
             self.refuse("a number within 1e7")
         return value
 
@@ -250,4 +250,4 @@ class _Node:
         return np.array([*values, *default[len(values) :]])
 
     def refuse(self, wanted: str) -> NoReturn:
-        raise MapError(f"{self.at}: {quote(self.value)}, but {wanted} was wanted")
+        raise MapError(f"{self.at}: expected {wanted}, got {quote(self.value)}")

@@ -44,9 +44,9 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         found = len(lines[k].rstrip(b" \t\r")) if k < len(lines) else 0
         if found != columns:
             what = f"{found} letters" if k < len(lines) and (found or k < len(lines) - 1) else "end of file"
-            raise MapError(f"{where}: line {line + k}: {what}, but {columns} letters were wanted")
+            raise MapError(f"{where}: line {line + k}: expected {columns} letters, got {what}")
     if len(lines) > rows and lines[rows].strip():
-        raise MapError(f"{where}: line {line + rows}: more than {rows} rows, but so many were wanted")
+        raise MapError(f"{where}: line {line + rows}: expected {rows} rows, got more")
     joined = b"".join(lines[k].rstrip(b" \t\r") for k in range(rows))
     letters = np.frombuffer(joined, np.uint8).reshape(rows, columns)
     cells = table[letters]
@@ -54,7 +54,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     if bad.any():
         row, column = (int(k) for k in np.argwhere(bad)[0])
         place = f"{where}: line {line + row}, column {column + 1}"
-        raise MapError(f"{place}: {quote(chr(letters[row, column]))}, but one of . G S @ O T W was wanted")
+        raise MapError(f"{place}: expected one of . G S @ O T W, got {quote(chr(letters[row, column]))}")
     cell = CELL if options.cell is None else options.cell
     notes = () if options.cell is not None else (f"no cell size was given: {CELL:g} m taken",)
     text = f"A grid of {cell:g} m a cell, imported from Moving AI's format."
@@ -74,22 +74,22 @@ def _header(data: bytes, where: str) -> tuple[int, int, bytes, int]:
         if key == "map" and len(words) == 1:
             for wanted in ("height", "width"):
                 if wanted not in sizes:
-                    raise MapError(f"{place}: no {wanted} so far, but one was wanted")
+                    raise MapError(f"{place}: expected {wanted} first")
             files.require_cells(sizes["width"], sizes["height"], where)
             return sizes["width"], sizes["height"], data[at:], number + 1
         if not words:
             continue
         if key == "type" and len(words) == 2:
             if words[1].lower() not in ("octile", "tile"):
-                raise MapError(f"{place}: type {quote(words[1])}, but octile was wanted")
+                raise MapError(f"{place}: expected octile, got type {quote(words[1])}")
         elif key in ("height", "width") and len(words) == 2 and words[1].isascii() and words[1].isdigit():
             if len(words[1]) > 9:
-                raise MapError(f"{place}: {key} {quote(words[1])}, but a smaller one was wanted")
+                raise MapError(f"{place}: expected a smaller {key}, got {quote(words[1])}")
             sizes[key] = int(words[1])
         else:
-            wanted = "type octile, height N, width N or map was wanted"
-            raise MapError(f"{place}: {quote(' '.join(words))}, but {wanted}")
-    raise MapError(f"{where}: no line map, but one after type, height and width was wanted")
+            wanted = "expected type octile, height N, width N or map"
+            raise MapError(f"{place}: {wanted}, got {quote(' '.join(words))}")
+    raise MapError(f"{where}: expected a line map after type, height and width, got none")
 
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:

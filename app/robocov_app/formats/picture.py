@@ -26,7 +26,7 @@ from robocov.arrays import BoolArray
 from robocov.environment import Environment
 from robocov.errors import MapError, format_count, quote, to_one_line
 from robocov.files.writing import replace_file
-from robocov.mapfile.models import FARTHEST
+from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov_app.formats import files
 from robocov_app.formats.base import (
     ExportReport,
@@ -100,7 +100,7 @@ def read_picture(path: Path, where: str, key: ColourKey = _NO_KEY) -> Brightness
         if begin.match(data):
             return _decoded(data, name, where, key)
     wanted = "a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM"
-    raise MapError(f"{where}: begins with {quote(data[:8])}, but {wanted} was wanted")
+    raise MapError(f"{where}: expected {wanted}, got a file that begins with {quote(data[:8])}")
 
 
 def _netpbm(data: bytes, where: str, key: ColourKey) -> Brightness:
@@ -111,13 +111,13 @@ def _netpbm(data: bytes, where: str, key: ColourKey) -> Brightness:
         digits = _DIGITS.match(data, blank.end()) if blank else None
         if digits is None or len(digits[0]) > 9:
             found = quote(data[blank.end() if blank else at :][:12])
-            raise MapError(f"{where}: {name}: {found}, but a whole number was wanted")
+            raise MapError(f"{where}: {name}: expected a whole number, got {found}")
         numbers.append(int(digits[0]))
         at = digits.end()
     width, height, most = numbers
     files.require_cells(width, height, where)
     if not 1 <= most <= 65535:
-        raise MapError(f"{where}: largest value: {most}, but a number from 1 to 65535 was wanted")
+        raise MapError(f"{where}: largest value: expected a number from 1 to 65535, got {most}")
     colours = 3 if data[1:2] in b"36" else 1
     count = width * height * colours
     if data[1:2] in b"56":
@@ -132,7 +132,7 @@ def _netpbm(data: bytes, where: str, key: ColourKey) -> Brightness:
         level = _plain(data[at:], count, where)
     highest = int(level.max())
     if highest > most:
-        raise MapError(f"{where}: a pixel of {highest}, but at most {most}, the largest value, was wanted")
+        raise MapError(f"{where}: expected at most {most}, the largest value, got a pixel of {highest}")
     pixels = level.reshape(height, width, colours)
     roles = np.zeros((height, width), np.uint8) if key else None
     pieces = []
@@ -182,7 +182,7 @@ def _plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
         strange = numbers[(numbers < 0) | (numbers > 65535)]
         if len(strange):
             worst = min(strange) if min(strange) < 0 else max(strange)
-            raise MapError(f"{where}: a pixel of {worst}, but a number from 0 to 65535 was wanted")
+            raise MapError(f"{where}: expected a number from 0 to 65535, got a pixel of {worst}")
         values[done : done + len(numbers)] = numbers
         done += len(numbers)
     if done < count:
@@ -208,10 +208,10 @@ def _decoded(data: bytes, name: str, where: str, key: ColourKey) -> Brightness:
         raise MapError(f"{where}: a TIFF whose brightness is unclear: {error}. {way_out}.") from None
     except PIL.Image.DecompressionBombError:
         most = files.MAX_CELLS // 1_000_000
-        raise MapError(f"{where}: too many pixels, but at most {most} million were wanted") from None
+        raise MapError(f"{where}: expected at most {most} million pixels, got more") from None
     except Exception as error:  # of Pillow, which raises what it likes on nonsense in any chunk
         reason = to_one_line(error).partition(" <")[0][:100]
-        raise MapError(f"{where}: broken, but a whole {name} was wanted: {reason}") from None
+        raise MapError(f"{where}: expected a complete {name}, got a broken one: {reason}") from None
 
 
 class _UnclearSamplesError(ValueError):
@@ -339,7 +339,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     if cell is None:
         beside = path.with_suffix(".yaml")
         hint = f" (or import {to_one_line(beside.name)} beside it)" if beside.is_file() else ""
-        raise MapError(f"{where}: a picture has no scale, but --cell, the metres a pixel, was wanted{hint}")
+        raise MapError(f"{where}: a picture has no scale, expected --cell, the metres per pixel{hint}")
     cells, notes = _classify(picture, options)
     unknown = options.unknown or "obstacle"
     if options.unknown is None and _is_drawn_on_nothing(cells):
@@ -493,7 +493,7 @@ def _require_both(
         levels = picture.level.min() / picture.full, picture.level.max() / picture.full
         cause = f"its brightness is from {levels[0]:.2g} to {levels[1]:.2g}"
         ways = "--threshold, --invert or --free-colour choose otherwise"
-        raise MapError(f"{where}: no cell is free, but some were wanted: {cause} ({ways})")
+        raise MapError(f"{where}: no cell is free: {cause} ({ways})")
     if not counts[BLOCKED] and unknown == "free" and counts[UNKNOWN]:
         notes.append(
             f"nothing is solid: {share:.3g} % of the pixels are transparent (less than half opaque), "
@@ -512,7 +512,7 @@ def _place(picture: Brightness) -> tuple[float | None, tuple[float, float]]:
     with suppress(ValueError, KeyError, TypeError, RecursionError, OverflowError):
         given = json.loads(picture.texts.get(CHUNK, ""))
         cell, (x, y) = float(given["cell_m"]), map(float, given["origin_m"])
-        if 1e-6 <= cell <= 1e4 and abs(x) <= FARTHEST and abs(y) <= FARTHEST:
+        if 1e-6 <= cell <= 1e4 and abs(x) <= MAX_COORDINATE_M and abs(y) <= MAX_COORDINATE_M:
             return cell, (x, y)
     return None, (0.0, 0.0)
 

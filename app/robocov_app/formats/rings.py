@@ -42,7 +42,7 @@ def _polygons(file: JsonFile, shapes: Shapes) -> list[list[Array]]:
 
     def polygon(value: Any, at: Steps) -> list[Array]:
         if not isinstance(value, list) or not value:
-            raise file.refused(at, value, "a list of rings was")
+            raise file.refused(at, value, "a list of rings")
         return [ring(each, (*at, k)) for k, each in enumerate(value)]
 
     def ring(value: Any, at: Steps) -> Array:
@@ -50,7 +50,7 @@ def _polygons(file: JsonFile, shapes: Shapes) -> list[list[Array]]:
 
     def flat_ring(value: Any, at: Steps, size: int) -> Array:
         if not isinstance(value, list) or len(value) % size or len(value) < 3 * size:
-            raise file.refused(at, value, f"at least 3 times {size} numbers were")
+            raise file.refused(at, value, f"at least 3 times {size} numbers")
         pairs = [value[k : k + size] for k in range(0, len(value), size)]
         return shapes.flat(file.positions(pairs, at, 3, size, size))
 
@@ -58,13 +58,13 @@ def _polygons(file: JsonFile, shapes: Shapes) -> list[list[Array]]:
     if isinstance(document, dict):
         dimensions = document.get("dimensions", 2)
         if type(dimensions) is not int or dimensions not in (2, 3):
-            raise file.refused(("dimensions",), dimensions, "2 or 3 was")
+            raise file.refused(("dimensions",), dimensions, "2 or 3")
         points = flat_ring(document.get("vertices"), ("vertices",), dimensions)
         holes = document.get("holes") or []
         good = isinstance(holes, list) and all(type(hole) is int for hole in holes)
         cuts = [0, *holes, len(points)] if good else []
         if not good or any(a >= b for a, b in pairwise(cuts)):
-            wanted = f"growing indices of vertices, from 1 to {len(points) - 1}, were"
+            wanted = f"growing indices of vertices, from 1 to {len(points) - 1}"
             raise file.refused(("holes",), holes, wanted)
         return [[points[a:b] for a, b in pairwise(cuts)]]
     depth = 0
@@ -79,4 +79,4 @@ def _polygons(file: JsonFile, shapes: Shapes) -> list[list[Array]]:
             return [polygon(document, ())]
         case 4:
             return [polygon(rings, (k,)) for k, rings in enumerate(document)]
-    raise file.refused((), document, "a list of rings [[x, y], ...] was")
+    raise file.refused((), document, "a list of rings [[x, y], ...]")

@@ -53,26 +53,26 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     given = files.parse_yaml(files.content(path, files.MAX_YAML_BYTES), where)
     mode = _text(given, "mode", where, "trinary").lower()
     if mode not in ("trinary", "scale", "raw"):
-        raise MapError(f"{where}: mode: {quote(mode)}, but one of trinary, scale, raw was wanted")
+        raise MapError(f"{where}: mode: expected one of trinary, scale, raw, got {quote(mode)}")
     cell = _number(_text(given, "resolution", where), f"{where}: resolution")
     files.require_length(cell, f"{where}: resolution", smallest=1e-4, largest=1000.0)
     corner = given.get("origin", ["0", "0", "0"])
     if not isinstance(corner, list) or not 2 <= len(corner) <= 3:
-        raise MapError(f"{where}: origin: {quote(corner)}, but [x, y, yaw] was wanted")
+        raise MapError(f"{where}: origin: expected [x, y, yaw], got {quote(corner)}")
     x, y, yaw = (_number(text, f"{where}: origin[{k}]") for k, text in enumerate([*corner, "0"][:3]))
     files.require_coordinate(x, f"{where}: origin[0]")
     files.require_coordinate(y, f"{where}: origin[1]")
     negated = _text(given, "negate", where, "0").lower()
     if negated not in ("0", "1", "false", "true", "no", "yes", "off", "on"):
-        raise MapError(f"{where}: negate: {quote(negated)}, but 0 or 1 was wanted")
+        raise MapError(f"{where}: negate: expected 0 or 1, got {quote(negated)}")
     negate = negated in ("1", "true", "yes", "on")
     occupied, free = (
         _number(_text(given, key, where, str(default)), f"{where}: {key}")
         for key, default in _THRESHOLDS.items()
     )
     if not 0.0 <= free <= occupied <= 1.0:
-        wanted = "numbers from 0 to 1 were wanted, the first not the larger"
-        raise MapError(f"{where}: free_thresh, occupied_thresh: {free:g}, {occupied:g}, but {wanted}")
+        wanted = "expected numbers from 0 to 1, the first not the larger"
+        raise MapError(f"{where}: free_thresh, occupied_thresh: {wanted}, got {free:g}, {occupied:g}")
     repaired: list[str] = []
     name, at = _text(given, "image", where), f"{where}: image"
     image = files.named_file(path, name, "picture", at, repaired, options.anywhere)
@@ -188,15 +188,15 @@ def _doubted(picture: Brightness, negate: bool, free: float) -> list[str]:
 def _text(given: dict[str, files.Value], key: str, where: str, default: str | None = None) -> str:
     value = given.get(key, default)
     if value is None:
-        raise MapError(f"{where}: {key}: missing, but it was wanted")
+        raise MapError(f"{where}: {key}: missing")
     if not isinstance(value, str):
-        raise MapError(f"{where}: {key}: {quote(value)}, but one value was wanted")
+        raise MapError(f"{where}: {key}: expected one value, got {quote(value)}")
     return value
 
 
 def _number(text: files.Value, where: str) -> float:
     if not isinstance(text, str) or not math.isfinite(value := files.number(text)):
-        raise MapError(f"{where}: {quote(text)}, but a number was wanted")
+        raise MapError(f"{where}: expected a number, got {quote(text)}")
     return value
 
 
@@ -209,7 +209,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     mode = options.mode or "trinary"
     _, image = files_of(path, options)
     if image == path:
-        raise OutputError(f"{to_one_line(path)}: the name of the picture, but one for the YAML was wanted")
+        raise OutputError(f"{to_one_line(path)}: expected another name for the YAML than for the picture")
     try:
         image.name.encode()
     except UnicodeEncodeError:

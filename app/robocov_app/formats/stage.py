@@ -27,7 +27,7 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array
 from robocov.errors import MapError, quote, to_one_line
-from robocov.mapfile.models import FARTHEST
+from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
@@ -54,7 +54,7 @@ class _Token(NamedTuple):
     at: str
 
     def refuse(self, wanted: str) -> NoReturn:
-        raise MapError(f"{self.at}: {quote(self.text)}, but {wanted} was wanted")
+        raise MapError(f"{self.at}: expected {wanted}, got {quote(self.text)}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +73,8 @@ class _Entity:
         """Return the values of a property; those that are not written are as in `default`."""
         given = self.properties.get(name, [])[: len(default)]
         values = np.array([*map(files.number, given), *default[len(given) :]])
-        if not (np.abs(values) <= FARTHEST).all():
-            raise MapError(f"{self.at}: {name} {quote(' '.join(given))}, but numbers within 1e7 were wanted")
+        if not (np.abs(values) <= MAX_COORDINATE_M).all():
+            raise MapError(f"{self.at}: expected numbers within 1e7, got {name} {quote(' '.join(given))}")
         return values
 
     def number(self, name: str, default: float) -> float:
@@ -154,7 +154,7 @@ class _World:
             elif token[:2] != ("word", "include"):
                 if len(self.tokens) >= MOST_TOKENS:
                     what = f"more than {MOST_TOKENS} words and numbers"
-                    raise MapError(f"{token.at}: {what}, but fewer were wanted")
+                    raise MapError(f"{token.at}: expected fewer, got {what}")
                 self.tokens.append(token)
             include = not include and token[:2] == ("word", "include")
 
@@ -171,7 +171,7 @@ class _World:
     def _fill(self, entity: _Entity, depth: int) -> None:
         end = _Token("", "the end of the file", entity.at)
         if depth > files.MAX_DEPTH:
-            raise MapError(f"{entity.at}: nested deeper than {files.MAX_DEPTH}, but less was wanted")
+            raise MapError(f"{entity.at}: nested deeper than {files.MAX_DEPTH}")
         while self.tokens:
             token = self.tokens.popleft()
             ahead = [*islice(self.tokens, 3), end, end, end]
@@ -211,7 +211,7 @@ class _World:
         for given in entities:
             entity, labels = self._expanded(given)
             if depth > files.MAX_DEPTH:
-                raise MapError(f"{entity.at}: in more than {files.MAX_DEPTH} models, but fewer were wanted")
+                raise MapError(f"{entity.at}: nested in more than {files.MAX_DEPTH} models")
             if entity.type in ("window", "block"):
                 continue
             here = frame @ self._pose(entity, "pose")
@@ -235,10 +235,10 @@ class _World:
         while chain[-1].type in self.macros:
             chain.append(self.macros[chain[-1].type])
             if len(chain) > files.MAX_DEPTH:
-                raise MapError(f"{entity.at}: {quote(entity.type)} is made of itself, but a model was wanted")
+                raise MapError(f"{entity.at}: the model {quote(entity.type)} is made of itself")
         self.entities += 1 + sum(len(part.inside) for part in chain)
         if self.entities > MOST_ENTITIES:
-            raise MapError(f"{entity.at}: more than {MOST_ENTITIES} models and blocks, but fewer were wanted")
+            raise MapError(f"{entity.at}: expected at most {MOST_ENTITIES} models and blocks, got more")
         whole = _Entity(chain[-1].type, entity.at)
         for part in reversed(chain):
             whole.properties.update(part.properties)
@@ -294,7 +294,7 @@ class _World:
             self.pixels += picture.level.size
             if self.pixels > files.MAX_CELLS:
                 what = f"with those before it more than {files.MAX_CELLS // 1_000_000} million pixels"
-                raise MapError(f"{where}: {what}, but fewer were wanted")
+                raise MapError(f"{where}: expected fewer, got {what}")
             dark = picture.level <= _DARK * picture.full
             transparency = describe_transparency(picture)
             if transparency:
@@ -302,7 +302,7 @@ class _World:
             if not dark.any() or (transparency and dark.all()):
                 what = "dark" if dark.any() else "light"
                 cause = f": {transparency}" if transparency else ""
-                raise MapError(f"{where}: all is {what}, but a picture with dark walls was wanted{cause}")
+                raise MapError(f"{where}: all is {what}, expected a picture with dark walls{cause}")
             row, column = np.flatnonzero(dark.any(axis=1)), np.flatnonzero(dark.any(axis=0))
             light = ~dark[row[0] : row[-1] + 1, column[0] : column[-1] + 1]
             rows, columns = light.shape
@@ -322,5 +322,5 @@ def _blocks(entity: _Entity) -> list[Array]:
     for prefix, points in rings.items():
         count = entity.number(f"{prefix}points", len(points))
         if count != len(points):
-            raise MapError(f"{entity.at}: {len(points)} points, but {count:g}, as it says, were wanted")
+            raise MapError(f"{entity.at}: expected {count:g}, as it says, got {len(points)} points")
     return [np.array([points[k] for k in sorted(points)]) for points in rings.values()]

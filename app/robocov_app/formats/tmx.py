@@ -84,11 +84,13 @@ class _Map:
         self.tiles_read = self.parts = 0
         orientation = root.attributes.get("orientation", "orthogonal")
         if orientation != "orthogonal":
-            root.refuse(f"{to_one_line(orientation)[:20]}, but an orthogonal map was wanted")
+            root.refuse(f"expected an orthogonal map, got {to_one_line(orientation)[:20]}")
         self.tile = np.array([_whole(root, name, 1) for name in ("tilewidth", "tileheight")], float)
         cell, scale = options.cell, options.scale
         if cell is not None and scale is not None:
-            raise ParameterError("--cell, --scale: both say how large a tile is, but one of them was wanted")
+            raise ParameterError(
+                "--cell, --scale: expected one of them, because both say how large a tile is"
+            )
         if cell is None and scale is None:
             shapes.notes.append(f"no size of a tile was given: {CELL:g} m wide taken (--cell)")
         self.pixel = scale or (cell or CELL) / float(self.tile[0])
@@ -108,8 +110,8 @@ class _Map:
         if not (solid.any() or shapes.outlines or shapes.lines or shapes.pillars):
             names = summarize_names([quote(layer.labels[0]) for layer in layers if layer.labels])
             nothing = "nothing is solid by properties, collision objects or names of layers"
-            wanted = f"--only LAYER, with one of walls, was wanted then: {names or 'there is none'}"
-            raise MapError(f"{where}: {nothing}, but {wanted}")
+            wanted = f"expected --only LAYER with one of walls: {names or 'there is none'}"
+            raise MapError(f"{where}: {nothing}, {wanted}")
         width, height = (self.pixel * self.tile).tolist()
         world = free_area(~solid, (width, height), (0.0, 0.0), where)
         shapes.count(vertices_of(world))
@@ -176,11 +178,11 @@ class _Map:
             left, top = min(x for x, _, _ in pieces), min(y for _, y, _ in pieces)
             right, bottom = (max(piece[k] + piece[2].shape[1 - k] for piece in pieces) for k in (0, 1))
         elif any((x, y, *ids.shape) != (0, 0, bottom, right) for x, y, ids in pieces):
-            self.root.refuse(f"a layer of another size, but one of {right} x {bottom} tiles was wanted")
+            self.root.refuse(f"expected one of {right} x {bottom} tiles, got a layer of another size")
         self.shape = bottom - top, right - left
         if math.prod(self.shape) > MOST_TILES or math.prod(self.shape) * len(given) > MOST_READ:
             found = f"{right - left} x {bottom - top} tiles in {format_count(len(given), 'layer')}"
-            self.root.refuse(f"{found}, but fewer were wanted")
+            self.root.refuse(f"expected fewer, got {found}")
         grids = []
         for layer, some in given:
             grid = np.zeros(self.shape, np.uint32)
@@ -206,7 +208,7 @@ class _Map:
             width, height = (_whole(part if chunks else layer, name, 1) for name in ("width", "height"))
             self.tiles_read += width * height
             if self.tiles_read > MOST_READ:
-                part.refuse(f"with those before more than {MOST_READ} tiles, but fewer were wanted")
+                part.refuse(f"expected at most {MOST_READ} tiles in all, got more")
             x, y = (_whole(part, name, -MOST_READ, "0") for name in "xy") if chunks else (0, 0)
             yield x, y, _decoded(part, data, width * height).reshape(height, width)
 
@@ -251,7 +253,7 @@ class _Map:
 
     def _require_few_parts(self, more: int) -> None:
         if self.parts + more > MOST_PARTS:
-            self.root.refuse(f"more than {MOST_PARTS} parts of tiles, but fewer were wanted")
+            self.root.refuse(f"expected at most {MOST_PARTS} parts of tiles, got more")
 
     def _add_part(self, element: Element, kind: str, points: Array, labels: tuple[str, ...]) -> None:
         self._require_few_parts(1)
@@ -307,16 +309,16 @@ def _decoded(part: Element, data: Element, count: int) -> _IDs:
         more = part.text.count(",") > count  # a comma may end it
         numbers = files.whole_numbers("" if more else part.text, ",")
         if numbers is None or not ((numbers >= 0) & (numbers < 2**32)).all():
-            part.refuse("what is not whole numbers from 0, but those, with commas, were wanted")
+            part.refuse("expected whole numbers from 0, separated by commas")
         ids = None if more else numbers.astype(np.uint32)
     elif not encoding:
         tiles = [child for child in part.children if child.tag == "tile"]
         ids = np.array([_whole(tile, "gid", 0, "0") for tile in tiles], np.uint32)
     else:
         name = " ".join(filter(None, (to_one_line(encoding)[:20], to_one_line(packing)[:20])))
-        part.refuse(f"{name}, but CSV, or base64 with zlib or gzip or neither, was wanted")
+        part.refuse(f"expected CSV, or base64 with zlib or gzip or neither, got {name}")
     if ids is None or len(ids) != count:
-        part.refuse(f"{'more' if ids is None else len(ids)} tiles, but {count}, as it says, were wanted")
+        part.refuse(f"expected {count} tiles, as it says, got {'more' if ids is None else len(ids)}")
     return ids
 
 
@@ -340,7 +342,7 @@ def _figure(element: Element) -> tuple[str, Array]:
         if tag in children:
             flat = children[tag].numbers("points")
             if len(flat) % 2 or len(flat) < 2 * least:
-                children[tag].refuse(f"points: {len(flat)} numbers, but {least} points were wanted")
+                children[tag].refuse(f"points: expected {least} points, got {len(flat)} numbers")
             kind, points = name, flat.reshape(-1, 2)
     return kind, moved(frame(x, y, math.radians(turn)), points)
 
@@ -374,5 +376,5 @@ def _number(element: Element, name: str) -> float:
 def _whole(element: Element, name: str, least: int, default: str = "") -> int:
     text = element.attributes.get(name, default)
     if not re.fullmatch(r"-?[0-9]{1,10}", text) or not least <= int(text) < 2**32:
-        element.refuse(f"{name} {quote(text)}, but a whole number from {least} was wanted")
+        element.refuse(f"expected a whole number from {least}, got {name} {quote(text)}")
     return int(text)

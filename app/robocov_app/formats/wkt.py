@@ -24,7 +24,7 @@ from shapely import MultiPolygon, Polygon
 from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.errors import MapError, format_count, quote
-from robocov.files.strictjson import line_and_column
+from robocov.files.json_positions import find_line_and_column
 from robocov.files.writing import replace_file
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import MAX_DEPTH, name_of_map, read_text
@@ -83,7 +83,7 @@ class WktText:
         while self._skip_space() < len(self.text):
             if srid := _SRID.match(self.text, self.at):
                 if self.srid not in (None, int(srid[1])):
-                    self._refuse(f"SRID {srid[1]} after {self.srid}, but one for all geometries was wanted")
+                    self._refuse(f"expected one SRID for all geometries, got {srid[1]} after {self.srid}")
                 self.srid = int(srid[1])
                 self.at = srid.end()
                 self._skip_space()
@@ -95,7 +95,7 @@ class WktText:
 
     def _geometry(self, depth: int, place: str) -> None:
         if depth > MAX_DEPTH:
-            self._refuse(f"nested too deeply, but at most {MAX_DEPTH} levels were wanted")
+            self._refuse(f"nested too deeply, expected at most {MAX_DEPTH} levels")
         begin, add = self.at, self._figures.append
         kind, measured = self._kind()
         if self._empty():
@@ -117,7 +117,7 @@ class WktText:
             several = kind == "MULTIPOINT" and not _POINTS.match(self.text, self.at)
             parts = [self._points(measured, 1) for _ in (self._items() if several else [0])]
             if kind == "POINT" and len(parts[0]) != 1:
-                self._refuse(f"{len(parts[0])} points, but one was wanted", begin)
+                self._refuse(f"expected one point, got {len(parts[0])}", begin)
             self._figures += [Figure("point", (point[None],), at=place) for part in parts for point in part]
 
     def _kind(self) -> tuple[str, bool]:
@@ -127,8 +127,8 @@ class WktText:
             word = _WORD.match(self.text, self.at)
             found = word[0].upper() if word else ""
             if found.rstrip("ZM") in CURVED:
-                self._refuse(f"{found}, but a geometry of straight edges was wanted")
-            self._refuse(f"{self._found()}, but one of {', '.join(KINDS)} was wanted")
+                self._refuse(f"expected a geometry of straight edges, got {found}")
+            self._refuse(f"expected one of {', '.join(KINDS)}, got {self._found()}")
         self.at = match.end()
         self._skip_space()
         return match[1].upper(), (match[2] or "").upper() == "M"
@@ -167,7 +167,7 @@ class WktText:
             end = strange.start() if strange else len(self.text)
             if self.text[end : end + 1] in ("", "("):
                 self.at = end
-                self._refuse(f"{self._found()}, but a point or ) was wanted")
+                self._refuse(f"expected a point or ), got {self._found()}")
             self.at = self.text.rfind(",", self.at, end) + 1 or self.at
             self._refuse_point()
         self.at = match.start(1)
@@ -181,11 +181,11 @@ class WktText:
                 self._refuse_point()
             self.at += len(point) + 1
         if len(points) < least:
-            self._refuse(f"1 point, but at least {least} were wanted", match.start())
+            self._refuse(f"expected at least {least} points, got 1", match.start())
         self.at = match.end()
         array = np.array(points)
         if not (np.abs(array) < _BEYOND).all():
-            self._refuse("a number beyond all bounds, but finite ones were wanted", match.start())
+            self._refuse("expected finite numbers", match.start())
         if array.shape[1] > 2 and not (measured and array.shape[1] == 3):
             self.shapes.leave_heights(array[:, 2])
         return array[:, :2]
@@ -199,7 +199,7 @@ class WktText:
     def _expect(self, bracket: str) -> None:
         self._skip_space()
         if self.text[self.at : self.at + 1] != bracket:
-            self._refuse(f"{self._found()}, but {bracket} was wanted")
+            self._refuse(f"expected {bracket}, got {self._found()}")
         self.at += 1
 
     def _found(self) -> str:
@@ -210,10 +210,10 @@ class WktText:
         point = self.text[self.at : self.at + 80].split(",")[0].split(")")[0]
         self._skip_space()
         what = quote(" ".join(point.split())) if point.strip() else "nothing"
-        self._refuse(f"{what}, but a point as 1.5 2, with as many numbers as the first, was wanted")
+        self._refuse(f"expected a point as 1.5 2, with as many numbers as the first, got {what}")
 
     def _refuse(self, what: str, at: int | None = None) -> NoReturn:
-        line, column = line_and_column(self.text, self.at if at is None else at)
+        line, column = find_line_and_column(self.text, self.at if at is None else at)
         raise MapError(f"{self.where}:{line}:{column}: {what}")
 
 

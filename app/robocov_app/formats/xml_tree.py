@@ -12,7 +12,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.errors import MapError, quote, to_one_line
-from robocov.mapfile.models import FARTHEST
+from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov_app.formats import files
 
 MOST_ELEMENTS = 100_000  # in a file, and drawn of it where parts are used again
@@ -52,10 +52,12 @@ class Element:
         """Return the numbers of an attribute, which commas or blanks separate, `count` of them."""
         text = self.attributes.get(name, default)
         values = np.array([files.number(part) for part in (text or "").replace(",", " ").split()])
-        if text is None or count not in (None, len(values)) or not (np.abs(values) <= FARTHEST).all():
-            found = "missing" if text is None else quote(text)
-            many = "numbers within 1e7 were" if count is None else f"{count} numbers within 1e7 were"
-            self.refuse(f"{name}: {found}, but {'a number within 1e7 was' if count == 1 else many} wanted")
+        if text is None or count not in (None, len(values)) or not (np.abs(values) <= MAX_COORDINATE_M).all():
+            number = "a number" if count == 1 else "numbers" if count is None else f"{count} numbers"
+            expected = f"expected {number} within 1e7"
+            if text is None:
+                self.refuse(f"{name}: missing, {expected}")
+            self.refuse(f"{name}: {expected}, got {quote(text)}")
         return values
 
     def refuse(self, what: str) -> NoReturn:
@@ -72,9 +74,9 @@ def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ())
     where = to_one_line(path)
     content = files.content(path, files.MAX_TEXT_BYTES)
     if content.startswith(b"\x1f\x8b"):
-        raise MapError(f"{where}: compressed, but plain {kind} was wanted (gunzip makes it)")
+        raise MapError(f"{where}: expected plain {kind}, got compressed (gunzip makes it)")
     if content.count(b"=") > MOST_ATTRIBUTES:
-        raise MapError(f"{where}: more than {MOST_ATTRIBUTES} attributes, but fewer were wanted")
+        raise MapError(f"{where}: expected at most {MOST_ATTRIBUTES} attributes, got more")
     reader = _Reader(where, content, kind, texts)
     try:
         reader.parser.Parse(content, True)
@@ -85,7 +87,7 @@ def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ())
     first = reader.first
     if first is None or first.tag != root:
         found = "other XML" if first is None else f"<{first.tag}>"
-        raise MapError(f"{where}: {found}, but <{root}> was wanted")
+        raise MapError(f"{where}: expected <{root}>, got {found}")
     return first
 
 
@@ -110,9 +112,9 @@ class _Reader:
         self.count += 1
         line = self.parser.CurrentLineNumber
         if self.count > MOST_ELEMENTS:
-            raise MapError(f"{self.where}:{line}: more than {MOST_ELEMENTS} elements, but fewer were wanted")
+            raise MapError(f"{self.where}:{line}: expected at most {MOST_ELEMENTS} elements, got more")
         if len(self.open) >= DEEPEST:
-            raise MapError(f"{self.where}:{line}: elements nested deeper than {DEEPEST}, but less was wanted")
+            raise MapError(f"{self.where}:{line}: elements are nested deeper than {DEEPEST}")
         namespace, _, tag = name.rpartition(" ")
         plain = {key.rpartition(" ")[2]: value for key, value in attributes.items()}
         self._take(sum(map(len, plain)) + sum(map(len, plain.values())))
@@ -162,4 +164,4 @@ class _Reader:
 
     def _refuse(self, what: str) -> NoReturn:
         line = self.parser.CurrentLineNumber
-        raise MapError(f"{self.where}:{line}: {what}, but plain {self.kind} was wanted")
+        raise MapError(f"{self.where}:{line}: expected plain {self.kind}, got {what}")

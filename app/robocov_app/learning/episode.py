@@ -89,7 +89,9 @@ def drawn_episode(
         try:
             positions = np.asarray(options["positions"], dtype=float)
         except (TypeError, ValueError):
-            raise StartError(f"positions: {quote(options['positions'])}, but (n, 2) were wanted") from None
+            raise StartError(
+                f"positions: expected an array of shape (n, 2), got {quote(options['positions'])}"
+            ) from None
         start = {"positions": positions, "start": None, "seed": None}
     more: dict[str, Any] = {"duration": task.duration, "dt": task.dt, "conditions": conditions}
     return Episode(task, RunSpec(environment, team=task.whole_team, **start, **more), cost, place)
@@ -160,7 +162,7 @@ class Episode:
         environment, positions, n = spec.environment, spec.starts, len(spec.team)
         self.task, self.team, self.environment, self._spec = task, spec.team, environment, spec
         if len(positions) != n:
-            raise StartError(f"starts: {len(positions)}, but one for each of {n} robots was wanted")
+            raise StartError(f"starts: expected one for each of {n} robots, got {len(positions)}")
         shared, run = place or (None, 0)
         self.shared: SharedSimulation | None = None
         self.simulation: Simulation | SimulationBatch
@@ -178,8 +180,8 @@ class Episode:
         self._counted = self._cost.find_counted_robots(0.0, self.positions, self.working)
         result = self._cost(0.0, self.positions, self.working)
         if result is None or not result.mean_distance > 0.0:
-            wanted = f"a finer one was wanted for map {environment.name!r}"
-            raise ParameterError(f"lattice: {task.lattice}, but {wanted}")
+            wanted = f"expected a finer lattice for map {environment.name!r}"
+            raise ParameterError(f"lattice: {wanted}, got {task.lattice}")
         self.result = self.initial = result
         self.reference = tasks.reference_distance(environment.free_area - result.uncovered_area, n)
         self.trail = [self.positions]
@@ -278,7 +280,7 @@ class Episode:
     def record(self) -> Record:
         """Return the episode so far as a record, without forces at its end; the task says `recording`."""
         if not self.task.recording or isinstance(self.simulation, SimulationBatch):
-            raise ParameterError("record: a task with recording=True was wanted")
+            raise ParameterError("record: expected a task with recording=True")
         recorder = self._spec.recorder(self.simulation.controller)
         for moment in (*self._moments, self.snapshot()):
             recorder.add(moment)
@@ -342,10 +344,10 @@ def checked_actions(actions: Any, count: int) -> Array:
     """Return the actions of so many robots, (count, 2), or raise ParameterError that names the robot."""
     array = np.asarray(actions, dtype=np.float64)
     if array.shape != (count, 2):
-        raise ParameterError(f"actions of shape {array.shape}, but {(count, 2)} was wanted")
+        raise ParameterError(f"expected actions of shape {(count, 2)}, got {array.shape}")
     if not np.isfinite(array).all():
         robot = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        told = f"{quote(array[robot].tolist())}, but finite numbers were wanted"
+        told = f"expected finite numbers, got {quote(array[robot].tolist())}"
         raise ParameterError(f"action of robot_{robot + 1}: {told}")
     return array
 
@@ -380,7 +382,7 @@ class EpisodeEnv:
                 f"render_mode: {describe_unknown_name('mode', str(render_mode), RENDER_MODES)}"
             )
         if len(size) != 2 or not all(64 <= side <= 8192 for side in size):
-            raise ParameterError(f"size: {size}, but width and height from 64 to 8192 pixels were wanted")
+            raise ParameterError(f"size: expected width and height from 64 to 8192 pixels, got {size}")
         if theme not in ("light", "dark"):
             raise ParameterError(f"theme: {describe_unknown_name('theme', str(theme), ('light', 'dark'))}")
         self.render_mode, self._theme, self._size = render_mode, theme, (int(size[0]), int(size[1]))
@@ -396,7 +398,7 @@ class EpisodeEnv:
 
     def _present(self) -> Episode:
         if self.episode is None:
-            raise RobocovError("environment: reset() was wanted before anything else")
+            raise RobocovError("environment: call reset() first")
         return self.episode
 
     def render(self) -> Frame | None:

@@ -41,7 +41,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         super().__init__(task, **options)
         self.max_cycles = self.task.cycles if max_cycles is None else max_cycles
         if self.max_cycles < 1:
-            raise ParameterError(f"max_cycles: {max_cycles}, but a whole number of at least 1 was wanted")
+            raise ParameterError(f"max_cycles: expected a whole number of at least 1, got {max_cycles}")
         self.possible_agents = self.task.agents
         self.agents: list[str] = []
         self._rng = np.random.default_rng()
@@ -81,13 +81,13 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
             if agent not in self.agents:
                 continue
             if agent not in actions:
-                raise ParameterError(f"actions: none of {agent}, but one of each agent was wanted")
+                raise ParameterError(f"actions: expected one for each agent, got none for {agent}")
             action = np.empty(0)
             with suppress(TypeError, ValueError):
                 action = np.asarray(actions[agent], dtype=np.float64)
             if action.shape != (2,) or not np.isfinite(action).all():
                 found = quote(actions[agent])
-                raise ParameterError(f"action of {agent}: {found}, but two finite numbers were wanted")
+                raise ParameterError(f"action of {agent}: expected two finite numbers, got {found}")
             values[robot] = action
         acting, over = self.agents, episode.cycle + 1 >= self.max_cycles
         outcome = episode.advance(values, last=over)

@@ -90,7 +90,7 @@ class PolicyController:
     def act(self, observation: NDArray[np.float32]) -> Any:
         """Return the action of one robot, (2,), from its observation, (size,)."""
         if self.policy is None:
-            raise ParameterError(f"{self.name}: a policy or a method act(observation) was wanted")
+            raise ParameterError(f"{self.name}: expected a policy or a method act(observation)")
         return self.policy(observation)
 
     def begin(self, region: Region, team: Team) -> Held:
@@ -103,7 +103,7 @@ class PolicyController:
             rows = self.layout.rows(seen, memory.team)
             given = [np.asarray(self.act(row), dtype=np.float64) for row in rows]
             if wrong := [action.shape for action in given if action.shape != (2,)]:
-                raise ParameterError(f"{self.name}: an action of shape {wrong[0]}, but (2,) was wanted")
+                raise ParameterError(f"{self.name}: expected an action of shape (2,), got {wrong[0]}")
             memory = Held(memory.team, np.array(given), seen.time + self.period)
         assert memory.actions is not None
         forces = driving_forces(self.action, memory.actions, seen.velocities, memory.team)

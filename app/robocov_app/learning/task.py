@@ -135,7 +135,7 @@ class GeneratedMaps:
 
     def __post_init__(self) -> None:
         if self.seeds is not None and not len(self.seeds):
-            raise ParameterError("maps: seeds: none, but at least one was wanted")
+            raise ParameterError("maps: seeds: expected at least one, got none")
 
     def __call__(self, seed: int) -> Environment:
         """Return the map of a seed, or where `seeds` are given that of ``seeds[seed % len(seeds)]``.
@@ -155,7 +155,7 @@ class Scenarios:
         several = isinstance(maps, Sequence) and not isinstance(maps, str)
         given: Any = maps if several else (maps,)
         if not given:
-            raise ParameterError("maps: none, but at least one was wanted")
+            raise ParameterError("maps: expected at least one, got none")
         self._sources = [_source(each, f"maps[{k}]" if several else "maps") for k, each in enumerate(given)]
         self._lattice, self._costs = lattice, dict[Environment, CoverageCost]()
 
@@ -181,7 +181,7 @@ def map_of(given: object, seed: int) -> Environment:
     source = _source(given, "map")
     environment = source if isinstance(source, Environment) else source(seed)
     if not isinstance(environment, Environment):
-        raise ParameterError(f"maps: for seed {seed} {quote(environment)}, but an Environment was wanted")
+        raise ParameterError(f"maps: expected an Environment for seed {seed}, got {quote(environment)}")
     return environment
 
 
@@ -191,7 +191,7 @@ def _source(given: object, where: str) -> Environment | Callable[[int], Environm
     if isinstance(given, Environment) or callable(given):
         return given
     wanted = "a map, its name or path, or a function from a seed to one"
-    raise ParameterError(f"{where}: {quote(given)}, but {wanted} was wanted")
+    raise ParameterError(f"{where}: expected {wanted}, got {quote(given)}")
 
 
 @dataclass(frozen=True)
@@ -273,8 +273,11 @@ class ObservationLayout:
         if self.rays:
             scans = seen.scans if scans is None else scans
             if scans is None or scans.rays != self.rays:
-                found, wanted = "none" if scans is None else scans.rays, f"{self.rays} in a scan were wanted"
-                raise ParameterError(f"observation.rays: {wanted}, but {found} are there")
+                found, wanted = (
+                    "none" if scans is None else scans.rays,
+                    f"expected {self.rays} rays in a scan",
+                )
+                raise ParameterError(f"observation.rays: {wanted}, got {found}")
             rows[:, places["rays"]] = np.where(scans.hit, scans.distances / reach, 1.0)
         if self.centroid:
             centroid = compute_known_cells(seen, "distance", None).centroid
@@ -346,16 +349,16 @@ class CoverageTask:
         for name, most in (("robots", MOST_ROBOTS), ("repeat", 100_000), ("reward_every", 100_000)):
             require_number(name, getattr(self, name), 1, most, whole=True)
         if not np.isfinite(self.duration) or self.duration < self.period - 5e-7:
-            wanted = f"at least the time of one action, {self.period:g} s, was wanted"
-            raise ParameterError(f"duration: {quote(self.duration)} s, but {wanted}")
+            wanted = f"expected at least the time of one action, {self.period:g} s"
+            raise ParameterError(f"duration: {wanted}, got {quote(self.duration)} s")
         if not 0.0 <= self.contact_penalty < np.inf:
             found = quote(self.contact_penalty)
-            raise ParameterError(f"contact_penalty: {found}, but a finite number from 0 was wanted")
+            raise ParameterError(f"contact_penalty: expected a finite number from 0, got {found}")
         checked_kind("reward", self.reward, REWARDS)
         checked_kind("action", self.action, ACTIONS)
         if self.action == "velocity" and self.dt > FOLLOWING:
-            wanted = f"at most {FOLLOWING:g} s was wanted for robots to follow velocities"
-            raise ParameterError(f"dt: {self.dt:g} s, but {wanted}")
+            wanted = f"expected at most {FOLLOWING:g} s for robots to follow velocities"
+            raise ParameterError(f"dt: {wanted}, got {self.dt:g} s")
         for name, kind in (("team", Team), ("observation", ObservationLayout), ("conditions", Conditions)):
             if getattr(self, name) is not None or name == "observation":
                 require_type(name, getattr(self, name), kind, f"a {kind.__name__}")

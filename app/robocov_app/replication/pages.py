@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from markupsafe import Markup
 
 from robocov import __version__
-from robocov.files.result_folder import for_results
+from robocov.files.result_folder import report_folder_errors
 from robocov.files.writing import replace_file
 from robocov.metrics import SETTLED_DISTANCE_M, SETTLED_WINDOW_S
 from robocov.record import Record, list_versions
@@ -86,7 +86,7 @@ def _save_figures(
     folder: Path, drawn: Callable[[str], figures.Plots], seen: Mapping[str, str], *, quiet: bool
 ) -> dict[str, Image]:
     target = folder / "figures"
-    with for_results(target):
+    with report_folder_errors(target):
         target.mkdir(exist_ok=True)
     light, dark = drawn("light"), drawn("dark")
     found: dict[str, Image] = {}

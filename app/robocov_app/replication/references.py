@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from robocov.errors import OutputError
-from robocov.files.result_folder import for_results
+from robocov.files.result_folder import report_folder_errors
 from robocov.files.writing import replace_file
 from robocov.mapfile import from_json, to_json
 from robocov_app.replication.plan import ROBOTS, TEAM, Plan
@@ -73,7 +73,7 @@ def find_references(
     maps: Sequence[StudyMap], folder: Path, plan: Plan, workers: int, stop: Interruption, *, quiet: bool
 ) -> References:
     """Return the reference of every map, kept in `folder` or searched for until `stop`."""
-    with for_results(folder):
+    with report_folder_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
     how = ROBOTS, TEAM["radius"], plan.lattice, plan.restarts
     wanted = {each.name: Question(to_json(each.environment), *how) for each in maps}

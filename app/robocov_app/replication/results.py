@@ -15,7 +15,7 @@ import robocov
 from robocov.controllers import CONTROLLERS, load_controller_class
 from robocov.cost import CoverageCost
 from robocov.errors import InputError
-from robocov.files.result_folder import for_results
+from robocov.files.result_folder import report_folder_errors
 from robocov.files.writing import replace_file
 from robocov.metrics import CostHistory
 from robocov.metrics.results import read_results
@@ -150,7 +150,7 @@ class BeyondResults:
 def open_folder(folder: Path, plan: Plan) -> None:
     """Make the folder of a study, or make sure that it is that of the same study, quick or full."""
     mark = folder / MARK
-    with for_results(folder):
+    with report_folder_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
         empty = not any(folder.iterdir())
     if empty:
@@ -164,7 +164,7 @@ def open_folder(folder: Path, plan: Plan) -> None:
             if content["plan"] == plan.name:
                 return
             words = f"holds the {content['plan']} study, but the {plan.name} one was asked for"
-    raise InputError(f"{folder}: {words}; another --out was wanted")
+    raise InputError(f"{folder}: {words}; choose another --out")
 
 
 def run_study(study: Study, folder: Path, name: str, options: RunnerOptions) -> Path:

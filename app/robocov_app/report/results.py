@@ -18,8 +18,8 @@ from robocov.controllers.gains import Value
 from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, RobocovError, quote
 from robocov.files.array_files import ArrayCache
-from robocov.files.result_folder import settle
-from robocov.files.strictjson import read_document
+from robocov.files.documents import read_document
+from robocov.files.result_folder import complete_commit
 from robocov.mapfile import from_json, to_json
 from robocov.metrics import CostHistory, compute_mean_over_run
 from robocov.metrics.results import read_history, read_results
@@ -151,7 +151,7 @@ class Result:
             return self.loaded[entry.folder].record
         record = Record.load(entry.folder)
         if not len(record) or not len(record.team) or not np.isfinite(record.positions).all():
-            raise InputError(f"{entry.folder / 'record.npz'}: finite positions of robots were wanted")
+            raise InputError(f"{entry.folder / 'record.npz'}: expected finite positions of robots")
         return record
 
     def history(self, entry: Entry) -> CostHistory | None:
@@ -200,10 +200,10 @@ def _reference(record: Record, lattice: int, *, search: bool) -> Reference | Non
 def gathered(folder: Path) -> Result:
     """Return what is in the folder of a run, comparison or sweep; raises InputError that names the file."""
     if not folder.is_dir():
-        raise InputError(f"{folder}: there is no such folder; that of a run, comparison or sweep was wanted")
+        raise InputError(f"{folder}: folder not found, expected the folder of a run, comparison or sweep")
     if (folder / "study.json").is_file():
         return _of_sweep(folder)
-    settle(folder)
+    complete_commit(folder)
     if not any((folder / name).is_file() for name in ("comparison.json", "run.json")):
         missing = "(there is no run.json, no comparison.json and no study.json)"
         raise InputError(f"{folder}: not the folder of a run, a comparison or a sweep {missing}")
@@ -375,5 +375,5 @@ def _json(path: Path) -> dict[str, Any]:
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
     if not isinstance(content, dict):
-        raise InputError(f"{path}: {quote(content)}, but an object was wanted")
+        raise InputError(f"{path}: expected an object, got {quote(content)}")
     return content

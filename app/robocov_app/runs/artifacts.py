@@ -11,7 +11,7 @@ import numpy as np
 from robocov.controllers import get_gains, load_controller_class
 from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.errors import ParameterError, describe_unknown_name, format_count
-from robocov.files.result_folder import Kind, results
+from robocov.files.result_folder import ResultKind, create_result
 from robocov.kernel_compilation import compile_kernels
 from robocov_app.runs.cost import built_cost, cost_for_pictures
 from robocov_app.runs.options import RunOptions
@@ -40,24 +40,24 @@ def performed(
     """Do one run, or compare several on one map, by their folders' names; also tell if Ctrl-C ended it."""
     compile_kernels()
     cost = built_cost(next(iter(specs.values())).environment, options.lattice, quiet=options.json)
-    kind: Kind = "comparison" if comparison else "run"
+    kind: ResultKind = "comparison" if comparison else "run"
     parts, runs = specs if comparison else (), dict[str, Run]()
-    with results(out, kind, overwrite=options.overwrite, parts=parts) as result, Interruption() as stop:
+    with create_result(out, kind, overwrite=options.overwrite, parts=parts) as result, Interruption() as stop:
         if comparison:
-            begin_comparison(result.new, list(specs))
+            begin_comparison(result.staging, list(specs))
         for part, spec in specs.items():
             runs[part] = saved_run(spec, cost, result, part if comparison else "", options, stop)
             if stop.requested:
                 break
         if comparison:
-            save_comparison(runs, cost, result.new, options)
+            save_comparison(runs, cost, result.staging, options)
         else:
-            save_pictures(list(runs.values()), cost, result.new, options)
-        result.keep()
+            save_pictures(list(runs.values()), cost, result.staging, options)
+        result.save_progress()
         if options.film.video or options.film.frames:
             from robocov_app.runs.film import save_moving
 
-            save_moving(list(runs.values()), cost, result.new, options.film, stop, quiet=options.json)
+            save_moving(list(runs.values()), cost, result.staging, options.film, stop, quiet=options.json)
     return runs, stop.requested
 
 

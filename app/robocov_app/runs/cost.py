@@ -7,7 +7,7 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import format_count
 from robocov.geodesic import Geodesics
-from robocov.mapfile.check import MANY_VERTICES, vertex_count
+from robocov.mapfile.check import MANY_VERTICES, count_vertices
 from robocov.team import DEFAULT_RADIUS, Team
 from robocov_app.terminal.progress import late_progress
 
@@ -26,7 +26,7 @@ def built_cost(
 def cost_for_pictures(environment: Environment, cost: CoverageCost, least: int | None = None) -> CoverageCost:
     """Return `cost`, or where its lattice is too coarse to be drawn and the map is simple a finer one."""
     least = least or PICTURE_LATTICE
-    if cost.lattice >= least or vertex_count(environment) > MANY_VERTICES:
+    if cost.lattice >= least or count_vertices(environment) > MANY_VERTICES:
         return cost
     return built_cost(environment, least, quiet=True, geodesics=cost.geodesics)
 

@@ -57,7 +57,7 @@ def save_film(path: Path, frames: Iterable[Frame], *, fps: float = 30.0) -> None
     source = iter(frames)
     first = next(source, None)
     if first is None:
-        raise ParameterError("frames: none were given, but at least one was wanted")
+        raise ParameterError("frames: expected at least one, got none")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -66,7 +66,7 @@ def save_film(path: Path, frames: Iterable[Frame], *, fps: float = 30.0) -> None
         for frame in chain([first], source):
             if frame.shape != first.shape:
                 sizes = f"{quote(frame.shape)} after {quote(first.shape)}"
-                raise ParameterError(f"frames: {sizes}, but one size was wanted")
+                raise ParameterError(f"frames: expected one size, got {sizes}")
             pipe.write(np.ascontiguousarray(_even(frame)).data)
 
 

@@ -86,7 +86,7 @@ class WebOptions:
         require_number("--max-sessions", self.max_sessions, 1, 200)
         require_number("--idle-minutes", self.idle_minutes, 0.05, 10_000.0)
         if self.each and not self.serve:
-            raise ParameterError("--each: --serve was wanted beside it")
+            raise ParameterError("--each: requires --serve")
 
 
 @dataclass(kw_only=True)
@@ -264,8 +264,8 @@ class RunOptions(ScenarioOptions, JsonOption):
         rows = self.duration / self.dt * self.robots / self.record_every
         if rows > MOST_ROWS:
             size = f"{self.duration:g} s of {self.robots} robots are {rows:.3g} rows of the record"
-            wanted = f"at most {MOST_ROWS:.0e} were wanted"
-            raise ParameterError(f"--record-hz: {self.record_hz:g} Hz for {size}, but {wanted}")
+            wanted = f"expected at most {MOST_ROWS:.0e}"
+            raise ParameterError(f"--record-hz: {wanted}, got {self.record_hz:g} Hz for {size}")
 
     @property
     def record_every(self) -> int:

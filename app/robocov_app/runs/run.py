@@ -63,11 +63,11 @@ def saved_run(
             return stop.requested
 
         record = spec.record(simulation, every=options.record_every, watch=watch)
-    record.save(into.new / part)
-    into.keep()  # what took long is safe, whatever happens to the evaluation
+    record.save(into.staging / part)
+    into.save_progress()  # what took long is safe, whatever happens to the evaluation
     run = evaluated(record, cost, stop, quiet=quiet)
-    save_numbers(run, into.new / part, options.lattice)
-    into.keep()
+    save_numbers(run, into.staging / part, options.lattice)
+    into.save_progress()
     return run
 
 

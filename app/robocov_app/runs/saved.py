@@ -10,8 +10,8 @@ from pydantic import Field
 
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import InputError
-from robocov.files.result_folder import settle
-from robocov.files.strictjson import Document, read_document, wanted
+from robocov.files.documents import Document, expect, read_document
+from robocov.files.result_folder import complete_commit
 from robocov.metrics import CostHistory
 from robocov.metrics.results import read_history
 from robocov.record import Record
@@ -20,7 +20,7 @@ from robocov.record import Record
 class ComparisonDocument(Document):
     """The content of ``comparison.json``; without `runs` as long as the comparison goes on."""
 
-    folders: list[Annotated[str, Field(pattern=r"^[^./\\\x00][^/\\\x00]*$"), wanted("the name of a folder")]]
+    folders: list[Annotated[str, Field(pattern=r"^[^./\\\x00][^/\\\x00]*$"), expect("the name of a folder")]]
     runs: list[dict[str, Any]] = Field([])
 
 
@@ -43,12 +43,12 @@ class Roster(NamedTuple):
 def load_saved(path: Path) -> list[Saved]:
     """Return a run, or those of a comparison (if it was killed, those there), by the folder or its JSON."""
     folder = path.parent if path.name in ("run.json", "comparison.json") and not path.is_dir() else path
-    settle(folder)
+    complete_commit(folder)
     if (path := folder / "comparison.json").is_file():
         content = read_document(path, ComparisonDocument, "robocov-comparison", 1)
         parts = [folder / name for name in content.folders]
         if linked := next((part for part in parts if part.is_symlink()), None):
-            raise InputError(f"{linked}: is a link, but a folder in the comparison's own was wanted")
+            raise InputError(f"{linked}: expected a folder in that of the comparison, got a link")
         saved = [_load_run(part) for part in parts if content.runs or (part / "run.json").is_file()]
         if not saved:
             raise InputError(f"{path}: there is no run in it")

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from robocov.errors import InputError, OutputError, format_count
 from robocov.files.folder_lock import lock_folder
-from robocov.files.result_folder import for_results
+from robocov.files.result_folder import report_folder_errors
 from robocov.files.writing import flush_to_disk
 from robocov_app.sweep.study import Task
 from robocov_app.sweep.worker import FIGURES, Outcome, made_with
@@ -161,12 +161,12 @@ def difference_of(versions: Mapping[str, str]) -> str:
 @contextmanager
 def opened(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
     """Give the ledger of a sweep, for one process at a time; `study` is the content of ``study.json``."""
-    with for_results(folder):
+    with report_folder_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
         used = any(not path.name.startswith(".") for path in folder.iterdir())
     if used and not is_sweep(folder):
         foreign = "the folder is not empty, and what is in it is no sweep"
-        raise InputError(f"{folder}: {foreign}; another --out was wanted")
+        raise InputError(f"{folder}: {foreign}; choose another --out")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OutputError(f"{folder}: cannot be used for results: Permission denied")
     with lock_folder(folder):

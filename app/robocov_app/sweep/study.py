@@ -118,7 +118,7 @@ class Gains:
         if isinstance(wanted, Mapping):
             return _of_axes(kind, wanted, sampling, path)
         if not wanted:
-            raise ParameterError(f"{format_path(path)}: none, but at least one set of gains was wanted")
+            raise ParameterError(f"{format_path(path)}: expected at least one set of gains, got none")
         known = get_gains(kind)
         choices = []
         for k, given in enumerate(wanted):
@@ -179,24 +179,22 @@ def _known(known: Mapping[str, Gain | Option], name: str, path: Place) -> Gain |
 def _checked_range(known: Mapping[str, Gain | Option], name: str, given: Range, path: Place) -> Range:
     gain = _known(known, name, path)
     if isinstance(gain, Option):
-        wanted = f"one of {', '.join(gain.choices)}, or a list of them,"
-        raise ParameterError(f"{format_path(path)}: a range, but {wanted} was wanted")
+        wanted = f"one of {', '.join(gain.choices)}, or a list of them"
+        raise ParameterError(f"{format_path(path)}: expected {wanted}, got a range")
     ends = []
     for end, value in (("low", given.low), ("high", given.high)):
         if value is None:
-            raise ParameterError(f"{format_path((*path, end))}: {quote(None)}, but a number was wanted")
+            raise ParameterError(f"{format_path((*path, end))}: expected a number, got {quote(None)}")
         ends.append(placed((*path, end), partial(gain.validate, value, "")) or 0.0)
     low, high = ends
     if given.scale not in get_args(Scale):
         unknown = describe_unknown_name("scale", given.scale, get_args(Scale))
         raise ParameterError(f"{format_path((*path, 'scale'))}: {unknown}")
     if not low < high:
-        raise ParameterError(
-            f"{format_path((*path, 'high'))}: {high:g}, but a number above {low:g} was wanted"
-        )
+        raise ParameterError(f"{format_path((*path, 'high'))}: expected a number above {low:g}, got {high:g}")
     if given.scale == "log" and low <= 0.0:
-        wanted = "a number above 0, as the scale is that of logarithms,"
-        raise ParameterError(f"{format_path((*path, 'low'))}: {low:g}, but {wanted} was wanted")
+        wanted = "a number above 0, as the scale is that of logarithms"
+        raise ParameterError(f"{format_path((*path, 'low'))}: expected {wanted}, got {low:g}")
     return Range(low, high, given.scale)
 
 
@@ -214,7 +212,7 @@ def axis(given: Any, path: Place, check: Callable[[Any, Place], T]) -> list[T]:
         return [check(given, path)]
     values = [check(value, (*path, k)) for k, value in enumerate(given)]
     if not values:
-        raise ParameterError(f"{format_path(path)}: none, but at least one value was wanted")
+        raise ParameterError(f"{format_path(path)}: expected at least one value, got none")
     once(values, path)
     return values
 
@@ -227,7 +225,7 @@ def once(values: Sequence[object], path: Place) -> None:
             told = (
                 f"{format_path((*path, k))}: {quote(value)} is given already at {format_path((*path, first))}"
             )
-            raise ParameterError(f"{told}; each once was wanted")
+            raise ParameterError(f"{told}; duplicate value")
 
 
 TeamValue: TypeAlias = float | str | None  # of what is varied of team and conditions
@@ -356,7 +354,9 @@ class Study:
         if self.group:
             size = len(build_team(list(self.group), ("team", "group")))
             if self.robots not in (Study.robots, (size,)):
-                raise ParameterError(f"robots: {list(self.robots)}, but the groups of the team have {size}")
+                raise ParameterError(
+                    f"robots: expected {size} as in the groups of the team, got {list(self.robots)}"
+                )
             object.__setattr__(self, "robots", (size,))
         for k, controller in enumerate(self.controllers):
             require_type(f"controllers[{k}]", controller, str, "a text")
@@ -364,7 +364,7 @@ class Study:
             name = each.name
             if not isinstance(name, str) or not 1 <= len(name) <= _LONGEST_NAME or not name.isprintable():
                 wanted = f"a text of 1 to {_LONGEST_NAME} characters on one line"
-                raise ParameterError(f"maps[{k}]: name {quote(name)}, but {wanted} was wanted")
+                raise ParameterError(f"maps[{k}]: expected {wanted}, got name {quote(name)}")
         for name, low, high in (("robots", 1, 10_000), ("seeds", 0, 2**63 - 1)):
             for k, value in enumerate(getattr(self, name)):
                 require_number(format_path((name, k)), value, low, high, whole=True)
@@ -375,12 +375,12 @@ class Study:
         require_type("metrics", self.metrics, bool, "true or false")
         for name in ("maps", "controllers", "robots", "seeds"):
             if not getattr(self, name):
-                raise ParameterError(f"{name}: none, but at least one was wanted")
+                raise ParameterError(f"{name}: expected at least one, got none")
             once([item.name for item in self.maps] if name == "maps" else getattr(self, name), (name,))
         once(self.starts, ("starts",))
         for (k, name), each in product(enumerate(self.starts if self.starts != (ALL,) else ()), self.maps):
             if name == ALL:
-                beside = "is all of them, so nothing beside it was wanted"
+                beside = "is all of them, so nothing next to it is possible"
                 raise ParameterError(f"starts[{k}]: {quote(ALL)} {beside}")
             try:
                 each.environment.start(name)
@@ -403,7 +403,9 @@ class Study:
         rows = self.duration / self.dt * max(self.robots)
         if rows > MOST_ROWS:
             rows_of = f"{self.duration:g} s of {max(self.robots)} robots at {self.dt:g} s are {rows:.3g} rows"
-            raise ParameterError(f"duration: {rows_of} of a record, but at most {MOST_ROWS:.0e} were wanted")
+            raise ParameterError(
+                f"duration: expected at most {MOST_ROWS:.0e} rows of a record, got {rows_of}"
+            )
 
     def _count_values(self) -> dict[str, int]:
         """Return how many values are given of what is varied, apart from gains, before they are checked."""
@@ -480,7 +482,7 @@ class Study:
                 sources[name] = source._replace(modules=find_own_modules(source.text))
             gains[name] = Gains.of(kind, self.gains.get(name, {}), self.sampling, ("gains", name))
         if self.sampling is not None and not any(each.ranges for each in gains.values()):
-            raise ParameterError("sampling: no gain has a range {low, high}, but at least one was wanted")
+            raise ParameterError("sampling: expected at least one gain with a range {low, high}, got none")
         return sources, gains
 
 
@@ -554,7 +556,7 @@ def _value_of(name: str, value: object, path: Place) -> TeamValue:
     if name == "kinematics":
         if value not in KINEMATICS:
             raise ParameterError(
-                f"{format_path(path)}: {quote(value)}, but {' or '.join(KINEMATICS)} was wanted"
+                f"{format_path(path)}: expected {' or '.join(KINEMATICS)}, got {quote(value)}"
             )
         return str(value)
     if name in EVENTS:
@@ -569,7 +571,7 @@ def _value_of(name: str, value: object, path: Place) -> TeamValue:
         given: dict[str, Any] = {"forget_after": 1e6, name: value}
         return getattr(placed(path, lambda: Conditions(**given)), name)  # type: ignore[no-any-return]
     if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > _HUGE:
-        raise ParameterError(f"{format_path(path)}: {quote(value)}, but a number was wanted")
+        raise ParameterError(f"{format_path(path)}: expected a number, got {quote(value)}")
     one: dict[str, Any] = {name: float(value)}
     placed(path, lambda: Team.homogeneous(1, **one))
     return float(value)

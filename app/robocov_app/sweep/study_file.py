@@ -46,7 +46,7 @@ def _of(*kinds: type, words: tuple[str, ...] = ()) -> Check:
 
 _TEXT, _WHOLE = _Value("a text", _of(str)), _Value("a whole number", _of(int))
 _NUMBER, _WORD = _Value("a number", _of(int, float)), _Value("a number or a text", _of(int, float, str))
-_LIMIT = _Value(f'a number, or "{NO_LIMIT}" for no limit,', _of(int, float, words=(NO_LIMIT,)))
+_LIMIT = _Value(f'a number, or "{NO_LIMIT}" for no limit', _of(int, float, words=(NO_LIMIT,)))
 _SCALE = _Value('"linear" or "log"', _of(words=get_args(Scale)))
 _METHOD = _Value('"sobol", "latin-hypercube" or "halton"', _of(words=get_args(Method)))
 
@@ -55,13 +55,13 @@ def _several(wanted: str, item: _Value) -> _Value:
     return _Value(wanted, item.one, item)
 
 
-_TEXTS = _several("a text, or a list of texts,", _TEXT)
-_TEAM = _several("a number, or a list of numbers,", _LIMIT)
-_CONDITION = _several("a number or a text, or a list of them,", _WORD)
+_TEXTS = _several("a text, or a list of texts", _TEXT)
+_TEAM = _several("a number, or a list of numbers", _LIMIT)
+_CONDITION = _several("a number or a text, or a list of them", _WORD)
 _GAIN = _Value(
-    "a number or a word, a list of them, or a range {low, high},",
+    "a number or a word, a list of them, or a range {low, high}",
     _WORD.one,
-    _WORD._replace(wanted=f'a number, "{NO_LIMIT}" for no limit, or a word,'),
+    _WORD._replace(wanted=f'a number, "{NO_LIMIT}" for no limit, or a word'),
     _Table("", {"low": _NUMBER, "high": _NUMBER, "scale": _SCALE}, ("low", "high")),
 )
 _GROUPS = _Value("tables [[team.group]]", item=_Value("a table", _of(dict)))
@@ -70,11 +70,11 @@ _SAMPLING = {"method": _METHOD, "samples": _WHOLE, "seed": _WHOLE}
 _STUDY = _Table(
     "a table",
     {
-        "maps": _several("a list of names of maps, or of paths beside this file,", _TEXT),
+        "maps": _several("a list of names of maps, or of paths beside this file", _TEXT),
         "controllers": _several("a list of controllers", _TEXT),
-        "robots": _several("a whole number, or a list of whole numbers,", _WHOLE),
+        "robots": _several("a whole number, or a list of whole numbers", _WHOLE),
         "starts": _TEXTS,
-        "seeds": _several("how many seeds, or a list of seeds,", _WHOLE),
+        "seeds": _several("how many seeds, or a list of seeds", _WHOLE),
         **dict.fromkeys(("duration", "dt", "cost_hz", "record_hz"), _NUMBER),
         "lattice": _WHOLE,
         "metrics": _Value("true or false", _of(bool)),
@@ -97,7 +97,7 @@ def _read(given: Any, wanted: _Value | _Table, path: Place, unknown: list[str], 
         above = f"{format_path(path)}: " if path else ""
         unknown += [above + describe_unknown_name("key", key, keys) for key in given if key not in keys]
         missing = {format_path((*path, key)): keys[key].wanted for key in table.required if key not in given}
-        mistakes += [f"{at}: missing, but {what} was wanted" for at, what in missing.items()]
+        mistakes += [f"{at}: missing, expected {what}" for at, what in missing.items()]
         there = [key for key in keys if key in given]
         return {key: _read(given[key], keys[key], (*path, key), unknown, mistakes) for key in there}
     if item is not None and isinstance(given, list):
@@ -105,12 +105,12 @@ def _read(given: Any, wanted: _Value | _Table, path: Place, unknown: list[str], 
     with suppress(ValueError, OverflowError):
         if one is not None:
             return one(given)
-    mistakes.append(f"{format_path(path)}: {quote(given)}, but {wanted.wanted} was wanted")
+    mistakes.append(f"{format_path(path)}: expected {wanted.wanted}, got {quote(given)}")
     return None
 
 
 def read_study(path: Path | str) -> Study:
-    """Return the study in a TOML file; raises InputError: the file, the key, the value, what was wanted."""
+    """Return the study in a TOML file; raises InputError with file, key, expected and given value."""
     path = Path(path)
     where = to_one_line(path)
     return study_of(parse_toml(read_bytes(path), where), path.parent, where)
@@ -158,7 +158,7 @@ def _maps(entries: list[str], folder: Path) -> list[StudyMap]:
         except InputError as error:
             raise InputError(f"maps[{k}]: {error}") from error
         if name in maps:
-            wanted = f"maps whose names differ, and there is a {name!r} already,"
-            raise InputError(f"maps[{k}]: {quote(entry)}, but {wanted} were wanted")
+            wanted = f"maps whose names differ, and there is a {name!r} already"
+            raise InputError(f"maps[{k}]: expected {wanted}, got {quote(entry)}")
         maps[name] = StudyMap(name, environment)
     return list(maps.values())

@@ -193,7 +193,7 @@ def sweep(
 
         def keep(task: Task, outcome: Outcome) -> None:
             if (difference := difference_of(outcome.versions)) and not keep_versions:
-                wanted = "the same versions everywhere, or --keep-versions, was wanted"
+                wanted = "expected the same versions everywhere, or --keep-versions"
                 raise OutputError(f"a worker has {difference}; {wanted}")
             ledger.keep(task, outcome)
             rows.finished.add(task.name)

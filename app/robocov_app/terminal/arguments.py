@@ -16,21 +16,21 @@ from robocov.errors import InputError, ParameterError, quote, require_number
 T = TypeVar("T")
 
 _WORDING: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
-    (r"^Error parsing (\S+): invalid literal for int.* 10: (.*)$", r"\1: \2, but a whole number was wanted"),
-    (r"^Error parsing (\S+): could not convert string to float: (.*)$", r"\1: \2, but a number was wanted"),
+    (r"^Error parsing (\S+): invalid literal for int.* 10: (.*)$", r"\1: expected a whole number, got \2"),
+    (r"^Error parsing (\S+): could not convert string to float: (.*)$", r"\1: expected a number, got \2"),
     (
         r"^Error parsing (\S+): no type matching (INT|FLOAT) could be .* from \[(.*?)\]\. .*$",
-        lambda match: f"{match[1]}: {match[3]}, but a {'whole ' * (match[2] == 'INT')}number was wanted",
+        lambda match: f"{match[1]}: expected a {'whole ' * (match[2] == 'INT')}number, got {match[3]}",
     ),
     (
         r"^Error parsing (\S+): no type matching \{?FLOAT FLOAT\}? could be .* from \[(.*?)\]\. .*$",
-        r"\1: \2, but two numbers were wanted",
+        r"\1: expected two numbers, got \2",
     ),
     (
         r"^invalid choice (.*) for argument '(\S+)'\. Expected one of \((.*?),? ?\) ?\.$",
         lambda match: f"{match[2]}: expected {_choices(match[3])}, got {match[1]}",
     ),
-    (r"^Missing value for argument '(\S+)'\..*$", r"\1: a value was wanted"),
+    (r"^Missing value for argument '(\S+)'\..*$", r"\1: expected a value"),
     (r"^Missing from robocov \w+: (-\S+).*$", r"\1: this option is required"),
     (r"^Missing from robocov \w+: (\S+).*$", r"missing argument: expected \1"),
     (r"^Unrecognized options: (-[^\s,]+).*$", r"unknown option \1"),
@@ -212,8 +212,8 @@ def parsed_size(option: str, text: str, least: tuple[int, int], most: tuple[int,
     """Return width and height from a text like ``1280x720``; raises ParameterError."""
     match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", text)
     if not match:
-        wanted = "WIDTHxHEIGHT in pixels, as in 1280x720, was wanted"
-        raise ParameterError(f"{option}: {quote(text)}, but {wanted}")
+        wanted = "expected WIDTHxHEIGHT in pixels, as in 1280x720"
+        raise ParameterError(f"{option}: {wanted}, got {quote(text)}")
     width, height = int(match[1]), int(match[2])
     require_number(option, width, least[0], most[0], "pixels wide")
     require_number(option, height, least[1], most[1], "pixels high")
@@ -230,7 +230,7 @@ def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
     for text in texts:
         name, equals, value = text.partition("=")
         if not equals or not re.fullmatch(r"[^\W\d][\w.:/-]*", name):
-            raise ParameterError(f"--set: {quote(text)}, but GAIN=VALUE, as in k_rep=0.3, was wanted")
+            raise ParameterError(f"--set: expected GAIN=VALUE, as in k_rep=0.3, got {quote(text)}")
         if name in gains:
             raise ParameterError(f"--set: {name} is given twice")
         if re.fullmatch(_WORD, value) and value not in _JSON_WORDS:
@@ -239,6 +239,6 @@ def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
         try:
             gains[name] = json.loads(value)
         except (ValueError, RecursionError) as error:  # also of thousands of digits, or brackets
-            wanted = "a number (or null), or a word, was wanted"
-            raise ParameterError(f"--set {name}: {quote(value)}, but {wanted}") from error
+            wanted = "expected a number (or null), or a word"
+            raise ParameterError(f"--set {name}: {wanted}, got {quote(value)}") from error
     return gains

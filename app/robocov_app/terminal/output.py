@@ -56,9 +56,9 @@ def require_fresh(
     if not resolve_target(path).exists():
         return
     if source is not None and source.exists() and path.samefile(source):
-        raise InputError(f"{path}: the {read} that is read; {other} was wanted")
+        raise InputError(f"{path}: the {read} that is read; choose {other}")
     if not overwrite:
-        raise InputError(f"{path}: exists already; {other}, or --overwrite, was wanted")
+        raise InputError(f"{path}: exists already; choose {other} or pass --overwrite")
 
 
 def listed(folder: Path) -> str:

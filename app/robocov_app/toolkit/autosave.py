@@ -16,7 +16,7 @@ from platformdirs import user_state_path
 
 from robocov.errors import MapError, OutputError
 from robocov.files.folder_lock import lock_folder
-from robocov.files.strictjson import parse, read_bytes
+from robocov.files.strictjson import parse_json, read_bytes
 from robocov.files.writing import replace_file
 from robocov_app.toolkit.opening import require_regular_file
 
@@ -238,7 +238,7 @@ def opened_elsewhere(folder: Path | None, kind: str, path: Path) -> bool:
 def read_record(folder: Path, kind: str) -> Record:
     file = folder / _FILE
     require_regular_file(file)
-    held = parse(read_bytes(file), str(file))
+    held = parse_json(read_bytes(file), str(file))
     if not isinstance(held, dict) or held.get("format") != kind or held.get("version") != 1:
         raise MapError(f"{file}: is no {kind}")
     content = {name: held[name] for name in held if name not in ("format", "version", "path", "when")}

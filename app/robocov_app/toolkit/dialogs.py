@@ -212,7 +212,7 @@ def list_choice(
 
     def chosen(typed: str, option: Option | None) -> None:
         if option is None:
-            raise InputError(f"{typed!r}, but one of the list was wanted")
+            raise InputError(f"expected one of the list, got {typed!r}")
         accept(option)
 
     return Choice(title, found, chosen, "type to find")

@@ -170,7 +170,7 @@ def _whole(word: str, options: Callable[[], Iterable[str]] = tuple) -> Takes:
         try:
             return int(text)
         except ValueError:
-            raise ParameterError(f"{word}: {text!r}, but a whole number was wanted") from None
+            raise ParameterError(f"{word}: expected a whole number, got {text!r}") from None
 
     return Takes("whole number", read, options)
 
@@ -185,5 +185,5 @@ def _positive(word: str, text: str, low: float = 0.0, high: float = 1e300) -> fl
     except ValueError:
         value = math.nan
     if not low <= value <= high:
-        raise ParameterError(f"{word}: {text!r}, but a positive number was wanted")
+        raise ParameterError(f"{word}: expected a positive number, got {text!r}")
     return value

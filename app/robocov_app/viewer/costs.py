@@ -233,7 +233,7 @@ def _evaluated(momentary: TimeVaryingCost, question: CostQuestion) -> _Answer:
     assert positions is not None
     result = momentary.evaluate_all_robots(now, positions)
     if result is None:
-        raise InputError("positions: none is free, but at least one robot was wanted")
+        raise InputError("positions: expected at least one at a free position, got none")
     path = travel_time = None
     if question.speeds is not None:
         first = momentary(now, positions, speeds=question.speeds)

@@ -159,11 +159,11 @@ def save_story(
         names = folder_names([record.controller for record in records])
         runs: dict[str, Run] = {}
         if len(records) > 1:
-            (result.new / folder).mkdir(exist_ok=True)
-            begin_comparison(result.new / folder, names)
+            (result.staging / folder).mkdir(exist_ok=True)
+            begin_comparison(result.staging / folder, names)
         costs = []
         for number, name, record in zip(part.setups, names, records, strict=True):
-            place = result.new / folder / (name if len(records) > 1 else "")
+            place = result.staging / folder / (name if len(records) > 1 else "")
             record.save(place)
             # as in the window, robots that failed count as no obstacles of the cost
             bare = replace(record, environment=part.setups[number].environment)
@@ -175,22 +175,22 @@ def save_story(
             mean = runs[name].summary["mean_distance_m"]
             rows.append({"part": k, "controller": name, "mean_distance_m": mean})
         if len(records) > 1:
-            save_comparison(runs, costs[0], result.new / folder, options)
+            save_comparison(runs, costs[0], result.staging / folder, options)
         else:
-            save_pictures([runs[names[0]]], costs[0], result.new / folder, options)
+            save_pictures([runs[names[0]]], costs[0], result.staging / folder, options)
         times = {"from_s": part.begin * dt, "to_s": part.ends * dt}
         told.append({"folder": folder, **times, "words": part.node.words})
-        result.keep()
+        result.save_progress()
     if several:
-        write_json(result.new / STORY, {"format": "robocov-story", "version": 1, "parts": told})
+        write_json(result.staging / STORY, {"format": "robocov-story", "version": 1, "parts": told})
         header = "controller," + cost_table(histories[0][2])[0]
         lines: list[tuple[object, ...]] = []
         for begin, name, history in histories:
             lines += [(name, begin + row[0], *row[1:]) for row in cost_table(history)[1]]
-        write_csv(result.new / "cost.csv", header, lines)
+        write_csv(result.staging / "cost.csv", header, lines)
     look = options.film
     if look.video or look.frames:
-        film = result.new / FILMS[len(parts[-1].setups) > 1]
+        film = result.staging / FILMS[len(parts[-1].setups) > 1]
         total = round((end * dt / look.film_speed + FILM_HOLD) * look.fps) + 1
         frames = story_frames(document, node, end, parts, histories, look)
         write_moving(frames, total, film, look, stop, quiet=options.json)

@@ -66,8 +66,8 @@ class Parameter:
         try:
             return float(plain)
         except ValueError:
-            also = ", or none," if self.optional else ""
-            raise ParameterError(f"{self.label}: {quote(text)}, but a number{also} was wanted") from None
+            also = ", or none" if self.optional else ""
+            raise ParameterError(f"{self.label}: expected a number{also}, got {quote(text)}") from None
 
 
 @dataclass(frozen=True)
@@ -89,8 +89,8 @@ class Pick:
         begun = [word for word in self.offered if plain and word.lower().startswith(plain)]
         found = [word for word in begun if word.lower() == plain] or begun
         if len(found) != 1:
-            wanted = f"one of {', '.join(self.offered)} was wanted"
-            raise ParameterError(f"{self.label}: {quote(text)}, but {wanted}")
+            wanted = f"expected one of {', '.join(self.offered)}"
+            raise ParameterError(f"{self.label}: {wanted}, got {quote(text)}")
         return found[0]
 
 

@@ -350,7 +350,7 @@ def _after(names: list[str], now: str) -> str:
 def plain(message: str) -> str:
     """Return a message without the places in files that mean nothing in a window.
 
-    >>> plain("team.max_speed: 0 m/s, but a number was wanted")
-    'max_speed: 0 m/s, but a number was wanted'
+    >>> plain("team.max_speed: expected a number, got 0 m/s")
+    'max_speed: expected a number, got 0 m/s'
     """
     return message.removeprefix("team.").removeprefix("obstacles: ")

@@ -9,7 +9,7 @@ from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile
 
 from robocov.errors import InputError, OutputError, RobocovError, describe_error
-from robocov.files.result_folder import MANIFEST
+from robocov.files.result_folder import MANIFEST_FILE
 from robocov.files.writing import replace_file
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit.dialogs import MOST_LISTED
@@ -124,7 +124,7 @@ def _is_offered(path: Path) -> bool:
     if path.name.startswith("."):
         return False
     if path.is_dir():
-        return (path / MANIFEST).exists()
+        return (path / MANIFEST_FILE).exists()
     return path.suffix.lower() in _OFFERED_SUFFIXES
 
 

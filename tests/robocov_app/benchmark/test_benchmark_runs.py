@@ -120,7 +120,7 @@ def test_built_in_entries_are_what_comes_out() -> None:
     assert count == 2
     # other processors' libraries of linear algebra may round the last bit differently
     for words in found:
-        numbers = re.search(r": ([\d.e-]+), but ([\d.e-]+) was found$", words)
+        numbers = re.search(r": expected ([\d.e-]+), got ([\d.e-]+)$", words)
         alike = numbers and float(numbers[1]) == pytest.approx(float(numbers[2]), rel=1e-3)
         assert words.startswith("made with") or alike, words
 
@@ -160,9 +160,9 @@ def test_what_is_forged_is_found(tmp_path: Path) -> None:
     ran(out)
     honest = (out / RESULT).read_text()
     for change, words in (
-        (lambda result: result["rows"][1].update(work_J=1.0), "blocks-b, seed 0: work_J: 1.0, but"),
-        (lambda result: result["rows"][0].update(gap=0.01), "blocks-a, seed 0: gap: 0.01, but"),
-        (lambda result: result["rows"].pop(), "blocks-b, seed 0: no row, but one was wanted"),
+        (lambda result: result["rows"][1].update(work_J=1.0), "blocks-b, seed 0: work_J: expected"),
+        (lambda result: result["rows"][0].update(gap=0.01), "blocks-a, seed 0: gap: expected"),
+        (lambda result: result["rows"].pop(), "blocks-b, seed 0: missing row"),
         (lambda result: result["rows"][0].update(seed=7), "seed 7: a row of a run that was not selected"),
         (lambda result: result["versions"].update(numpy="1.0"), "made with numpy 1.0 instead of"),
     ):
@@ -179,7 +179,7 @@ def test_code_in_a_file_is_verified_only_if_it_is_named_and_the_same(
     mine.write_text(HEAD + PULL)
     ran(out, f"{mine}:Mine")
     assert str(tmp_path) not in (out / RESULT).read_text()
-    assert "--controller FILE.py:CLASS was wanted" in complaint(capsys, "benchmark", "verify", str(out))
+    assert "pass --controller FILE.py:CLASS" in complaint(capsys, "benchmark", "verify", str(out))
     assert checked(out, controller=f"{mine}:Mine", sample=1) == (1, [])
     mine.write_text(HEAD + PULL + "\n# changed\n")
     wrong = complaint(capsys, "benchmark", "verify", str(out), "--controller", f"{mine}:Mine")
@@ -216,9 +216,9 @@ def test_what_was_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.Mon
         (("--controller", "rapff"), "--controller: unknown controller 'rapff': did you mean 'rapf'"),
         (("--controller", "rapf", "--set", "k_re=1"), "unknown gain 'k_re'"),
         (("--controller", "rapf", "--track", "idael"), "did you mean 'ideal'"),
-        ((), "--controller: none, but"),
-        (("verify",), "DIR: 0 paths, but one result"),
-        (("page", "--alone"), "DIR: 0 paths, but results"),
+        ((), "--controller: expected the name of one, or FILE.py:CLASS"),
+        (("verify",), "DIR: expected one result"),
+        (("page", "--alone"), "DIR: expected results"),
         (("page", "nowhere"), "nowhere: no such file"),
         (("page", "TORN"), "torn.json.gz: Compressed file ended"),
         (("suite", "--quick"), "--quick: robocov benchmark suite has no such option"),

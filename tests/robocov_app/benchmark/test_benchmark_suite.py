@@ -76,7 +76,7 @@ def test_names_that_are_unknown() -> None:
         suite.chosen(["ideel"], [], quick=False)
     with pytest.raises(ParameterError, match="--maps: unknown map of the benchmark 'room'"):
         suite.chosen([], ["room"], quick=False)
-    with pytest.raises(ParameterError, match="--maps: forklifts, but a map of ideal was wanted"):
+    with pytest.raises(ParameterError, match="--maps: expected a map of ideal, got forklifts"):
         suite.chosen(["ideal"], ["forklifts"], quick=False)
 
 

@@ -44,9 +44,9 @@ def test_each_mistake_gets_a_line(file: Path, capsys: pytest.CaptureFixture[str]
     said = capsys.readouterr()
     lines = said.err.splitlines()
     assert len(lines) == 4
-    assert lines[0].startswith(f"robocov: error: {file}:6:52: obstacles[0].radius: -1, but a number")
-    assert lines[1].startswith(f"robocov: error: {file}:7:5: obstacles[1].radius: missing, but a number")
-    assert lines[2].startswith(f"robocov: error: {file}:7:34: obstacles[1].center: [2], but a point")
+    assert lines[0].startswith(f"robocov: error: {file}:6:52: obstacles[0].radius: expected a number")
+    assert lines[1].startswith(f"robocov: error: {file}:7:5: obstacles[1].radius: missing, expected a number")
+    assert lines[2].startswith(f"robocov: error: {file}:7:34: obstacles[1].center: expected a point")
     assert lines[3].startswith(f"robocov: error: {file}:7:39: obstacles[1]: unknown key 'raduis': did you")
     assert said.out.startswith("rooms: valid\n")
 
@@ -65,7 +65,7 @@ def test_the_lines_are_in_the_answer_for_programs(file: Path, capsys: pytest.Cap
         "line": 6,
         "column": 52,
     }
-    assert second["text"].startswith("obstacles[0].radius: -1, but a number")
+    assert second["text"].startswith("obstacles[0].radius: expected a number")
     assert row["mistakes_not_listed"] == 0
     assert none["line"] is None and none["mistakes"] == []
     assert none["error"] == f"{file.parent / 'none.json'}: no such file"
@@ -108,7 +108,7 @@ def test_differences_are_to_the_last_valid_state(
     assert "was" not in blocks[1] and "  area " in blocks[2]
     assert "narrowest gap  0.100 m, between" in blocks[3] and ", was 1.500 m, between" in blocks[3]
     assert "warning        the gap between" in blocks[3] and "does not pass (new)" in blocks[3]
-    assert f"{file}: invalid\n{file}:6:52: obstacles[0].radius: -1" in blocks[3]
+    assert f"{file}: invalid\n{file}:6:52: obstacles[0].radius: expected a number" in blocks[3]
     assert ", was 0.100 m, between" in blocks[4] and "no longer      the gap between" in blocks[4]
     assert "free area      55.3" in blocks[4]
 
@@ -160,9 +160,9 @@ def test_watching_from_outside(file: Path, terminal: bool) -> None:
         fresh = file.with_suffix(".new")
         fresh.write_text(BAD)
         fresh.replace(file)
-        said = read_until(ours, b"missing, but")
+        said = read_until(ours, b"missing, expected")
         assert time.monotonic() - began < 10.0
-        assert b"mine.json:6:52: obstacles[0].radius: -1" in said
+        assert b"mine.json:6:52: obstacles[0].radius: expected a number" in said
         process.send_signal(signal.SIGINT)
         _, complaints = process.communicate(timeout=30)
     finally:

@@ -61,7 +61,7 @@ def test_a_folder_of_maps_and_a_sheet(tmp_path: Path, capsys: pytest.CaptureFixt
     for seed, name in enumerate(names, start=8):
         assert load_map(folder / name) == generate_map(seed, kind="mazes")
     assert sheet.read_bytes().startswith(b"\x89PNG")
-    assert complaint(capsys, *words).startswith(f"{folder}: the folder is not empty; another --out, or")
+    assert complaint(capsys, *words).startswith(f"{folder}: the folder is not empty; choose another --out or")
 
 
 def test_overwriting_replaces_maps_and_nothing_else(
@@ -108,26 +108,26 @@ def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str
             "--kind: expected polygons, blocks, rooms, mazes or caves, got 'mases'",
         ),
         ("--seed -1", "--seed: expected a whole number of at least 0, got -1"),
-        ("--seed x", "--seed: 'x', but a whole number was wanted"),
+        ("--seed x", "--seed: expected a whole number, got 'x'"),
         ("--obstacles 0", "--obstacles: expected a whole number from 1 to 100000, got 0"),
         ("--area 2", "--area: expected a number from 0.01 to 0.9, got 2.0"),
         ("--area nan", "--area: expected a number from"),
         ("--area 0.8", "--area: no layout of 6 obstacles was found"),
         ("--gap 0.1", "--gap: expected a number from 0.21 to 3.33333, got 0.1"),
         ("--side 0", "--side: expected a number from 1 to 1000, got 0.0"),
-        ("--width 5", "--width: 5, but --height was wanted with it"),
-        ("--height 5", "--height: 5, but --width was wanted with it"),
+        ("--width 5", "requires --height"),
+        ("--height 5", "requires --width"),
         ("--width 5 --height 2000", "--height: expected a number from 1 to 1000, got 2000.0"),
         ("--side 5 --width 5 --height 5", "--side: 5, but --width and --height say how large the map is"),
         ("--count 0 --out maps", "--count: expected a number from 1 to 10000, got 0"),
-        ("--count 3", "--out: a folder for the maps was wanted with --count and --study"),
-        ("--study full", "--out: a folder for the maps was wanted with --count and --study"),
+        ("--count 3", "--out: required with --count and --study, as the folder of the maps"),
+        ("--study full", "--out: required with --count and --study, as the folder of the maps"),
         ("--study full --gap 0.7 --out maps", "--gap: 0.7, but --study says what its maps are like"),
         ("--study full --count 3 --out maps", "--count: 3, but --study says what its maps are like"),
         ("--study half", "--study: expected full or quick, got 'half'"),
-        ("--plot sheet.gif", "sheet.gif: suffix '.gif', but .png, .svg or .pdf was wanted"),
+        ("--plot sheet.gif", "sheet.gif: expected .png, .svg or .pdf, got suffix '.gif'"),
         ("--plot none/sheet.png", "none/sheet.png: cannot be written: there is no folder none"),
-        ("--out .", "--out: '.', but the name of a file was wanted"),
+        ("--out .", "--out: expected the name of a file, got '.'"),
         ("--out none/map.json", "none/map.json: cannot be written: No such file or directory"),
     ],
 )
@@ -152,7 +152,9 @@ def test_the_seed_that_leads_nowhere_is_named(tmp_path: Path, capsys: pytest.Cap
 def test_a_file_that_is_there_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "map.json"
     file.write_text("mine")
-    assert "exists already; another --out, or --overwrite" in complaint(capsys, "generate", "-o", str(file))
+    assert "exists already; choose another --out or pass --overwrite" in complaint(
+        capsys, "generate", "-o", str(file)
+    )
     assert file.read_text() == "mine"
     assert "cannot be used for maps: " in complaint(capsys, "generate", "--count", "2", "-o", str(file / "x"))
 

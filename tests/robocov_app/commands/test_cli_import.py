@@ -58,7 +58,7 @@ def test_the_name_of_the_map_is_that_of_the_file(
     (tmp_path / "maps" / "grid.map").write_text(GRID)
     assert said(capsys, "import", "maps/grid.map", "--cell", "0.5")[-1] == "saved in grid.json"
     assert load_map(Path("grid.json")).free_area == 1.25
-    assert "grid.json: exists already; another -o, or --overwrite" in complaint(
+    assert "grid.json: exists already; choose another -o or pass --overwrite" in complaint(
         capsys, "import", "maps/grid.map"
     )
     words = ("import", "maps/grid.map", "--trees", "free", "--overwrite", "--json")
@@ -70,11 +70,11 @@ def test_the_file_that_is_read_is_never_written(tmp_path: Path, capsys: pytest.C
     path = tmp_path / "plan.map"
     path.write_text(GRID)
     message = complaint(capsys, "import", str(path), "--overwrite", "-o", str(path))
-    assert f"{path}: the file that is read; another -o was wanted" in message
+    assert f"{path}: the file that is read; choose another -o" in message
     picture = tmp_path / "plan.png"
     picture.write_bytes(b"")
     words = ("-o", str(tmp_path / "a.json"), "--overwrite", "--preview", str(picture))
-    assert "another --preview was wanted" in complaint(capsys, "import", str(picture), *words)
+    assert "choose another --preview" in complaint(capsys, "import", str(picture), *words)
     assert path.read_text() == GRID
     assert set(tmp_path.iterdir()) == {path, picture}
 
@@ -87,17 +87,17 @@ def test_the_file_that_is_read_is_never_written(tmp_path: Path, capsys: pytest.C
         ("plan.yaml", "--invert", "--invert: no option of the format ros"),
         ("grid.map", "--unknown free", "--unknown: no option of the format movingai, whose options are: --"),
         ("plan.pgm", "--trees obstacle", "--trees: no option of the format picture"),
-        ("plan.pgm", "", "--cell, the metres a pixel, was wanted (or import plan.yaml beside it)"),
+        ("plan.pgm", "", "expected --cell, the metres per pixel (or import plan.yaml beside it)"),
         ("plan.pgm", "--cell nan", "--cell: expected a number from 1e-06 to 10000 m"),
         ("plan.pgm", "--cell 1 --threshold 3", "--threshold: expected a number from 0 to 1"),
         ("plan.pgm", "--cell 0.001", "no place is wide enough for a robot of radius 0.1 m"),
-        ("plan.yaml", "--inside 1", "--inside: '1', but two numbers were wanted"),
-        ("plan.yaml", "--inside 1 x", "--inside: '1', 'x', but two numbers were wanted"),
+        ("plan.yaml", "--inside 1", "--inside: expected two numbers, got '1'"),
+        ("plan.yaml", "--inside 1 x", "--inside: expected two numbers, got '1', 'x'"),
         ("plan.yaml", "--radius 1", "no place is wide enough for a robot of radius 1 m"),
         ("plan.yaml", "--simplify -1", "--simplify: expected a number from 0 to 10"),
         ("plan.yaml", "--keep some", "--keep: expected largest or all, got 'some'"),
-        ("plan.yaml", "--format bmp", "--format: 'bmp', but one of "),
-        ("plan.yaml", "--format movingai", "line 1: 'image: plan.pgm', but type octile"),
+        ("plan.yaml", "--format bmp", "--format: expected one of "),
+        ("plan.yaml", "--format movingai", "line 1: 'image: expected type octile"),
         ("none.yaml", "", "none.yaml: no such file"),
         ("plan.yaml", "--preview a.bmp", "a.bmp"),
     ],

@@ -129,14 +129,14 @@ def test_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("words", "part"),
     [
-        ((), "MAP or --run DIR: one of the two was wanted"),
-        (("rooms", "--run", "x"), "MAP or --run DIR: one of the two was wanted"),
+        ((), "MAP or --run DIR: expected one of the two"),
+        (("rooms", "--run", "x"), "MAP or --run DIR: expected one of the two"),
         (("roms",), "unknown map 'roms': did you mean 'rooms'?"),
         (("rooms", "--robots", "0"), "--robots: expected a whole number from 1 to 500, got 0"),
         (("rooms", "--robots", "many"), "--robots: "),
         (("rooms", "--restarts", "0"), "--restarts: expected a whole number from 1 to 100000, got 0"),
         (("rooms", "--lattice", "1"), "--lattice: expected a whole number from 2 to 2048, got 1"),
-        (("rooms", "--seed", "-1"), "--seed: -1, but"),
+        (("rooms", "--seed", "-1"), "--seed: expected a whole number of at least 0, got -1"),
         (("rooms", "--precision", "0"), "--precision: expected a number from 1e-05 to 1, got 0.0"),
         (("rooms", "--radius", "-1"), "radius: expected a number above 0 m, got -1.0"),
         (("square", "--radius", "6"), "robots: expected at most about 0, as many as fit with radius 6 m in"),

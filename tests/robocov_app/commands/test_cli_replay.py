@@ -116,7 +116,7 @@ def test_a_run_is_not_replaced_by_its_own_film(run: Path, both: Path, capsys) ->
     for source, out in ((run, run), (run, run.parent), (both, both / "lloyd"), (both / "lloyd", both)):
         words = ("--frames", *SMALL, "--overwrite", "--out", str(out))
         assert complaint(capsys, "replay", str(source), *words).endswith(
-            "another folder than that of the run was wanted"
+            "expected another folder than that of the run"
         )
     assert (run / "record.npz").exists()
     assert (both / "lloyd" / "record.npz").exists()
@@ -130,7 +130,7 @@ def test_runs_of_different_lengths_make_a_film(both: Path, tmp_path: Path, capsy
     answer(capsys, "replay", str(both), "--frames", *SMALL, "--fps", "2", "--out", str(tmp_path / "film"))
     assert len(pictures(tmp_path / "film")) == 3 + 2
     assert complaint(capsys, "replay", str(both)) == (
-        f"{both}/lloyd: moments: 61, but 31 as in {both}/rpf was wanted; --frames and --video show both"
+        f"{both}/lloyd: moments: expected 31 as in {both}/rpf, got 61; --frames and --video show both"
     )
 
 
@@ -189,12 +189,12 @@ def test_without_a_display_it_says_what_else_there_is(run: Path, monkeypatch, ca
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("--frames", "--out: a folder for frames and film was wanted"),
-        ("--out film", "--out: --frames or --video was wanted beside it"),
-        ("--json", "--json: --frames or --video was wanted beside it"),
-        ("--frames --out film --controller a.py:A", "--controller: neither --frames nor --video was wanted"),
-        ("--controller gone.py:Mine", "controller 'gone.py:Mine': file not found: gone.py"),
-        ("--controller lloyd", "--controller: lloyd, but the controller of a run was wanted: rapf"),
+        ("--frames", "--out: expected a folder for the frames and the video"),
+        ("--out film", "--out: requires --frames or --video"),
+        ("--json", "--json: requires --frames or --video"),
+        ("--frames --out film --controller a.py:A", "--controller: expected neither --frames nor --video"),
+        ("--controller gone.py:Mine", "controller 'gone.py:Mine': there is no file gone.py"),
+        ("--controller lloyd", "--controller: expected the controller of a run, got lloyd: rapf"),
         ("--size 480x320", "--size: expected a number from 900 to 7680 pixels wide, got 480"),
         ("--frames --out film --fps 0", "--fps: expected a number from 1 to 240, got 0"),
         ("--frames --out film --show cell", "--show: unknown layer 'cell'"),
@@ -225,7 +225,7 @@ def arrays(folder: Path, **changes) -> None:
         ),
         (
             lambda run: edited(run / "run.json", session=[1]),
-            "{run}/run.json: session: [1], but an object was wanted",
+            "{run}/run.json: session: expected an object, got [1]",
         ),
         (lambda run: arrays(run, time=np.zeros(61)), "{run}/record.npz: time: expected ascending numbers"),
         (
@@ -277,19 +277,19 @@ def test_a_spoilt_run_is_refused_in_one_line(run: Path, capsys, spoil, message: 
         ),
         (
             lambda both: (both / "comparison.json").write_text("[]"),
-            "{both}/comparison.json: [], but a JSON object with a comparison was",
+            "{both}/comparison.json: expected a JSON object with a comparison, got []",
         ),
         (
             lambda both: edited(both / "comparison.json", folders=["rpf", "../run"]),
-            '{both}/comparison.json: folders[1]: "../run", but the name of a folder was wanted',
+            '{both}/comparison.json: folders[1]: expected the name of a folder, got "../run"',
         ),
         (
             lambda both: edited(both / "comparison.json", folders=[".."]),
-            '{both}/comparison.json: folders[0]: "..", but the name of a folder was wanted',
+            '{both}/comparison.json: folders[0]: expected the name of a folder, got ".."',
         ),
         (
             lambda both: edited(both / "comparison.json", version=99),
-            "{both}/comparison.json: version: 99, but 1 was wanted; it was written by a newer robocov",
+            "{both}/comparison.json: version: expected 1, got 99; it was written by a newer robocov",
         ),
         (
             lambda both: edited(both / "comparison.json", folders=["gone"]),

@@ -113,14 +113,16 @@ def test_a_comparison_keeps_to_its_folder(tmp_path: Path, capsys: pytest.Capture
     (inner / "comparison.json").write_text(
         '{"format": "robocov-comparison", "version": 1, "folders": [".."]}'
     )
-    assert 'folders[0]: "..", but the name of a folder' in complaint(capsys, "metrics", str(inner))
+    assert "folders[0]: expected the name of a folder" in complaint(capsys, "metrics", str(inner))
     answer(capsys, "run", "square", *SHORT, "--out", str(inner), "--overwrite")
     assert len(Record.load(tmp_path / "run")) == len(Record.load(inner)) == 61
     (inner / "comparison.json").write_text(
         '{"format": "robocov-comparison", "version": 1, "folders": ["on"]}'
     )
     (inner / "on").symlink_to(tmp_path / "run")
-    assert "on: is a link" in complaint(capsys, "metrics", str(inner))
+    assert "on: expected a folder in that of the comparison, got a link" in complaint(
+        capsys, "metrics", str(inner)
+    )
 
 
 @pytest.mark.usefixtures("no_pictures")
@@ -215,15 +217,15 @@ def test_all_that_led_to_an_error_is_shown_where_it_is_wanted(
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ("9" * 5000, "--set k_rep: '99999"),
+        ("9" * 5000, "--set k_rep: expected a number (or null), or a word, got '99999"),
         ("9" * 4000, "rapf.k_rep: expected a number from"),
-        ("[" * 100_000, "--set k_rep: '[[["),
+        ("[" * 100_000, "--set k_rep: expected a number (or null), or a word, got '[[["),
         ("[" * 9 + "]" * 9, "rapf.k_rep: expected a number from"),
         ("NaN", "rapf.k_rep: expected a number from"),
         ("-Infinity", "rapf.k_rep: expected a number from"),
         ("1e999", "rapf.k_rep: expected a number from"),
         ('{"a": 1}', "rapf.k_rep: expected a number from"),
-        ("", "--set k_rep: '', but a number (or null), or a word, was wanted"),
+        ("", "--set k_rep: expected a number (or null), or a word, got ''"),
     ],
     ids=range(9),
 )

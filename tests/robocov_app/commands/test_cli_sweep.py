@@ -129,7 +129,7 @@ def test_a_dry_run_says_what_is_done_already(study: Path, capsys: pytest.Capture
     ("words", "message"),
     [
         (("--workers", "0"), "--workers: expected a number from 1 to 1024, got 0"),
-        (("--workers", "2", "--scheduler", "tcp://here:1"), "--workers: those of a cluster are its own"),
+        (("--workers", "2", "--scheduler", "tcp://here:1"), "--workers: cannot be combined with --scheduler"),
         (("--seeds", "3"), "unknown option --seeds"),
     ],
 )

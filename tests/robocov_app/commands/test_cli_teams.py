@@ -75,8 +75,8 @@ def test_the_cost_of_places_in_seconds(tmp_path: Path, capsys: pytest.CaptureFix
     half = answer(capsys, *words, "--speeds", "0.5")
     assert half["mean_time_s"] == pytest.approx(2.0 * plain["mean_distance_m"])
     said = complaint(capsys, *words, "--speeds", "1", "1", "1")
-    assert said == "--speeds: 3 numbers, but one, or one for each of 2 robots, was wanted"
-    assert complaint(capsys, *words, "--speeds", "0") == "--speeds: 0.0 m/s, but a number above 0 was wanted"
+    assert said == "--speeds: expected one, or one for each of 2 robots, got 3 numbers"
+    assert complaint(capsys, *words, "--speeds", "0") == "--speeds: expected a number above 0, got 0.0 m/s"
 
 
 def test_teams_that_are_none(tmp_path: Path, team: Path, capsys: pytest.CaptureFixture[str]) -> None:

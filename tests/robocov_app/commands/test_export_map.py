@@ -51,12 +51,12 @@ def test_what_is_wrong_gets_one_line_and_leaves_nothing(
     monkeypatch.chdir(tmp_path)
     for words, part in (
         ("export square", "this option is required"),
-        ("export square -o x.doc", "x.doc: unknown format, but a file ending in one of"),
-        ("export square -o x.svg --format doc", "--format: 'doc', but one of"),
+        ("export square -o x.doc", "x.doc: unknown format, expected a file ending in one of"),
+        ("export square -o x.svg --format doc", "--format: expected one of"),
         ("export square -o x.svg --cell 1", "--cell: no option of the format svg"),
         ("export square -o none/x.svg", "cannot be written"),
         ("export nowhere -o x.svg", "nowhere"),
-        ("export square -o x.svg --digits 99", "digits: 99"),
+        ("export square -o x.svg --digits 99", "digits: expected a number from 0 to 12, got 99"),
     ):
         assert part in complaint(capsys, *words.split())
     assert list(tmp_path.iterdir()) == []

@@ -312,10 +312,10 @@ def test_messages_of_the_map_name_things_and_where_they_are():
     for message, words in [
         ("map: obstacles[0]: is odd", "circle “pillar”: is odd"),
         ("map: obstacles[1].vertices[0]: is odd", "polygon 2, corner 1: is odd"),
-        ("map: obstacles[1].vertices[2][1]: nan, but", "polygon 2, corner 3: nan, but"),
+        ("map: obstacles[1].vertices[2][1]: is odd", "polygon 2, corner 3: is odd"),
         ("map: obstacles[1].holes[0][3]: is odd", "polygon 2, hole 1, corner 4: is odd"),
         ("map: obstacles[9]: is odd", "obstacles[9]: is odd"),
-        ("obstacles[1].path.speed: 0, but", "polygon 2, path, speed: 0, but"),
+        ("obstacles[1].path.speed: is odd", "polygon 2, path, speed: is odd"),
         ("obstacles[1].path.points[0]: is odd", "polygon 2, path, point 1: is odd"),
         ("density.areas[2].vertices[0]: is odd", "density, area 3, corner 1: is odd"),
         ("starts.corner.positions[1]: is odd", "start “corner”, place 2: is odd"),

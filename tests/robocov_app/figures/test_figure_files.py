@@ -133,7 +133,7 @@ class TestPdf:
 
 @pytest.mark.parametrize("name", ["a.eps", "a", "a.jpeg"])
 def test_other_suffixes_are_refused(tmp_path, name):
-    with pytest.raises(ParameterError, match=r"suffix '.*', but \.png, \.svg or \.pdf was wanted"):
+    with pytest.raises(ParameterError, match=r"expected \.png, \.svg or \.pdf, got suffix '.*'"):
         save_figure(plot_environment(HALL), tmp_path / name)
     with pytest.raises(ParameterError, match="suffix"):
         check_figure_path(tmp_path / name)

@@ -157,7 +157,7 @@ def test_a_small_page_has_the_curves_alone(size):
 
 
 def test_no_moments_are_refused():
-    with pytest.raises(ParameterError, match="moments: none were given"):
+    with pytest.raises(ParameterError, match="moments: expected at least one, got none"):
         plot_coverage(curves(1), [])
 
 

@@ -49,7 +49,7 @@ CASES: list[tuple[str, str, str]] = [
     ("json", overpass(building="yes"), NONE),
     ("json", "[[[1, 1], [1, 1], [1, 1]]]", NONE),
     ("json", '{"vertices": [1, 1, 1, 1, 1, 1]}', NONE),
-    ("json", '{"verts": [[1, 1], [1, 1], [1, 1]]}', "0 different points"),
+    ("json", '{"verts": [[1, 1], [1, 1], [1, 1]]}', "expected at least 3 different points, got 0"),
     ("geojson", geojson("Polygon", [[[1, 1], [1, 1], [1, 1]]]), NONE),
     ("geojson", geojson("Polygon", [[[0, 0], [2, 0], [0, 0]]]), NONE),
     ("geojson", geojson("Polygon", [[]]), "a list of at least 1 point"),
@@ -67,7 +67,7 @@ CASES: list[tuple[str, str, str]] = [
     ("dxf", dxf(0, "CIRCLE", 8, 0, 10, 0, 20, 0, 40, 0), NONE),
     ("dxf", dxf(0, "SOLID", 8, 0, 10, 0, 20, 0, 11, 0, 21, 0, 12, 0, 22, 0), NONE),
     ("world", "model ( block ( points 1 point[0] [1 1] ) )", NONE),
-    ("world", "model ( size [0 0 0] )", "size: 0.0, but a number"),
+    ("world", "model ( size [0 0 0] )", "size: expected a number"),
 ]
 
 

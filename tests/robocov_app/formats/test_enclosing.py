@@ -67,7 +67,7 @@ def test_lines_of_that_name_are_the_boundary_where_they_close() -> None:
     assert foreign.boundary.equals(box(0, 0, 20, 10))  # type: ignore[union-attr]
     assert foreign.free.area == pytest.approx(200 - 1 - 0.5)
     assert foreign.notes[-1] == "1 line taken as walls, 0.1 m wide (--thickness)"
-    with pytest.raises(MapError, match=r"plan: boundary 'open': encloses no area, but a closed outline"):
+    with pytest.raises(MapError, match=r"plan: boundary 'open': encloses no area, expected a closed outline"):
         taken(shapes(HALL, lines=[([[0, 0], [1, 1]], "open")], boundary="open"))
 
 
@@ -126,7 +126,7 @@ def test_what_outlines_are_can_be_said() -> None:
     foreign = taken(rooms)
     assert foreign.free.area == pytest.approx(32.0)
     assert foreign.boundary.area == pytest.approx(200.0)  # type: ignore[union-attr]
-    with pytest.raises(MapError, match="no closed outline, but one that encloses free space"):
+    with pytest.raises(MapError, match="no closed outline, expected one that encloses free space"):
         taken(shapes(lines=[HALL], outlines="free"))
 
 
@@ -175,7 +175,9 @@ def test_what_is_nothing_is_told() -> None:
         "2 third coordinates, z from 2 to 3.5",
     )
     assert foreign.repaired == ("2 rings closed",)
-    with pytest.raises(MapError, match=r"no closed outline and no line \(1 text left out\), but a drawing"):
+    with pytest.raises(
+        MapError, match=r"no closed outline and no line \(1 text left out\), expected a drawing"
+    ):
         empty = shapes()
         empty.leave_out("text")
         taken(empty)
@@ -199,7 +201,7 @@ def test_outlines_that_meet_themselves_are_counted() -> None:
 @pytest.mark.parametrize("far", [1e300, np.nan, np.inf, 2e7])
 def test_coordinates_beyond_the_world_are_refused(far: float) -> None:
     for drawn in ({"lines": [[[0, 0], [far, 0]]]}, {"points": [[far, 0]]}):
-        with pytest.raises(MapError, match=r"plan: a point at \[.*\] m, but coordinates from -10000000 to"):
+        with pytest.raises(MapError, match=r"plan: expected coordinates from -10000000 to"):
             shapes(**drawn)
     with pytest.raises(MapError, match="coordinates from"):
         shapes([[0, 0], [far, 0], [0, 1]])
@@ -209,7 +211,7 @@ def test_coordinates_beyond_the_world_are_refused(far: float) -> None:
 
 def test_what_is_larger_than_any_map_is_refused() -> None:
     far = shapes(square(0, 0, 1e6, 9))
-    with pytest.raises(MapError, match=r"plan: 1e\+06 x 9 m, but at most 10 km was wanted: is the"):
+    with pytest.raises(MapError, match=r"plan: expected at most 10 km, got 1e.06 x 9 m: is the scale right."):
         taken(far)
 
 
@@ -220,7 +222,7 @@ def test_shapes_thinner_than_the_grid_are_no_walls() -> None:
 
 def test_too_many_vertices_are_refused() -> None:
     found = Shapes("plan", ReadOptions())
-    with pytest.raises(MapError, match=rf"plan: some {MAX_VERTICES + 1} vertices, but at most"):
+    with pytest.raises(MapError, match=r"plan: expected at most"):
         found.add_line(Line(np.zeros((MAX_VERTICES + 1, 2)), 0.1))
 
 

@@ -44,7 +44,7 @@ def test_every_format_says_what_it_is() -> None:
 
 def test_what_is_not_known(tmp_path: Path) -> None:
     with pytest.raises(
-        ParameterError, match=r"a\.xyz: unknown format, but a file ending in one of \.yaml, .*\.png"
+        ParameterError, match=r"a\.xyz: unknown format, expected a file ending in one of \.yaml, .*\.png"
     ):
         export_map(ROOM, "a.xyz")
     with pytest.raises(ParameterError, match="unknown format 'rosy': did you mean 'ros'"):
@@ -54,10 +54,10 @@ def test_what_is_not_known(tmp_path: Path) -> None:
     ):
         export_map(ROOM, tmp_path / "a.png", options=WriteOptions(mode="raw"))
     for options, wanted in (
-        ({"cell": 0.0}, "cell: expected a number from"),
-        ({"mode": "binary"}, "mode: 'binary', but one of trinary, scale, raw"),
-        ({"image": "bmp"}, "image: 'bmp'"),
-        ({"digits": 99}, "digits: 99"),
+        ({"cell": 0.0}, "cell: expected a number from 1e-06 to 10000 m, got 0.0"),
+        ({"mode": "binary"}, "mode: expected one of trinary, scale, raw"),
+        ({"image": "bmp"}, "image: expected one of pgm, png, got 'bmp'"),
+        ({"digits": 99}, "digits: expected a number from 0 to 12, got 99"),
         ({"scale": float("nan")}, "scale: expected a number from"),
     ):
         with pytest.raises(ParameterError, match=wanted):

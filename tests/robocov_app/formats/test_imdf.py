@@ -195,9 +195,13 @@ def test_content_that_is_refused(tmp_path: Path) -> None:
     cases: list[tuple[str, Any, str]] = [
         ("level", [], "expected units on its levels, got none"),
         ("unit", [], "expected units on its levels, got none"),
-        ("unit", [3], "unit.geojson:1:44: features[0]: 3, but a feature with properties was wanted"),
+        ("unit", [3], "unit.geojson:1:44: features[0]: expected a feature with properties, got 3"),
         ("unit", [{**unit("office", 0, 0, 9, 9), "properties": {"level_id": []}}], "got none"),
-        ("level", [feature("level", None)], "features[0].properties.ordinal: null"),
+        (
+            "level",
+            [feature("level", None)],
+            "features[0].properties.ordinal: expected the number of a floor, got null",
+        ),
         ("unit", [unit("office", 0, 0, 0, 0)], "expected spaces with an area on this level, got none"),
         ("unit", [unit("column", 0, 0, 1, 1)], "expected spaces with an area on this level, got none"),
     ]
@@ -210,7 +214,7 @@ def test_content_that_is_refused(tmp_path: Path) -> None:
 
 def test_a_folder_or_zip_of_something_else_is_none(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
-    with pytest.raises(MapError, match="is a folder"):
+    with pytest.raises(MapError, match="expected a file, got a folder"):
         detect(tmp_path / "empty")
     other = tmp_path / "other.zip"
     with zipfile.ZipFile(other, "w") as archive:

@@ -54,15 +54,15 @@ def test_the_content_counts_before_the_suffix(tmp_path: Path) -> None:
 def test_what_is_not_known(tmp_path: Path) -> None:
     path = tmp_path / "plan.xyz"
     path.write_text("nothing")
-    wanted = r"plan\.xyz: unknown format \(text that begins with 'nothing'\), but one of .*ros.* was wanted"
+    wanted = r"plan\.xyz: unknown format \(text that begins with 'nothing'\), expected one of .*ros.*"
     with pytest.raises(MapError, match=wanted):
         detect(path)
     with pytest.raises(MapError, match="no such file"):
         detect(tmp_path / "none.png")
     os.mkfifo(tmp_path / "pipe.png")
-    with pytest.raises(MapError, match="is a pipe or a device"):
+    with pytest.raises(MapError, match="expected a file, got a pipe or a device"):
         detect(tmp_path / "pipe.png")
-    with pytest.raises(MapError, match="is a folder"):
+    with pytest.raises(MapError, match="expected a file, got a folder"):
         import_map(tmp_path)
     with pytest.raises(ParameterError, match="unknown format 'gif'"):
         import_map(path, format="gif")
@@ -83,14 +83,14 @@ def test_a_format_may_be_forced(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "wanted"),
     [
-        ({"cell": 0.0}, "cell: expected a number from"),
-        ({"cell": float("nan")}, "cell: expected a number from"),
-        ({"scale": -1.0}, "scale: expected a number from"),
-        ({"thickness": float("inf")}, "thickness: expected a number from"),
+        ({"cell": 0.0}, "cell: expected a number from 1e-06 to 10000 m, got 0.0"),
+        ({"cell": float("nan")}, "cell: expected a number from 1e-06 to 10000 m, got nan"),
+        ({"scale": -1.0}, "scale: expected a number from 1e-06 to 10000 m, got -1.0"),
+        ({"thickness": float("inf")}, "thickness: expected a number from 1e-06 to 10000 m, got inf"),
         ({"threshold": 1.1}, "threshold: expected a number from 0 to 1"),
-        ({"threshold": float("nan")}, "threshold: expected a number from"),
-        ({"unknown": "solid"}, "unknown: 'solid', but one of obstacle, free, cut"),
-        ({"trees": "green"}, "trees: 'green', but one of obstacle, free"),
+        ({"threshold": float("nan")}, "threshold: expected a number from 0 to 1, got nan"),
+        ({"unknown": "solid"}, "unknown: expected one of obstacle, free, cut"),
+        ({"trees": "green"}, "trees: expected one of obstacle, free"),
     ],
 )
 def test_options_out_of_range(options: dict[str, object], wanted: str) -> None:

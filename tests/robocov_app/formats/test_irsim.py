@@ -154,22 +154,22 @@ def test_pictures_are_only_read_from_the_folder(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
-        ("  obstacle_map: {name: perlin, seed: 1}", "world.obstacle_map: 'perlin', which IR-SIM generates"),
-        ("  mdownsample: 0\n  obstacle_map: a.pgm", "world.mdownsample: '0', but a number from 1"),
-        ("obstacle: 5", "obstacle: '5', but a mapping"),
-        ("obstacle:\n  - {shape: {name: blob}}", "obstacle[0].shape.name: 'blob', but circle, rectangle"),
-        ("obstacle:\n  - {shape: {radius: -1}}", "obstacle[0].shape.radius: -1.0, but a number from"),
-        ("obstacle:\n  - {shape: {radius: x}}", "obstacle[0].shape.radius: 'x', but a number within 1e7"),
-        ("obstacle:\n  - {state: [1, a]}", "obstacle[0].state[1]: 'a', but a number within 1e7 was wanted"),
-        ("obstacle:\n  - {state: 1}", "obstacle[0].state: '1', but a list was wanted"),
-        ("obstacle:\n  - {state: [1]}", "obstacle[0].state: ['1'], but a list of 3 numbers"),
-        ("obstacle:\n  - {state: [.nan, 1]}", "obstacle[0].state[0]: '.nan', but a number"),
-        ("obstacle:\n  - {state: [1e9, 1]}", "obstacle[0].state[0]: '1e9', but a number within 1e7"),
-        ("obstacle:\n  - {number: 9e6}", "obstacle[0].number: '9e6', but a number of at most 4000"),
-        ("obstacle:\n  - {distribution: {name: x}}", "obstacle[0].distribution.name: 'x', but manual"),
-        ("obstacle:\n  shape: {name: polygon, vertices: [[0, 0]]}", "shape.vertices: [['0', '0']], but "),
+        ("  obstacle_map: {name: perlin, seed: 1}", "world.obstacle_map: expected a picture, got 'perlin'"),
+        ("  mdownsample: 0\n  obstacle_map: a.pgm", "world.mdownsample: expected a number from 1"),
+        ("obstacle: 5", "obstacle: expected a mapping"),
+        ("obstacle:\n  - {shape: {name: blob}}", "obstacle[0].shape.name: expected circle, rectangle"),
+        ("obstacle:\n  - {shape: {radius: -1}}", "obstacle[0].shape.radius: expected a number from"),
+        ("obstacle:\n  - {shape: {radius: x}}", "obstacle[0].shape.radius: expected a number within 1e7"),
+        ("obstacle:\n  - {state: [1, a]}", "obstacle[0].state[1]: expected a number within 1e7, got 'a'"),
+        ("obstacle:\n  - {state: 1}", "obstacle[0].state: expected a list, got '1'"),
+        ("obstacle:\n  - {state: [1]}", "obstacle[0].state: expected a list of 3 numbers"),
+        ("obstacle:\n  - {state: [.nan, 1]}", "obstacle[0].state[0]: expected a number"),
+        ("obstacle:\n  - {state: [1e9, 1]}", "obstacle[0].state[0]: expected a number within 1e7"),
+        ("obstacle:\n  - {number: 9e6}", "obstacle[0].number: expected a number of at most 4000"),
+        ("obstacle:\n  - {distribution: {name: x}}", "obstacle[0].distribution.name: expected manual"),
+        ("obstacle:\n  shape: {name: polygon, vertices: [[0, 0]]}", "shape.vertices: expected "),
         ("obstacle:\n  - &a {shape: *a}", "line 7: expected the name of an anchor before it"),
-        ("obstacle: " + "[" * 20, "nested too deeply, but at most 12 levels"),
+        ("obstacle: " + "[" * 20, "nested too deeply, expected at most 12 levels"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, text: str, wanted: str) -> None:
@@ -224,7 +224,7 @@ PARTS = ", ".join(["*a"] * 100)
     ids=["aliases", "parts"],
 )
 def test_parts_of_many_objects_are_counted_together(tmp_path: Path, text: str) -> None:
-    with pytest.raises(MapError, match="shapes, but at most 20000 were wanted"):
+    with pytest.raises(MapError, match="expected at most 20000, got 20001 shapes"):
         read(tmp_path, text)
 
 

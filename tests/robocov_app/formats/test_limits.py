@@ -15,7 +15,7 @@ def test_the_beginning_and_the_whole_of_a_file(tmp_path: Path) -> None:
     assert len(files.head(path)) == files.HEAD
     assert files.content(path) == b"x" * (files.HEAD + 10)
     assert files.content(path, files.HEAD + 10) == b"x" * (files.HEAD + 10)
-    with pytest.raises(MapError, match=r"a\.bin: larger than 1 MB, but a smaller file was wanted"):
+    with pytest.raises(MapError, match=r"a\.bin: expected at most 1 MB, got more"):
         files.content(path, 1_000_000)
 
 
@@ -23,9 +23,9 @@ def test_what_is_no_file(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for path, wanted in (
         (tmp_path / "none", "no such file"),
-        (tmp_path, "is a folder, but a file was wanted"),
-        (tmp_path / "pipe", "is a pipe or a device"),
-        (Path("/dev/zero"), "is a pipe or a device"),
+        (tmp_path, "expected a file, got a folder"),
+        (tmp_path / "pipe", "expected a file, got a pipe or a device"),
+        (Path("/dev/zero"), "expected a file, got a pipe or a device"),
         (tmp_path / "nul\0", "cannot be read"),
         (tmp_path / ("long" * 100), "cannot be read"),
     ):
@@ -40,16 +40,16 @@ def test_a_size_on_the_disk_is_looked_at_before_the_content(tmp_path: Path) -> N
     path = tmp_path / "sparse"
     with path.open("wb") as file:
         file.truncate(10**12)
-    with pytest.raises(MapError, match="larger than 256 MB"):
+    with pytest.raises(MapError, match="expected at most 256 MB, got more"):
         files.content(path)
 
 
 def test_sizes_counts_lengths_and_places() -> None:
     files.require_cells(8000, 8000, "grid")
     for width, height in ((0, 5), (5, -1)):
-        with pytest.raises(MapError, match="but at least 1 x 1 was wanted"):
+        with pytest.raises(MapError, match="expected at least 1 x 1, got"):
             files.require_cells(width, height, "grid")
-    with pytest.raises(MapError, match="1000000000 x 1000000000 cells, but at most 64 million"):
+    with pytest.raises(MapError, match="expected at most 64 million"):
         files.require_cells(10**9, 10**9, "grid")
     files.require_vertices(files.MAX_VERTICES, "grid")
     with pytest.raises(MapError, match="500001 vertices"):
@@ -57,7 +57,7 @@ def test_sizes_counts_lengths_and_places() -> None:
     files.require_length(0.05, "resolution")
     files.require_coordinate(-1e7, "origin")
     for bad in (float("nan"), float("inf"), -float("inf"), -1.0, 0.0, 1e5):
-        with pytest.raises(MapError, match=r"^resolution: .* a number from 1e-06 to 10000 \(m\) was wanted"):
+        with pytest.raises(MapError, match=r"^resolution: expected a number from 1e-06 to 10000 \(m\)"):
             files.require_length(bad, "resolution")
     for bad in (float("nan"), float("inf"), 1.1e7):
         with pytest.raises(MapError, match=r"^origin: "):

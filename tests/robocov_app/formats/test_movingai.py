@@ -46,7 +46,7 @@ def test_letters(tmp_path: Path) -> None:
 def test_it_is_known_by_its_content_and_its_suffix(tmp_path: Path) -> None:
     assert detect(write(tmp_path, GRID, "grid.txt")) is IMPORTER
     assert detect(write(tmp_path, "nothing of the kind", "b.map")) is IMPORTER
-    with pytest.raises(MapError, match=r"b\.map: line 1: 'nothing of the kind', but type octile"):
+    with pytest.raises(MapError, match=r"b\.map: line 1: expected type octile"):
         import_map(tmp_path / "b.map")
 
 
@@ -68,25 +68,34 @@ def test_line_ends_marks_blanks_and_the_order_of_the_header(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
-        ("", "no line map"),
-        ("type octile\n", "no line map"),
-        ("type hex\nheight 1\nwidth 1\nmap\n.", "line 1: type 'hex', but octile"),
-        ("type octile\nheight 1\nmap\n.", "line 3: no width so far"),
-        ("type octile\nheight -1\nwidth 1\nmap\n.", "line 2: 'height -1'"),
-        ("type octile\nheight nan\nwidth 1\nmap\n.", "line 2: 'height nan'"),
-        ("type octile\nheight 0\nwidth 1\nmap\n", "1 x 0 cells, but at least 1 x 1"),
+        ("", "expected a line map after type, height and width, got none"),
+        ("type octile\n", "expected a line map after type, height and width, got none"),
+        ("type hex\nheight 1\nwidth 1\nmap\n.", "line 1: expected octile"),
+        ("type octile\nheight 1\nmap\n.", "line 3: expected width first"),
+        (
+            "type octile\nheight -1\nwidth 1\nmap\n.",
+            "line 2: expected type octile, height N, width N or map, got 'height -1'",
+        ),
+        (
+            "type octile\nheight nan\nwidth 1\nmap\n.",
+            "line 2: expected type octile, height N, width N or map, got 'height nan'",
+        ),
+        ("type octile\nheight 0\nwidth 1\nmap\n", "expected at least 1 x 1"),
         ("type octile\nheight 999999999\nwidth 999999999\nmap\n.", "at most 64 million"),
-        ("type octile\nheight 9999999999999\nwidth 1\nmap\n.", "line 2: height '9999999999999'"),
+        (
+            "type octile\nheight 9999999999999\nwidth 1\nmap\n.",
+            "line 2: expected a smaller height, got '9999999999999'",
+        ),
         ("type octile\nheight \u0665\nwidth 1\nmap\n.", "line 2: "),
-        (GRID.replace("@S.OW@", "@S.XW@"), "line 7, column 4: 'X', but one of . G S @ O T W"),
-        (GRID.replace("@S.OW@", "@S.OW"), "line 7: 5 letters, but 6 letters"),
-        (GRID.replace("@S.OW@", "@S.OW@@"), "line 7: 7 letters"),
-        (GRID.replace("@S.OW@\n", "\n@S.OW@\n"), "line 7: 0 letters"),
-        (GRID.replace("@....@\n@@@@@@\n", ""), "line 8: end of file, but 6 letters"),
-        (GRID + "......\n", "line 10: more than 5 rows"),
+        (GRID.replace("@S.OW@", "@S.XW@"), "line 7, column 4: expected one of . G S @ O T W"),
+        (GRID.replace("@S.OW@", "@S.OW"), "line 7: expected 6 letters"),
+        (GRID.replace("@S.OW@", "@S.OW@@"), "line 7: expected 6 letters, got 7 letters"),
+        (GRID.replace("@S.OW@\n", "\n@S.OW@\n"), "line 7: expected 6 letters, got 0 letters"),
+        (GRID.replace("@....@\n@@@@@@\n", ""), "line 8: expected 6 letters"),
+        (GRID + "......\n", "line 10: expected 5 rows, got more"),
         (GRID.replace(".", "@").replace("G", "@").replace("S", "@"), "no cell is free"),
-        ("type octile\n" * 30, "no line map"),
-        ("x" * 5000, "line 1: 'xxx"),
+        ("type octile\n" * 30, "expected a line map after type, height and width, got none"),
+        ("x" * 5000, "line 1: expected type octile, height N, width N or map, got"),
     ],
     ids=map(str, range(99)),
 )

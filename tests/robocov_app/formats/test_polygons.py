@@ -111,7 +111,7 @@ def test_crossings_are_those_of_all_shapes_together() -> None:
     enclosed([star], "nonzero", crossings)
     assert crossings.count == pytest.approx(151 * (75 - 1), rel=0.01)
     enclosed([star + 5], "evenodd", crossings)
-    with pytest.raises(MapError, match=r"stars: its lines cross each other some 3e\+04 times, but at most"):
+    with pytest.raises(MapError, match=r"stars: expected at most"):
         enclosed([star + 9], "holes", crossings)
 
 

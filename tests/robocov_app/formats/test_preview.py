@@ -114,7 +114,7 @@ def test_files_are_the_same_every_time(tmp_path: Path) -> None:
         assert (tmp_path / name).read_bytes() == first
     with Image.open(tmp_path / "plan.png") as picture:
         assert picture.getpixel((2, 2))[:3] == LIGHT.background
-    with pytest.raises(ParameterError, match=r"suffix '.bmp', but .png, .svg or .pdf was wanted"):
+    with pytest.raises(ParameterError, match=r"expected .png, .svg or .pdf, got suffix '.bmp'"):
         preview(read, environment, report, tmp_path / "plan.bmp")
     with pytest.raises(OutputError, match="there is no folder"):
         preview(read, environment, report, tmp_path / "none" / "plan.png")

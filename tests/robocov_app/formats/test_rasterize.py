@@ -63,15 +63,13 @@ def test_the_grid_has_a_cell_to_spare_on_each_side() -> None:
 
 
 def test_cells_that_are_too_small_or_too_large() -> None:
-    with pytest.raises(
-        ParameterError, match=r"cell: 0\.0001 m makes 50002 x 30002 cells, but at most 64 million"
-    ):
+    with pytest.raises(ParameterError, match=r"cell: expected at most 64 million"):
         grid_over(room(), 1e-4)
     blocks = tuple(
         PolygonObstacle(((x, 2.0), (x + 0.4, 2.0), (x + 0.4, 5.0), (x, 5.0)))
         for x in (1.0, 1.5, 2.0, 2.5, 3.0)
     )
-    with pytest.raises(ParameterError, match="cell: with 20 m no cell is free, but a smaller one was wanted"):
+    with pytest.raises(ParameterError, match="cell: no cell of 20 m is free, expected a smaller size"):
         free_cells(room(obstacles=blocks), grid_over(room(obstacles=blocks), 20.0))
 
 

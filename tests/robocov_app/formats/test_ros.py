@@ -246,7 +246,7 @@ def test_the_picture_is_looked_for_beside_the_file_and_nowhere_else(tmp_path: Pa
     (maps / "secret.pgm").symlink_to(tmp_path / "secret.pgm")
     for image in ("../secret.pgm", str(tmp_path / "secret.pgm"), "link.pgm", "away/secret.pgm", "secret.pgm"):
         path = ros_map(maps, b"", image=image)
-        with pytest.raises(MapError, match=r"outside of the file's folder.*\(--anywhere allows it\)"):
+        with pytest.raises(MapError, match=r"expected a picture in it .--anywhere allows it."):
             read(path)
         assert read(path, anywhere=True).area > 0
     # a link to the whole folder is no way out of it
@@ -276,30 +276,33 @@ def test_a_picture_that_is_not_there_is_taken_from_beside_the_file(tmp_path: Pat
     [
         ({"image": "none.pgm"}, "none.pgm: no such file"),
         ({"image": "''"}, "image: empty"),
-        ({"image": "[a, b]"}, "image: ['a', 'b'], but one value"),
-        ({"image": "."}, "is a folder"),
+        ({"image": "[a, b]"}, "image: expected one value"),
+        ({"image": "."}, "expected a file, got a folder"),
         ({"image": "x" * 300}, "image: 'xxx"),
-        ({"image": "x/" * 2000}, "4000 characters, but a shorter name was wanted"),
+        ({"image": "x/" * 2000}, "expected a shorter name, got 4000 characters"),
         ({"image": '"a\\0b"'}, "image: 'a\\x00b'"),
-        ({"image": "pipe"}, "is a pipe or a device"),
+        ({"image": "pipe"}, "expected a file, got a pipe or a device"),
         ({"resolution": None}, "resolution: missing"),
-        ({"resolution": "nan"}, "resolution: 'nan', but a number"),
-        ({"resolution": ".nan"}, "resolution: '.nan', but a number"),
-        ({"resolution": "inf"}, "resolution: 'inf', but a number"),
-        ({"resolution": -0.05}, "resolution: -0.05, but a number from 0.0001 to 1000 (m)"),
-        ({"resolution": 0}, "resolution: 0.0, but a number"),
-        ({"resolution": 1e-9}, "resolution: 1e-09, but a number"),
-        ({"resolution": "{a: 1}"}, "resolution: {'a': '1'}, but one value"),
-        ({"origin": "[1, 2, nan]"}, "origin[2]: 'nan'"),
-        ({"origin": "[1, 1e30, 0]"}, "origin[1]: 1e+30"),
-        ({"origin": "[1]"}, "origin: ['1'], but [x, y, yaw]"),
-        ({"origin": "[[1, 2], 0]"}, "origin[0]: ['1', '2'], but a number"),
-        ({"origin": 5}, "origin: '5', but [x, y, yaw]"),
-        ({"negate": 2}, "negate: '2', but 0 or 1"),
-        ({"free_thresh": 0.9}, "free_thresh, occupied_thresh: 0.9, 0.65"),
-        ({"free_thresh": -1}, "free_thresh, occupied_thresh: -1, 0.65"),
-        ({"occupied_thresh": "much"}, "occupied_thresh: 'much', but a number"),
-        ({"mode": "quaternary"}, "mode: 'quaternary', but one of trinary, scale, raw"),
+        ({"resolution": "nan"}, "resolution: expected a number"),
+        ({"resolution": ".nan"}, "resolution: expected a number"),
+        ({"resolution": "inf"}, "resolution: expected a number"),
+        ({"resolution": -0.05}, "resolution: expected a number from 0.0001 to 1000 (m)"),
+        ({"resolution": 0}, "resolution: expected a number"),
+        ({"resolution": 1e-9}, "resolution: expected a number"),
+        ({"resolution": "{a: 1}"}, "resolution: expected one value"),
+        ({"origin": "[1, 2, nan]"}, "origin[2]: expected a number, got 'nan'"),
+        (
+            {"origin": "[1, 1e30, 0]"},
+            "origin[1]: expected a number from -10000000 to 10000000 (m), got 1e+30",
+        ),
+        ({"origin": "[1]"}, "origin: expected [x, y, yaw]"),
+        ({"origin": "[[1, 2], 0]"}, "origin[0]: expected a number"),
+        ({"origin": 5}, "origin: expected [x, y, yaw]"),
+        ({"negate": 2}, "negate: expected 0 or 1"),
+        ({"free_thresh": 0.9}, "free_thresh, occupied_thresh: expected numbers from 0 to 1, the first not"),
+        ({"free_thresh": -1}, "free_thresh, occupied_thresh: expected numbers from 0 to 1, the first not"),
+        ({"occupied_thresh": "much"}, "occupied_thresh: expected a number"),
+        ({"mode": "quaternary"}, "mode: expected one of trinary, scale, raw"),
         ({"mode": "!!str raw"}, "the tag 'tag:yaml.org,2002:str'"),
     ],
 )
@@ -317,11 +320,9 @@ def test_what_is_refused(tmp_path: Path, keys: dict[str, object], wanted: str) -
 
 
 def test_nothing_free(tmp_path: Path) -> None:
-    with pytest.raises(
-        MapError, match=r"no cell is free, but some were wanted \(--unknown free takes unknown"
-    ):
+    with pytest.raises(MapError, match=r"no cell is free \(--unknown free takes unknown"):
         read(ros_map(tmp_path, drawn("##\n??")))
-    with pytest.raises(MapError, match=r"no cell is free, but some were wanted$"):
+    with pytest.raises(MapError, match=r"no cell is free$"):
         read(ros_map(tmp_path, drawn("##\n##")))
 
 

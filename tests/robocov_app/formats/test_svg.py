@@ -223,7 +223,7 @@ def test_an_origin_that_the_file_gives(tmp_path: Path) -> None:
 
 
 def test_a_plan_as_small_as_its_paper_needs_a_scale(tmp_path: Path) -> None:
-    wanted = "0.265 x 0.159 m at its own scale, but at least 1 m was wanted: --scale METRES"
+    wanted = "expected at least 1 m, got 0.265 x 0.159 m at its own scale: --scale METRES"
     with pytest.raises(MapError, match=wanted):
         drawn(tmp_path, PAGE, scale=None)
 
@@ -250,23 +250,23 @@ def test_what_editors_write_before_it(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("body", "wanted"),
     [
-        ('<path id="p" d="M0 0 L 10"/>', ":1: <path> 'p': character 10: 'the end', but a number"),
-        ('\n<rect width="10em"/>', ":2: <rect>: '10em', but a length in px"),
-        ('<rect width="9" height="9" transform="spin(1)"/>', "<rect>: 'spin(1)', but a transform"),
-        ('<polygon points="1 2 x"/>', "<polygon>: 'x', but a number"),
-        ('<circle cx="1e300" r="5"/>', "<circle>: 1e300, but a number up to 1e+30"),
-        ('<circle cx="1e20" r="5"/>', "line 1: a point at [1e+18, 5.95] m, but coordinates"),
-        ('<circle r="1e20"/>', "line 1: a point at [-1e+18, -1e+18] m, but coordinates"),
-        ('<ellipse rx="1e20" ry="1e20"/>', "<ellipse>: more than 250000 points, but fewer"),
-        ('<path d="M0 0 A 1e20 1e20 0 1 1 5 5"/>', "<path>: more than 500000 points, but fewer"),
-        ('<path d="M0 0 C 1e10 0 0 1e10 5 5"/>', "line 1: a point at"),
+        ('<path id="p" d="M0 0 L 10"/>', ":1: <path> 'p': character 10: expected a number"),
+        ('\n<rect width="10em"/>', ":2: <rect>: expected a length in px"),
+        ('<rect width="9" height="9" transform="spin(1)"/>', "<rect>: expected a transform"),
+        ('<polygon points="1 2 x"/>', "<polygon>: expected a number"),
+        ('<circle cx="1e300" r="5"/>', "<circle>: expected a number up to 1e+30"),
+        ('<circle cx="1e20" r="5"/>', "line 1: expected coordinates"),
+        ('<circle r="1e20"/>', "line 1: expected coordinates"),
+        ('<ellipse rx="1e20" ry="1e20"/>', "<ellipse>: expected at most 250000 points, got more"),
+        ('<path d="M0 0 A 1e20 1e20 0 1 1 5 5"/>', "<path>: expected at most 500000 points, got more"),
+        ('<path d="M0 0 C 1e10 0 0 1e10 5 5"/>', "got a point at"),
         (
             '<g transform="scale(1e20)"><g transform="scale(1e20)"/></g>',
             "<g>: a transform to coordinates beyond 1e+30",
         ),
-        ('<svg viewBox="0 0 1"/>', "<svg>: viewBox '0 0 1', but four numbers"),
-        ("", "no closed outline and no line, but a drawing"),
-        ("<g><text>Hall</text></g>", "(1 text left out), but a drawing"),
+        ('<svg viewBox="0 0 1"/>', "<svg>: expected four numbers"),
+        ("", "no closed outline and no line, expected a drawing"),
+        ("<g><text>Hall</text></g>", "expected a drawing"),
     ],
 )
 def test_what_cannot_be_understood_is_refused(tmp_path: Path, body: str, wanted: str) -> None:
@@ -303,12 +303,12 @@ def test_document_types_that_drawing_programs_write(tmp_path: Path, inside: str)
         (b"", "not XML: no element found"),
         (b"<svg><g></svg>", ":1: not XML: mismatched tag"),
         (b"<svg><g xlink:href='#a'/></svg>", ":1: not XML: unbound prefix"),
-        (b"<html><svg/></html>", ": <html>, but <svg> was wanted"),
-        (b"<x:y xmlns:x='urn:z'/>", ": other XML, but <svg> was wanted"),
-        (b"\x1f\x8b\x08", ": compressed, but plain SVG was wanted"),
+        (b"<html><svg/></html>", ": expected <svg>, got <html>"),
+        (b"<x:y xmlns:x='urn:z'/>", ": expected <svg>, got other XML"),
+        (b"\x1f\x8b\x08", ": expected plain SVG, got compressed"),
         (
             b"<!DOCTYPE svg [\n<!ENTITY a SYSTEM 'file:///etc/passwd'>]><svg>&a;</svg>",
-            ":2: entity 'a' stands for another file ('file:///etc/passwd'), which is not read, but plain SVG",
+            ":2: entity 'a' stands for another file ('file:///etc/passwd'), which",
         ),
         (b"<!DOCTYPE svg [<!ENTITY % a SYSTEM 'b'> %a;]><svg/>", "entity 'a' stands for another file"),
         (b"<!DOCTYPE svg [<!ENTITY % a 'b'>]><svg/>", "entity 'a' stands for other entities"),
@@ -326,8 +326,8 @@ def test_document_types_that_drawing_programs_write(tmp_path: Path, inside: str)
         (b"<svg>&lol;</svg>", "not XML: undefined entity"),
         ("<!DOCTYPE svg [<!ENTITY a SYSTEM 'b'>]><svg/>".encode("utf-16"), "stands for another file"),
         (b"<?xml version='1.0' encoding='EBCDIC-CP-BE'?><svg/>", "not XML: "),
-        (b"<svg width='0' height='5'/>", "<svg>: 0 x 5 px, but a size was wanted"),
-        (b"<svg data-origin='1'/>", "<svg>: data-origin '1', but two numbers"),
+        (b"<svg width='0' height='5'/>", "<svg>: expected a size, got 0 x 5 px"),
+        (b"<svg data-origin='1'/>", "<svg>: expected two numbers"),
         (b"<svg" + b" a='1'" * 1_000_001 + b"/>", "more than 1000000 attributes"),
         (b"<svg>" + b"<g/>" * (MOST_ELEMENTS + 1) + b"</svg>", f"more than {MOST_ELEMENTS} elements"),
         (b"<g>" * 1_000_000, f"nested deeper than {DEEPEST}"),
@@ -353,11 +353,11 @@ def test_what_is_no_svg_is_refused(tmp_path: Path, content: bytes, wanted: str) 
             "<defs><g id='a0'><path d='M0 0h1v1z'/></g>"
             + "".join(f"<g id='a{k + 1}'>" + f"<use href='#a{k}'/>" * 10 + "</g>" for k in range(10))
             + "</defs><use href='#a10'/>",
-            f"elements to be drawn, uses and all, but at most {MOST_ELEMENTS} were wanted",
+            f"expected at most {MOST_ELEMENTS}, got ",
         ),
         (
             "".join(f"<g id='a{k + 1}'><use href='#a{k}'/></g>" for k in reversed(range(500))),
-            f"uses nested deeper than {DEEPEST}",
+            f"uses are nested deeper than {DEEPEST}",
         ),
     ],
 )

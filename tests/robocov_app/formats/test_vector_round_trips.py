@@ -179,7 +179,7 @@ def test_svg_at_a_smaller_scale(tmp_path: Path, cluttered: Environment) -> None:
     assert report.notes == ("1 mm is 0.05 m: 212 x 212 mm", "to import it again: --scale 0.05")
     again, _, _ = import_map(path, options=ReadOptions(scale=0.05), shaping=AS_IT_IS)
     assert again.free.symmetric_difference(cluttered.free).area < 1e-2
-    with pytest.raises(Exception, match="at its own scale, but at least 1 m was wanted"):
+    with pytest.raises(Exception, match=r"expected at least 1 m, got .* at its own scale"):
         import_map(path)
 
 
@@ -190,7 +190,7 @@ def test_what_cannot_be_written_is_refused(
         export_map(empty, tmp_path / "none" / "plan.wkt")
     with pytest.raises(ParameterError, match="cell: no option of the format wkt"):
         export_map(empty, tmp_path / "plan.wkt", options=WriteOptions(cell=0.1))
-    with pytest.raises(ParameterError, match=r"origin: \(200, 0\), but a longitude from -180 to 180"):
+    with pytest.raises(ParameterError, match=r"origin: expected a longitude from -180 to 180"):
         WriteOptions(origin=(200, 0))
     monkeypatch.setitem(sys.modules, "pyproj", None)
     with pytest.raises(ParameterError, match=r'origin: degrees need more: .*pip install "robocov\[geo\]"'):

@@ -176,30 +176,30 @@ def test_obstacles_are_asked_for(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
-        ("", ": no closed outline and no line, but a drawing was wanted"),
-        ("PLOYGON((0 0, 1 1))", ":1:1: 'PLOYGON((0 0, 1 1))', but one of POINT, LINESTRING"),
-        ("POLYGON\n((0 0, 1 0, 1 x, 0 0))", ":2:13: '1 x', but a point as 1.5 2"),
-        ("POLYGON((0 0, 10 0, 10 5, 0 nan))", ":1:27: '0 nan', but a point"),
-        ("POLYGON((0 0, 10 0, 10 inf, 0 1))", ":1:21: '10 inf', but a point"),
-        ("POLYGON((0 0, 10 0, 10, 0 1))", ":1:21: '10', but a point"),
-        ("POLYGON((0 0, 10 0 3, 10 5, 0 1))", ":1:15: '10 0 3', but a point as 1.5 2, with as many"),
-        ("POLYGON((0 0, 10 0, 10 5, 0 1e999))", ":1:9: a number beyond all bounds"),
-        ("POLYGON((0 0, 10 0, 10 5, 0 1e308))", ":1:9: a number beyond all bounds"),
-        ("POLYGON((0 0, 10 0, 10 5, 0 1e99))", ": geometry 1: a point at [0, 1e+99] m, but coordinates"),
-        ("POLYGON((0 0, 10 0, 10 5, 0 1..5))", "'0 1..5', but a point"),
-        ("POLYGON((0 0, 10 0, 10 5, 0 1", ":1:30: the end, but a point or ) was wanted"),
-        ("POLYGON((0 0, 10 0, 10 5, 0 1)", ":1:31: the end, but ) was wanted"),
-        ("POLYGON(0 0, 10 0, 10 5, 0 1)", ":1:9: '0 0, 10 0, 10 5, 0 1)', but ( was wanted"),
-        ("POLYGON", ":1:8: the end, but ( was wanted"),
-        ("POINT(1 1, 2 2)", ":1:1: 2 points, but one was wanted"),
-        ("LINESTRING(1 1)", ":1:11: 1 point, but at least 2 were wanted"),
-        ("CURVEPOLYGON((0 0, 1 0, 1 1, 0 0))", ":1:1: CURVEPOLYGON, but a geometry of straight edges"),
-        ("GEOMETRYCOLLECTION(" * 40, "nested too deeply, but at most 32 levels"),
-        ("SRID=1;POINT(0 0);SRID=2;POINT(0 0)", ":1:19: SRID 2 after 1, but one for all geometries"),
+        ("", ": no closed outline and no line, expected a drawing"),
+        ("PLOYGON((0 0, 1 1))", ":1:1: expected one of POINT, LINESTRING"),
+        ("POLYGON\n((0 0, 1 0, 1 x, 0 0))", ":2:13: expected a point as 1.5 2"),
+        ("POLYGON((0 0, 10 0, 10 5, 0 nan))", ":1:27: expected a point"),
+        ("POLYGON((0 0, 10 0, 10 inf, 0 1))", ":1:21: expected a point"),
+        ("POLYGON((0 0, 10 0, 10, 0 1))", ":1:21: expected a point"),
+        ("POLYGON((0 0, 10 0 3, 10 5, 0 1))", ":1:15: expected a point as 1.5 2, with as many"),
+        ("POLYGON((0 0, 10 0, 10 5, 0 1e999))", ":1:9: expected finite numbers"),
+        ("POLYGON((0 0, 10 0, 10 5, 0 1e308))", ":1:9: expected finite numbers"),
+        ("POLYGON((0 0, 10 0, 10 5, 0 1e99))", ": geometry 1: expected coordinates"),
+        ("POLYGON((0 0, 10 0, 10 5, 0 1..5))", "expected a point"),
+        ("POLYGON((0 0, 10 0, 10 5, 0 1", ":1:30: expected a point or ), got the end"),
+        ("POLYGON((0 0, 10 0, 10 5, 0 1)", ":1:31: expected ), got the end"),
+        ("POLYGON(0 0, 10 0, 10 5, 0 1)", ":1:9: expected (, got '0 0, 10 0, 10 5, 0 1)'"),
+        ("POLYGON", ":1:8: expected (, got the end"),
+        ("POINT(1 1, 2 2)", ":1:1: expected one point, got 2"),
+        ("LINESTRING(1 1)", ":1:11: expected at least 2 points, got 1"),
+        ("CURVEPOLYGON((0 0, 1 0, 1 1, 0 0))", ":1:1: expected a geometry of straight edges"),
+        ("GEOMETRYCOLLECTION(" * 40, "nested too deeply, expected at most 32 levels"),
+        ("SRID=1;POINT(0 0);SRID=2;POINT(0 0)", ":1:19: expected one SRID for all geometries"),
         ("SRID=99999;POINT(0 0)", ": reference system EPSG:99999 is unknown"),
         ("POLYGON((0 0, 1 1, 2 2, 0 0))", ": no closed outline and no line (1 outline without an area"),
-        ("POLYGON((0 0, 1_0 1, 2 2, 0 0))", ":1:15: '1_0 1', but a point"),
-        ("POLYGON((٠ 0, 1 1, 2 2, 0 0))", ":1:10: '٠ 0', but a point"),
+        ("POLYGON((0 0, 1_0 1, 2 2, 0 0))", ":1:15: expected a point"),
+        ("POLYGON((٠ 0, 1 1, 2 2, 0 0))", ":1:10: expected a point"),
     ],
 )
 def test_what_is_no_text_is_refused_with_its_place(tmp_path: Path, text: str, wanted: str) -> None:
@@ -214,7 +214,7 @@ def test_what_is_no_text_is_refused_with_its_place(tmp_path: Path, text: str, wa
 
 def test_bytes_that_are_no_text(tmp_path: Path) -> None:
     (tmp_path / "plan.wkt").write_bytes(b"POLYGON((0 0, 1\xff 0))")
-    with pytest.raises(MapError, match="byte 15: not UTF-8, but text was wanted"):
+    with pytest.raises(MapError, match="byte 15: not UTF-8, expected text"):
         IMPORTERS["wkt"].read(tmp_path / "plan.wkt", ReadOptions())
 
 

@@ -117,7 +117,7 @@ def test_the_record_is_that_of_a_simulation_under_the_same_forces(cluttered: Env
         assert twin.velocities.tobytes() == record.velocities[k].tobytes()
         twin.step(forces=record.forces[k])
     assert twin.positions.tobytes() == record.positions[-1].tobytes()
-    with pytest.raises(ParameterError, match="recording=True was wanted"):
+    with pytest.raises(ParameterError, match="expected a task with recording=True"):
         begun(cluttered).record()
 
 
@@ -215,11 +215,11 @@ def test_conditions_are_seeded_anew(empty: Environment) -> None:
 
 def test_what_cannot_be_done(empty: Environment) -> None:
     episode = begun(empty)
-    with pytest.raises(ParameterError, match=r"actions of shape \(2, 2\), but \(3, 2\) was wanted"):
+    with pytest.raises(ParameterError, match=r"expected actions of shape \(3, 2\), got \(2, 2\)"):
         episode.advance(np.zeros((2, 2)))
-    with pytest.raises(ParameterError, match=r"action of robot_2: \[nan, 0.0\], but finite numbers"):
+    with pytest.raises(ParameterError, match=r"action of robot_2: expected finite numbers"):
         episode.advance(np.array([[0.0, 0.0], [np.nan, 0.0], [0.0, 0.0]]))
-    with pytest.raises(StartError, match="starts: 2, but one for each of 3 robots was wanted"):
+    with pytest.raises(StartError, match="starts: expected one for each of 3 robots, got 2"):
         begun(empty, STARTS[:2], robots=3)
     scenarios, rng = Scenarios(empty, 8), np.random.default_rng(0)
     overlapping, ragged = {"positions": [[5.0, 5.0]] * 3}, {"positions": [[1.0], [2.0, 1.0]]}

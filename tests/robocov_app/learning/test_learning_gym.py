@@ -113,10 +113,10 @@ def test_actions_may_be_rescaled_and_observations_flattened() -> None:
 
 def test_what_is_wrong_is_said() -> None:
     env = CoverageEnv(**SMALL)
-    with pytest.raises(RobocovError, match=r"reset\(\) was wanted"):
+    with pytest.raises(RobocovError, match=r"call reset\(\) first"):
         env.step(env.action_space.sample())
     env.reset(seed=0)
-    with pytest.raises(ParameterError, match=r"actions of shape \(6,\), but \(3, 2\) was wanted"):
+    with pytest.raises(ParameterError, match=r"expected actions of shape \(3, 2\), got \(6,\)"):
         env.step(np.zeros(6))
 
 

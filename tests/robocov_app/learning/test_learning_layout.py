@@ -130,7 +130,7 @@ def test_a_message_that_is_old_is_told_as_it_came() -> None:
     ("values", "message"),
     [
         ({"neighbours": -1}, r"observation.neighbours: expected a whole number from 0 to 1000, got -1"),
-        ({"rays": 2.5}, r"observation.rays: expected a whole number from 0 to 3600, got 2.5"),
+        ({"rays": 2.5}, r"observation.rays: expected a whole number"),
         ({"centroid": 1}, r"observation.centroid: expected true or false, got 1"),
     ],
 )
@@ -141,5 +141,5 @@ def test_what_cannot_be_told(values: dict[str, object], message: str) -> None:
 
 def test_rays_want_a_scan() -> None:
     seen = seen_at(np.array([[1.0, 1.0]]), rays=4)
-    with pytest.raises(ParameterError, match=r"observation.rays: 6 in a scan were wanted, but 4 are there"):
+    with pytest.raises(ParameterError, match=r"observation.rays: expected 6 rays in a scan, got 4"):
         ObservationLayout(rays=6).rows(seen, Team.homogeneous(1))

@@ -138,13 +138,13 @@ def test_a_task_and_changes_of_it(empty: Environment) -> None:
 
 def test_what_is_wrong_is_said(empty: Environment) -> None:
     env = made(empty)
-    with pytest.raises(RobocovError, match=r"reset\(\) was wanted"):
+    with pytest.raises(RobocovError, match=r"call reset\(\) first"):
         env.step({})
     env.reset(seed=0)
-    with pytest.raises(ParameterError, match="actions: none of robot_2"):
+    with pytest.raises(ParameterError, match="actions: expected one for each agent, got none for robot_2"):
         env.step({"robot_1": (0, 0)})
     for bad in ((0.0, np.inf), (1.0,), "go", None):
-        with pytest.raises(ParameterError, match=r"action of robot_1: .* but two finite numbers were wanted"):
+        with pytest.raises(ParameterError, match=r"action of robot_1: expected .* but two finite numbers"):
             env.step({"robot_1": bad})
     with pytest.raises(ParameterError, match="max_cycles: 0"):
         made(empty, max_cycles=0)

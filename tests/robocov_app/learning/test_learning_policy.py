@@ -239,9 +239,9 @@ def test_what_is_no_policy(empty: Environment) -> None:
     def run(controller: PolicyController) -> None:
         Simulation(empty, controller, [[2.0, 2.0]]).step()
 
-    with pytest.raises(ParameterError, match=r"policy: a policy or a method act\(observation\) was wanted"):
+    with pytest.raises(ParameterError, match=r"policy: expected a policy or a method act\(observation\)"):
         run(PolicyController())
-    with pytest.raises(ParameterError, match=r"policy: an action of shape \(3,\), but \(2,\) was wanted"):
+    with pytest.raises(ParameterError, match=r"policy: expected an action of shape \(2,\), got \(3,\)"):
         run(PolicyController(lambda observation: (1.0, 2.0, 3.0)))
     with pytest.raises(
         ParameterError, match=r"controller 'policy': ZeroDivisionError: .*test_learning_policy.py"

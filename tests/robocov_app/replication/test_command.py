@@ -11,5 +11,5 @@ def test_bad_input(tmp_path, capsys):
     )
     assert "--out" in complaint(capsys, "paper")
     said = complaint(capsys, "paper", "--out", "x", "--beyond-only", "--figures-only")
-    assert "--figures-only and --beyond-only: one of them was wanted" in said
+    assert "--figures-only and --beyond-only: expected one of them" in said
     assert (tmp_path / "notes.txt").read_text() == "mine"

@@ -649,5 +649,5 @@ def test_other_folders_are_left_alone(tmp_path):
 def test_quick_and_full_do_not_mix(tmp_path):
     open_folder(tmp_path / "out", TINY)
     open_folder(tmp_path / "out", TINY)
-    with pytest.raises(InputError, match="holds the quick study, but the full one was asked for"):
+    with pytest.raises(InputError, match="expected the full one, got holds the quick study asked for"):
         open_folder(tmp_path / "out", replace(TINY, name="full"))

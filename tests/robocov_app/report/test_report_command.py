@@ -14,7 +14,7 @@ from called import answer, complaint
 from drawn_run import SQUARE
 from reported_results import saved_comparison, saved_run, walk
 
-from robocov.files.result_folder import is_report, results
+from robocov.files.result_folder import create_result, is_report
 from robocov_app.cli import main
 
 ROOT = Path(__file__).parents[3]
@@ -63,15 +63,15 @@ def test_a_report_goes_with_its_results_and_another_file_of_that_name_stays(run)
     saved_run(run / "again", walk(SQUARE, robots=2, seconds=1.0))
     (run / "again" / "report.html").write_text("mine")
     for folder, left in ((run, ["again", "run.json"]), (run / "again", ["report.html", "run.json"])):
-        with results(folder, overwrite=True) as result:
-            (result.new / "run.json").write_text("{}")
+        with create_result(folder, overwrite=True) as result:
+            (result.staging / "run.json").write_text("{}")
         assert sorted(path.name for path in folder.glob("[!.]*")) == left
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["nothing"], "nothing: there is no such folder"),
+        (["nothing"], "nothing: folder not found"),
         (["."], ".: not the folder of a run, a comparison or a sweep"),
         (["one", "--out", "no/page.html"], "no/page.html: cannot be written: there is no folder no"),
         (["one", "--out", "one"], "one: expected a file, got a folder"),

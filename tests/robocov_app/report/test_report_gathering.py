@@ -135,7 +135,7 @@ def broken(folder: Path, name: str, text: str) -> Path:
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda copy: copy / "nothing", "there is no such folder"),
+        (lambda copy: copy / "nothing", "folder not found"),
         (lambda copy: copy / "runs", "not the folder of a run, a comparison or a sweep"),
         (lambda copy: broken(copy, "study.json", "{"), "study.json: cannot be read"),
         (

@@ -5,7 +5,7 @@ import pytest
 from drawn_run import ROOMS
 
 from robocov.cost import CoverageCost
-from robocov.mapfile.check import vertex_count
+from robocov.mapfile.check import count_vertices
 from robocov_app.runs import cost as run_cost
 from robocov_app.runs.cost import built_cost, cost_for_pictures
 
@@ -38,7 +38,7 @@ def test_in_a_terminal_there_is_a_bar(monkeypatch, capsys):
 
 def test_large_maps_are_drawn_as_they_were_measured(monkeypatch):
     coarse = built_cost(ROOMS, 16)
-    monkeypatch.setattr(run_cost, "MANY_VERTICES", vertex_count(ROOMS) - 1)
+    monkeypatch.setattr(run_cost, "MANY_VERTICES", count_vertices(ROOMS) - 1)
     assert cost_for_pictures(ROOMS, coarse) is coarse
 
 

@@ -77,21 +77,21 @@ def test_the_study_is_written_whole(tmp_path: Path) -> None:
 
 
 WRONG = [
-    ({"maps": ()}, "maps: none, but at least one was wanted"),
-    ({"maps": (MAPS[0], MAPS[0])}, "maps[1]: 'room' is given already at maps[0]; each once was wanted"),
+    ({"maps": ()}, "maps: expected at least one, got none"),
+    ({"maps": (MAPS[0], MAPS[0])}, "maps[1]: 'room' is given already at maps[0]; duplicate value"),
     (
         {"maps": (StudyMap("a\nb", ROOM),)},
-        "maps[0]: name 'a\\nb', but a text of 1 to 100 characters on one line",
+        "maps[0]: expected a text of 1 to 100 characters on one line",
     ),
-    ({"controllers": ()}, "controllers: none, "),
+    ({"controllers": ()}, "controllers: expected at least one, got none"),
     ({"controllers": ("rapf", "rapff")}, "controllers[1]: unknown controller 'rapff': did you mean 'rapf'?"),
     ({"controllers": ("rapf", "rapf")}, "controllers[1]: 'rapf' is given already at controllers[0]"),
     ({"controllers": (3,)}, "controllers[0]: expected a text, got 3"),
     ({"controllers": ("none.py:Mine",)}, "controllers[0]: 'none.py:Mine': "),
     ({"controllers": ("none.py",)}, "controllers[0]: controller 'none.py': expected a file and a class, "),
     ({"robots": (6, 0)}, "robots[1]: expected a whole number from 1 to 10000, got 0"),
-    ({"robots": (True,)}, "robots[0]: expected a whole number from"),
-    ({"robots": ()}, "robots: none, "),
+    ({"robots": (True,)}, "robots[0]: expected a whole number"),
+    ({"robots": ()}, "robots: expected at least one, got none"),
     ({"seeds": (1, -2)}, "seeds[1]: expected a whole number from 0 to "),
     ({"seeds": (1, 2, 1)}, "seeds[2]: 1 is given already at seeds[0]"),
     (
@@ -101,24 +101,24 @@ WRONG = [
     ({"starts": ("corner", "*")}, "starts[1]: '*' is all of them, "),
     ({"starts": ("corner", "corner")}, "starts[1]: 'corner' is given already at starts[0]"),
     ({"duration": -1}, "duration: expected a number from 0 to 1e+06, got -1"),
-    ({"duration": float("nan")}, "duration: expected a number from"),
+    ({"duration": float("nan")}, "duration: expected a number"),
     (
         {"duration": 1e6, "dt": 1e-3},
-        "duration: 1e+06 s of 2 robots at 0.001 s are 2e+09 rows of a record, but at most",
+        "duration: expected at most 2e+07 rows of a record, got 1e+06 s of 2 robots at",
     ),
     ({"dt": 0.0}, "dt: expected a number from 0.0001 to 1 s, got 0.0"),
     ({"lattice": 1}, "lattice: expected a whole number from 2 to 2048, got 1"),
     ({"cost_hz": -1}, "cost_hz: expected a number from 0 to 10000, got -1"),
-    ({"record_hz": "often"}, "record_hz: expected a number from"),
+    ({"record_hz": "often"}, "record_hz: expected a number"),
     ({"max_speed": -1}, "team.max_speed: expected a number from 1e-06 to 1000, got -1.0 m/s"),
     ({"max_speed": (1, -1)}, "team.max_speed[1]: expected a number from 1e-06 to 1000, got -1.0 m/s"),
     ({"max_speed": (1, 1.0)}, "team.max_speed[1]: 1.0 is given already at team.max_speed[0]"),
-    ({"max_speed": None}, "team.max_speed: None, but a number was wanted"),
-    ({"max_speed": 10**400}, "team.max_speed: 1000"),
-    ({"radius": ()}, "team.radius: none, but at least one value was wanted"),
+    ({"max_speed": None}, "team.max_speed: expected a number, got None"),
+    ({"max_speed": 10**400}, "team.max_speed: expected a number, got 1000"),
+    ({"radius": ()}, "team.radius: expected at least one value, got none"),
     ({"gains": {"rapff": {}}}, "gains.rapff: unknown controller of the study 'rapff': did you mean 'rapf'?"),
     ({"gains": {"rapf": {"k_rep": -1}}}, "gains.rapf.k_rep: expected a number from "),
-    ({"sampling": Sampling()}, "sampling: no gain has a range {low, high}, but at least one was wanted"),
+    ({"sampling": Sampling()}, "sampling: expected at least one gain with a range {low, high}, got none"),
     (
         {"seeds": range(1000), "robots": range(1, 1001)},
         "runs: expected at most 100000, got 2000000 (1000 robots x 1000 seeds x 2 sets of gains)",
@@ -160,7 +160,9 @@ def test_a_team_of_groups() -> None:
     assert team.radius.tolist() == [0.15, 0.1, 0.1]
     assert team.viscosity.tolist() == [1.0, 1.0, 1.0]
     assert not small_study().mixed_speeds
-    with pytest.raises(ParameterError, match=r"robots: \[2, 4\], but the groups of the team have 3"):
+    with pytest.raises(
+        ParameterError, match=r"robots: expected 3 as in the groups of the team, got \[2, 4\]"
+    ):
         small_study(group=GROUPS, robots=(2, 4))
     with pytest.raises(InputError, match=r"team.group\[1\].max_speed: expected .* got -1.0 m/s"):
         small_study(group=(GROUPS[0], {"count": 2, "max_speed": -1.0}), robots=(3,))
@@ -180,5 +182,5 @@ def test_kinematics_are_swept_as_words() -> None:
     assert [team_of(2, team).track_width[1] for team in study.teams] == [0.0, pytest.approx(0.16)]
     assert all(team_of(1, team).turning_rate[0] == 2.0 for team in study.teams)
     assert not {"kinematics", "track_width", "turning_rate"} & set(small_study().teams[0])
-    with pytest.raises(ParameterError, match=r"team.kinematics: 'car', but point or unicycle was wanted"):
+    with pytest.raises(ParameterError, match=r"team.kinematics: expected point or unicycle, got 'car'"):
         small_study(kinematics="car")

@@ -111,21 +111,21 @@ WRONG = [
     (
         "robots = [3, 6]",
         "robots = [3, 3]",
-        "robots[1]: 3 is given already at robots[0]; each once was wanted",
+        "robots[1]: 3 is given already at robots[0]; duplicate value",
     ),
     ("robots = [3, 6]", "robots = [0]", "robots[0]: expected a whole number from 1 to 10000, got 0"),
-    ("robots = [3, 6]", "robots = [1.5]", "robots[0]: 1.5, but a whole number was wanted"),
+    ("robots = [3, 6]", "robots = [1.5]", "robots[0]: expected a whole number, got 1.5"),
     (
         "robots = [3, 6]",
         "robots = true",
-        "robots: True, but a whole number, or a list of whole numbers, was wanted",
+        "robots: expected a whole number, or a list of whole numbers, got True",
     ),
     (
         "robots = [3, 6]",
         'robots = "6"',
-        "robots: '6', but a whole number, or a list of whole numbers, was wanted",
+        "robots: expected a whole number, or a list of whole numbers, got '6'",
     ),
-    ("robots = [3, 6]", "robots = []", "robots: none, but at least one was wanted"),
+    ("robots = [3, 6]", "robots = []", "robots: expected at least one, got none"),
     ("robots = [3, 6]", "robots = 6\ngains = 3", "Cannot overwrite"),
     (
         'starts = "*"',
@@ -135,23 +135,23 @@ WRONG = [
     (
         'starts = "*"',
         'starts = ["*", "door"]',
-        "starts[0]: '*' is all of them, so nothing beside it was wanted",
+        "starts[0]: '*' is all of them, so nothing next to it is possible",
     ),
-    ('starts = "*"', "starts = 3", "starts: 3, but a text, or a list of texts, was wanted"),
-    ("seeds = 4", "seeds = [1, 2, 1]", "seeds[2]: 1 is given already at seeds[0]; each once was wanted"),
+    ('starts = "*"', "starts = 3", "starts: expected a text, or a list of texts, got 3"),
+    ("seeds = 4", "seeds = [1, 2, 1]", "seeds[2]: 1 is given already at seeds[0]; duplicate value"),
     ("seeds = 4", "seeds = 0", "seeds: expected a whole number from 1, got 0"),
     ("seeds = 4", "seeds = [-1]", "seeds[0]: expected a whole number from 0 to "),
-    ("seeds = 4", "seeds = 1e3", "seeds: 1000.0, but how many seeds, or a list of seeds, was wanted"),
+    ("seeds = 4", "seeds = 1e3", "seeds: expected how many seeds, or a list of seeds, got 1000.0"),
     ("duration = 5.0", "duration = nan", "duration: expected a number from 0 to 1e+06, got nan"),
-    ("duration = 5.0", "duration = [5]", "duration: [5], but a number was wanted"),
+    ("duration = 5.0", "duration = [5]", "duration: expected a number, got [5]"),
     (
         "duration = 5.0",
         "duration = 1979-05-27",
-        "duration: datetime.date(1979, 5, 27), but a number was wanted",
+        "duration: expected a number, got datetime.date(1979, 5, 27)",
     ),
     ("dt = 0.02", "dt = 2", "dt: expected a number from 0 to 1, got 2.0"),
     ("lattice = 32", "lattice = 1", "lattice: expected a whole number from 2 to 2048, got 1"),
-    ("lattice = 32", "lattice = 32.0", "lattice: 32.0, but a whole number was wanted"),
+    ("lattice = 32", "lattice = 32.0", "lattice: expected a whole number, got 32.0"),
     ("record_hz = 0", "record_hz = -1", "record_hz: expected a number from 0 to 10000, got -1.0"),
     (
         "max_speed = [0.5, 1]",
@@ -161,14 +161,14 @@ WRONG = [
     (
         "max_speed = [0.5, 1]",
         'max_speed = "fast"',
-        "team.max_speed: 'fast', but a number, or a list of numbers, ",
+        "team.max_speed: expected a number, or a list of numbers, ",
     ),
     (
         "max_speed = [0.5, 1]",
         "max_speed = [0.5, -1]",
         "team.max_speed[1]: expected a number from 1e-06 to 1000, got -1.0 m/s",
     ),
-    ("max_speed = [0.5, 1]", 'max_speed = "null"', "team.max_speed: 'null', but a number was wanted"),
+    ("max_speed = [0.5, 1]", 'max_speed = "null"', "team.max_speed: expected a number, got 'null'"),
     (
         "max_speed = [0.5, 1]",
         "max_speed = [1, 1.0]",
@@ -179,26 +179,26 @@ WRONG = [
         "lo = 0.1",
         "gains.rapf.k_rep: unknown key 'lo': did you mean 'low'? (known: high, low, scale)",
     ),
-    ("low = 0.1, ", "", "gains.rapf.k_rep.low: missing, but a number was wanted"),
-    ("low = 0.1", "low = true", "gains.rapf.k_rep.low: True, but a number was wanted"),
+    ("low = 0.1, ", "", "gains.rapf.k_rep.low: missing, expected a number"),
+    ("low = 0.1", "low = true", "gains.rapf.k_rep.low: expected a number, got True"),
     (
         "low = 0.1",
         "low = 0",
-        "gains.rapf.k_rep.low: 0, but a number above 0, as the scale is that of logarithms, ",
+        "gains.rapf.k_rep.low: expected a number above 0, as the scale is that of logarithms, ",
     ),
-    ("low = 0.1", "low = 10", "gains.rapf.k_rep.high: 10, but a number above 10 was wanted"),
+    ("low = 0.1", "low = 10", "gains.rapf.k_rep.high: expected a number above 10, got 10"),
     (
         "high = 10.0",
         "high = 1e9",
         "gains.rapf.k_rep.high: expected a number from 0 to 1e+06 N m³, got 1000000000.0",
     ),
-    ('"log"', '"lag"', 'gains.rapf.k_rep.scale: \'lag\', but "linear" or "log" was wanted'),
+    ('"log"', '"lag"', 'gains.rapf.k_rep.scale: expected "linear" or "log", got \'lag\''),
     ("k_rep =", "krep =", "gains.rapf: unknown gain 'krep': did you mean 'k_rep'? (known: "),
-    ("k_att = 3", "k_att = []", "gains.rapf.k_att: none, but at least one value was wanted"),
+    ("k_att = 3", "k_att = []", "gains.rapf.k_att: expected at least one value, got none"),
     (
         "k_att = 3",
         "k_att = [[3]]",
-        'gains.rapf.k_att[0]: [3], but a number, "null" for no limit, or a word, was wanted',
+        'gains.rapf.k_att[0]: expected a number, "null" for no limit, or a word, got [3]',
     ),
     ("k_att = 3", "k_att = [3, 3.0]", "gains.rapf.k_att[1]: 3.0 is given already at gains.rapf.k_att[0]"),
     ("k_att = 3", 'k_att = "null"', "gains.rapf.k_att: expected a number from "),
@@ -210,14 +210,14 @@ WRONG = [
     ),
     ("[gains.rapf]", "[gains.raf]", "gains.raf: unknown controller of the study 'raf': did you mean 'rapf'?"),
     ("[gains.rapf]", "[gain.rapf]", "unknown key 'gain': did you mean 'gains'? (known: "),
-    ("pull = [1, 2]", "pull = [1, {}]", 'gains["mine.py:Mine"].pull[1]: {}, but a number, "null" for'),
+    ("pull = [1, 2]", "pull = [1, {}]", 'gains["mine.py:Mine"].pull[1]: expected a number, "null" for'),
     ("pull = [1, 2]", "push = 1", "gains[\"mine.py:Mine\"]: unknown gain 'push': did you mean 'pull'?"),
     ("samples = 5", "samples = 0", "sampling.samples: expected a whole number from 1 to 100000, got 0"),
-    ("samples = 5", "", "sampling.samples: missing, but a whole number was wanted"),
+    ("samples = 5", "", "sampling.samples: missing, expected a whole number"),
     (
         '"halton"',
         '"halten"',
-        'sampling.method: \'halten\', but "sobol", "latin-hypercube" or "halton" was wanted',
+        'sampling.method: expected "sobol", "latin-hypercube" or "halton", got \'halten\'',
     ),
     (
         "seed = 9",
@@ -230,12 +230,12 @@ WRONG = [
         "maps[0]: unknown map 'roms': did you mean 'rooms'? (known: ",
     ),
     ('["rooms", "plans/hall.json"]', '["rooms", "rooms"]', "maps[1]: 'rooms' is given already at maps[0]"),
-    ('["rooms", "plans/hall.json"]', "[3]", "maps[0]: 3, but a text was wanted"),
-    ('["rooms", "plans/hall.json"]', "[]", "maps: none, but at least one was wanted"),
+    ('["rooms", "plans/hall.json"]', "[3]", "maps[0]: expected a text, got 3"),
+    ('["rooms", "plans/hall.json"]', "[]", "maps: expected at least one, got none"),
     (
         'maps = ["rooms", "plans/hall.json"]',
         "",
-        "maps: missing, but a list of names of maps, or of paths beside ",
+        "maps: missing, expected a list of names of maps, or of paths beside ",
     ),
     (
         '"mine.py:Mine"]',
@@ -272,26 +272,26 @@ def test_only_the_first_mistake_is_told_and_how_many_more_there_are(folder: Path
 def test_two_maps_of_one_name_cannot_be_told_apart(folder: Path) -> None:
     save_map(HALL, folder / "rooms.json")
     text = 'maps = ["rooms", "rooms.json"]\ncontrollers = ["rapf"]\n'
-    with pytest.raises(
-        InputError, match=r"maps\[1\]: 'rooms.json', but maps whose names differ, and there is a"
-    ):
+    with pytest.raises(InputError, match=r"maps\[1\]: expected maps whose names differ, and there is a"):
         read_study(written(folder, text))
 
 
 def test_a_mistake_in_a_map_is_named_with_its_file(folder: Path) -> None:
     (folder / "bad.json").write_text('{"format": "robocov-map", "version": 1, "name": "bad"}')
-    with pytest.raises(InputError, match=r"study.toml: maps\[0\]: .*bad.json:1:1: boundary: missing, but "):
+    with pytest.raises(
+        InputError, match=r"study.toml: maps\[0\]: .*bad.json:1:1: boundary: missing, expected "
+    ):
         read_study(written(folder, 'maps = ["bad.json"]\ncontrollers = ["rapf"]\n'))
 
 
 def test_what_is_no_study_file_is_said_to_be_none(folder: Path) -> None:
     with pytest.raises(InputError, match=r"none.toml: no such file"):
         read_study(folder / "none.toml")
-    with pytest.raises(InputError, match=r": is a folder, but a file was wanted"):
+    with pytest.raises(InputError, match=r": expected a file, got a folder"):
         read_study(folder)
     path = folder / "bytes.toml"
     path.write_bytes(b"maps = '\xff'")
-    with pytest.raises(InputError, match=r"bytes.toml: byte at offset 8: not UTF-8, but TOML was wanted"):
+    with pytest.raises(InputError, match=r"bytes.toml: byte at offset 8: not UTF-8"):
         read_study(path)
     path.write_text("a = " + "[" * 100_000)
     with pytest.raises(InputError, match=r"bytes.toml: "):
@@ -335,8 +335,8 @@ def test_a_team_of_groups(folder: Path) -> None:
     [
         ("max_speed = 0.3", "max_sped = 0.3", "team.group[1]: unknown key 'max_sped': did you mean"),
         ("count = 1\n", "", "team.group[1].count: expected a whole number from 1 to 10000, got nothing"),
-        ("metrics = true", "metrics = 1", "metrics: 1, but true or false was wanted"),
-        ("metrics = true", "robots = [4]", "robots: [4], but the groups of the team have 3"),
+        ("metrics = true", "metrics = 1", "metrics: expected true or false, got 1"),
+        ("metrics = true", "robots = [4]", "robots: expected 3 as in the groups of the team, got [4]"),
         (
             "max_speed = 1.0",
             "max_speed = 0",
@@ -353,7 +353,7 @@ def test_groups_that_are_none(folder: Path, before: str, after: str, message: st
 
 def test_a_group_that_is_no_table(folder: Path) -> None:
     path = written(folder, 'maps = ["rooms"]\ncontrollers = ["rapf"]\n[team]\ngroup = 3\n')
-    with pytest.raises(InputError, match=r"team.group: 3, but tables \[\[team.group\]\] was wanted"):
+    with pytest.raises(InputError, match=r"team.group: expected tables \[\[team.group\]\], got 3"):
         read_study(path)
 
 

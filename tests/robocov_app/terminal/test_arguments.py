@@ -30,12 +30,12 @@ def test_words_become_values() -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("--count 1.5", "--count: '1.5', but a whole number was wanted"),
-        ("--length far", "--length: 'far', but a number was wanted"),
+        ("--count 1.5", "--count: expected a whole number, got '1.5'"),
+        ("--length far", "--length: expected a number, got 'far'"),
         ("--kind c", "--kind: expected a or b, got 'c'"),
         ("--study mid", "--study: expected early or late, got 'mid'"),
         ("--kount 3", "unknown option --kount: did you mean --count?"),
-        ("--count", "--count: a value was wanted"),
+        ("--count", "--count: expected a value"),
     ],
 )
 def test_a_wrong_word_gets_one_line_whatever_the_terminal(
@@ -61,8 +61,8 @@ def test_defaults_that_say_something_are_in_the_help() -> None:
 
 def test_a_message_names_the_option() -> None:
     kind = make_dataclass("Arguments", ["fail"])
-    said = by_option(kind, "conditions.failures[0]: robot 9, but 1 was wanted")
-    assert said == "--fail: robot 9, but 1 was wanted"
+    said = by_option(kind, "conditions.failures[0]: expected 1, got robot 9")
+    assert said == "--fail: expected 1, got robot 9"
 
 
 def test_gains_are_json_or_words() -> None:

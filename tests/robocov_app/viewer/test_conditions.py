@@ -199,5 +199,5 @@ def test_where_obstacles_move_the_cost_is_told_as_elsewhere() -> None:
 def test_messages_of_very_many_robots_are_too_much_for_the_past() -> None:
     Scenario(HALL, robots=MOST_THAT_TALK, conditions=BAD)
     Scenario(HALL, robots=500, conditions=Conditions(sensing_noise=0.1))
-    with pytest.raises(ParameterError, match="robots: 101, but at most 100 were wanted where messages"):
+    with pytest.raises(ParameterError, match="robots: expected at most 100, got 101 where messages"):
         Scenario(HALL, robots=MOST_THAT_TALK + 1, conditions=BAD)

@@ -88,7 +88,7 @@ def test_each_branch_is_a_story_of_its_own(tmp_path: Path, capsys: pytest.Captur
     capsys.readouterr()
     assert main(["run", path, *SMALL, "--out", str(tmp_path / "no"), "--branch", "9"]) == 2
     assert (
-        "branch: '9', but one of 1 (robot 2 failed), 2 (robot 4 joined) was wanted" in capsys.readouterr().err
+        "branch: expected one of 1 (robot 2 failed), 2 (robot 4 joined), got '9'" in capsys.readouterr().err
     )
     assert not (tmp_path / "no").exists()
 

@@ -203,7 +203,9 @@ def test_the_command_checks_a_lesson(tmp_path: Path, capsys: pytest.CaptureFixtu
     content = json.loads(never.read_text())
     content["lesson"]["chapters"][0]["touch"] = 9
     path.write_text(json.dumps(content))
-    with pytest.raises(MapError, match=r"lesson\.chapters\[0\]\.touch: 9, but the number of a touch, 0 to 2"):
+    with pytest.raises(
+        MapError, match=r"lesson\.chapters\[0\]\.touch: expected the number of a touch, 0 to 2"
+    ):
         load_lesson(path)
 
 

@@ -95,7 +95,7 @@ def test_more_and_fewer_robots() -> None:
     for _ in range(3):
         do(viewer, "fewer")
     assert viewer.session.scenario.robots == 1 and viewer.trouble
-    assert viewer.message == f"robots: 0, but a whole number from 1 to {MOST_ROBOTS} was wanted"
+    assert viewer.message == f"robots: expected a whole number from 1 to {MOST_ROBOTS}, got 0"
 
 
 def test_robots_without_room_are_told_and_nothing_changes() -> None:

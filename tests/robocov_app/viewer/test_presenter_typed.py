@@ -81,7 +81,7 @@ def test_no_limit_can_be_set_where_there_may_be_none() -> None:
     viewer = viewer_of()
     typed(viewer, "sensing_range none")
     assert viewer.pane.setup.limits.sensing_range == math.inf
-    with pytest.raises(ParameterError, match="number was wanted"):
+    with pytest.raises(ParameterError, match="expected a number"):
         typed(viewer, "max_speed none")
 
 

@@ -238,7 +238,7 @@ def test_a_thinned_record_goes_on_at_its_own_pace(record: Record) -> None:
 
 
 def test_moments_at_uneven_times_are_refused(record: Record) -> None:
-    with pytest.raises(InputError, match=r"record.npz: time: moments .* s apart were wanted"):
+    with pytest.raises(InputError, match=r"record.npz: time: expected moments .* s apart"):
         replayed(record.thin(1.0 / (7 * record.dt)))
 
 
@@ -294,8 +294,8 @@ def test_robots_that_failed_at_different_places_stay_there() -> None:
 @pytest.mark.parametrize(
     ("other", "message"),
     [
-        (lambda record: recorded(steps=5), r"saved/1: moments: 6, but 61 as in saved/0 was wanted"),
-        (lambda record: recorded(dt=1 / 50), r"saved/1: dt_s: 0.02, but 0.016\d* as in"),
+        (lambda record: recorded(steps=5), r"saved/1: moments: expected 61 as in saved/0, got 6"),
+        (lambda record: recorded(dt=1 / 50), r"saved/1: dt_s: expected 0.016\d* as in"),
         (lambda record: recorded(robots=3), r"saved/1: team: "),
         (
             lambda record: replace(record, time=record.time**2),
@@ -303,7 +303,7 @@ def test_robots_that_failed_at_different_places_stay_there() -> None:
         ),
         (
             lambda record: replace(record, team=replace(record.team, radius=np.array([0.1, 0.1, 0.1, 0.2]))),
-            "saved/1: team: .*, but .* as in saved/0 was wanted",
+            "saved/1: team: expected .* as in saved/0, got .*",
         ),
     ],
 )

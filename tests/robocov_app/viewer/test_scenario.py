@@ -142,7 +142,7 @@ class TestScenario:
 
     @pytest.mark.parametrize("count", [0, MOST_PANES + 1])
     def test_too_many_controllers_or_none(self, count):
-        with pytest.raises(ParameterError, match="1 to 4 were wanted"):
+        with pytest.raises(ParameterError, match="expected 1 to 4"):
             Scenario(HALL, (RAPF,) * count)
 
     def test_no_room_or_no_such_start(self):

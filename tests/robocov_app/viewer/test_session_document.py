@@ -283,30 +283,28 @@ def test_a_file_is_small_and_says_what_it_is(tmp_path: Path) -> None:
 
     jsonschema.Draft202012Validator(session_schema()).validate(content)
     (tmp_path / "changed.robocov").write_text(path.read_text().replace(content["maps"][0]["digest"], "0"))
-    with pytest.raises(
-        MapError, match=r'maps\[0\]\.digest: "0", but that of the map as it is now was wanted'
-    ):
+    with pytest.raises(MapError, match=r'maps\[0\]\.digest: expected that of the map as it is now, got "0"'):
         load_session(tmp_path / "changed.robocov")
 
 
 @pytest.mark.parametrize(
     ("place", "value", "words"),
     [
-        (("head",), 9, "head: 9, but the number of a touch, 0 to 1 was wanted"),
-        (("step",), 999, "step: 999, but a step of the head, 10 to 30 was wanted"),
-        (("touches", 1, "parent"), 1, "touches[1].parent: 1, but null for the first"),
-        (("touches", 1, "at"), 999, "touches[1].at: 999, but a step of touch 0, 0 to 10 was wanted"),
-        (("touches", 1, "changes", 0, "robot"), "two", 'changes[0].robot: "two", but an integer was wanted'),
-        (("touches", 1, "changes", 0, "do"), "fly", "touches[1].changes[0].do: \"fly\", but one of 'drag', "),
-        (("touches", 1, "changes"), [], "touches[1].changes: [], but at least 1 item was wanted"),
+        (("head",), 9, "head: expected the number of a touch, 0 to 1, got 9"),
+        (("step",), 999, "step: expected a step of the head, 10 to 30, got 999"),
+        (("touches", 1, "parent"), 1, "touches[1].parent: expected null for the first"),
+        (("touches", 1, "at"), 999, "touches[1].at: expected a step of touch 0, 0 to 10, got 999"),
+        (("touches", 1, "changes", 0, "robot"), "two", 'changes[0].robot: expected an integer, got "two"'),
+        (("touches", 1, "changes", 0, "do"), "fly", "touches[1].changes[0].do: expected one of 'drag', "),
+        (("touches", 1, "changes"), [], "touches[1].changes: expected at least 1 item, got []"),
         (
             ("touches", 0, "changes", 0, "scenario", "robots"),
             0,
-            "touches[0].changes[0].scenario.robots: 0, but",
+            "touches[0].changes[0].scenario.robots: expected greater than or equal to 1, got 0",
         ),
-        (("touches", 0, "changes", 0, "scenario", "map"), 7, "scenario.map: 7, but the number of a map"),
+        (("touches", 0, "changes", 0, "scenario", "map"), 7, "scenario.map: expected the number of a map"),
         (("maps", 0, "boundary"), [], "maps[0]: boundary: "),
-        (("version",), 2, "version: 2, but 1 was wanted; it was written by a newer robocov"),
+        (("version",), 2, "version: expected 1, got 2; it was written by a newer robocov"),
         (("nonsense",), 1, "nonsense: unknown key"),
     ],
 )

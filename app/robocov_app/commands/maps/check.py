@@ -42,7 +42,7 @@ class Arguments(JsonOption):
 
 def command(options: Arguments) -> int:
     if not options.files:
-        raise InputError("check: at least one map file was wanted")
+        raise InputError("check: expected at least one map file")
     if options.watch:
         watch(options)
         return 0

@@ -43,7 +43,7 @@ class Arguments(JsonOption):
 def command(options: Arguments) -> None:
     if options.format is not None and options.format not in EXPORTERS:
         known = ", ".join(EXPORTERS)
-        raise InputError(f"--format: {to_one_line(options.format)!r}, but one of {known} was wanted")
+        raise InputError(f"--format: expected one of {known}, got {to_one_line(options.format)!r}")
     for file in exporter(options.out, options.format).files(options.out, options.write):
         require_fresh(file, "another -o", overwrite=options.overwrite, source=Path(options.map), read="map")
     report = export_map(load_map(options.map), options.out, format=options.format, options=options.write)

@@ -81,7 +81,7 @@ class Arguments(PlotOptions):
             require_number("--count", self.count, 1, MOST)
         if (self.width is None) != (self.height is None):
             given, missing = ("width", "height") if self.height is None else ("height", "width")
-            raise InputError(f"--{given}: {getattr(self, given):g}, but --{missing} was wanted with it")
+            raise InputError(f"--{given}: requires --{missing}")
         if self.side != _SIDE and self.width is not None:
             raise InputError(f"--side: {self.side:g}, but --width and --height say how large the map is")
         super().__post_init__()
@@ -128,18 +128,18 @@ def _facts(row: dict[str, Any]) -> str:
 def check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
     if folder:
         if out is None:
-            raise InputError("--out: a folder for the maps was wanted with --count and --study")
+            raise InputError("--out: required with --count and --study, as the folder of the maps")
         try:
             out.mkdir(parents=True, exist_ok=True)
             used = any(out.iterdir())
         except OSError as error:
             raise OutputError(f"{out}: cannot be used for maps: {describe_error(error)}") from error
         if used and not overwrite:
-            raise InputError(f"{out}: the folder is not empty; another --out, or --overwrite, was wanted")
+            raise InputError(f"{out}: the folder is not empty; choose another --out or pass --overwrite")
     elif out is not None:
         if out.is_dir() or not out.name:
-            wanted = "the name of a file was wanted (--count makes a folder)"
-            raise InputError(f"--out: {str(out)!r}, but {wanted}")
+            wanted = "expected the name of a file (--count makes a folder)"
+            raise InputError(f"--out: {wanted}, got {str(out)!r}")
         require_fresh(out, "another --out", overwrite=overwrite)
 
 
@@ -148,7 +148,7 @@ def _require_map(path: Path) -> None:
         try:
             load_map(path)
         except MapError:
-            why = "is no map of robocov, so --overwrite leaves it alone; another --out was wanted"
+            why = "is no map of robocov, so --overwrite leaves it alone; choose another --out"
             raise InputError(f"{path}: {why}") from None
 
 

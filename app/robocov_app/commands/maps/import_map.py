@@ -60,7 +60,7 @@ class Arguments(JsonOption):
 def command(options: Arguments) -> None:
     if options.format is not None and options.format not in IMPORTERS:
         known = ", ".join(IMPORTERS)
-        raise InputError(f"--format: {to_one_line(options.format)!r}, but one of {known} was wanted")
+        raise InputError(f"--format: expected one of {known}, got {to_one_line(options.format)!r}")
     out = Path(f"{options.file.stem}.json") if options.out is None else options.out
     require_fresh(out, "another -o", overwrite=options.overwrite, source=options.file)
     if options.preview is not None:

@@ -9,7 +9,7 @@ import shapely
 
 from robocov.environment import GRID_M, CircleObstacle, Obstacle, PolygonObstacle
 from robocov.errors import MapError, format_count
-from robocov.mapfile.models import LARGEST, SMALLEST
+from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import outlines, tenths
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
@@ -49,13 +49,13 @@ def divided(sketch: Sketch, selection: Selection) -> Change:
 
 def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
     """Grow the selected obstacles by so many metres on every side, with sharp corners; shrink with by < 0."""
-    require(SMALLEST <= abs(by) <= LARGEST, f"a length of at least {1000 * SMALLEST:g} mm was wanted")
+    require(MIN_SIZE_M <= abs(by) <= MAX_SIZE_M, f"expected a length of at least {1000 * MIN_SIZE_M:g} mm")
     require(selection.items, "select obstacles first")
     shapes: dict[int, Sequence[Obstacle]] = {}
     for item in selection.items_in(sketch):
         if isinstance(item.shape, CircleObstacle):
             radius = tenths(item.shape.radius + by)
-            shapes[item.key] = [replace(item.shape, radius=radius)] if radius >= SMALLEST else []
+            shapes[item.key] = [replace(item.shape, radius=radius)] if radius >= MIN_SIZE_M else []
         else:
             # corners sharper than a right angle would reach far out: they are cut off
             buffered = item.geometry.buffer(by, join_style="mitre", mitre_limit=1.5)

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 from robocov.environment import Obstacle, Point, PolygonObstacle
 from robocov.errors import MapError
-from robocov.files.strictjson import parse
+from robocov.files.strictjson import parse_json
 from robocov.mapfile import dump_document
-from robocov.mapfile.models import HEAD
+from robocov.mapfile.models import HEADER
 from robocov_app.editor.edits import create, transform
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import middle_of
@@ -50,14 +50,14 @@ def _part(text: str) -> Sketch:
     require(text.strip(), "there is nothing to paste")
     require(text.lstrip()[:1] in ("{", "["), "what was copied is no part of a map")
     try:
-        value = parse(text, "what was copied")
+        value = parse_json(text, "what was copied")
         if isinstance(value, dict) and "format" in value:
             ours = value["format"] == FORMAT
-            return sketch_of({**value, "format": HEAD["format"]} if ours else value, "what was copied")
+            return sketch_of({**value, "format": HEADER["format"]} if ours else value, "what was copied")
         obstacles = [value] if isinstance(value, dict) else value
         if not obstacles or not all(isinstance(each, dict) for each in obstacles):
-            require(len(obstacles) >= 3, "three points at least, obstacles or a map were wanted")
+            require(len(obstacles) >= 3, "expected at least three points, obstacles or a map")
             obstacles = [{"kind": "polygon", "vertices": obstacles}]
-        return sketch_of({**HEAD, "obstacles": obstacles}, "what was copied")
+        return sketch_of({**HEADER, "obstacles": obstacles}, "what was copied")
     except MapError as error:
         raise MapError(f"this cannot be pasted: {error}") from None

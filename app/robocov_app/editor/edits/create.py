@@ -13,7 +13,7 @@ from shapely.ops import substring
 from robocov import environment as env
 from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError
-from robocov.mapfile.models import LARGEST, LONGEST_LABEL, SMALLEST
+from robocov.mapfile.models import MAX_LABEL_CHARACTERS, MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import distinct, point_near, rectangle, ring_near, rounded, tenths
 from robocov_app.editor.model.hit_test import obstacles_at
@@ -48,7 +48,7 @@ def wall_drawn(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
     line = distinct(ring_near(points), closed=False)
     if len(line) < 2 or shapely.LineString(line).length < SHORTEST:
         raise MapError("a wall needs two points that are apart")
-    require(SMALLEST <= width <= LARGEST, f"a wall's width is at least {1000 * SMALLEST:g} mm")
+    require(MIN_SIZE_M <= width <= MAX_SIZE_M, f"a wall's width is at least {1000 * MIN_SIZE_M:g} mm")
     return drawn(sketch, env.WallObstacle(line, tenths(width)))
 
 
@@ -94,7 +94,7 @@ def free_name(sketch: Sketch, name: str) -> str:
 
 
 def label_of(name: str) -> str:
-    name = text_of(" ".join(name.split()), "a name", LONGEST_LABEL)
+    name = text_of(" ".join(name.split()), "a name", MAX_LABEL_CHARACTERS)
     require(all(ord(char) >= 32 and ord(char) != 127 for char in name), "a name is text on one line")
     return name
 
@@ -114,7 +114,7 @@ def _outline(points: Sequence[Point], what: str) -> Ring:
 
 
 def _radius(radius: float, what: str) -> float:
-    require(SHORTEST <= radius <= LARGEST, f"{what} needs a radius: drag from its middle to its rim")
+    require(SHORTEST <= radius <= MAX_SIZE_M, f"{what} needs a radius: drag from its middle to its rim")
     return tenths(radius)
 
 
@@ -136,13 +136,13 @@ def on_wall(sketch: Sketch, key: int, point: Point) -> Point:
 
 
 def door_width(width: float) -> float:
-    require(SHORTEST <= width <= LARGEST, f"a door's width is at least {100 * SHORTEST:g} cm")
+    require(SHORTEST <= width <= MAX_SIZE_M, f"a door's width is at least {100 * SHORTEST:g} cm")
     return width
 
 
 def door_opened(sketch: Sketch, key: int, point: Point, width: float) -> Change:
     line = _line(sketch, key)
-    if door_width(width) > line.length - SMALLEST:
+    if door_width(width) > line.length - MIN_SIZE_M:
         raise MapError(f"the {sketch.display_name(key)} is not longer than a door of {width:g} m")
     return _opened(sketch, key, *_span(line, point, width))
 
@@ -158,7 +158,7 @@ def _opened(sketch: Sketch, key: int, begin: float, end: float) -> Change:
     """Take what lies between two lengths along a wall away; the pieces keep its name and note."""
     line, wall = _line(sketch, key), sketch.item(key).shape
     assert isinstance(wall, env.WallObstacle)
-    left = [(low, high) for low, high in ((0.0, begin), (end, line.length)) if high - low >= SMALLEST]
+    left = [(low, high) for low, high in ((0.0, begin), (end, line.length)) if high - low >= MIN_SIZE_M]
     pieces = [replace(wall, points=tuple(map(rounded, substring(line, *part).coords))) for part in left]
     require(pieces, f"nothing would be left of the {sketch.display_name(key)}")
     words = f"door of {end - begin:.3g} m opened in {sketch.display_name(key)}"

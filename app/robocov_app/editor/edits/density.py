@@ -9,7 +9,7 @@ import shapely
 from robocov.density import MAX_WEIGHT, Density, Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
 from robocov.environment import Point, PolygonObstacle
 from robocov.errors import MapError, format_count
-from robocov.mapfile.models import LARGEST
+from robocov.mapfile.models import MAX_SIZE_M
 from robocov_app.editor.edits import create, transform
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import distinct, point_near, ring_near, tenths
@@ -114,7 +114,7 @@ def weight_of(text: str) -> float:
     try:
         weight = float(text)
     except ValueError:
-        raise MapError(f"“{text}”, but a weight was wanted: a number above 0") from None
+        raise MapError(f"expected a weight above 0, got “{text}”") from None
     return _weight(weight, least=LIGHTEST)
 
 
@@ -180,11 +180,11 @@ def _sound(area: WeightedArea) -> WeightedArea:
 
 
 def _sigma(sigma: float) -> float:
-    require(create.SHORTEST <= sigma <= LARGEST, "a hot spot needs a size: drag from its middle outwards")
+    require(create.SHORTEST <= sigma <= MAX_SIZE_M, "a hot spot needs a size: drag from its middle outwards")
     return tenths(sigma)
 
 
 def _weight(weight: float, *, least: float) -> float:
     if not least <= weight <= MAX_WEIGHT:
-        raise MapError(f"weight: {weight:g}, but a number {'above' if least else 'from'} 0 was wanted")
+        raise MapError(f"weight: expected a number {'above' if least else 'from'} 0, got {weight:g}")
     return float(weight)

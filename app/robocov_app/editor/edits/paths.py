@@ -9,7 +9,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.environment import ObstaclePath, Point, Repeat
 from robocov.errors import MapError
-from robocov.mapfile.models import FASTEST, SLOWEST, SMALLEST
+from robocov.mapfile.models import MAX_SPEED_M_S, MIN_SIZE_M, MIN_SPEED_M_S
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import as_array, middle_of, nearest_on, point_near
 from robocov_app.editor.model.selection import Change, Selection
@@ -81,7 +81,7 @@ def speed_of(text: str) -> float:
     try:
         return _speed(float(text.strip().removesuffix("m/s")))
     except ValueError:
-        raise MapError(f"“{text}”, but a speed in m/s was wanted, as in 0.5") from None
+        raise MapError(f"expected a speed in m/s, such as 0.5, got “{text}”") from None
 
 
 def way_point_at(path: ObstaclePath, point: Point, reach: float) -> int | None:
@@ -127,12 +127,12 @@ def _with_paths(sketch: Sketch, selection: Selection, change: _Change, words: st
 
 def _put(sketch: Sketch, key: int, path: ObstaclePath, words: str) -> Change:
     extent = np.ptp(path.points, axis=0).max()
-    require(extent >= SMALLEST, "the way points lie in one place: click somewhere else")
+    require(extent >= MIN_SIZE_M, "the way points lie in one place: click somewhere else")
     after = sketch.with_things({key: replace(sketch.item(key).shape, path=path)})
     return Change(after, Selection.of(key), f"{sketch.display_name(key)}: {words}")
 
 
 def _speed(speed: float) -> float:
-    if not SLOWEST <= speed <= FASTEST:
-        raise MapError(f"speed: {speed:g} m/s, but {SLOWEST:g} to {FASTEST:g} m/s was wanted")
+    if not MIN_SPEED_M_S <= speed <= MAX_SPEED_M_S:
+        raise MapError(f"speed: expected {MIN_SPEED_M_S:g} to {MAX_SPEED_M_S:g} m/s, got {speed:g} m/s")
     return float(f"{speed:.6g}")

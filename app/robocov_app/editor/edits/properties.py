@@ -7,7 +7,7 @@ from typing import Any
 
 from robocov.environment import PolygonObstacle
 from robocov.errors import MapError, to_one_line
-from robocov.mapfile.models import LARGEST, SMALLEST
+from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.editor.edits import create, vertices
 from robocov_app.editor.model import require
 from robocov_app.editor.model.background import Background
@@ -101,7 +101,7 @@ def sized(sketch: Sketch, selection: Selection, radius: float) -> Change:
 
 
 def _sized(sketch: Sketch, selection: Selection, name: str, size: float, missing: str, words: str) -> Change:
-    require(SMALLEST <= size <= LARGEST, f"a {name} of at least {1000 * SMALLEST:g} mm was wanted")
+    require(MIN_SIZE_M <= size <= MAX_SIZE_M, f"expected a {name} of at least {1000 * MIN_SIZE_M:g} mm")
     things: dict[Owner, Any] = {owner: sketch.thing(owner) for owner in selection.owners}
     sized = {owner: thing for owner, thing in things.items() if hasattr(thing, name)}
     require(sized, missing)
@@ -111,7 +111,7 @@ def _sized(sketch: Sketch, selection: Selection, name: str, size: float, missing
 
 def raised(sketch: Sketch, selection: Selection, where: str) -> Change:
     require(selection.items, "select obstacles first")
-    require(where in ("top", "bottom"), "top or bottom was wanted")
+    require(where in ("top", "bottom"), "expected top or bottom")
     upper = selection.items if where == "top" else sketch.places.keys() - selection.items
     order = tuple(sorted(sketch.obstacles, key=lambda item: item.key in upper))
     way = "brought to the top" if where == "top" else "sent to the bottom"

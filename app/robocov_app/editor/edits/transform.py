@@ -12,7 +12,7 @@ import shapely
 from robocov.density import Gaussians, WeightedPolygons
 from robocov.environment import CircleObstacle, DiscStart, Point, PolygonObstacle, Ring
 from robocov.errors import MapError
-from robocov.mapfile.models import LARGEST, SMALLEST
+from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.editor.edits.create import added
 from robocov_app.editor.edits.vertices import with_places
 from robocov_app.editor.model import geometry, require
@@ -105,14 +105,16 @@ def moved(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
 
 def rotated(sketch: Sketch, selection: Selection, degrees: float, about: Point | None = None) -> Change:
     """Turn what is selected counter-clockwise, by default about the middle of its bounding box."""
-    require(math.isfinite(degrees), "an angle in degrees was wanted")
+    require(math.isfinite(degrees), "expected an angle in degrees")
     return _change(sketch, selection, Affine.turn(degrees, about or _middle(sketch, selection)), "turned")
 
 
 def scaled(sketch: Sketch, selection: Selection, fx: float, fy: float, about: Point | None = None) -> Change:
     """Scale by fx and fy about the middle or a point, see `Affine.thing`; factors below 0 mirror."""
-    if not all(math.isfinite(f) and SMALLEST / LARGEST <= abs(f) <= LARGEST / SMALLEST for f in (fx, fy)):
-        raise MapError("a factor that is not 0 was wanted")
+    if not all(
+        math.isfinite(f) and MIN_SIZE_M / MAX_SIZE_M <= abs(f) <= MAX_SIZE_M / MIN_SIZE_M for f in (fx, fy)
+    ):
+        raise MapError("expected a factor that is not 0")
     return _change(sketch, selection, Affine.stretch(fx, fy, about or _middle(sketch, selection)), "scaled")
 
 
@@ -121,11 +123,11 @@ def resized(sketch: Sketch, selection: Selection, width: float | None, height: f
     low_x, low_y, high_x, high_y = _bounds(sketch, selection)
     wide, high = high_x - low_x, high_y - low_y
     for wanted, there, name in ((width, wide, "width"), (height, high, "height")):
-        if wanted is not None and not SMALLEST <= wanted <= LARGEST:
-            raise MapError(f"a {name} from {1000 * SMALLEST:g} mm to {LARGEST / 1000:g} km was wanted")
-        require(wanted is None or there >= SMALLEST, f"it has no {name} that could be scaled")
-    require(width is not None or height is not None, "a width or a height was wanted")
-    fx, fy = (width or 0.0) / max(wide, SMALLEST), (height or 0.0) / max(high, SMALLEST)
+        if wanted is not None and not MIN_SIZE_M <= wanted <= MAX_SIZE_M:
+            raise MapError(f"expected a {name} from {1000 * MIN_SIZE_M:g} mm to {MAX_SIZE_M / 1000:g} km")
+        require(wanted is None or there >= MIN_SIZE_M, f"it has no {name} that could be scaled")
+    require(width is not None or height is not None, "expected a width or a height")
+    fx, fy = (width or 0.0) / max(wide, MIN_SIZE_M), (height or 0.0) / max(high, MIN_SIZE_M)
     # walls keep their width, so that the box does not quite grow by the factor: go nearer step by step
     for _ in range(20):
         change = _change(sketch, selection, Affine.stretch(fx or fy, fy or fx, (low_x, low_y)), "resized")
@@ -149,7 +151,7 @@ def placed(sketch: Sketch, selection: Selection, x: float | None, y: float | Non
 
 def mirrored(sketch: Sketch, selection: Selection, axis: str) -> Change:
     """Mirror what is selected about the middle of its box: axis "x" swaps left and right, "y" up and down."""
-    require(axis in ("x", "y"), "an axis x or y was wanted")
+    require(axis in ("x", "y"), "expected an axis x or y")
     factors = (-1.0, 1.0) if axis == "x" else (1.0, -1.0)
     return _change(sketch, selection, Affine.stretch(*factors, _middle(sketch, selection)), "mirrored")
 
@@ -163,7 +165,7 @@ def duplicated(sketch: Sketch, selection: Selection, dx: float = 0.0, dy: float 
 def arrayed(sketch: Sketch, selection: Selection, columns: int, rows: int, dx: float, dy: float) -> Change:
     """Copy the selected obstacles into columns and rows, (dx, dy) m apart, the originals in a corner."""
     whole = require(Selection(items=selection.items), "select obstacles to copy")
-    require(columns >= 1 and rows >= 1 and columns * rows >= 2, "two columns or rows at least were wanted")
+    require(columns >= 1 and rows >= 1 and columns * rows >= 2, "expected at least two columns or rows")
     if columns * rows * len(whole.items) > _MOST_COPIES:
         raise MapError(f"that makes more than {_MOST_COPIES} obstacles")
     after, everything = sketch, whole
@@ -175,7 +177,7 @@ def arrayed(sketch: Sketch, selection: Selection, columns: int, rows: int, dx: f
 
 def aligned(sketch: Sketch, selection: Selection, side: Side) -> Change:
     """Align selected obstacles and starts, or vertices, at a side of their box, or of a selected boundary."""
-    require(side in SIDES, f"one of {', '.join(SIDES)} was wanted")
+    require(side in SIDES, f"expected one of {', '.join(SIDES)}")
     words = {"centre": "by their centres", "middle": "by their middles"}.get(side, f"at the {side}")
     if selection.vertices and not selection.owners:
         places = {vertex: place_of(sketch, vertex) for vertex in selection.vertices}
@@ -196,7 +198,7 @@ def aligned(sketch: Sketch, selection: Selection, side: Side) -> Change:
 
 def distributed(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
     """Spread three or more selected things, with equal gaps between their boxes; first and last stay."""
-    require(axis in ("x", "y"), "an axis x or y was wanted")
+    require(axis in ("x", "y"), "expected an axis x or y")
     a = "xy".index(axis)
     boxes = sorted(_boxes(sketch, selection).items(), key=lambda pair: (pair[1][a], pair[1][a + 2]))
     require(len(boxes) >= 3, "select three or more obstacles or starts to distribute")
@@ -212,7 +214,7 @@ def distributed(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
 
 def levelled(sketch: Sketch, a: Point, b: Point) -> Change:
     """Turn map, picture and density about `a`: the line to `b` becomes level or upright."""
-    require(math.dist(a, b) >= SMALLEST, "two points that are apart were wanted")
+    require(math.dist(a, b) >= MIN_SIZE_M, "expected two points that are apart")
     degrees = geometry.angle_to_level(a, b)
     affine = Affine.turn(degrees, a)
     everything = Selection.of(*sketch.owners).within(sketch)

@@ -18,7 +18,7 @@ from robocov import environment as env
 from robocov.arrays import Array
 from robocov.environment import Point, Ring
 from robocov.errors import MapError, format_count
-from robocov.mapfile.models import LARGEST, SMALLEST
+from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import as_array, distinct, point_near, ring_near, tenths
 from robocov_app.editor.model.selection import Change, Edge, Selection, Vertex, place_of, replace_obstacles
@@ -52,7 +52,7 @@ def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
             first = min(moves, key=lambda vertex: vertex.index)
             place = point_near(moves[first])
             radius = disc.radius if first.index == 0 else tenths(math.dist(disc.center, place))
-            if first.index and radius < SMALLEST:
+            if first.index and radius < MIN_SIZE_M:
                 raise MapError("a circle needs a radius: drag its rim away from its centre")
             center = disc.center if first.index else place
             sketch = sketch.with_things({owner: replace(disc, center=center, radius=radius)})
@@ -119,7 +119,7 @@ def bevelled(sketch: Sketch, selection: Selection, length: float) -> Change:
 
 def rounded_off(sketch: Sketch, selection: Selection, radius: float) -> Change:
     """Round the selected corners with a radius in metres, to a millimetre, by arcs that touch both edges."""
-    require(0.0 < radius < math.inf, "a radius above 0 m was wanted")
+    require(0.0 < radius < math.inf, "expected a radius above 0 m")
 
     def cut(turn: float) -> tuple[float, int]:
         step = 2.0 * math.acos(max(1.0 - env.MAX_SAGITTA_M / radius, 0.0))
@@ -163,7 +163,7 @@ def _cuts(ring: Ring, indices: set[int], closed: bool, wanted: _Cut) -> dict[int
             if taken > edge + 1e-9:
                 more = " for the corners at both ends" if other in cuts else ""
                 found = f"that takes {tenths(taken):g} m of an edge that is {tenths(edge):g} m long{more}"
-                raise MapError(f"{found}: less was wanted")
+                raise MapError(f"{found}: expected less")
     return cuts
 
 
@@ -227,7 +227,7 @@ def joined(sketch: Sketch, selection: Selection) -> Change:
 
 def simplified(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
     """Leave vertices out, to `tolerance` m, by Douglas and Peucker (1973): nothing comes to cross itself."""
-    require(0.0 <= tolerance <= LARGEST, "a tolerance of 0 m or more was wanted")
+    require(0.0 <= tolerance <= MAX_SIZE_M, "expected a tolerance of 0 m or more")
     after, changed = _redrawn(sketch, selection, lambda rings, closed: _simpler(rings, tolerance, closed))
     count = sum(len(old) - len(new) for old, new in changed)
     require(count, "no vertex can be left out at that tolerance")
@@ -237,7 +237,7 @@ def simplified(sketch: Sketch, selection: Selection, tolerance: float) -> Change
 
 def straightened(sketch: Sketch, selection: Selection, degrees: float = 5.0) -> Change:
     """Make edges horizontal or vertical that nearly are; those in line come to lie on one line."""
-    require(0.0 < degrees <= 30.0, "an angle of up to 30 degrees was wanted")
+    require(0.0 < degrees <= 30.0, "expected an angle of up to 30 degrees")
     after, changed = _redrawn(
         sketch, selection, lambda rings, closed: tuple(_straight(ring, degrees, closed) for ring in rings)
     )

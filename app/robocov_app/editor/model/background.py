@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from robocov.environment import Point
 from robocov.errors import MapError
-from robocov.mapfile.models import plain
+from robocov.mapfile.models import to_json_value
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import angle_to_level, cos_sin
 
@@ -45,7 +45,7 @@ class Background:
         return left, right, self.place_of((width, 0)), self.place_of((0, 0))
 
     def document(self) -> dict[str, Any]:
-        return {name: plain(value) for name, value in asdict(self).items()} | {"shown": self.shown}
+        return {name: to_json_value(value) for name, value in asdict(self).items()} | {"shown": self.shown}
 
     @classmethod
     def of_document(cls, document: Any) -> "Background | None":
@@ -65,7 +65,7 @@ _ADAPTER = TypeAdapter(Background)
 def picture_laid(path: str, pixels: tuple[int, int], width: float = 20.0) -> Background:
     """Return a picture just taken, so many metres wide, its lower left corner in the origin."""
     if min(pixels) < 1 or math.prod(pixels) > MOST_PIXELS:
-        wanted = f"1 to {MOST_PIXELS // 1_000_000} million pixels were wanted"
+        wanted = f"expected 1 to {MOST_PIXELS // 1_000_000} million pixels"
         raise MapError(f"the picture has {pixels[0]} x {pixels[1]} pixels: {wanted}")
     return Background(path, pixels, width / pixels[0])
 

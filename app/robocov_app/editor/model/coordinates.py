@@ -8,7 +8,7 @@ import re
 
 from robocov.environment import Point
 from robocov.errors import MapError, quote
-from robocov.mapfile.models import FARTHEST, LARGEST
+from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import cos_sin
 
@@ -49,8 +49,8 @@ def point_of(text: str, *, last: Point | None = None) -> Point:
         x, y = (_wanted(value, text, _POINTS) for value in _pair(length, ""))
     if relative and last is not None:
         x, y = last[0] + x, last[1] + y
-    if max(abs(x), abs(y)) > FARTHEST:
-        raise MapError(f"{quote(text)}: maps reach {FARTHEST / 1000:.0f} km from their origin")
+    if max(abs(x), abs(y)) > MAX_COORDINATE_M:
+        raise MapError(f"{quote(text)}: maps reach {MAX_COORDINATE_M / 1000:.0f} km from their origin")
     return _exact(x), _exact(y)
 
 
@@ -138,5 +138,5 @@ def _exact(value: float) -> float:
 
 
 def _limited(length: float, text: str) -> float:
-    require(abs(length) <= LARGEST, f"{quote(text)}: at most {LARGEST / 1000:g} km was wanted")
+    require(abs(length) <= MAX_SIZE_M, f"{quote(text)}: expected at most {MAX_SIZE_M / 1000:g} km")
     return _exact(length)

@@ -293,7 +293,7 @@ class Document:
         """Write the file, which names an unnamed map; ChangedError, unless `over`, if it has changed."""
         path = _with_suffix(path)
         if is_bundled(path):
-            raise MapError(f"{path.name} comes with robocov and stays as it is: another name was wanted")
+            raise MapError(f"{path.name} comes with robocov and stays as it is: expected another name")
         named = self.history.sketch.named(path.stem)
         before = self.disk if path == self.path else None
         self.disk = write_sketch(named, path, before, over=over or (self._over and path == self.path))

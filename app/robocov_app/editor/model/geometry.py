@@ -11,7 +11,7 @@ from shapely import Polygon
 
 from robocov.arrays import Array
 from robocov.environment import Point, PolygonObstacle, Ring
-from robocov.mapfile.models import FARTHEST, SMALLEST
+from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
 from robocov_app.editor.model import require
 
 Box: TypeAlias = tuple[float, float, float, float]  # smallest x, smallest y, largest x, largest y, m
@@ -37,8 +37,10 @@ def as_array(points: Sequence[Point] | Array) -> Array:
 def ring_near(points: Sequence[Point] | Array) -> Ring:
     """Return points to the tenth of a millimetre; MapError where one is farther than maps reach."""
     found = as_array(points)
-    limit = f"maps reach {FARTHEST / 1000:.0f} km from their origin"
-    require(np.all(np.abs(found) <= FARTHEST), f"that is too far away: {limit}")  # nan is not near either
+    limit = f"maps reach {MAX_COORDINATE_M / 1000:.0f} km from their origin"
+    require(
+        np.all(np.abs(found) <= MAX_COORDINATE_M), f"that is too far away: {limit}"
+    )  # nan is not near either
     return tuple([(x, y) for x, y in (np.round(found, DECIMALS) + 0.0).tolist()])
 
 
@@ -116,7 +118,7 @@ def outlines(geometry: shapely.Geometry, name: str | None = None) -> tuple[Polyg
 
 def _is_crumb(part: shapely.Geometry) -> bool:
     low_x, low_y, high_x, high_y = part.bounds
-    return not min(high_x - low_x, high_y - low_y) >= SMALLEST  # of what is empty these are no numbers
+    return not min(high_x - low_x, high_y - low_y) >= MIN_SIZE_M  # of what is empty these are no numbers
 
 
 def bearing_words(a: Point, b: Point) -> str:

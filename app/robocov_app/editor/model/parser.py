@@ -17,7 +17,8 @@ from robocov.errors import (
     quote_json,
     to_one_line,
 )
-from robocov.files.strictjson import check_header, located, parse, require_json
+from robocov.files.documents import check_header
+from robocov.files.strictjson import locate_mistakes, parse_json, require_json
 from robocov.mapfile import parse_density
 from robocov.mapfile.models import FORMAT, VERSION, MapModel
 from robocov_app.editor.model.background import taken_apart
@@ -37,11 +38,11 @@ _Read = TypeVar("_Read")
 
 def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> Sketch:
     """Return the sketch in the text of a file; messages call it `where`, and `folder` holds its pictures."""
-    document = parse(text, where)
+    document = parse_json(text, where)
     try:
         return sketch_of(document, where, folder)
     except MapError as error:
-        raise located(error, text, where) from None
+        raise locate_mistakes(error, text, where) from None
 
 
 def sketch_of(document: Any, where: str = "map", folder: Path | None = None) -> Sketch:
@@ -83,7 +84,7 @@ class _Reader:
 
     def typed(self, kind: type[_Read], value: Any, path: JsonPath, wanted: str) -> _Read:
         if not isinstance(value, kind):
-            self.refuse(path, f"{quote_json(value)}, but {wanted} was wanted")
+            self.refuse(path, f"expected {wanted}, got {quote_json(value)}")
         return value
 
     def members(self, value: Any, path: JsonPath, known: Sequence[str]) -> dict[str, Any]:
@@ -97,12 +98,12 @@ class _Reader:
 
     def number(self, value: Any, path: JsonPath) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            self.refuse(path, f"{quote_json(value)}, but a number was wanted")
+            self.refuse(path, f"expected a number, got {quote_json(value)}")
         return float(value)
 
     def point(self, value: Any, path: JsonPath) -> Point:
         if not isinstance(value, list | tuple) or len(value) != 2:
-            self.refuse(path, f"{quote_json(value)}, but a point [x, y] in metres was wanted")
+            self.refuse(path, f"expected a point [x, y] in metres, got {quote_json(value)}")
         x, y = value
         if type(x) is float and type(y) is float:  # most of a large file: no path for each
             return x, y
@@ -118,7 +119,7 @@ class _Reader:
 
     def repeat(self, value: Any, path: JsonPath) -> env.Repeat:
         if value not in env.REPEATS:
-            self.refuse(path, f"{quote_json(value)}, but one of {', '.join(env.REPEATS)} was wanted")
+            self.refuse(path, f"expected one of {', '.join(env.REPEATS)}, got {quote_json(value)}")
         return value  # type: ignore[no-any-return]
 
     def way(self, value: Any, path: JsonPath) -> env.ObstaclePath:
@@ -127,10 +128,10 @@ class _Reader:
     def either(self, classes: Mapping[str, type[_Read]], value: Any, path: JsonPath) -> _Read:
         wanted = f"one of {', '.join(classes)}"
         if "kind" not in self.typed(dict, value, path, f"an object whose kind is {wanted}"):
-            self.refuse((*path, "kind"), "missing, but it was wanted")
+            self.refuse((*path, "kind"), "missing")
         kind = value["kind"]
         if kind not in tuple(classes):
-            self.refuse((*path, "kind"), f"{quote_json(kind)}, but {wanted} was wanted")
+            self.refuse((*path, "kind"), f"expected {wanted}, got {quote_json(kind)}")
         return self.built(classes[kind], value, path, "kind")
 
     def built(self, of: type[_Read], value: Any, path: JsonPath, *more: str) -> _Read:
@@ -142,5 +143,5 @@ class _Reader:
             if key in members and not (members[key] is None and default is None):
                 found[key] = getattr(self, _READ_AS[key])(members[key], (*path, key))
             elif default is MISSING:
-                self.refuse((*path, key), "missing, but it was wanted")
+                self.refuse((*path, key), "missing")
         return of(**found)

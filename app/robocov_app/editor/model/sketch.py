@@ -13,7 +13,7 @@ from robocov.density import Density
 from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import to_one_line
 from robocov.mapfile import dump_document, from_json, to_json
-from robocov.mapfile.models import FARTHEST, LARGEST
+from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M
 from robocov_app.editor.model.background import MARKS, Background, annotated, taken_apart
 from robocov_app.editor.model.geometry import Box, as_array
 
@@ -222,13 +222,13 @@ def geometry_of(shape: Obstacle) -> shapely.Geometry:
     if isinstance(shape, env.CircleObstacle):
         if not _is_near([shape.center]):
             return shapely.GeometryCollection()
-        return shape.polygon if 0.0 < shape.radius <= LARGEST else shapely.Point(shape.center)
+        return shape.polygon if 0.0 < shape.radius <= MAX_SIZE_M else shapely.Point(shape.center)
     points = shape.points if isinstance(shape, env.WallObstacle) else shape.vertices
     if not _is_near(points) or not points:
         return shapely.GeometryCollection()
     line = shapely.LineString(points) if len(set(points)) > 1 else shapely.Point(points[0])
     if isinstance(shape, env.WallObstacle):
-        return shape.polygon if line.length > 0.0 and 0.0 < shape.width <= LARGEST else line
+        return shape.polygon if line.length > 0.0 and 0.0 < shape.width <= MAX_SIZE_M else line
     if len(points) < 3:
         return line
     holes = [hole for hole in shape.holes if len(hole) >= 3 and _is_near(hole)]
@@ -237,4 +237,4 @@ def geometry_of(shape: Obstacle) -> shapely.Geometry:
 
 
 def _is_near(points: Iterable[Point]) -> bool:
-    return all(abs(x) <= FARTHEST and abs(y) <= FARTHEST for x, y in points)
+    return all(abs(x) <= MAX_COORDINATE_M and abs(y) <= MAX_COORDINATE_M for x, y in points)

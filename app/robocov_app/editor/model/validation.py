@@ -15,8 +15,9 @@ from robocov import environment as env
 from robocov.arrays import Array
 from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError, StartError, format_count, summarize_names
-from robocov.mapfile.check import check_rules
-from robocov.mapfile.models import FARTHEST, LARGEST, LONGEST_LABEL, SMALLEST, validate
+from robocov.mapfile.models import MAX_COORDINATE_M, MAX_LABEL_CHARACTERS, MAX_SIZE_M, MIN_SIZE_M
+from robocov.mapfile.rules import check_rules
+from robocov.mapfile.structure import validate_document
 from robocov.team import DEFAULT_RADIUS
 from robocov_app.editor.model.geometry import as_array
 from robocov_app.editor.model.selection import numbered_name
@@ -58,7 +59,7 @@ def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiP
         environment = sketch.unchecked()
         free = environment.free
         try:
-            validate(draft_document(sketch), "map")  # whatever the rules are, these are they
+            validate_document(draft_document(sketch), "map")  # whatever the rules are, these are they
             check_rules(environment, "map")
         except MapError as error:
             found = list(_space_faults(sketch, free, set())) or [Problem(in_words(str(error), sketch), None)]
@@ -116,8 +117,8 @@ def _faults(sketch: Sketch) -> Iterator[Problem]:
 def _label_faults(name: str) -> Iterator[str]:
     if not name:
         yield "has no name"
-    elif len(name) > LONGEST_LABEL:
-        yield f"has a name of {len(name)} characters: at most {LONGEST_LABEL} are possible"
+    elif len(name) > MAX_LABEL_CHARACTERS:
+        yield f"has a name of {len(name)} characters: at most {MAX_LABEL_CHARACTERS} are possible"
     elif _CONTROL.search(name):
         yield "has a name with line breaks or other control characters"
 
@@ -138,10 +139,10 @@ def _thing_faults(thing: Obstacle | StartSpec | None, boundary: Ring | None) -> 
         yield from far
         points = as_array(thing.points)
         extent = np.ptp(points, axis=0).max() if len(points) else 0.0
-        if not far and (len(points) < 2 or extent < SMALLEST):
+        if not far and (len(points) < 2 or extent < MIN_SIZE_M):
             yield Problem("it has no length: it needs two points that are apart", _drawn(points))
-        elif not far and extent > LARGEST:
-            words = f"it is {extent:.5g} m long: at most {LARGEST / 1000:g} km are possible"
+        elif not far and extent > MAX_SIZE_M:
+            words = f"it is {extent:.5g} m long: at most {MAX_SIZE_M / 1000:g} km are possible"
             yield Problem(words, _drawn(points))
     elif isinstance(thing, env.PointsStart):
         if not thing.positions:
@@ -162,10 +163,12 @@ def _ring_faults(ring: Ring, what: str = "its outline") -> Iterator[Problem]:
         yield from far or [Problem(f"{what} has {corners}: it needs three", _drawn(points))]
         return
     extent, polygon = np.ptp(points, axis=0), Polygon(points)
-    if extent.max() > LARGEST:
+    if extent.max() > MAX_SIZE_M:
         size = f"{extent[0]:.5g} × {extent[1]:.5g} m"
-        yield Problem(f"{what} is {size} large: at most {LARGEST / 1000:g} km are possible", _drawn(points))
-    elif extent.min() < SMALLEST or shapely.convex_hull(polygon).area <= _FLAT * float(extent.max()) ** 2:
+        yield Problem(
+            f"{what} is {size} large: at most {MAX_SIZE_M / 1000:g} km are possible", _drawn(points)
+        )
+    elif extent.min() < MIN_SIZE_M or shapely.convex_hull(polygon).area <= _FLAT * float(extent.max()) ** 2:
         yield Problem(f"{what} encloses nothing: its corners lie on one line", _drawn(points))
     elif not polygon.is_valid:
         places = _meetings(points, polygon)
@@ -196,15 +199,17 @@ def _polygon_faults(shape: env.PolygonObstacle) -> Iterator[Problem]:
 
 
 def _size_faults(what: str, size: float, at: Point | None) -> Iterator[Problem]:
-    if not SMALLEST <= size <= LARGEST:
-        limit = f"at least {1000 * SMALLEST:g} mm" if size < SMALLEST else f"at most {LARGEST / 1000:g} km"
+    if not MIN_SIZE_M <= size <= MAX_SIZE_M:
+        limit = (
+            f"at least {1000 * MIN_SIZE_M:g} mm" if size < MIN_SIZE_M else f"at most {MAX_SIZE_M / 1000:g} km"
+        )
         yield Problem(f"its {what} is {size:.5g} m: {limit} is possible", at and shapely.Point(at))
 
 
 def _far_faults(points: Ring) -> Iterator[Problem]:
     for x, y in points:
-        if not max(abs(x), abs(y)) <= FARTHEST:
-            limit = f"maps reach {FARTHEST / 1000:.0f} km from their origin"
+        if not max(abs(x), abs(y)) <= MAX_COORDINATE_M:
+            limit = f"maps reach {MAX_COORDINATE_M / 1000:.0f} km from their origin"
             yield Problem(f"{place_words(x, y)} is too far away: {limit}", shapely.Point(x, y))
             return
 
@@ -231,7 +236,7 @@ def _meetings(points: Array, polygon: Polygon) -> list[Point]:
 def _rough_free(sketch: Sketch) -> MultiPolygon:
     """Return the free space of a draft, as far as its boundary and its obstacles can be made valid."""
     ring = sketch.boundary or ()
-    if len(ring) < 3 or np.abs(ring).max() > FARTHEST or np.ptp(ring, axis=0).max() > LARGEST:
+    if len(ring) < 3 or np.abs(ring).max() > MAX_COORDINATE_M or np.ptp(ring, axis=0).max() > MAX_SIZE_M:
         return MultiPolygon()
     inside = shapely.make_valid(Polygon(ring))
     solid = shapely.union_all(sketch.geometries) if len(sketch.geometries) else MultiPolygon()

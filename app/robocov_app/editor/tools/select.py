@@ -201,7 +201,7 @@ class Scaling(Drag):
         axis = 0 if self._side[0] else 1
         now = self._bounds[2 + axis] - self._bounds[axis]
         factor = length_of(text, now=now) / now
-        require(factor > 0.0, f"“{text}”: a size above 0 was wanted")
+        require(factor > 0.0, f"“{text}”: expected a size above 0")
         both = self._even or (self._side[0] and self._side[1])
         fx, fy = (factor if both or axis == k else 1.0 for k in (0, 1))
         self._scale(fx, fy, self._fixed)

@@ -212,12 +212,12 @@ def _number(word: str, text: str, kind: type[_Number]) -> _Number:
         return kind(text)
     except ValueError:
         wanted = "a whole number" if kind is int else "a number"
-        raise MapError(f"{word}: {text!r}, but {wanted} was wanted") from None
+        raise MapError(f"{word}: expected {wanted}, got {text!r}") from None
 
 
 def _set_angle(editor: Editor, text: str) -> None:
     angle = angle_of(text)
-    require(0.1 <= angle <= 90.0, f"angle: {angle:g}°, but 0.1° to 90° was wanted")
+    require(0.1 <= angle <= 90.0, f"angle: expected 0.1° to 90°, got {angle:g}°")
     editor.snap_angle = angle
     editor.say(f"angles snap to multiples of {angle:g}°")
 
@@ -281,13 +281,13 @@ def _signed(text: str) -> float:
 
 
 def _set_density(editor: Editor, text: str) -> None:
-    require(text == "none", f"density: {text!r}, but none was wanted; the tool Density draws hot spots")
+    require(text == "none", f"density: expected none, got {text!r}; the tool Density draws hot spots")
     editor.change(density.density_removed(editor.sketch))
 
 
 def _array_of(text: str) -> tuple[int, int, float, float]:
     parts = text.replace("x", " ").split()
-    require(len(parts) == 4, "array: columns, rows and both distances were wanted, as in array 3 x 2 1.5 1.5")
+    require(len(parts) == 4, "array: expected columns, rows and both distances, as in array 3 x 2 1.5 1.5")
     columns, rows = (_number("array", each, int) for each in parts[:2])
     return columns, rows, _signed(parts[2]), _signed(parts[3])
 
@@ -502,7 +502,7 @@ def typed_commands(editor: Editor) -> list[Command]:
 
 def run_typed(editor: Editor, text: str, word: str) -> None:
     """Do what was typed, as ``rotate 30``; raises a MapError when that means nothing, or cannot be done."""
-    require(text.strip(), f"{word}: a value was wanted after it")
+    require(text.strip(), f"{word}: expected a value after it")
     TYPED[word][1](editor, text.strip())
 
 

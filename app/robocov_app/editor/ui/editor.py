@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from robocov.environment import Point
 from robocov.errors import MapError, RobocovError
-from robocov.mapfile.models import SMALLEST
+from robocov.mapfile.models import MIN_SIZE_M
 from robocov.team import DEFAULT_RADIUS
 from robocov_app.editor.model import require
 from robocov_app.editor.model.document import Document
@@ -241,8 +241,8 @@ class Editor(Workspace):
 
     def set_length(self, name: str, length: float) -> None:
         most, what = 10.0 if name == "radius" else 100.0, name.replace("_", " ")
-        if not SMALLEST <= length <= most:
-            raise MapError(f"{what}: {length:g} m, but {SMALLEST:g} to {most:g} m was wanted")
+        if not MIN_SIZE_M <= length <= most:
+            raise MapError(f"{what}: expected {MIN_SIZE_M:g} to {most:g} m, got {length:g} m")
         setattr(self, name, length)
         if name == "grid":
             self.say(f"the grid is {length:g} m")
@@ -253,7 +253,7 @@ class Editor(Workspace):
         self.set_length("grid", coarser[0] if by > 0 else finer[-1])
 
     def set_robots(self, count: int) -> None:
-        require(1 <= count <= 1000, f"robots: {count}, but 1 to 1000 were wanted")
+        require(1 <= count <= 1000, f"robots: expected 1 to 1000, got {count}")
         self.robots = count
 
     def add_robots(self, by: int) -> None:

@@ -42,7 +42,7 @@ class Option:
             numbers = ()
         if len(numbers) != (2 if self.kind == "place" else 1):
             wanted = "x and y" if self.kind == "place" else "a number"
-            raise ParameterError(f"{self.name}: {quote(text)}, but {wanted} was wanted")
+            raise ParameterError(f"{self.name}: expected {wanted}, got {quote(text)}")
         return numbers if self.kind == "place" else numbers[0]
 
 

@@ -18,8 +18,8 @@ from robocov.arrays import Array
 from robocov.environment import Environment, Ring
 from robocov.errors import MapError, ParameterError, format_count, quote, to_one_line
 from robocov.mapfile import from_json, to_json
-from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
-from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST
+from robocov.mapfile.check import MANY_VERTICES, count_vertices, describe_vertex_count
+from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M, MIN_SIZE_M
 from robocov.team import DEFAULT_RADIUS
 from robocov_app.formats.base import ForeignMap, ImportReport, Options, Primitive, square_metres
 from robocov_app.formats.geometry.cleaning import Cleaned, Deviation, measure_deviation, remove_hairs
@@ -95,9 +95,9 @@ class Shaping(Options):
         )
         if self.inside is None:
             return
-        if len(self.inside) != 2 or not all(abs(value) <= FARTHEST for value in self.inside):
-            wanted = f"two numbers from {-FARTHEST:.0f} to {FARTHEST:.0f} (m) were wanted"
-            raise ParameterError(f"inside: {quote(self.inside)}, but {wanted}")
+        if len(self.inside) != 2 or not all(abs(value) <= MAX_COORDINATE_M for value in self.inside):
+            wanted = f"expected two numbers from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} (m)"
+            raise ParameterError(f"inside: {wanted}, got {quote(self.inside)}")
         if self.keep == "all":
             raise ParameterError("inside: keeps one part of the free space, but keep is all")
 
@@ -154,8 +154,8 @@ class _Shaper:
         self._report_deviation(plan.deviation, drawing.free)
         environment = self._to_environment(plan, drawing.free)
         self._report_reach(environment)
-        kept = vertex_count(environment)
-        self.notes += [many_vertices(kept)] if kept > MANY_VERTICES else []
+        kept = count_vertices(environment)
+        self.notes += [describe_vertex_count(kept)] if kept > MANY_VERTICES else []
         width, height = np.ptp(np.array(environment.boundary), axis=0).tolist()
         return environment, ImportReport(
             source=self.where,
@@ -225,7 +225,7 @@ class _Shaper:
             simple = simplified(plan, allowed, foreign.cell, self.radius)
             free = rounded(simple.free, self.digits)
             if free.is_empty:
-                few = f"{read.area:.3g} m² are free, but more was wanted"
+                few = f"only {read.area:.3g} m² are free"
                 raise MapError(f"{self.where}: {few}: is the scale right?")
             if measure_deviation(before, free).distance <= tolerance + grid:
                 break
@@ -311,7 +311,7 @@ class _Shaper:
         """Return the free space within `outer` as disjoint valid polygons, the largest first."""
         given = self.foreign.free
         if not np.isfinite(shapely.get_coordinates(given)).all():
-            raise MapError(f"{self.where}: a coordinate is not finite, but numbers were wanted")
+            raise MapError(f"{self.where}: expected finite coordinates")
         # what is all but zero makes GEOS divide by zero
         free: BaseGeometry = shapely.transform(given, lambda xy: np.where(abs(xy) < _ZERO, 0.0, xy))
         if not free.is_valid:
@@ -325,7 +325,7 @@ class _Shaper:
             free = inside
         valid = polygons_of(free)
         if valid.is_empty:
-            raise MapError(f"{self.where}: nothing is free, but some free space was wanted")
+            raise MapError(f"{self.where}: there is no free space")
         return valid
 
     def _kept(self, free: MultiPolygon) -> list[Polygon]:
@@ -340,8 +340,8 @@ class _Shaper:
             if distance[nearest] > 0.0:
                 (a, b), (x, y) = shaping.inside, _place_in(parts[nearest])
                 raise MapError(
-                    f"{self.where}: inside: {a:.10g} {b:.10g} is solid, but a place in the free space was "
-                    f"wanted; {x:.10g} {y:.10g} is one in the nearest part, {distance[nearest]:.3g} m away"
+                    f"{self.where}: inside: {a:.10g} {b:.10g} is solid, expected a free position; "
+                    f"{x:.10g} {y:.10g} is one in the nearest part, {distance[nearest]:.3g} m away"
                 )
             stays = np.arange(len(parts)) == nearest
         elif (enclosed := self._enclosed_part(parts)) is not None:
@@ -357,7 +357,7 @@ class _Shaper:
         left: list[Polygon] = parts[~stays].tolist()
         if not kept:
             found = f"no part of the free space is larger than {area[0]:.3g} m²"
-            raise MapError(f"{self.where}: {found}, but one of at least {self.specks:g} m² was wanted")
+            raise MapError(f"{self.where}: {found}, expected one of at least {self.specks:g} m²")
         if left:
             largest = f" (the largest {square_metres(left[0].area, 3)})" if len(left) > 1 else ""
             drop(f"{format_count(len(left), 'separate part')} of the free space, {_squared(left)}{largest}")
@@ -439,7 +439,7 @@ class _Shaper:
     def _require_few(self, count: int, what: str, most: int) -> None:
         if count > most:
             ways = "--specks AREA drops small obstacles, --simplify METRES draws walls with fewer vertices"
-            raise MapError(f"{self.where}: {count} {what}, but at most {most} were wanted: {ways}")
+            raise MapError(f"{self.where}: expected at most {most}, got {count} {what}: {ways}")
 
     def _require_room(self, parts: list[Polygon]) -> None:
         widest = 0.0
@@ -454,10 +454,10 @@ class _Shaper:
 
     def _obstacles(self, solid: list[Polygon]) -> list[env.PolygonObstacle]:
         """Return `solid` as obstacles, the largest first, without what is too small for a map."""
-        kept = [part for part in solid if min(np.subtract(part.bounds[2:], part.bounds[:2])) >= SMALLEST]
+        kept = [part for part in solid if min(np.subtract(part.bounds[2:], part.bounds[:2])) >= MIN_SIZE_M]
         if len(kept) < len(solid):
             thin = format_count(len(solid) - len(kept), "obstacle")
-            self.dropped.append(f"{thin} thinner than {SMALLEST * 1000:g} mm")
+            self.dropped.append(f"{thin} thinner than {MIN_SIZE_M * 1000:g} mm")
         kept.sort(key=lambda part: (-round(part.area, 6), part.bounds))
         ring = self._ring
         return [env.PolygonObstacle(ring(part.exterior), (*map(ring, part.interiors),)) for part in kept]
@@ -651,7 +651,9 @@ def _fits(primitive: Primitive) -> bool:
         sizes = [primitive.radius]
     else:
         sizes = [primitive.width, np.ptp(points, axis=0).max()]
-    return bool(min(sizes) >= SMALLEST and max(sizes) <= LARGEST and np.abs(points).max() <= FARTHEST)
+    return bool(
+        min(sizes) >= MIN_SIZE_M and max(sizes) <= MAX_SIZE_M and np.abs(points).max() <= MAX_COORDINATE_M
+    )
 
 
 @dataclass(frozen=True, eq=False)

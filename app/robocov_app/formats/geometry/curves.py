@@ -77,5 +77,5 @@ def sampled(curve: Callable[[Array], Array], breaks: Array, tolerance: float) ->
 def _counted(count: Array, most: int) -> IntArray:
     whole = np.ceil(np.clip(count, 1.0, most + 1.0))
     if not whole.sum() <= most:  # nan is too many
-        raise ValueError(f"more than {most} points, but fewer were wanted")
+        raise ValueError(f"expected at most {most} points, got more")
     return whole.astype(np.intp)

@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle, WallObstacle
 from robocov.errors import to_one_line
-from robocov.mapfile.models import LONGEST_LABEL
+from robocov.mapfile.models import MAX_LABEL_CHARACTERS
 from robocov_app.formats.colours import Colour, Role
 from robocov_app.formats.geometry.painting import Coat
 from robocov_app.formats.geometry.polygons import Rule
@@ -171,5 +171,5 @@ class Line:
 
 def name_of(labels: Sequence[str]) -> str | None:
     """Return what an obstacle with these labels is called in a map; layer 0 of a drawing is no name."""
-    names = (to_one_line(label)[:LONGEST_LABEL].strip() for label in labels[:1] if label != "0")
+    names = (to_one_line(label)[:MAX_LABEL_CHARACTERS].strip() for label in labels[:1] if label != "0")
     return next(names, None) or None

@@ -35,7 +35,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array
 from robocov.environment import GRID_M, CircleObstacle
 from robocov.errors import MapError, format_count, quote
-from robocov.mapfile.models import LARGEST
+from robocov.mapfile.models import MAX_SIZE_M
 from robocov_app.formats.base import Primitive, ReadOptions, square_metres
 from robocov_app.formats.colours import WHITE, count_colours
 from robocov_app.formats.geometry.figures import BOUNDARY, Line, Outline
@@ -60,7 +60,7 @@ DEFAULT_AROUND_M = 1.0  # distance from the shapes to the rectangle around them
 MOST = 0.5  # a boundary holds more of the other shapes; walls that are one leave so much of it open
 _SAME = 0.999  # of two outlines one of which lies in the other: ratio of areas from which on they are one
 _BACKGROUND_SHARE = 0.98  # of the page, which its background covers at least
-_MAX_APART_M = 10.0 * LARGEST  # shapes farther from each other are of no map: unions take seconds
+_MAX_APART_M = 10.0 * MAX_SIZE_M  # shapes farther from each other are of no map: unions take seconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +197,7 @@ def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation
         boundary = find_surrounding(drawing, floors.outlines)
     region = _find_region(drawing, boundary, report, are_solid=are_solid)
     if region.is_empty:
-        found = "no closed outline, but one that encloses free space was wanted"
+        found = "no closed outline, expected one that encloses free space"
         raise MapError(f"{drawing.where}: {found}")
     require_size(region.geoms[0].bounds, drawing.where)
     if nested is not None:
@@ -222,12 +222,12 @@ def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation
     )
 
 
-def require_size(bounds: Iterable[float], where: str, maximum: float = LARGEST) -> None:
+def require_size(bounds: Iterable[float], where: str, maximum: float = MAX_SIZE_M) -> None:
     """Raise MapError where bounds, m, are larger than any map."""
     x, y, right, top = bounds
     if max(right - x, top - y) > maximum:
-        wanted = f"at most {LARGEST / 1000:g} km was wanted: is the scale right?"
-        raise MapError(f"{where}: {right - x:.6g} x {top - y:.6g} m, but {wanted}")
+        wanted = f"expected at most {MAX_SIZE_M / 1000:g} km"
+        raise MapError(f"{where}: {wanted}, got {right - x:.6g} x {top - y:.6g} m: is the scale right?")
 
 
 def _require_measurable(drawing: Drawing) -> None:
@@ -274,7 +274,7 @@ def _find_named(drawing: Drawing) -> Boundary | None:
     if not area.is_empty:
         return Boundary(area, f"what is called {quote(wanted or BOUNDARY)}", outlines, lines, is_named=True)
     if wanted is not None:
-        found = "encloses no area, but a closed outline was wanted"
+        found = "encloses no area, expected a closed outline"
         raise MapError(f"{drawing.where}: boundary {quote(wanted)}: {found}")
     return None
 

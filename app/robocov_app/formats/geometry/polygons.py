@@ -57,7 +57,7 @@ class Crossings:
         self.count += estimate
         if self.count > MAX_CROSSINGS:
             found = f"its lines cross each other some {self.count:.1g} times"
-            raise MapError(f"{self.where}: {found}, but at most {MAX_CROSSINGS} times was wanted")
+            raise MapError(f"{self.where}: expected at most {MAX_CROSSINGS} times, got {found}")
 
 
 def edges_of(lines: Iterable[BaseGeometry]) -> Array:

@@ -89,8 +89,8 @@ def grid_over(environment: Environment, cell: float | None, most: int = MAX_CELL
     columns = math.ceil((high_x - low_x) / cell - 1e-3) + 2
     rows = math.ceil((high_y - low_y) / cell - 1e-3) + 2
     if rows * columns > most:
-        few = f"at most {most // 1_000_000} million were wanted"
-        raise ParameterError(f"cell: {cell:g} m makes {columns} x {rows} cells, but {few}")
+        few = f"expected at most {most // 1_000_000} million"
+        raise ParameterError(f"cell: {few} cells, got {columns} x {rows} of {cell:g} m")
     return Grid(rows, columns, cell, (round(low_x - cell, _DIGITS), round(low_y - cell, _DIGITS)))
 
 
@@ -109,7 +109,7 @@ def free_cells(environment: Environment, grid: Grid) -> BoolArray:
     column, row = np.floor((inside - grid.origin) / grid.cell).astype(np.intp).T
     free[row, column] = False
     if not free.any():
-        raise ParameterError(f"cell: with {grid.cell:g} m no cell is free, but a smaller one was wanted")
+        raise ParameterError(f"cell: no cell of {grid.cell:g} m is free, expected a smaller size")
     return free
 
 

@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, describe_unknown_name, format_count
-from robocov.mapfile.models import FARTHEST, SMALLEST
+from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, Painted, ReadOptions
 from robocov_app.formats.colours import UNPAINTED, ColourKey, Paint, count_colours, name_colour
@@ -142,9 +142,9 @@ class Shapes:
         (points,) = self._checked([line.points], at)
         width = max(line.width, 0.0)
         files.require_length(width, ": ".join(filter(None, (self.where, at, "width"))), 0.0)
-        if width < SMALLEST:
-            self.mended["line", f"thinner than {1000 * SMALLEST:g} mm, made as wide"] += 1
-            width = SMALLEST
+        if width < MIN_SIZE_M:
+            self.mended["line", f"thinner than {1000 * MIN_SIZE_M:g} mm, made as wide"] += 1
+            width = MIN_SIZE_M
         if not (points[1:] != points[:-1]).any():
             self.leave_out("line", "without a length")
         else:
@@ -250,12 +250,12 @@ class Shapes:
         """Count the points of rings, and return them to a nanometre: next to nothing is nothing."""
         self.count(sum(map(len, rings)))
         for ring in rings:
-            good = np.abs(ring) <= FARTHEST  # nan is not good either
+            good = np.abs(ring) <= MAX_COORDINATE_M  # nan is not good either
             if not good.all():
                 x, y = ring[int(np.argmin(good.all(axis=1)))].tolist()
                 place = f"{self.where}: {at}" if at else self.where
-                wanted = f"coordinates from {-FARTHEST:.0f} to {FARTHEST:.0f} m were wanted"
-                raise MapError(f"{place}: a point at [{x:g}, {y:g}] m, but {wanted}")
+                wanted = f"expected coordinates from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} m"
+                raise MapError(f"{place}: {wanted}, got a point at [{x:g}, {y:g}] m")
         return [np.round(ring, _DIGITS) + 0.0 for ring in rings]
 
     def foreign_map(
@@ -287,7 +287,7 @@ class Shapes:
         self.require_known_names()
         if world is None and not self.outlines and not self.lines:
             dropped = f" ({'; '.join(self.dropped)} left out)" if self.dropped else ""
-            raise MapError(f"{self.where}: no closed outline and no line{dropped}, but a drawing was wanted")
+            raise MapError(f"{self.where}: no closed outline and no line{dropped}, expected a drawing")
         found = interpret(self._to_drawing(world), solid=solid, overlap=overlap)
         if found.outside:
             self.leave_out("shape", "outside of the boundary", found.outside)

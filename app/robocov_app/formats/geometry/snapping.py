@@ -3,7 +3,7 @@
 Rooms that are drawn one by one often miss each other by a rounding error. Such a gap is no wall, but it would
 cut the free space apart. A gap between two outlines is closed
 
-- if it is narrower than `robocov.mapfile.models.SMALLEST`, as no obstacle of a map is that thin, or
+- if it is narrower than `robocov.mapfile.models.MIN_SIZE_M`, as no obstacle of a map is that thin, or
 - if it is narrower than the snapping tolerance and lies between parts that the file does not connect in
   another way. Where a door leads through it, it is a wall, however thin.
 
@@ -22,7 +22,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array
 from robocov.environment import GRID_M
 from robocov.errors import format_count
-from robocov.mapfile.models import SMALLEST
+from robocov.mapfile.models import MIN_SIZE_M
 from robocov_app.formats.geometry.polygons import buffer_with_mitres, polygons_of, united
 
 DEFAULT_SNAP_M = 0.01  # thinner than any wall of a building
@@ -77,8 +77,8 @@ def close_gaps(areas: Sequence[BaseGeometry], snap: float) -> ClosedGaps:
     if snap <= 0.0 or not _are_close(outlines, snap):
         return ClosedGaps(area)
     # what is thinner than any obstacle of a map, wherever it is; then what cuts the area apart
-    hairlines = _find_gaps(outlines, min(snap, SMALLEST))
-    area = _fill(area, hairlines, min(snap, SMALLEST))
+    hairlines = _find_gaps(outlines, min(snap, MIN_SIZE_M))
+    area = _fill(area, hairlines, min(snap, MIN_SIZE_M))
     cracks = _find_gaps(shapely.get_parts(area), snap)
     area = _fill(area, cracks, snap)
     widths = np.concatenate([hairlines.widths, cracks.widths])

@@ -70,7 +70,7 @@ def foreign_map(
         free |= upward == UNKNOWN
     if not free.any():
         hint = f" (--unknown free takes {called} cells as free)" if number[UNKNOWN] else ""
-        raise MapError(f"{where}: no cell is free, but some were wanted{hint}")
+        raise MapError(f"{where}: no cell is free{hint}")
     boundary, dropped = None, []
     if unknown == "cut" and number[UNKNOWN]:
         island, count = ndimage.label(upward != UNKNOWN, structure=_TOUCHING)
@@ -101,7 +101,7 @@ def foreign_map(
 def free_area(free: BoolArray, cell: Point, origin: Point, where: str) -> MultiPolygon:
     """Return free cells, (rows, columns), the top row first, as polygons, m; MapError where none is."""
     if not free.any():
-        raise MapError(f"{where}: no cell is free, but some were wanted")
+        raise MapError(f"{where}: no cell is free")
     return _traced(free[::-1], where, lambda points: _placed(points, cell, origin))
 
 

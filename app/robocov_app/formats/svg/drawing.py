@@ -27,7 +27,7 @@ from robocov.arrays import Array
 from robocov.environment import CircleObstacle, Environment, Obstacle, Ring, WallObstacle
 from robocov.errors import MapError, to_one_line
 from robocov.files.writing import replace_file
-from robocov.mapfile.models import LARGEST, SMALLEST
+from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.colours import Paint, read_colour
 from robocov_app.formats.files import MAX_VERTICES, name_of_map, require_shapes
@@ -76,7 +76,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         if max(right - x, top - y) < _SMALLEST:
             hint = "--scale METRES says what a unit is, as in --scale 0.01"
             found = f"{right - x:.3g} x {top - y:.3g} m at its own scale"
-            raise MapError(f"{shapes.where}: {found}, but at least {_SMALLEST:g} m was wanted: {hint}")
+            raise MapError(f"{shapes.where}: expected at least {_SMALLEST:g} m, got {found}: {hint}")
     own = "at its own scale" if options.scale is None else f"a unit is {options.scale:g} m"
     shapes.notes = [own, *drawing.notes()]
     shapes.note_colours(drawing.key)
@@ -95,7 +95,7 @@ def _page(given: dict[str, str], scale: float | None) -> tuple[Array, float, flo
     width, height = (length("100%" if sizes[k] == "auto" else sizes[k], whole[k]) for k in whole)
     box = box or (0.0, 0.0, width, height)
     if width <= 0.0 or height <= 0.0:
-        raise ValueError(f"{width:g} x {height:g} px, but a size was wanted")
+        raise ValueError(f"expected a size, got {width:g} x {height:g} px")
     if scale is None:
         inside = paths.fitted(box, width, height, given.get("preserveAspectRatio", ""))
         fit, bottom = composed(affine(paths.PIXEL, d=paths.PIXEL), inside), paths.PIXEL * height
@@ -103,7 +103,7 @@ def _page(given: dict[str, str], scale: float | None) -> tuple[Array, float, flo
         fit, bottom = composed(affine(scale, d=scale), affine(e=-box[0], f=-box[1])), scale * box[3]
     origin = numbers(given.get("data-origin", "0 0"))
     if len(origin) != 2:
-        raise ValueError(f"data-origin {given['data-origin'][:30]!r}, but two numbers were wanted")
+        raise ValueError(f"expected two numbers, got data-origin {given['data-origin'][:30]!r}")
     return composed(affine(d=-1.0, e=origin[0], f=origin[1] + bottom), fit), box[2], box[3]
 
 
@@ -113,7 +113,7 @@ def _view_box(given: dict[str, str]) -> tuple[float, float, float, float] | None
         return None
     values = numbers(given["viewBox"])
     if len(values) != 4:
-        raise ValueError(f"viewBox {given['viewBox'][:30]!r}, but four numbers were wanted")
+        raise ValueError(f"expected four numbers, got viewBox {given['viewBox'][:30]!r}")
     x, y, width, height = values
     return (x, y, width, height) if width > 0.0 and height > 0.0 else None
 
@@ -198,9 +198,9 @@ class _Drawing:
 
         def count(element: Element, depth: int) -> tuple[int, int]:
             if element in inside:
-                element.refuse("is used within itself, but an end was wanted")
+                element.refuse("is used within itself")
             if depth > DEEPEST:
-                element.refuse(f"uses nested deeper than {DEEPEST}, but less was wanted")
+                element.refuse(f"uses are nested deeper than {DEEPEST}")
             if element not in counted:
                 inside.add(element)
                 target = self._target(element)
@@ -212,8 +212,8 @@ class _Drawing:
 
         elements, shapes = count(self.root, 0)
         if elements > MOST_ELEMENTS:
-            few = f"but at most {MOST_ELEMENTS} were wanted"
-            raise MapError(f"{self.root.where}: {elements:.3g} elements to be drawn, uses and all, {few}")
+            few = f"expected at most {MOST_ELEMENTS}"
+            raise MapError(f"{self.root.where}: {few}, got {elements:.3g} elements to be drawn, uses and all")
         require_shapes(shapes, self.root.where)
 
     def _target(self, element: Element) -> Element | None:
@@ -228,7 +228,7 @@ class _Drawing:
         if element.tag not in _GROUPS and element.tag not in _SHAPES:
             return
         if outer.depth > DEEPEST:
-            element.refuse(f"nested deeper than {DEEPEST}, but less was wanted")
+            element.refuse(f"nested deeper than {DEEPEST}")
         own = self.sheet.of(element)
         if paths.is_hidden(own):
             self.shapes.leave_out("hidden element")
@@ -346,8 +346,8 @@ class _Drawing:
         except ValueError:  # of a width that no program writes, of a stroke that may never matter
             return
         thinnest = self.shapes.options.stroke_width(self.pixel)
-        wide = (line for line in lines if thinnest <= line.measure_widths()[1] <= LARGEST)
-        self.shapes.add_edges([replace(line, width=max(line.width, SMALLEST)) for line in wide])
+        wide = (line for line in lines if thinnest <= line.measure_widths()[1] <= MAX_SIZE_M)
+        self.shapes.add_edges([replace(line, width=max(line.width, MIN_SIZE_M)) for line in wide])
 
     def _strokes(self, parts: list[tuple[Array, bool]], place: _Place, paint: Paint, at: str) -> None:
         lines = self._lines(parts, place, paint)

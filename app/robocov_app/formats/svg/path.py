@@ -36,7 +36,7 @@ _ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A
 def number(text: str) -> float:
     value = float(text)
     if not abs(value) <= _LARGEST:
-        raise ValueError(f"{text[:20]}, but a number up to {_LARGEST:g} was wanted")
+        raise ValueError(f"expected a number up to {_LARGEST:g}, got {text[:20]}")
     return 0.0 if abs(value) < 1.0 / _LARGEST else value
 
 
@@ -47,7 +47,7 @@ def numbers(text: str) -> list[float]:
         found.append(number(match[1]))
         at = match.end()
     if text[at:].strip(" \t\r\n\f,"):
-        raise ValueError(f"{text[at : at + 20].strip()!r}, but a number was wanted")
+        raise ValueError(f"expected a number, got {text[at : at + 20].strip()!r}")
     return found
 
 
@@ -56,7 +56,7 @@ def length(text: str, whole: float | None = None) -> float:
     match = _LENGTH.fullmatch(text)
     unit = match[2].lower() if match else ""
     if match is None or not (unit in _PIXELS or (unit == "%" and whole is not None)):
-        raise ValueError(f"{text[:30]!r}, but a length in px, mm, cm, in, pt, pc or % was wanted")
+        raise ValueError(f"expected a length in px, mm, cm, in, pt, pc or %, got {text[:30]!r}")
     value = number(match[1])
     return value * whole / 100.0 if unit == "%" and whole is not None else value * _PIXELS[unit]
 
@@ -72,7 +72,7 @@ def composed(outer: Array, inner: Array) -> Array:
     """Return the matrix of both, the inner one first; ValueError when it makes things too large."""
     both = outer @ inner
     if not (np.abs(both) <= _LARGEST).all():
-        raise ValueError(f"a transform to coordinates beyond {_LARGEST:g}, but smaller ones were wanted")
+        raise ValueError(f"a transform to coordinates beyond {_LARGEST:g}")
     return np.asarray(both)
 
 
@@ -92,11 +92,11 @@ def transform(text: str) -> Array:
         # CSS writes units where attributes have none
         values = numbers(re.sub(r"(?<=[\d.])(?:px|deg)\b", "", match[2]))
         if function is None or len(values) not in function[0]:
-            raise ValueError(f"{match[0].strip()[:40]!r}, but a transform was wanted")
+            raise ValueError(f"expected a transform, got {match[0].strip()[:40]!r}")
         matrix = composed(matrix, function[1](*values))
         at = match.end()
     if text[at:].strip(" \t\r\n,") not in ("", "none"):
-        raise ValueError(f"{text[at:].strip()[:40]!r}, but a transform was wanted")
+        raise ValueError(f"expected a transform, got {text[at:].strip()[:40]!r}")
     return matrix
 
 
@@ -140,13 +140,13 @@ def subpaths(
     Raises ValueError where it is no path data, or has more; the message says which character.
     """
     if sum(text.count(letter) for command in _ARGUMENTS for letter in (command, command.lower())) > draws:
-        raise ValueError(f"more than {draws} commands, but fewer were wanted")
+        raise ValueError(f"expected at most {draws} commands, got more")
     pen = _Pen()
     at = 0
     while match := _COMMAND.match(text, at):
         command, at = match[1], match.end()
         if not pen.draws and command not in "Mm":
-            raise ValueError(f"character {at}: {command}, but M was wanted first")
+            raise ValueError(f"character {at}: expected M, got {command} first")
         if command in "Zz":
             pen.close()
             continue
@@ -160,7 +160,7 @@ def subpaths(
             for k in range(0, len(values), count):
                 pen.draw(command, values[k : k + count])
     if text[at : at + 1].strip(" \t\r\n\f,") or text[at:].strip(" \t\r\n\f,"):
-        raise ValueError(f"character {at + 1}: {text[at : at + 12].strip()!r}, but a command was wanted")
+        raise ValueError(f"character {at + 1}: expected a command, got {text[at : at + 12].strip()!r}")
     return pen.finished(tolerance, most), pen.draws
 
 
@@ -188,10 +188,10 @@ class _Pen:
             at = match.end()
             if len(values) > room:
                 many = f"{most} points" if room == count * points else f"{draws} commands"
-                raise ValueError(f"character {at}: more than {many}, but fewer were wanted")
+                raise ValueError(f"character {at}: expected at most {many}, got more")
         if not values or len(values) % count:
             found = text[at : at + 12].strip() or "the end"
-            raise ValueError(f"character {at + 1}: {found!r}, but a number was wanted")
+            raise ValueError(f"character {at + 1}: expected a number, got {found!r}")
         return values, at
 
     def draw(self, command: str, v: list[float]) -> None:
@@ -328,7 +328,7 @@ class StyleSheet:
         """Add the rules of a text. Raises MapError when there are too many."""
         self._size += len(text)
         if self._size > MOST_TEXT:
-            raise MapError(f"{self.where}: style sheets of over {MOST_TEXT} characters, but less was wanted")
+            raise MapError(f"{self.where}: expected style sheets of at most {MOST_TEXT} characters, got more")
         text = text.replace("<!--", " ").replace("-->", " ")
         # up to the last end of a comment: to look for one that is not there takes for ever
         commented, end, text = text.rpartition("*/")
@@ -350,7 +350,7 @@ class StyleSheet:
         looked_at = [rule for key in ("", *marks) for rule in self._keyed.get(key, ())]
         self._work += len(looked_at)
         if self._work > MOST_WORK:
-            raise MapError(f"{self.where}: too many rules for too many elements, but fewer were wanted")
+            raise MapError(f"{self.where}: too many rules for too many elements")
         rules = [rule for rule in looked_at if rule.marks <= marks]
         chosen = [rule.properties for rule in sorted(rules, key=lambda rule: rule.weight)]
         chosen.append(_by_importance(declarations(attributes.get("style", ""))))

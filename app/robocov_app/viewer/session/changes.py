@@ -11,7 +11,7 @@ from robocov.density import Density
 from robocov.environment import Environment, Obstacle, Point
 from robocov.errors import MapError, ParameterError, RobocovError
 from robocov.mapfile import parse_density, to_json
-from robocov.mapfile.models import DensityModel, ObstacleModel, plain
+from robocov.mapfile.models import DensityModel, ObstacleModel, to_json_value
 from robocov.world.free_positions import find_free_position
 from robocov_app.viewer.session.map_edits import painted, with_replaced
 from robocov_app.viewer.session.pane import Continuation, Pane
@@ -24,8 +24,8 @@ _SINCE = "Control steps since time 0"
 Step: TypeAlias = Annotated[int, Field(strict=True, ge=0, le=100_000_000, description=_SINCE)]
 _OBSTACLES = read_as(
     list[ObstacleModel],
-    lambda models, _: tuple(model.built() for model in models),
-    lambda obstacles, _: [plain(each) for each in obstacles],
+    lambda models, _: tuple(model.build() for model in models),
+    lambda obstacles, _: [to_json_value(each) for each in obstacles],
 )
 
 

@@ -18,7 +18,8 @@ from pydantic_core import PydanticCustomError
 
 from robocov.environment import Environment
 from robocov.errors import MapError, Mistake, quote_json
-from robocov.files.strictjson import check_header, located, parse, read_bytes, refused
+from robocov.files.documents import build_document_error, check_header
+from robocov.files.strictjson import locate_mistakes, parse_json, read_bytes
 from robocov.files.writing import replace_file
 from robocov.mapfile import from_json, list_bundled_maps, load_map, to_json
 from robocov_app.viewer.session import changes
@@ -199,14 +200,14 @@ def load_session(path: Path, controllers: Collection[str] = ()) -> SavedSession:
     """Return the content of a session file.
 
     `controllers`: the user's own that may be run. MapError, one line: file, line and column, JSON path, value
-    and what was wanted.
+    and the expected value.
     """
     text, where = read_bytes(path), str(path)
-    content = parse(text, where)
+    content = parse_json(text, where)
     try:
         return session_of(content, where, controllers)
     except MapError as error:
-        raise located(error, text, where) from None
+        raise locate_mistakes(error, text, where) from None
 
 
 def session_of(content: Any, where: str, controllers: Collection[str] = ()) -> SavedSession:
@@ -214,7 +215,7 @@ def session_of(content: Any, where: str, controllers: Collection[str] = ()) -> S
     try:
         model = SessionModel.model_validate(content, context=_Maps(where, controllers))
     except ValidationError as error:
-        raise refused(error, where, _mistake) from None
+        raise build_document_error(error, where, _mistake) from None
     refuse, nodes = partial(_refuse, where), list[Node]()
     for touch in model.touches:
         nodes.append(_node(touch, nodes, partial(refuse, "touches", len(nodes))))
@@ -263,7 +264,7 @@ def _node(touch: TouchModel, nodes: list[Node], refuse: Callable[..., None]) -> 
 
 def _refuse(where: str, *path: str | int, value: object, wanted: str) -> None:
     raise MapError.from_mistakes(
-        where, [Mistake.at_path(path, f"{quote_json(value)}, but {wanted} was wanted")]
+        where, [Mistake.at_path(path, f"expected {wanted}, got {quote_json(value)}")]
     )
 
 
@@ -326,11 +327,11 @@ def _mistake(detail: Any) -> Mistake:
     if detail["type"] == "extra_forbidden":
         return Mistake.at_path(path, "unknown key", at_key=True)
     if detail["type"] in ("model_type", "dataclass_type"):
-        return Mistake.at_path(path, f"{quote_json(detail['input'])}, but an object was wanted")
+        return Mistake.at_path(path, f"expected an object, got {quote_json(detail['input'])}")
     if (tag := _TAG.match(str(detail["msg"]))) is not None:
-        wanted = f"one of {tag['known']} was wanted"
-        return Mistake.at_path((*path, tag["key"]), f"{quote_json(tag['found'])}, but {wanted}")
+        wanted = f"expected one of {tag['known']}"
+        return Mistake.at_path((*path, tag["key"]), f"{wanted}, got {quote_json(tag['found'])}")
     words = str(detail["msg"]).removeprefix("Input should be ").replace("a valid integer", "an integer")
     words = words.replace("a valid ", "a ")
     words = re.sub(r".* should have (.*?)( after validation)?, not \d+", r"\1", words)
-    return Mistake.at_path(path, f"{quote_json(detail['input'])}, but {words} was wanted")
+    return Mistake.at_path(path, f"expected {words}, got {quote_json(detail['input'])}")

@@ -136,7 +136,7 @@ def _check(saved: Sequence[Saved]) -> None:
         record, where = each.record, each.folder
         even = np.arange(len(record)) * record.dt
         if not np.allclose(record.time - record.time[0], even, rtol=1e-6, atol=1e-3 * record.dt):
-            raise InputError(f"{where / 'record.npz'}: time: moments {record.dt:g} s apart were wanted")
+            raise InputError(f"{where / 'record.npz'}: time: expected times {record.dt:g} s apart")
         for what, mine, others in (
             ("dt_s", record.dt, first.dt),
             ("moments", len(record), len(first)),
@@ -145,8 +145,8 @@ def _check(saved: Sequence[Saved]) -> None:
             ("conditions", record.conditions, first.conditions),
         ):
             if mine != others:
-                wanted = f"{others} as in {saved[0].folder} was wanted; --frames and --video show both"
-                raise InputError(f"{where}: {what}: {mine}, but {wanted}")
+                wanted = f"expected {others} as in {saved[0].folder}; --frames and --video show both"
+                raise InputError(f"{where}: {what}: {wanted}, got {mine}")
 
 
 def _standing(law: ControllerChoice) -> ControllerChoice:

@@ -208,13 +208,13 @@ class Scenario:
 
     def __post_init__(self) -> None:
         if not 1 <= self.robots <= MOST_ROBOTS:
-            wanted = f"a whole number from 1 to {MOST_ROBOTS} was wanted"
-            raise ParameterError(f"robots: {quote(self.robots)}, but {wanted}")
+            wanted = f"expected a whole number from 1 to {MOST_ROBOTS}"
+            raise ParameterError(f"robots: {wanted}, got {quote(self.robots)}")
         if self.conditions is not None and self.conditions.uses_messages and self.robots > MOST_THAT_TALK:
             why = "where messages may be lost or late: the window remembers all of them, of all moments"
-            raise ParameterError(f"robots: {self.robots}, but at most {MOST_THAT_TALK} were wanted {why}")
+            raise ParameterError(f"robots: expected at most {MOST_THAT_TALK}, got {self.robots} {why}")
         if not 1 <= len(self.laws) <= MOST_PANES:
-            raise ParameterError(f"controllers: {len(self.laws)}, but 1 to {MOST_PANES} were wanted")
+            raise ParameterError(f"controllers: expected 1 to {MOST_PANES}, got {len(self.laws)}")
 
     @property
     def start_name(self) -> str:

@@ -118,7 +118,7 @@ class Document:
             if name in (each.node.name, str(k)):
                 return each
         known = ", ".join(f"{k} ({each.words})" for k, each in enumerate(branches, 1))
-        raise ParameterError(f"branch: {name!r}, but one of {known} was wanted")
+        raise ParameterError(f"branch: expected one of {known}, got {name!r}")
 
 
 def replayed(
