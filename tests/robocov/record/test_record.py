@@ -214,7 +214,7 @@ CONDITIONS = Conditions(loss=0.1, failures=((1, 0.5),), joins=((2, 0.5, (1.0, 1.
         (edited("team", "mass_kg", to=[1, 1, 1, "1"]), "run.json: team.mass_kg: "),
         (
             edited("conditions", to={**CONDITIONS, "loss": 2}),
-            "run.json: conditions.loss: 2, but a number from 0",
+            "run.json: conditions.loss: expected a number from 0",
         ),
         (
             edited("conditions", to={**CONDITIONS, "failures": [{"robot": 0, "time_s": 1}]}),
