@@ -205,11 +205,11 @@ def list_compiled_kernels() -> list[str]:
     list of str
         In alphabetical order.
     """
-    return sorted(each.name for each in _kernels if each.is_compiled)
+    return sorted(item.name for item in _kernels if item.is_compiled)
 
 
 def _disable_cache() -> None:
-    """Go on without the cache for the rest of the process; kernels build new dispatchers when needed."""
+    """Continue without the cache for the rest of the process; kernels build new dispatchers when needed."""
     global _is_cache_usable
     _is_cache_usable = False
 
@@ -231,8 +231,8 @@ def import_numba() -> ModuleType:
 def _import_numba() -> ModuleType:
     is_source_root = False
     if "numba" not in sys.modules and "coverage" not in sys.modules:
-        found = importlib.util.find_spec("coverage")
-        is_source_root = found is not None and found.origin is None
+        spec = importlib.util.find_spec("coverage")
+        is_source_root = spec is not None and spec.origin is None
     if is_source_root:
         sys.modules["coverage"] = None  # type: ignore[assignment]
     try:

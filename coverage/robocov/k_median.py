@@ -372,8 +372,10 @@ def _find_best_swap(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[
 
 
 @kernel
-def _replace_sources(table: Array, sources: IntArray, order: IntArray, kept: int) -> tuple[float, IntArray]:
-    """Keep the first `kept` sources of an order, and replace the others one by one where each helps most.
+def _replace_sources(
+    table: Array, sources: IntArray, order: IntArray, unchanged: int
+) -> tuple[float, IntArray]:
+    """Keep the first `unchanged` sources of an order, and replace the others greedily one by one.
 
     Returns the cost, and the sources.
     """
@@ -382,7 +384,7 @@ def _replace_sources(table: Array, sources: IntArray, order: IntArray, kept: int
     is_taken = np.zeros(table.shape[1], dtype=np.bool_)
     for position in range(len(order)):
         k = order[position]
-        if position >= kept:
+        if position >= unchanged:
             sums = np.zeros(table.shape[1])
             for t in range(len(table)):
                 for column in range(table.shape[1]):

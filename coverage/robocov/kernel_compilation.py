@@ -260,8 +260,8 @@ def _save_compiled_list(folder: Path) -> None:
         compiled = set(list_compiled_kernels())
         with suppress(OSError, ValueError):
             compiled |= set(json.loads(path.read_text(encoding="utf-8")))
-        with replace_file(path, durable=False) as part:
-            part.write_text(json.dumps(sorted(compiled)), encoding="utf-8")
+        with replace_file(path, durable=False) as temporary:
+            temporary.write_text(json.dumps(sorted(compiled)), encoding="utf-8")
 
 
 def main() -> None:

@@ -145,8 +145,8 @@ class Team:
     def __post_init__(self) -> None:
         size = np.atleast_1d(np.asarray(self.radius)).shape[0]
         for name in PARAMETERS:
-            given = to_floats(f"team.{name}", getattr(self, name), "a number for each robot")
-            values = freeze(np.atleast_1d(given))
+            floats = to_floats(f"team.{name}", getattr(self, name), "a number for each robot")
+            values = freeze(np.atleast_1d(floats))
             if name in _POINT_ROBOT_VALUES and len(values) == 0:
                 values = freeze(np.full(size, _POINT_ROBOT_VALUES[name]))
             _check_column(name, values, size)

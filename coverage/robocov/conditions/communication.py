@@ -30,7 +30,7 @@ class Broadcast(NamedTuple):
     ----------
     arrives, sent : int
         Steps since time zero.
-    places : (n, 2) array, m
+    positions : (n, 2) array, m
         Reported positions of the senders.
     is_received : (n, n) bool array
         Whether the row's robot receives the message of the column's robot.
@@ -38,7 +38,7 @@ class Broadcast(NamedTuple):
 
     arrives: int
     sent: int
-    places: Array
+    positions: Array
     is_received: BoolArray
 
 
@@ -51,7 +51,7 @@ class Inbox:
     sent, arrived : (n, n) int array
         Steps at which the newest message that the row's robot has from the column's robot was sent, and
         arrived; `NEVER` if there is none.
-    places : (n, n, 2) array, m
+    positions : (n, n, 2) array, m
         Positions in these messages.
     in_flight : tuple of Broadcast
         In the order in which they arrive.
@@ -59,7 +59,7 @@ class Inbox:
 
     sent: IntArray
     arrived: IntArray
-    places: Array
+    positions: Array
     in_flight: tuple[Broadcast, ...] = ()
 
     @classmethod
@@ -76,7 +76,7 @@ class Inbox:
         Inbox
         """
         never = np.full((count, count), NEVER, dtype=np.intp)
-        return cls(sent=never, arrived=never.copy(), places=np.zeros((count, count, 2)))
+        return cls(sent=never, arrived=never.copy(), positions=np.zeros((count, count, 2)))
 
     def select_robots(self, rows: IntArray) -> Inbox:
         """Return the inbox of a team that consists of robots of this one and of new robots.
@@ -96,14 +96,15 @@ class Inbox:
         old_pairs = np.ix_(old_rows, old_rows)
         in_flight = tuple(
             broadcast._replace(
-                places=broadcast.places[old_rows], is_received=broadcast.is_received[old_pairs] & ~is_new_pair
+                positions=broadcast.positions[old_rows],
+                is_received=broadcast.is_received[old_pairs] & ~is_new_pair,
             )
             for broadcast in self.in_flight
         )
         return Inbox(
             sent=np.where(is_new_pair, NEVER, self.sent[old_pairs]),
             arrived=np.where(is_new_pair, NEVER, self.arrived[old_pairs]),
-            places=self.places[old_pairs],
+            positions=self.positions[old_pairs],
             in_flight=in_flight,
         )
 
@@ -153,7 +154,7 @@ class Radio:
             broadcast = Broadcast(
                 arrives=step + self._latency_steps,
                 sent=step,
-                places=np.array(reported),
+                positions=np.array(reported),
                 is_received=self._find_receivers(step, positions, working),
             )
             in_flight = (*in_flight, broadcast)
@@ -162,13 +163,13 @@ class Radio:
             return replace(inbox, in_flight=in_flight)
         sent = inbox.sent.copy()
         arrived = inbox.arrived.copy()
-        places = inbox.places.copy()
+        newest_positions = inbox.positions.copy()
         for broadcast in due:
             sent[broadcast.is_received] = broadcast.sent
             arrived[broadcast.is_received] = broadcast.arrives
             receiver, sender = np.nonzero(broadcast.is_received)
-            places[receiver, sender] = broadcast.places[sender]
-        return Inbox(sent, arrived, places, in_flight[len(due) :])
+            newest_positions[receiver, sender] = broadcast.positions[sender]
+        return Inbox(sent, arrived, newest_positions, in_flight[len(due) :])
 
     def read_reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbours, Array, Array]:
         """Read the newest message that each working robot has from each other one and has not forgotten.
@@ -184,7 +185,7 @@ class Radio:
         -------
         neighbours : Neighbours
             Robots from which each robot has such a message.
-        places : (m, 2) array, m
+        positions : (m, 2) array, m
             Positions in the messages, in the order of ``neighbours.indices``.
         ages : (m,) array, s
             Times since they were sent.
@@ -194,7 +195,7 @@ class Radio:
         robot, neighbour = np.nonzero((inbox.arrived >= 0) & is_recent & working[:, None])
         neighbours = Neighbours.from_pairs(len(working), robot, neighbour, self._ranges)
         ages = (step - inbox.sent[robot, neighbour]) * self._dt
-        return neighbours, inbox.places[robot, neighbour], np.asarray(ages)
+        return neighbours, inbox.positions[robot, neighbour], np.asarray(ages)
 
     def _is_sending(self, step: int) -> bool:
         """Return whether messages are sent in a step: at time zero, and whenever a period has passed."""

@@ -84,9 +84,9 @@ class Perception:
             neighbours = truth.neighbours.restrict_to_working(working)
             return replace(observations, neighbours=neighbours), None
         inbox = self._radio.exchange_messages(inbox, step, positions, truth.positions, working)
-        neighbours, places, ages = self._radio.read_reports(inbox, step, working)
+        neighbours, reported_positions, ages = self._radio.read_reports(inbox, step, working)
         observations = replace(
-            observations, neighbours=neighbours, reported_positions=places, report_ages=ages
+            observations, neighbours=neighbours, reported_positions=reported_positions, report_ages=ages
         )
         return observations, inbox
 

@@ -238,14 +238,14 @@ def _list_possibly_nearest(
 def _list_within(
     boxes: Array, box: int, robots: Array, bound2: float, candidates: IntArray, count: int, result: IntArray
 ) -> int:
-    """List which of the first `count` candidates are within a squared distance of a box; return how many."""
-    found = 0
+    """List the first `count` candidates that are within a squared distance of a box; return their number."""
+    size = 0
     for k in range(count):
         i = candidates[k]
         if compute_squared_box_distance(boxes, box, robots[i, 0], robots[i, 1]) <= bound2:
-            result[found] = i
-            found += 1
-    return found
+            result[size] = i
+            size += 1
+    return size
 
 
 @kernel
@@ -325,8 +325,8 @@ def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None
         if corner % LEAF_SIZE == 0:
             leaf = first_leaf + corner // LEAF_SIZE
             bound = 0.0
-            for other in range(corner, min(corner + LEAF_SIZE, len(walls.corners))):
-                bound = max(bound, paths.length[other])
+            for corner_of_leaf in range(corner, min(corner + LEAF_SIZE, len(walls.corners))):
+                bound = max(bound, paths.length[corner_of_leaf])
             count = _list_within(
                 boxes, leaf, robots, bound * bound, search.all_robots, len(robots), search.group_robots
             )

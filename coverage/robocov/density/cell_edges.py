@@ -75,11 +75,11 @@ class CellEdges:
             Pairs (i, j) with i < j, in ascending order.
         """
         is_shared = (self.beyond != REGION) & self._has_length()
-        one = self.cell[is_shared]
-        other = self.beyond[is_shared]
-        count = int(max(one.max(initial=0), other.max(initial=0))) + 1
+        first_cell = self.cell[is_shared]
+        second_cell = self.beyond[is_shared]
+        count = int(max(first_cell.max(initial=0), second_cell.max(initial=0))) + 1
         # Each pair becomes one number: sorting pairs takes several times as long.
-        numbers = np.unique(np.minimum(one, other) * count + np.maximum(one, other))
+        numbers = np.unique(np.minimum(first_cell, second_cell) * count + np.maximum(first_cell, second_cell))
         return np.column_stack(np.divmod(numbers, count)).astype(np.intp, copy=False)
 
     def _has_length(self) -> BoolArray:

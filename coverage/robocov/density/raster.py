@@ -225,11 +225,13 @@ def _build_grid(raster: Raster) -> _Grid:
     if raster.interpolation == "bilinear":
         # Squares reach from one centre of pixels to the next; the border is repeated outside.
         padded = np.pad(values, 1, mode="edge")
-        here = padded[:-1, :-1]
+        lower_left = padded[:-1, :-1]
         right = padded[:-1, 1:]
         above = padded[1:, :-1]
         diagonal = padded[1:, 1:]
-        coefficients = np.stack([here, right - here, above - here, diagonal - right - above + here])
+        coefficients = np.stack(
+            [lower_left, right - lower_left, above - lower_left, diagonal - right - above + lower_left]
+        )
         origin = origin - 0.5 * step
     else:
         zero = np.zeros_like(values)

@@ -105,17 +105,17 @@ def compute_swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
 
 def _sweep(polygon: Polygon, start: Array, end: Array) -> BaseGeometry:
     """Return the Minkowski sum of a polygon and a line: both end positions, and the areas swept by edges."""
-    parts: list[BaseGeometry] = []
+    pieces: list[BaseGeometry] = []
     motion = end - start
     for ring in (polygon.exterior, *polygon.interiors):
         corners = shapely.get_coordinates(ring)
-        here = corners[:-1]
-        after = corners[1:]
-        edges = after - here
-        quadrilaterals = np.stack([here + start, after + start, after + end, here + end], axis=1)
+        first = corners[:-1]
+        second = corners[1:]
+        edges = second - first
+        quadrilaterals = np.stack([first + start, second + start, second + end, first + end], axis=1)
         cross_products = edges[:, 0] * motion[1] - edges[:, 1] * motion[0]
         is_parallel = np.abs(cross_products) < _PARALLEL_TOLERANCE_M2
-        parts += shapely.polygons(quadrilaterals[~is_parallel]).tolist()
+        pieces += shapely.polygons(quadrilaterals[~is_parallel]).tolist()
     for displacement in (start, end):
-        parts.append(shapely.transform(polygon, lambda points, by=displacement: points + by))
-    return shapely.union_all(parts)
+        pieces.append(shapely.transform(polygon, lambda points, by=displacement: points + by))
+    return shapely.union_all(pieces)

@@ -80,8 +80,8 @@ def extract_polygons(geometry: BaseGeometry) -> MultiPolygon:
     -------
     MultiPolygon, m
     """
-    parts = shapely.get_parts(geometry)
-    polygons = [part for part in parts if isinstance(part, Polygon) and part.area > 0.0]
+    shapes = shapely.get_parts(geometry)
+    polygons = [shape for shape in shapes if isinstance(shape, Polygon) and shape.area > 0.0]
     polygons.sort(key=lambda polygon: (-polygon.area, polygon.bounds))
     return MultiPolygon([shapely.orient_polygons(polygon) for polygon in polygons])
 

@@ -250,8 +250,8 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
     high = int(np.floor((stop + _PADDING) * scale))
     inner_low = int(np.ceil((start + _PADDING) * scale))
     inner_high = int(np.floor((stop - _PADDING) * scale))
-    for place in range(low, min(high, low + bins - 1) + 1):
-        k = place & (bins - 1)
+    for unwrapped_bin in range(low, min(high, low + bins - 1) + 1):
+        k = unwrapped_bin & (bins - 1)
         if near2 > index.horizon2[source, k]:
             continue
         index.clear2[source, k] = min(index.clear2[source, k], near2)
@@ -260,7 +260,7 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
         index.head[source, k] = used
         used += 1
         # Everything farther than a wall across the whole bin is hidden by that wall.
-        if inner_low <= place < inner_high:
+        if inner_low <= unwrapped_bin < inner_high:
             index.horizon2[source, k] = min(index.horizon2[source, k], far2)
     # The last bin is covered only in part; the walls that follow this one may cover the rest.
     last = inner_high & (bins - 1)

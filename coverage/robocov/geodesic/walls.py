@@ -179,10 +179,10 @@ def _compute_angles(vectors: Array) -> Array:
 
 def _find_corners(vertex: IntArray, incoming: Array, outgoing: Array) -> BoolArray:
     """Find the sectors that are corners, given their vertices and the directions of their walls."""
-    turn = compute_crosses(incoming, outgoing)
+    crosses = compute_crosses(incoming, outgoing)
     is_pinch = np.bincount(vertex)[vertex] > 1
     # At a pinch a straight wall is a corner, too: the walls of the other sector would hide the points ahead.
-    return np.asarray((turn < 0.0) | ((turn == 0.0) & is_pinch))
+    return np.asarray((crosses < 0.0) | ((crosses == 0.0) & is_pinch))
 
 
 def _find_following(segments: _Segments) -> IntArray:

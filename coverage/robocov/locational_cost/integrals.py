@@ -281,13 +281,13 @@ def _sum_costs(
             # By quadrature, exact to rounding. The closed form has dilogarithms, which cancel if a triangle
             # is flat or seen from far above.
             w = np.sqrt(d * d + height * height)
-            begin = np.arcsinh(first / w)
-            stop = np.arcsinh(last / w)
-            panels = max(int(np.ceil((stop - begin) / _PANEL_LENGTH)), 1)
-            half = 0.5 * (stop - begin) / panels
+            first_tau = np.arcsinh(first / w)
+            last_tau = np.arcsinh(last / w)
+            panels = max(int(np.ceil((last_tau - first_tau) / _PANEL_LENGTH)), 1)
+            half = 0.5 * (last_tau - first_tau) / panels
             for panel in range(panels):
                 for node in range(rule.shape[1]):
-                    tau = begin + half * (2 * panel + 1 + rule[0, node])
+                    tau = first_tau + half * (2 * panel + 1 + rule[0, node])
                     s = w * np.sinh(tau)
                     ratio = (s * s + d * d) / (height * height)
                     # log(1 + r²/h²)/r², times h²; its limit at r = 0 is 1.

@@ -42,16 +42,16 @@ _SLACK = 0.3
 _MAX_ITERATIONS = 100
 """Maximum number of iterations of each search for prices."""
 
-_MIN_PLACES = 500
+_MIN_POSITIONS = 500
 """About the minimum number of positions in the table."""
 
-_PLACES_PER_ROBOT = 60
+_POSITIONS_PER_ROBOT = 60
 """About the minimum number of these for each robot."""
 
 _SERVING_ROBOTS = 4
 """Number of robots of the placement from which a site is at least as far as its price, at most."""
 
-_PLACES_PER_BLOCK = 256
+_POSITIONS_PER_BLOCK = 256
 """Number of positions whose distances are computed at the same time."""
 
 _MAX_TRIANGLES = 1_000_000
@@ -180,7 +180,7 @@ class _Proof(NamedTuple):
     """Lower bound of the cost, as a weighted sum over the sites, m."""
     prices: Array
     """(m,) m, prices of the sites that prove it."""
-    worthy_places: Array
+    worthy_positions: Array
     """(p, 2) grid steps, positions that are worth more than all of the table."""
 
 
@@ -201,7 +201,7 @@ def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float],
             best = proof
         if best.bound >= (1.0 - precision) * dual.placement_cost:
             break
-        dual.add_places(proof.worthy_places)
+        dual.add_positions(proof.worthy_positions)
         smoothing /= 2.0
     assert best is not None
     return best
@@ -257,12 +257,12 @@ class _Dual:
         self._max_prices, self.first_prices = self._compute_first_prices(robots)
 
         # The table starts with one site in each square of some cells, and the robots.
-        places = max(_MIN_PLACES, _PLACES_PER_ROBOT * len(robots))
-        side = max(1, int(math.sqrt(len(sites) / places)))
-        self._place_spacing = side * cost.spacing / self._unit
+        count = max(_MIN_POSITIONS, _POSITIONS_PER_ROBOT * len(robots))
+        side = max(1, int(math.sqrt(len(sites) / count)))
+        self._position_spacing = side * cost.spacing / self._unit
         inside = sites[shapely.intersects_xy(room, points[:, 0], points[:, 1])]
         self._table = PriceTable.build_empty()
-        self.add_places(np.concatenate([robots, self._thin_out(inside)]))
+        self.add_positions(np.concatenate([robots, self._thin_out(inside)]))
 
     def _build_room(self, environment: Environment, radius: float) -> shapely.Geometry:
         """Return the area for the centres of robots, m; it may be a little too large, but never too small."""
@@ -294,16 +294,16 @@ class _Dual:
         first_prices = np.where(np.isinf(second), beyond, (nearest + second) / 2.0)
         return distances[_SERVING_ROBOTS - 1], first_prices
 
-    def _thin_out(self, places: Array) -> Array:
+    def _thin_out(self, positions: Array) -> Array:
         """Return the first of (p, 2) positions in each square of a grid."""
-        squares = np.floor(places * 2.0 / self._place_spacing)
+        squares = np.floor(positions * 2.0 / self._position_spacing)
         _, first = np.unique(squares, axis=0, return_index=True)
-        return places[np.sort(first)]
+        return positions[np.sort(first)]
 
-    def add_places(self, places: Array) -> None:
+    def add_positions(self, positions: Array) -> None:
         """Add positions, (p, 2) grid steps, to the table."""
-        for first in range(0, len(places), _PLACES_PER_BLOCK):
-            block = places[first : first + _PLACES_PER_BLOCK]
+        for first in range(0, len(positions), _POSITIONS_PER_BLOCK):
+            block = positions[first : first + _POSITIONS_PER_BLOCK]
             distances = self._geodesics.compute_grid_distances(block, self._known.sites) * self._unit
             self._table = self._table.append(distances, self._max_prices)
 

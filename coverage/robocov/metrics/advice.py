@@ -96,9 +96,9 @@ def find_trembling(record: Record) -> IntArray:
     before = displacements[:-1]
     after = displacements[1:]
     cross = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
-    turn = np.abs(np.arctan2(cross, (before * after).sum(axis=-1)))
+    turning_angle = np.abs(np.arctan2(cross, (before * after).sum(axis=-1)))
     trembles = length.mean(axis=0) >= MIN_TREMBLE_STEP_M
-    trembles &= turn.mean(axis=0) >= MIN_TREMBLE_TURN
+    trembles &= turning_angle.mean(axis=0) >= MIN_TREMBLE_TURN
     trembles &= length.sum(axis=0) >= MIN_TREMBLE_DETOUR * net_displacement
     trembles &= record.travelled[-steps:].all(axis=0) & record.working[-steps:].all(axis=0)
     return np.flatnonzero(trembles)

@@ -75,8 +75,8 @@ class Observations:
         """
         if self.reported_positions is None or self.neighbours.indptr is None:
             return self.positions[self.neighbours.list_neighbours(robot)]
-        begin, end = self.neighbours.indptr[robot : robot + 2]
-        return self.reported_positions[begin:end]
+        start, stop = self.neighbours.indptr[robot : robot + 2]
+        return self.reported_positions[start:stop]
 
     def find_near_neighbours(self, reach: float) -> NearNeighbours:
         """Find the neighbours that are at most `reach` metres away, by their known positions.

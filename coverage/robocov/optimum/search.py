@@ -229,12 +229,12 @@ class _Search:
     Attributes
     ----------
     space : ConfigurationSpace
-    places : (p, 2) array, m
+    positions : (p, 2) array, m
         The sources of the table: positions for robots.
     component : (p,) int array
         Their components of the free space.
     table : (t, p) array, m
-        Distances of groups of sites from the places, times the weights of the groups.
+        Distances of groups of sites from the positions, times the weights of the groups.
     """
 
     def __init__(self, environment: Environment, cost: CoverageCost, robots: int, radius: float) -> None:
@@ -251,15 +251,15 @@ class _Search:
         covered_area = sum(areas[k].area for k in covered)
         sources = max(_MIN_SOURCES, _SOURCES_PER_ROBOT * robots)
         spacing = max(math.sqrt(covered_area / sources), self.space.spacing)
-        places = [_spread_points(areas[k], spacing) for k in covered]
-        self.component = np.repeat(covered, [len(points) for points in places]).astype(np.intp)
+        positions = [_spread_points(areas[k], spacing) for k in covered]
+        self.component = np.repeat(covered, [len(points) for points in positions]).astype(np.intp)
         if len(self.component) < robots:
             capacity = sum(len(_spread_points(areas[k], self.space.spacing)) for k in usable)
             raise ParameterError(
                 f"robots: expected at most about {capacity}, as many as fit with radius {radius:g} m in map "
                 f"{environment.name!r}, got {robots}"
             )
-        self.places = np.concatenate(places)
+        self.positions = np.concatenate(positions)
         self.table = self._compute_table(site_component, np.isin(site_component, covered))
         # Many restarts end with the same sources: descend from these only once.
         self._outcome_by_sources: dict[tuple[int, ...], _Outcome] = {}
@@ -269,7 +269,7 @@ class _Search:
         sources = self._find_sources(rng, beat)
         key = tuple(sources.tolist())
         if key not in self._outcome_by_sources:
-            positions = self.places[sources]
+            positions = self.positions[sources]
             result = descend(self.cost, self.space, positions, self.component[sources], beat)
             self._outcome_by_sources[key] = _Outcome(
                 undescended=self.cost(positions).mean_distance,
@@ -297,7 +297,7 @@ class _Search:
         site = site[np.lexsort((chance[site], offset2[site], group[site]))]
         _, first, count = np.unique(group[site], return_index=True, return_counts=True)
         weight = count if cost.weights is None else np.add.reduceat(cost.weights[site], first)
-        table = cost.geodesics.compute_distances(self.places, cost.points[site[first]])
+        table = cost.geodesics.compute_distances(self.positions, cost.points[site[first]])
         table[np.isinf(table)] = _UNREACHABLE_SIZES * cost.geodesics.size
         return np.ascontiguousarray((table * weight).T)
 
@@ -310,7 +310,7 @@ class _Search:
         moved = run_lloyd(self.table, drawn, beat=beat)
         swapped = apply_best_swaps(self.table, moved, beat)
         stages = [np.sort(sources) for sources in (swapped, moved, drawn)]
-        return min(stages, key=lambda sources: _get_rank(self.cost(self.places[sources])))
+        return min(stages, key=lambda sources: _get_rank(self.cost(self.positions[sources])))
 
 
 def _spread_points(area: BaseGeometry, spacing: float) -> Array:
@@ -329,16 +329,16 @@ def _spread_points(area: BaseGeometry, spacing: float) -> Array:
     is_inside = shapely.contains_xy(area, x, y)
     is_on_grid = is_inside & (row % _STEPS_PER_SPACING == 0) & (column % _STEPS_PER_SPACING == 0)
     chosen = points[is_on_grid].tolist()
-    rest = points[is_inside & ~is_on_grid]
+    candidates = points[is_inside & ~is_on_grid]
     if not chosen:
         point = area.representative_point()
         chosen = [[point.x, point.y]]
-    if len(rest):
-        distance = np.asarray(cKDTree(chosen).query(rest)[0])
+    if len(candidates):
+        distance = np.asarray(cKDTree(chosen).query(candidates)[0])
         farthest = int(distance.argmax())
         while distance[farthest] >= _STEPS_PER_SPACING * step:
-            chosen.append(rest[farthest].tolist())
-            offset = rest - rest[farthest]
+            chosen.append(candidates[farthest].tolist())
+            offset = candidates - candidates[farthest]
             distance = np.minimum(distance, compute_lengths(offset))
             farthest = int(distance.argmax())
     return np.array(chosen)

@@ -344,15 +344,15 @@ class GridPlanner(MapWindow):
     def _remove_detours(self, position: Array, points: Array) -> Array:
         """Return the waypoints without those that are unnecessary, because later ones are in sight."""
         remaining: list[Array] = []
-        here = position
+        current = position
         k = 0
         while k < len(points):
             ignored_length = 0.0 if remaining else self.clearance
-            is_visible = self.find_clear_lines(here, points[k:], self.is_tight, ignored_length)
+            is_visible = self.find_clear_lines(current, points[k:], self.is_tight, ignored_length)
             if is_visible.any():
                 k += int(is_visible.nonzero()[0][-1])
-            here = points[k]
-            remaining.append(here)
+            current = points[k]
+            remaining.append(current)
             k += 1
         return np.array(remaining)
 

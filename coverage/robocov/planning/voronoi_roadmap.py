@@ -182,10 +182,10 @@ def _list_adjacent_groups(group: IntArray) -> tuple[IntArray, IntArray]:
     rows, columns = group.shape
     pairs = []
     for up, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
-        here = group[: rows - up, max(0, -right) : columns - max(0, right)]
-        there = group[up:, max(0, right) : columns + min(0, right)]
-        is_border = (here >= 0) & (there >= 0) & (here != there)
-        pairs.append(np.sort(np.column_stack([here[is_border], there[is_border]]), axis=1))
+        first = group[: rows - up, max(0, -right) : columns - max(0, right)]
+        second = group[up:, max(0, right) : columns + min(0, right)]
+        is_border = (first >= 0) & (second >= 0) & (first != second)
+        pairs.append(np.sort(np.column_stack([first[is_border], second[is_border]]), axis=1))
     starts, ends = np.unique(np.concatenate(pairs), axis=0).T
     return starts, ends
 

@@ -131,13 +131,13 @@ def check_joins(environment: Environment, conditions: Conditions | None) -> None
         if join.place is None:
             continue
         x, y = join.place
-        where = f"conditions.joins[{k}]"
+        prefix = f"conditions.joins[{k}]"
         if join.time <= TIME_TOLERANCE_S:
             expected = "expected a time above 0 s for a robot that joins at a place of its own"
-            raise ParameterError(f"{where}: {expected}, got robot {join.robot} at {join.time:g} s")
+            raise ParameterError(f"{prefix}: {expected}, got robot {join.robot} at {join.time:g} s")
         if not environment.boundary_polygon.covers(shapely.Point(x, y)):
             left, bottom, right, top = environment.boundary_polygon.bounds
             inside = f"inside the boundary of map {environment.name!r}"
             extent = f"x from {left:g} to {right:g} m, y from {bottom:g} to {top:g} m"
             got = f"got [{x:g}, {y:g}] for robot {join.robot}"
-            raise ParameterError(f"{where}: expected a place {inside} ({extent}), {got}")
+            raise ParameterError(f"{prefix}: expected a place {inside} ({extent}), {got}")

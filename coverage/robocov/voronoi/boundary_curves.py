@@ -294,9 +294,9 @@ def _intersect(one: Array, other: Array) -> tuple[float, float, int]:
     quadratic = a2 * bend * bend - k * outward * bend - c2 * k * k
     constant = a2 * r1 * r1 + r1 * outward - c2
     # 1 - g² as a sum of minors: if the curves meet at a small angle, g itself would leave only rounding.
-    turn = b1x * b2y - b1y * b2x
+    b_cross = b1x * b2y - b1y * b2x
     across = a1 * c2 - a2 * c1
-    square_sine = turn * turn - 4.0 * across * across
+    square_sine = b_cross * b_cross - 4.0 * across * across
     square_sine += 4.0 * (
         (b1x * a2 - b2x * a1) * (b1x * c2 - b2x * c1) + (b1y * a2 - b2y * a1) * (b1y * c2 - b2y * c1)
     )
@@ -320,18 +320,18 @@ def _add_parts(curve: Array, crossings: Array, pieces: Array, used: int) -> int:
 
     The crossings with the other curves, (k, 2), are overwritten.
     """
-    begin = curve[_BEGIN]
+    start = curve[_BEGIN]
     end = curve[_END]
     for other in range(len(crossings)):
         if crossings[other, 0] <= crossings[other, 1]:
-            begin = max(begin, crossings[other, 0])
+            start = max(start, crossings[other, 0])
             end = min(end, crossings[other, 1])
-    # A curve that is left before it is entered cuts a gap out of this one. Sort the gaps by their begin.
+    # A curve that is left before it is entered cuts a gap out of this one. Sort the gaps by their start.
     gaps = 0
     for other in range(len(crossings)):
         enter = crossings[other, 0]
         leave = crossings[other, 1]
-        if leave < enter and leave < end and enter > begin:
+        if leave < enter and leave < end and enter > start:
             k = gaps
             while k > 0 and crossings[k - 1, 1] > leave:
                 crossings[k, 0] = crossings[k - 1, 0]
@@ -341,23 +341,23 @@ def _add_parts(curve: Array, crossings: Array, pieces: Array, used: int) -> int:
             crossings[k, 1] = leave
             gaps += 1
     for k in range(gaps):
-        used = _add_pieces(curve, begin, min(crossings[k, 1], end), pieces, used)
-        begin = max(begin, crossings[k, 0])
-    return _add_pieces(curve, begin, end, pieces, used)
+        used = _add_pieces(curve, start, min(crossings[k, 1], end), pieces, used)
+        start = max(start, crossings[k, 0])
+    return _add_pieces(curve, start, end, pieces, used)
 
 
 @kernel
-def _add_pieces(curve: Array, begin: float, end: float, pieces: Array, used: int) -> int:
+def _add_pieces(curve: Array, start: float, end: float, pieces: Array, used: int) -> int:
     """Add a part of a curve, cut at t = 0 so that no piece exceeds half a circle; return the number."""
     k = 2.0 * curve[_COEFFICIENT]
-    while begin < end:
-        stop = 0.0 if begin < 0.0 < end and k != 0.0 else end
-        pieces[used, START_X], pieces[used, START_Y] = _evaluate(curve, begin)
+    while start < end:
+        stop = 0.0 if start < 0.0 < end and k != 0.0 else end
+        pieces[used, START_X], pieces[used, START_Y] = _evaluate(curve, start)
         pieces[used, END_X], pieces[used, END_Y] = _evaluate(curve, stop)
-        pieces[used, HALF_ANGLE] = 0.0 if k == 0.0 else np.arctan(k * stop) - np.arctan(k * begin)
+        pieces[used, HALF_ANGLE] = 0.0 if k == 0.0 else np.arctan(k * stop) - np.arctan(k * start)
         pieces[used, CELL] = curve[_CURVE_CELL]
         pieces[used, BEYOND] = curve[_CURVE_BEYOND]
-        begin = stop
+        start = stop
         used += 1
     return used
 

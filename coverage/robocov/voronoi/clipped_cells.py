@@ -51,7 +51,7 @@ def _add_listed_neighbours(
     workspace: Workspace, points: Array, neighbours: NeighbourPositions, i: int
 ) -> int:
     """Add the neighbours of robot i at their known positions; return their number."""
-    near = workspace.neighbours
+    neighbour_rows = workspace.neighbours
     indices = neighbours.indices
     positions = neighbours.positions
     count = 0
@@ -63,17 +63,17 @@ def _add_listed_neighbours(
         else:
             dx = points[j, 0] - points[i, 0]
             dy = points[j, 1] - points[i, 1]
-        count = add_neighbour(near, count, dx, dy, j)
+        count = add_neighbour(neighbour_rows, count, dx, dy, j)
     return count
 
 
 @inlined_kernel
 def _add_all_robots(workspace: Workspace, points: Array, i: int) -> int:
     """Add all robots as neighbours of robot i; return their number."""
-    near = workspace.neighbours
+    neighbour_rows = workspace.neighbours
     count = 0
     for j in range(len(points)):
         dx = points[j, 0] - points[i, 0]
         dy = points[j, 1] - points[i, 1]
-        count = add_neighbour(near, count, dx, dy, j)
+        count = add_neighbour(neighbour_rows, count, dx, dy, j)
     return count

@@ -131,7 +131,7 @@ def clip_cell(workspace: Workspace, neighbours: int, points: Array, sides: Array
     CellPolygon
     """
     rings = workspace.rings
-    near = workspace.neighbours
+    neighbour_rows = workspace.neighbours
     ring = 0
     count = len(sides)
     for k in range(count):
@@ -140,16 +140,16 @@ def clip_cell(workspace: Workspace, neighbours: int, points: Array, sides: Array
         rings[ring, k, BEYOND] = REGION
     # A bisector lies half way to the neighbour: no farther neighbour can cut the cell.
     max_square = _compute_max_square(rings, ring, count)
-    for turn in range(neighbours):
-        if turn < _SORTED_NEIGHBOURS:
-            _move_nearest(near, turn, neighbours)
-        if near[turn, SQUARE] <= max_square:
-            new_count = _cut(rings, ring, count, near, turn)
+    for row in range(neighbours):
+        if row < _SORTED_NEIGHBOURS:
+            _move_nearest(neighbour_rows, row, neighbours)
+        if neighbour_rows[row, SQUARE] <= max_square:
+            new_count = _cut(rings, ring, count, neighbour_rows, row)
             if new_count >= 0:
                 ring = 1 - ring
                 count = new_count
                 max_square = _compute_max_square(rings, ring, count)
-        elif turn < _SORTED_NEIGHBOURS:
+        elif row < _SORTED_NEIGHBOURS:
             break
     return CellPolygon(ring, count, 0)
 
@@ -166,23 +166,26 @@ def _compute_max_square(rings: Array, ring: int, count: int) -> float:
 
 
 @inlined_kernel
-def _move_nearest(near: Array, turn: int, count: int) -> None:
-    """Move the nearest neighbour from row `turn` on to that row."""
-    best = turn
-    for k in range(turn + 1, count):
-        if near[k, SQUARE] < near[best, SQUARE]:
+def _move_nearest(neighbour_rows: Array, row: int, count: int) -> None:
+    """Swap the nearest of the neighbours from a row on into this row."""
+    best = row
+    for k in range(row + 1, count):
+        if neighbour_rows[k, SQUARE] < neighbour_rows[best, SQUARE]:
             best = k
     for column in range(_NEIGHBOUR_COLUMNS):
-        near[turn, column], near[best, column] = near[best, column], near[turn, column]
+        neighbour_rows[row, column], neighbour_rows[best, column] = (
+            neighbour_rows[best, column],
+            neighbour_rows[row, column],
+        )
 
 
 @inlined_kernel
-def _cut(rings: Array, old: int, count: int, near: Array, turn: int) -> int:
+def _cut(rings: Array, old: int, count: int, neighbour_rows: Array, row: int) -> int:
     """Write the part of a polygon on the generator's side of a bisector to the other ring.
 
     Return its number of vertices, or -1 if the bisector does not cut the polygon; nothing is written then.
     """
-    worst = _compute_excess(rings, old, count, near, turn)
+    worst = _compute_excess(rings, old, count, neighbour_rows, row)
     if worst < 0:
         return -1
     # The vertices beyond the line follow each other, up to rounding, because the polygon is convex.
@@ -199,19 +202,19 @@ def _cut(rings: Array, old: int, count: int, near: Array, turn: int) -> int:
     while rings[old, first - 1 if first else count - 1, _EXCESS] > 0.0:
         first = first - 1 if first else count - 1
     size = 0
-    kept = after
+    last_kept = after
     k = after
     while k != first:
         for column in range(3):
             rings[1 - old, size, column] = rings[old, k, column]
-        kept = k
+        last_kept = k
         size += 1
         k = k + 1 if k + 1 < count else 0
-    robot = near[turn, ROBOT]
-    if rings[old, kept, _EXCESS] == 0.0:
+    robot = neighbour_rows[row, ROBOT]
+    if rings[old, last_kept, _EXCESS] == 0.0:
         rings[1 - old, size - 1, BEYOND] = robot
     else:
-        _add_crossing(rings, old, size, kept, first, robot)
+        _add_crossing(rings, old, size, last_kept, first, robot)
         size += 1
     if rings[old, after, _EXCESS] < 0.0:
         _add_crossing(rings, old, size, after, last, rings[old, last, BEYOND])
@@ -220,11 +223,11 @@ def _cut(rings: Array, old: int, count: int, near: Array, turn: int) -> int:
 
 
 @inlined_kernel
-def _compute_excess(rings: Array, ring: int, count: int, near: Array, turn: int) -> int:
+def _compute_excess(rings: Array, ring: int, count: int, neighbour_rows: Array, row: int) -> int:
     """Compute the excess of each vertex over a bisector; return the vertex farthest beyond it, or -1."""
-    dx = near[turn, DX]
-    dy = near[turn, DY]
-    level = 0.5 * near[turn, SQUARE]
+    dx = neighbour_rows[row, DX]
+    dy = neighbour_rows[row, DY]
+    level = 0.5 * neighbour_rows[row, SQUARE]
     worst = -1
     max_excess = 0.0
     for k in range(count):

@@ -187,9 +187,9 @@ def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, h: int) ->
 @inlined_kernel
 def _must_flip(mesh: Mesh, cotangents: Array, h: int) -> bool:
     """Return whether the edge of a half-edge with a twin is not Delaunay, or its angles are undefined."""
-    one = cotangents[h]
-    other = cotangents[mesh[TWIN, h]]
-    return not one + other >= -_TOLERANCE * (abs(one) + abs(other))
+    own = cotangents[h]
+    opposite = cotangents[mesh[TWIN, h]]
+    return not own + opposite >= -_TOLERANCE * (abs(own) + abs(opposite))
 
 
 @kernel

@@ -102,8 +102,8 @@ def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
     ends = [cut.last]
     cells = [edges.cell]
     fraction = np.linspace(0.0, 1.0, _CHORDS_PER_ARC + 1)
-    for begin, turn in (cut.arc_before, cut.arc_behind):
-        angle = begin[:, None] + turn[:, None] * fraction
+    for start_angle, turn in (cut.arc_before, cut.arc_behind):
+        angle = start_angle[:, None] + turn[:, None] * fraction
         points = radius[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         curved = np.flatnonzero(turn != 0.0)
         starts.append(points[curved, :-1].reshape(-1, 2))

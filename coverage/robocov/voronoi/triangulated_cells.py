@@ -162,20 +162,20 @@ def _find_cell(
 
 @inlined_kernel
 def _walk_around(
-    workspace: Workspace, triangulation: Triangulation, points: Array, i: int, begin: int
+    workspace: Workspace, triangulation: Triangulation, points: Array, i: int, first_half_edge: int
 ) -> _Fan:
-    """Write neighbours and Voronoi vertices of robot i, counter-clockwise from half-edge `begin` on."""
+    """Write neighbours and Voronoi vertices of robot i, counter-clockwise from a half-edge on."""
     mesh = triangulation.mesh
     cotangents = triangulation.cotangents
-    near = workspace.neighbours
+    neighbour_rows = workspace.neighbours
     rings = workspace.rings
     n = len(points)
     count = 0
     lowest = n
-    first = begin
+    first = first_half_edge
     start = 0
     max_square = 0.0
-    h = begin
+    h = first_half_edge
     while True:
         back = get_previous(h)
         j = mesh[CORNER, get_next(h)]
@@ -190,10 +190,10 @@ def _walk_around(
             x = 0.5 * (dx - cotangents[h] * dy)
             y = 0.5 * (dy + cotangents[h] * dx)
             max_square = max(max_square, x * x + y * y)
-            near[count, DX] = dx
-            near[count, DY] = dy
-            near[count, SQUARE] = dx * dx + dy * dy
-            near[count, ROBOT] = j
+            neighbour_rows[count, DX] = dx
+            neighbour_rows[count, DY] = dy
+            neighbour_rows[count, SQUARE] = dx * dx + dy * dy
+            neighbour_rows[count, ROBOT] = j
             rings[0, count, X] = x
             rings[0, count, Y] = y
             rings[0, count, BEYOND] = mesh[CORNER, back]
@@ -201,5 +201,5 @@ def _walk_around(
         else:
             max_square = np.inf
         h = mesh[TWIN, back]
-        if h == begin:
+        if h == first_half_edge:
             return _Fan(count, first, start, max_square)

@@ -139,8 +139,8 @@ def split_into_convex_pieces(geometry: BaseGeometry) -> tuple[Array, ...]:
     tuple of (k, 2) arrays, m
         Counter-clockwise polygons that tile those of the geometry.
     """
-    parts = shapely.get_parts(geometry)
-    polygons = [part for part in parts if part.geom_type == "Polygon" and part.area > 0.0]
+    shapes = shapely.get_parts(geometry)
+    polygons = [shape for shape in shapes if shape.geom_type == "Polygon" and shape.area > 0.0]
     loops = chain.from_iterable(_merge_loops(_triangulate(polygon)) for polygon in polygons)
     return tuple(freeze(loop) for loop in loops)
 

@@ -160,10 +160,10 @@ def test_inboxes_are_immutable() -> None:
         content = deepcopy(inbox)
         first = radio.exchange_messages(inbox, step, positions, positions, working)
         second = radio.exchange_messages(inbox, step, positions, positions, working)
-        np.testing.assert_array_equal(first.places, second.places)
+        np.testing.assert_array_equal(first.positions, second.positions)
         np.testing.assert_array_equal(inbox.sent, content.sent)
         np.testing.assert_array_equal(inbox.arrived, content.arrived)
-        np.testing.assert_array_equal(inbox.places, content.places)
+        np.testing.assert_array_equal(inbox.positions, content.positions)
         assert len(inbox.in_flight) == len(content.in_flight)
         inbox = first
 
@@ -357,7 +357,7 @@ def test_inboxes_can_be_selected_for_another_team() -> None:
     # Robots 3 and 1 of the old team, with a new one between them.
     selected = inbox.select_robots(np.array([2, -1, 0]))
     assert selected.sent[0, 2] == inbox.sent[2, 0]
-    np.testing.assert_array_equal(selected.places[0, 2], inbox.places[2, 0])
+    np.testing.assert_array_equal(selected.positions[0, 2], inbox.positions[2, 0])
     assert (selected.sent[1] == NEVER).all()
     assert (selected.sent[:, 1] == NEVER).all()
     assert len(selected.in_flight) == len(inbox.in_flight) == 2
