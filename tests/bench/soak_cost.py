@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "robocov"))
 
 import brute_force_geodesic as brute
 from cost_cases import compute_distance_error
-from drawn_maps import KINDS, SIDE, drawn_map, drawn_places
+from random_maps import KINDS, SIDE, build_random_map, draw_positions
 
 from robocov.cost import CoverageCost
 from robocov.errors import ParameterError
@@ -30,12 +30,12 @@ def by_brute_force(environment, robots):
     cost = CoverageCost(environment, 5)
 
     def placed(points):
-        return [p for p in points.tolist() if brute.well_placed(environment.free, tuple(p), SIDE)]
+        return [p for p in points.tolist() if brute.is_well_placed(environment.free, tuple(p), SIDE)]
 
     robots, points = placed(robots)[:3], placed(cost.points)
     if not robots or not points:
         return 0.0
-    expected = brute.distances(environment.free, robots, points).min(axis=0)
+    expected = brute.compute_distances(environment.free, robots, points).min(axis=0)
     found = cost(robots).distances[[p in points for p in cost.points.tolist()]]
     reached = np.isfinite(expected)
     assert (np.isfinite(found) == reached).all()
@@ -54,10 +54,10 @@ def main(seconds: float, seed: int) -> None:
             rng = np.random.default_rng(seed)
             kind = names[seed % len(names)]
             count, lattice, robots = rng.integers(1, 50), int(rng.integers(1, 40)), int(rng.integers(1, 80))
-            environment = drawn_map(kind, int(count), seed)
+            environment = build_random_map(kind, int(count), seed)
             if environment is None:
                 continue
-            places = drawn_places(environment, robots, seed)
+            places = draw_positions(environment, robots, seed)
             try:
                 worst = max(worst, compute_distance_error(environment, lattice, places))
                 maps += 1

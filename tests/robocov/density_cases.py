@@ -48,18 +48,20 @@ RASTERS = {
 KINDS: dict[str, Density] = {"uniform": Uniform(2.5), **GAUSSIANS, **POLYGONS, **RASTERS}
 
 
-def fine_integrals(
+def integrate_on_fine_lattice(
     density: Density, ring: Array, origin: Array, side: int = 300
 ) -> tuple[float, Array, float]:
     """Return mass, centroid and polar moment about a point of a cell, by sums over a fine lattice."""
-    low, high = ring.min(axis=0), ring.max(axis=0)
+    low = ring.min(axis=0)
+    high = ring.max(axis=0)
     step = (high - low) / side
-    x, y = (low[k] + (np.arange(side) + 0.5) * step[k] for k in (0, 1))
+    x = low[0] + (np.arange(side) + 0.5) * step[0]
+    y = low[1] + (np.arange(side) + 0.5) * step[1]
     points = np.column_stack([np.tile(x, side), np.repeat(y, side)])
     polygon = shapely.Polygon(ring)
     points = points[shapely.contains_xy(polygon, *points.T)]
     weights = density.evaluate(points)
-    # what the lattice misses of the cell's area is spread evenly
+    # The difference between the lattice and the area of the cell is spread evenly.
     weights = weights * (polygon.area / len(points))
     offset = points - origin
     mass = float(weights.sum())

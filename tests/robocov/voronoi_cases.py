@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from robocov.arrays import Array
 
 Family: TypeAlias = Callable[..., "Array"]
-"""Makes so many points for a region."""
+"""Builds a number of points for a region."""
 
 SQUARE = Region(np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 6.0], [0.0, 6.0]]))
 PENTAGON = Region(np.array([[0.0, 0.0], [4.0, 0.0], [5.0, 2.0], [2.0, 4.0], [-1.0, 1.5]]))
@@ -60,8 +60,8 @@ def lattice(region: Region, n: int, rng: np.random.Generator) -> Array:
 
 
 def circle(region: Region, n: int, rng: np.random.Generator) -> Array:
-    turn = rng.uniform(0, 1) + np.arange(n) * 2 * np.pi / n
-    return region.centroid + 0.3 * np.column_stack([np.cos(turn), np.sin(turn)])
+    angle = rng.uniform(0, 1) + np.arange(n) * 2 * np.pi / n
+    return region.centroid + 0.3 * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def collinear(region: Region, n: int, rng: np.random.Generator) -> Array:
@@ -74,7 +74,7 @@ def huddled(region: Region, n: int, rng: np.random.Generator) -> Array:
 
 
 def huddles(region: Region, n: int, rng: np.random.Generator) -> Array:
-    """Return some points alone and some in heaps of a micrometre."""
+    """Return some single points, and some in groups of a micrometre."""
     centres = scattered(region, max(2, n // 3), rng)
     return centres[rng.integers(0, len(centres), n)] + 1e-6 * rng.uniform(-1, 1, (n, 2))
 
@@ -100,25 +100,27 @@ FAMILIES = [scattered, lattice, circle, collinear, huddled, huddles, almost_twin
 families = st.sampled_from(FAMILIES)
 
 
-def exact_cell(
+def compute_exact_cell(
     robot: int, generators: Array, region: Region
 ) -> tuple[Fraction, Fraction, Fraction, Fraction]:
     """Return area, first moments and polar moment (all about the generator) in rational arithmetic."""
     px, py = map(Fraction, generators[robot].tolist())
     ring = [(Fraction(x) - px, Fraction(y) - py) for x, y in region.vertices.tolist()]
     for other in generators.tolist():
-        dx, dy = Fraction(other[0]) - px, Fraction(other[1]) - py
+        dx = Fraction(other[0]) - px
+        dy = Fraction(other[1]) - py
         side = [x * dx + y * dy - (dx * dx + dy * dy) / 2 for x, y in ring]
         clipped = []
         for k, (x, y) in enumerate(ring):
             u, v = ring[(k + 1) % len(ring)]
-            a, b = side[k], side[(k + 1) % len(ring)]
+            a = side[k]
+            b = side[(k + 1) % len(ring)]
             if a <= 0:
                 clipped.append((x, y))
             if a * b < 0:
                 clipped.append((x + a / (a - b) * (u - x), y + a / (a - b) * (v - y)))
         ring = clipped
-    area, mx, my, polar = (Fraction(0) for _ in range(4))
+    area = mx = my = polar = Fraction(0)
     for (x, y), (u, v) in zip(ring, ring[1:] + ring[:1], strict=True):
         cross = x * v - u * y
         area += cross / 2
@@ -130,7 +132,7 @@ def exact_cell(
 
 def assert_exact(cells: VoronoiPartition, region: Region) -> None:
     for robot, p in enumerate(cells.generators):
-        area, mx, my, polar = map(float, exact_cell(robot, cells.generators, region))
+        area, mx, my, polar = map(float, compute_exact_cell(robot, cells.generators, region))
         assert cells.mass[robot] == pytest.approx(area, rel=1e-8, abs=ROUNDING * region.area)
         moment = cells.mass[robot] * (cells.centroid[robot] - p)
         assert moment == pytest.approx([mx, my], abs=ROUNDING * region.area * reach(cells, region))
@@ -148,20 +150,20 @@ def compute_moment_about_centroid(cells: Cells) -> Array:
 def reach(cells: VoronoiPartition, region: Region) -> float:
     """Return a length that no difference of a generator and a point of the region exceeds by much."""
     outside = float(np.abs(cells.generators - region.centroid).max()) if len(cells.generators) else 0.0
-    # coordinates far from the origin carry the rounding of their size
+    # Coordinates far from the origin have larger rounding errors.
     return region.diameter + outside + 1e-4 * float(np.abs(region.vertices).max())
 
 
-def clipped(points: Array, region: Region) -> VoronoiPartition:
-    """Return the partition by clipping alone: the path of limited communication, with ranges that reach."""
+def partition_by_clipping(points: Array, region: Region) -> VoronoiPartition:
+    """Return the partition by clipping alone, as with limited communication; all robots are in range."""
     n = len(points)
-    everybody = Neighbours(
+    all_neighbours = Neighbours(
         n,
         np.full(n, 1e9),
         np.arange(n + 1) * (n - 1),
         np.array([j for i in range(n) for j in range(n) if j != i], dtype=np.intp),
     )
-    return partition(points, region, everybody)
+    return partition(points, region, all_neighbours)
 
 
 def assert_same_ring(a: Array, b: Array, tolerance: float) -> None:

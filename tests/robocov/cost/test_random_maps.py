@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import shapely
 from cost_cases import compute_distance_error
-from drawn_maps import KINDS, SIDE, drawn_map, drawn_places
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from random_maps import KINDS, SIDE, build_random_map, draw_positions
 
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
@@ -26,10 +26,10 @@ seeds = st.integers(0, 2**32)
 @settings(max_examples=120)
 @given(kinds, st.integers(1, 40), seeds, st.integers(1, 24), st.integers(1, 60))
 def test_distances_and_owners_agree_with_distances_from_point_to_point(kind, count, seed, lattice, robots):
-    environment = drawn_map(kind, count, seed)
+    environment = build_random_map(kind, count, seed)
     assume(environment is not None)
     try:
-        error = compute_distance_error(environment, lattice, drawn_places(environment, robots, seed))
+        error = compute_distance_error(environment, lattice, draw_positions(environment, robots, seed))
     except Exception as problem:
         assume("at least one site in the free space" not in str(problem))
         raise
@@ -45,9 +45,9 @@ def test_distances_and_owners_agree_with_distances_from_point_to_point(kind, cou
     st.sampled_from([0.0, 1e3, -4e5]),
 )
 def test_distances_are_exact_for_maps_of_any_size_and_position(kind, count, seed, scale, shift):
-    environment = drawn_map(kind, count, seed, scale, (shift, -2.0 * shift))
+    environment = build_random_map(kind, count, seed, scale, (shift, -2.0 * shift))
     assume(environment is not None and environment.free_area > 0.0)
-    robots = drawn_places(environment, 12, seed)
+    robots = draw_positions(environment, 12, seed)
     # Far from the origin, the coordinates themselves are rounded.
     size = SIDE * scale
     cost = CoverageCost(environment, 16)
@@ -61,30 +61,30 @@ def test_distances_are_exact_for_maps_of_any_size_and_position(kind, count, seed
 @settings(max_examples=50)
 @given(kinds, st.integers(1, 8), seeds, st.integers(1, 4))
 def test_distances_agree_with_the_brute_force(kind, count, seed, robots):
-    environment = drawn_map(kind, count, seed)
+    environment = build_random_map(kind, count, seed)
     assume(environment is not None and len(shapely.get_coordinates(environment.free)) < 120)
     cost = CoverageCost(environment, 5)
-    candidates = drawn_places(environment, 3 * robots, seed).tolist()
+    candidates = draw_positions(environment, 3 * robots, seed).tolist()
     positions = [point for point in candidates if is_well_placed(environment, point)][:robots]
     is_compared = [is_well_placed(environment, point) for point in cost.points.tolist()]
     assume(positions and any(is_compared))
     points = cost.points[is_compared].tolist()
-    expected = brute.distances(environment.free, positions, points).min(axis=0)
+    expected = brute.compute_distances(environment.free, positions, points).min(axis=0)
     distances = cost(positions).distances[is_compared]
     np.testing.assert_allclose(distances, expected, rtol=0, atol=1e-12 * SIDE)
 
 
 def is_well_placed(environment, point):
     """Return whether rounding cannot move a point across a wall."""
-    return brute.well_placed(environment.free, tuple(point), SIDE)
+    return brute.is_well_placed(environment.free, tuple(point), SIDE)
 
 
 @settings(max_examples=40)
 @given(kinds, st.integers(1, 30), seeds)
 def test_robots_never_lengthen_distances_and_obstacles_never_shorten_them(kind, count, seed):
-    environment = drawn_map(kind, count, seed)
+    environment = build_random_map(kind, count, seed)
     assume(environment is not None)
-    robots = drawn_places(environment, 9, seed)
+    robots = draw_positions(environment, 9, seed)
     cost = CoverageCost(environment, 20)
     tolerance = 1e-12 * SIDE
     distances = cost(robots).distances
@@ -102,12 +102,12 @@ def test_robots_never_lengthen_distances_and_obstacles_never_shorten_them(kind, 
 @settings(max_examples=25)
 @given(kinds, st.integers(1, 30), seeds)
 def test_results_do_not_depend_on_the_order_of_calls_and_robots(kind, count, seed):
-    environment = drawn_map(kind, count, seed)
+    environment = build_random_map(kind, count, seed)
     assume(environment is not None)
-    robots = drawn_places(environment, 14, seed)
+    robots = draw_positions(environment, 14, seed)
     cost = CoverageCost(environment, 24)
     first = cost(robots)
-    cost(drawn_places(environment, 5, seed + 1))
+    cost(draw_positions(environment, 5, seed + 1))
     repeated = cost(robots)
     by_new_cost = CoverageCost(environment, 24)(robots)
     for name in ("distances", "owner", "first_corner", "last_corner", "gradient"):
@@ -120,7 +120,7 @@ def test_results_do_not_depend_on_the_order_of_calls_and_robots(kind, count, see
 @settings(max_examples=30)
 @given(st.sampled_from(["polygons", "needles", "circles", "rooms"]), st.integers(1, 30), seeds)
 def test_the_gradient_is_the_slope_of_the_value(kind, count, seed):
-    environment = drawn_map(kind, count, seed)
+    environment = build_random_map(kind, count, seed)
     assume(environment is not None)
     rng = np.random.default_rng(seed)
     low_x, low_y, high_x, high_y = environment.region.bounds
@@ -167,7 +167,9 @@ def test_medium_maps_agree_with_the_brute_force(name):
     candidates = environment.start("uniform").sample(12, seed=5).tolist()
     positions = [point for point in candidates if is_well_placed(environment, point)]
     is_compared = [is_well_placed(environment, point) for point in cost.points.tolist()]
-    expected = brute.distances(environment.free, positions, cost.points[is_compared].tolist()).min(axis=0)
+    expected = brute.compute_distances(environment.free, positions, cost.points[is_compared].tolist()).min(
+        axis=0
+    )
     distances = cost(positions).distances[is_compared]
     np.testing.assert_allclose(distances, expected, rtol=0, atol=1e-12 * cost.geodesics.size)
 
@@ -175,8 +177,8 @@ def test_medium_maps_agree_with_the_brute_force(name):
 @pytest.mark.slow
 @pytest.mark.parametrize(("lattice", "robots"), [(32, 1000), (128, 1), (256, 300), (512, 50)])
 def test_lattices_and_teams_of_every_size(lattice, robots):
-    environment = drawn_map("polygons", 40, 5)
-    positions = drawn_places(environment, robots, 3)
+    environment = build_random_map("polygons", 40, 5)
+    positions = draw_positions(environment, robots, 3)
     cost = CoverageCost(environment, lattice)
     result = cost(positions)
     samples = min(len(cost.points), 400)
@@ -191,10 +193,10 @@ MEASURE_MEMORY = """
 import re, sys
 from pathlib import Path
 sys.path.insert(0, {folder!r})
-from drawn_maps import drawn_map
+from random_maps import build_random_map
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
-environment = drawn_map("polygons", 260, 4)
+environment = build_random_map("polygons", 260, 4)
 cost = CoverageCost(environment, 512)
 cost(cost.points[::1000])
 # A child inherits ru_maxrss from the process that starts it.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from density_cases import GAUSSIANS, KINDS, POLYGONS, RASTERS, fine_integrals
+from density_cases import GAUSSIANS, KINDS, POLYGONS, RASTERS, integrate_on_fine_lattice
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -39,7 +39,7 @@ def cells_of(density, points=ROW, region=SHAPE):
 def test_mass_centroid_and_polar_moment_are_those_of_quadrature(density):
     cells = cells_of(density)
     for k, ring in enumerate(cells.polygons):
-        mass, centroid, polar = fine_integrals(density, ring, cells.generators[k])
+        mass, centroid, polar = integrate_on_fine_lattice(density, ring, cells.generators[k])
         smooth = isinstance(density, Uniform | Gaussians)
         within = 2e-4 if smooth else 8e-3
         assert cells.mass[k] == pytest.approx(mass, rel=within)

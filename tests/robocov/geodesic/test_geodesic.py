@@ -1,3 +1,5 @@
+"""Geodesic distances and paths: known values, brute force, and properties."""
+
 from __future__ import annotations
 
 import brute_force_geodesic as brute
@@ -16,18 +18,18 @@ SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 BAY = ((0, 0), (8, 0), (8, 4), (4, 4), (4, 6), (8, 6), (8, 8), (0, 8), (2, 4))
 
 
-def environment(*obstacles, boundary=SQUARE):
+def build_environment(*obstacles, boundary=SQUARE):
     return Environment(
         "test", boundary, tuple(PolygonObstacle(tuple(map(tuple, ring))) for ring in obstacles)
     )
 
 
-def box(x0, y0, x1, y1):
+def build_ring(x0, y0, x1, y1):
     return ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
 
 
-PILLAR = environment(box(3 / 8, 3 / 8, 5 / 8, 5 / 8))
-PILLAR_WITH_COLLINEAR_VERTICES = environment(
+PILLAR = build_environment(build_ring(3 / 8, 3 / 8, 5 / 8, 5 / 8))
+PILLAR_WITH_COLLINEAR_VERTICES = build_environment(
     [
         (3 / 8, 3 / 8),
         (1 / 2, 3 / 8),
@@ -38,22 +40,24 @@ PILLAR_WITH_COLLINEAR_VERTICES = environment(
         (3 / 8, 5 / 8),
     ]
 )
-CUP = environment(
+CUP = build_environment(
     [
         *((1 / 4, 1 / 4), (3 / 4, 1 / 4), (3 / 4, 3 / 4), (5 / 8, 3 / 4)),
         *((5 / 8, 3 / 8), (3 / 8, 3 / 8), (3 / 8, 3 / 4), (1 / 4, 3 / 4)),
     ]
 )
-PINCH = environment(box(1 / 4, 1 / 4, 1 / 2, 1 / 2), box(1 / 2, 1 / 2, 3 / 4, 3 / 4))
-SHARED_EDGE = environment(box(1 / 4, 1 / 4, 1 / 2, 3 / 4), box(1 / 2, 1 / 4, 3 / 4, 3 / 4))
-MAZE = environment(
-    *[box(x, 1 if k % 2 else 0, x + 1, 8 if k % 2 else 7) for k, x in enumerate((1, 3, 5))],
+PINCH = build_environment(build_ring(1 / 4, 1 / 4, 1 / 2, 1 / 2), build_ring(1 / 2, 1 / 2, 3 / 4, 3 / 4))
+SHARED_EDGE = build_environment(
+    build_ring(1 / 4, 1 / 4, 1 / 2, 3 / 4), build_ring(1 / 2, 1 / 4, 3 / 4, 3 / 4)
+)
+MAZE = build_environment(
+    *[build_ring(x, 1 if k % 2 else 0, x + 1, 8 if k % 2 else 7) for k, x in enumerate((1, 3, 5))],
     boundary=((0, 0), (8, 0), (8, 8), (0, 8)),
 )
 
 
 @pytest.mark.parametrize(
-    ("where", "source", "target", "expected"),
+    ("environment", "source", "target", "expected"),
     [
         (PILLAR, (1 / 8, 1 / 2), (7 / 8, 1 / 2), 0.809016994375),
         (PILLAR_WITH_COLLINEAR_VERTICES, (1 / 8, 1 / 2), (7 / 8, 1 / 2), 0.809016994375),
@@ -63,23 +67,27 @@ MAZE = environment(
         (CUP, (1 / 2, 1 / 2), (1 / 2, 1 / 8), 1.184016994375),
         (PINCH, (3 / 8, 5 / 8), (5 / 8, 3 / 8), 0.853553390593),
         (SHARED_EDGE, (1 / 2, 1 / 8), (1 / 2, 7 / 8), 1.059016994375),
-        # over the first wall, under the second, over the third and straight on
+        # Above the first wall, below the second and above the third one.
         (MAZE, (0.5, 0.5), (7.5, 7.5), np.hypot(0.5, 6.5) + 2 + 2 * np.hypot(1, 6) + np.hypot(2.5, 0.5)),
     ],
 )
-def test_distances_known_in_closed_form(where, source, target, expected):
-    distances = Geodesics(where)
+def test_distances_known_in_closed_form(environment, source, target, expected):
+    distances = Geodesics(environment)
     assert distances.compute_distances([source], [target])[0, 0] == pytest.approx(expected, abs=1e-12)
     assert distances.compute_distances([target], [source])[0, 0] == pytest.approx(expected, abs=1e-12)
 
 
 def test_paths_pass_collinear_walls_that_touch_in_a_point():
-    # the bottoms of both obstacles lie on one line and touch in a point; below it the way is free
-    where = environment([(1, 1), (3, 1), (2, 3)], box(3, 1, 6, 4), boundary=((0, 0), (8, 0), (8, 8), (0, 8)))
-    assert Geodesics(where).compute_distances([[0.5, 1]], [[7, 1]])[0, 0] == pytest.approx(6.5, abs=1e-12)
-    # above, the pinch blocks: round the triangle's top or the box
-    above = Geodesics(where).compute_distances([[2.75, 2]], [[2.5, 0.5]])[0, 0]
-    expected = brute.distances(where.free, [(2.75, 2.0)], [(2.5, 0.5)])[0, 0]
+    # The bottoms of both obstacles are on one line and touch in a point; the space below is free.
+    environment = build_environment(
+        [(1, 1), (3, 1), (2, 3)], build_ring(3, 1, 6, 4), boundary=((0, 0), (8, 0), (8, 8), (0, 8))
+    )
+    assert Geodesics(environment).compute_distances([[0.5, 1]], [[7, 1]])[0, 0] == pytest.approx(
+        6.5, abs=1e-12
+    )
+    # Above the line the pinch blocks: the path leads around the triangle or around the box.
+    above = Geodesics(environment).compute_distances([[2.75, 2]], [[2.5, 0.5]])[0, 0]
+    expected = brute.compute_distances(environment.free, [(2.75, 2.0)], [(2.5, 0.5)])[0, 0]
     assert above == pytest.approx(expected, abs=1e-12)
     assert above > 3.0
 
@@ -90,119 +98,129 @@ def test_a_robot_on_a_pinch_sees_both_sides():
 
 
 def test_sealed_rooms_are_infinitely_far():
-    where = environment(box(3, 0, 5, 8), boundary=((0, 0), (8, 0), (8, 8), (0, 8)))
-    assert len(where.free.geoms) == 2
-    distances = Geodesics(where).compute_distances([[1, 1], [7, 7]], [[2, 2], [6, 6]])
+    environment = build_environment(build_ring(3, 0, 5, 8), boundary=((0, 0), (8, 0), (8, 8), (0, 8)))
+    assert len(environment.free.geoms) == 2
+    distances = Geodesics(environment).compute_distances([[1, 1], [7, 7]], [[2, 2], [6, 6]])
     assert np.isinf(distances).tolist() == [[False, True], [True, False]]
-    assert Geodesics(where).find_path(np.array([1.0, 1.0]), np.array([7.0, 7.0])).shape == (0, 2)
+    assert Geodesics(environment).find_path(np.array([1.0, 1.0]), np.array([7.0, 7.0])).shape == (0, 2)
 
 
 cell = st.integers(0, 16).map(lambda k: k / 2)
-boxes = st.tuples(cell, cell, cell, cell).filter(lambda b: b[0] < b[2] and b[1] < b[3]).map(lambda b: box(*b))
+boxes = (
+    st.tuples(cell, cell, cell, cell)
+    .filter(lambda b: b[0] < b[2] and b[1] < b[3])
+    .map(lambda b: build_ring(*b))
+)
 triangles = st.tuples(*[st.tuples(cell, cell)] * 3).filter(lambda t: shapely.Polygon(t).area > 0.1)
 diamonds = st.tuples(cell, cell, st.sampled_from([0.5, 1.0, 2.0])).map(
     lambda d: ((d[0] + d[2], d[1]), (d[0], d[1] + d[2]), (d[0] - d[2], d[1]), (d[0], d[1] - d[2]))
 )
 maps = st.builds(
-    lambda obstacles, boundary: environment(*obstacles, boundary=boundary),
+    lambda obstacles, boundary: build_environment(*obstacles, boundary=boundary),
     st.lists(boxes | boxes | triangles | diamonds, max_size=6),
-    st.sampled_from([box(0, 0, 8, 8), BAY]),
-).filter(lambda where: where.free_area > 6.0)
+    st.sampled_from([build_ring(0, 0, 8, 8), BAY]),
+).filter(lambda environment: environment.free_area > 6.0)
 
 
-def draw_points(data, where, count):
-    """Points of the closed free space: vertices, points on walls or in line with them, any points."""
-    vertices = np.unique(shapely.get_coordinates(where.free), axis=0)
+def draw_points(data, environment, count):
+    """Draw points of the closed free space: vertices, points on walls or in line with them, any points."""
+    vertices = np.unique(shapely.get_coordinates(environment.free), axis=0)
     on_grid = st.tuples(st.integers(0, 32), st.integers(0, 32)).map(lambda p: (p[0] / 4, p[1] / 4))
     anywhere = st.tuples(*[st.integers(0, 2**23).map(lambda k: k / 2**20)] * 2)
     at_vertex = st.integers(0, len(vertices) - 1).map(lambda k: tuple(vertices[k].tolist()))
     points = data.draw(st.lists(on_grid | anywhere | at_vertex, min_size=count, max_size=count + 4))
-    keep = [
-        p for p in points if shapely.intersects_xy(where.free, *p) and brute.well_placed(where.free, p, 8.0)
+    free_points = [
+        point
+        for point in points
+        if shapely.intersects_xy(environment.free, *point)
+        and brute.is_well_placed(environment.free, point, 8.0)
     ]
-    assume(keep)
-    return keep
+    assume(free_points)
+    return free_points
 
 
 @settings(max_examples=250, deadline=None)
 @given(maps, st.data())
-def test_distances_agree_with_brute_force(where, data):
-    sources, targets = draw_points(data, where, 2), draw_points(data, where, 3)
-    expected = brute.distances(where.free, sources, targets)
+def test_distances_agree_with_brute_force(environment, data):
+    sources = draw_points(data, environment, 2)
+    targets = draw_points(data, environment, 3)
+    expected = brute.compute_distances(environment.free, sources, targets)
     np.testing.assert_allclose(
-        Geodesics(where).compute_distances(sources, targets), expected, rtol=0, atol=8e-12
+        Geodesics(environment).compute_distances(sources, targets), expected, rtol=0, atol=8e-12
     )
 
 
 @settings(max_examples=150, deadline=None)
 @given(maps, st.data())
-def test_the_cost_agrees_with_brute_force(where, data):
-    robots = draw_points(data, where, 3)
-    cost = CoverageCost(where, lattice=7)
+def test_the_cost_agrees_with_brute_force(environment, data):
+    robots = draw_points(data, environment, 3)
+    cost = CoverageCost(environment, lattice=7)
     result = cost(robots)
-    good = [brute.well_placed(where.free, p, 8.0) for p in cost.points]
-    expected = brute.distances(where.free, robots, cost.points).min(axis=0)
-    np.testing.assert_allclose(result.distances[good], expected[good], rtol=0, atol=8e-12)
+    is_compared = [brute.is_well_placed(environment.free, point, 8.0) for point in cost.points]
+    expected = brute.compute_distances(environment.free, robots, cost.points).min(axis=0)
+    np.testing.assert_allclose(result.distances[is_compared], expected[is_compared], rtol=0, atol=8e-12)
     assert ((result.owner >= 0) == np.isfinite(result.distances)).all()
 
 
 @settings(max_examples=60, deadline=None)
 @given(maps, st.data())
-def test_paths_are_as_long_as_the_distance_and_stay_in_the_free_space(where, data):
-    source, *others = draw_points(data, where, 4)
-    geodesics = Geodesics(where)
+def test_paths_are_as_long_as_the_distance_and_stay_in_the_free_space(environment, data):
+    source, *others = draw_points(data, environment, 4)
+    geodesics = Geodesics(environment)
     for target in others:
-        way = geodesics.find_path(np.array(source), np.array(target))
+        path = geodesics.find_path(np.array(source), np.array(target))
         distance = geodesics.compute_distances([source], [target])[0, 0]
         if np.isinf(distance):
-            assert way.shape == (0, 2)
+            assert path.shape == (0, 2)
             continue
-        assert np.hypot(*np.diff(way, axis=0).T).sum() == pytest.approx(distance, abs=8e-12)
-        assert shapely.LineString(way).difference(where.free.buffer(1e-9)).length < 1e-9
-        np.testing.assert_allclose(way[[0, -1]], [source, target], rtol=0, atol=1e-12)
+        assert np.hypot(*np.diff(path, axis=0).T).sum() == pytest.approx(distance, abs=8e-12)
+        assert shapely.LineString(path).difference(environment.free.buffer(1e-9)).length < 1e-9
+        np.testing.assert_allclose(path[[0, -1]], [source, target], rtol=0, atol=1e-12)
 
 
 @settings(max_examples=60, deadline=None)
 @given(maps, st.data())
-def test_distances_are_a_metric_no_shorter_than_the_straight_line(where, data):
-    points = np.array(draw_points(data, where, 4))
-    vertices = shapely.get_coordinates(where.free)
-    inner = np.array([not (vertices == p).all(axis=1).any() for p in points])
-    distances = Geodesics(where).compute_distances(points, points)
+def test_distances_are_a_metric_no_shorter_than_the_straight_line(environment, data):
+    points = np.array(draw_points(data, environment, 4))
+    vertices = shapely.get_coordinates(environment.free)
+    is_no_vertex = np.array([not (vertices == point).all(axis=1).any() for point in points])
+    distances = Geodesics(environment).compute_distances(points, points)
     straight = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
     assert (distances >= straight - 1e-11).all()
     np.testing.assert_array_equal(np.diag(distances), 0.0)
     finite = np.where(np.isinf(distances), 1e9, distances)
     np.testing.assert_allclose(finite, finite.T, rtol=0, atol=1e-11)
-    # a point on a pinch lies on both sides at once, and would be a short cut
-    by_way_of = (distances[:, inner, None] + distances[None, inner]).min(axis=1, initial=np.inf)
-    assert (distances <= by_way_of + 1e-11).all()
+    # A point on a pinch belongs to both of its sides, and would be a short cut.
+    detours = distances[:, is_no_vertex, None] + distances[None, is_no_vertex]
+    assert (distances <= detours.min(axis=1, initial=np.inf) + 1e-11).all()
 
 
 def test_without_obstacles_the_distance_is_euclidean():
     rng = np.random.default_rng(5)
     points = rng.uniform(size=(20, 2))
-    distances = Geodesics(environment()).compute_distances(points, points)
+    distances = Geodesics(build_environment()).compute_distances(points, points)
     np.testing.assert_allclose(
         distances, np.hypot(*(points[:, None] - points).transpose(2, 0, 1)), atol=1e-15
     )
 
 
-SLANTED = environment([(0.2, 0.31), (0.7, 0.17), (0.83, 0.59), (0.4, 0.77)])
+SLANTED = build_environment([(0.2, 0.31), (0.7, 0.17), (0.83, 0.59), (0.4, 0.77)])
 
 
 @pytest.mark.parametrize("depth", [-1e-9, -1e-15, 0.0, 1e-15, 1e-9, 1e-6])
 def test_points_barely_inside_an_obstacle_are_moved_to_its_wall(depth):
     geodesics = Geodesics(SLANTED)
-    a, b = np.array([0.2, 0.31]), np.array([0.7, 0.17])
-    inward = np.array([a[1] - b[1], b[0] - a[0]]) / np.hypot(*(b - a))
-    for part in np.linspace(0.01, 0.99, 30):
-        wall = a + part * (b - a)
-        target = [[0.6, 0.9]]
-        distance = geodesics.compute_distances([wall + depth * inward], target)[0, 0]
-        outside = geodesics.compute_distances([wall - 1e-8 * inward], target)[0, 0]
-        assert distance == pytest.approx(outside, abs=1.1e-6 if depth == 1e-6 else 3e-8)
-        assert distance > np.hypot(*(wall - target[0])) + 0.01
+    start = np.array([0.2, 0.31])
+    end = np.array([0.7, 0.17])
+    inward = np.array([start[1] - end[1], end[0] - start[0]]) / np.hypot(*(end - start))
+    target = np.array([[0.6, 0.9]])
+    tolerance = 1.1e-6 if depth == 1e-6 else 3e-8
+    for fraction in np.linspace(0.01, 0.99, 30):
+        wall_point = start + fraction * (end - start)
+        distance = geodesics.compute_distances([wall_point + depth * inward], target)[0, 0]
+        distance_from_outside = geodesics.compute_distances([wall_point - 1e-8 * inward], target)[0, 0]
+        assert distance == pytest.approx(distance_from_outside, abs=tolerance)
+        assert distance > np.hypot(*(wall_point - target[0])) + 0.01
 
 
 @pytest.mark.parametrize("point", [(0.5, 0.4), (1.1, 0.5), (-1e-3, 0.2), (1e9, 0.0)])
@@ -226,12 +244,12 @@ def test_errors_name_points_that_are_not_finite():
 @pytest.mark.slow
 def test_a_large_map_agrees_with_brute_force():
     rng = np.random.default_rng(11)
-    turn = np.array([[1, 0.2], [-0.3, 1], [-1, -0.4], [0.1, -0.9]])
-    rings = [rng.uniform(0.05, 0.95, 2) + rng.uniform(0.02, 0.07) * turn for _ in range(24)]
-    where = environment(*rings, [(0.5, 0.5), (0.7, 0.5), (0.6, 0.8)])
-    cost = CoverageCost(where, lattice=10)
+    ring = np.array([[1, 0.2], [-0.3, 1], [-1, -0.4], [0.1, -0.9]])
+    rings = [rng.uniform(0.05, 0.95, 2) + rng.uniform(0.02, 0.07) * ring for _ in range(24)]
+    environment = build_environment(*rings, [(0.5, 0.5), (0.7, 0.5), (0.6, 0.8)])
+    cost = CoverageCost(environment, lattice=10)
     robots = cost.points[[3, 30, 31, 60]]
-    expected = brute.distances(where.free, robots, cost.points)
+    expected = brute.compute_distances(environment.free, robots, cost.points)
     np.testing.assert_allclose(
         cost.geodesics.compute_distances(robots, cost.points), expected, rtol=0, atol=1e-12
     )

@@ -5,9 +5,9 @@ from itertools import combinations_with_replacement
 import numpy as np
 import pytest
 import shapely
-from drawn_maps import KINDS, drawn_map
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from random_maps import KINDS, build_random_map
 
 from robocov.cost import CoverageCost
 from robocov.density.gaussians import Gaussian, Gaussians
@@ -83,7 +83,7 @@ def test_it_is_close_to_the_optimum_on_bundled_maps(name, robots):
 @settings(max_examples=30)
 @given(st.sampled_from(sorted(KINDS)), st.integers(0, 2**20), st.integers(1, 7))
 def test_no_place_in_a_triangle_is_worth_more_than_is_proved(kind, seed, halvings):
-    where = drawn_map(kind, 12, seed)
+    where = build_random_map(kind, 12, seed)
     if where is None:
         return
     rng = np.random.default_rng(seed)
@@ -110,7 +110,7 @@ def test_no_place_in_a_triangle_is_worth_more_than_is_proved(kind, seed, halving
 @settings(max_examples=8)
 @given(st.sampled_from(sorted(KINDS)), st.integers(0, 2**20), st.integers(1, 9))
 def test_no_team_costs_less(kind, seed, robots):
-    where = drawn_map(kind, 10, seed)
+    where = build_random_map(kind, 10, seed)
     if where is None:
         return
     rng = np.random.default_rng(seed)

@@ -16,10 +16,10 @@ from voronoi_cases import (
     Family,
     assert_same_ring,
     circle,
-    clipped,
     families,
     lattice,
     names,
+    partition_by_clipping,
     scattered,
     seeds,
 )
@@ -93,7 +93,7 @@ def test_robots_on_the_boundary_and_outside_have_complete_polygons() -> None:
     points = np.concatenate([inner, [[3.0, -0.05], [6.0, 2.5], [0.0, 1.0]]])
     cells = partition(points, SQUARE)
     assert cells.triangulation is not None
-    for a, b in zip(cells.polygons, clipped(points, SQUARE).polygons, strict=True):
+    for a, b in zip(cells.polygons, partition_by_clipping(points, SQUARE).polygons, strict=True):
         assert_same_ring(a, b, 1e-9)
 
 
@@ -102,7 +102,7 @@ def test_robots_on_the_boundary_and_outside_have_complete_polygons() -> None:
 def test_triangulated_and_clipped_cells_agree(n: int, name: str) -> None:
     region = REGIONS[name]
     points = scattered(region, n, np.random.default_rng(n))
-    quick, slow = partition(points, region), clipped(points, region)
+    quick, slow = partition(points, region), partition_by_clipping(points, region)
     assert quick.triangulation is not None
     assert quick.mass == pytest.approx(slow.mass, rel=1e-9, abs=1e-12 * region.area)
     assert quick.centroid == pytest.approx(slow.centroid, abs=1e-9 * region.diameter)
@@ -125,11 +125,11 @@ def test_lattices_are_triangulated(side: int, name: str) -> None:
     if name != "far away":  # rounding of the coordinates there makes edges between the cocircular
         links = 2 * side * (side - 1)
         assert len(cells.adjacency) == links
-        assert len(clipped(points, region).adjacency) == links
+        assert len(partition_by_clipping(points, region).adjacency) == links
     eighth = region.centroid + (points - region.centroid) @ np.array([[1.0, 1.0], [-1.0, 1.0]])
     cells = partition(eighth, region)
     assert cells.triangulation is not None
-    assert cells.mass == pytest.approx(clipped(eighth, region).mass, abs=1e-12 * region.area)
+    assert cells.mass == pytest.approx(partition_by_clipping(eighth, region).mass, abs=1e-12 * region.area)
 
 
 @settings(deadline=None, max_examples=60)
@@ -221,7 +221,7 @@ def test_a_team_on_a_circle_needs_no_clipping(name: str) -> None:
             assert cells.triangulation is not None
             assert cells.mass.sum() == pytest.approx(REGIONS[name].area, rel=1e-12)
             # where the others cut a cell, all their bisectors meet in one of its corners
-            assert cells.mass == pytest.approx(clipped(points, REGIONS[name]).mass, rel=1e-9)
+            assert cells.mass == pytest.approx(partition_by_clipping(points, REGIONS[name]).mass, rel=1e-9)
 
 
 def test_small_teams_have_no_triangulation() -> None:

@@ -17,11 +17,11 @@ from voronoi_cases import (
     Family,
     assert_exact,
     assert_same_ring,
-    clipped,
+    compute_exact_cell,
     compute_moment_about_centroid,
-    exact_cell,
     families,
     names,
+    partition_by_clipping,
     scattered,
     seeds,
 )
@@ -49,7 +49,7 @@ def test_every_family_is_exact(seed: int, name: str, family: Family, n: int) -> 
     region = REGIONS[name]
     points = family(region, n, np.random.default_rng(seed))
     assert_exact(partition(points, region), region)
-    assert_exact(clipped(points, region), region)
+    assert_exact(partition_by_clipping(points, region), region)
 
 
 def test_one_robot_gets_the_whole_region() -> None:
@@ -72,7 +72,7 @@ def test_nine_robots_on_a_lattice_get_a_ninth_of_the_square_each() -> None:
     x, y = np.meshgrid([1.0, 3.0, 5.0], [1.0, 3.0, 5.0])
     points = np.column_stack([x.ravel(), y.ravel()])
     across = [(0, 1), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 6), (4, 5), (4, 7), (5, 8), (6, 7), (7, 8)]
-    for cells in (partition(points, SQUARE), clipped(points, SQUARE)):
+    for cells in (partition(points, SQUARE), partition_by_clipping(points, SQUARE)):
         assert cells.mass == pytest.approx(np.full(9, 4.0), rel=1e-13)
         assert cells.centroid == pytest.approx(points, rel=1e-13)
         assert cells.polar_moment == pytest.approx(np.full(9, 16.0 / 6.0), rel=1e-13)
@@ -133,7 +133,7 @@ def test_polygons_are_convex_rings_about_their_mass(seed: int, name: str, family
 def test_parallel_axis(seed: int, n: int) -> None:
     """Equation (3), with the moment about the centroid from triangles that have it for a corner."""
     points = scattered(PENTAGON, n, np.random.default_rng(seed))
-    for cells in (partition(points, PENTAGON), clipped(points, PENTAGON)):
+    for cells in (partition(points, PENTAGON), partition_by_clipping(points, PENTAGON)):
         direct = []
         for ring, centroid in zip(cells.polygons, cells.centroid, strict=True):
             (x, y), (u, v) = (ring - centroid).T, (np.roll(ring, -1, axis=0) - centroid).T
@@ -232,7 +232,7 @@ def test_limited_cells_equal_those_of_the_neighbours_alone(seed: int, n: int, ra
     cells = partition(points, PENTAGON, neighbours)
     for robot in range(n):
         heard = np.concatenate([points[robot : robot + 1], points[neighbours.list_neighbours(robot)]])
-        area, mx, my, _ = map(float, exact_cell(0, heard, PENTAGON))
+        area, mx, my, _ = map(float, compute_exact_cell(0, heard, PENTAGON))
         assert cells.mass[robot] == pytest.approx(area, abs=1e-11)
         lever = cells.centroid[robot] - points[robot]
         assert cells.mass[robot] * lever == pytest.approx([mx, my], abs=1e-10)

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from drawn_maps import KINDS, drawn_map
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from random_maps import KINDS, build_random_map
 
 from robocov.controllers import Rapf
 from robocov.environment import CircleObstacle, Environment
@@ -39,7 +39,7 @@ def compute_distances(positions):
     is_crowded=st.booleans(),
 )
 def test_all_robots_fit_and_those_that_did_before_stay(kind, obstacles, seed, robots, is_crowded):
-    environment = drawn_map(kind, obstacles, seed)
+    environment = build_random_map(kind, obstacles, seed)
     assume(environment is not None)
     positions = np.random.default_rng(seed).uniform(0.0, 8.0, (robots, 2))
     if is_crowded:

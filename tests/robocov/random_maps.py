@@ -1,4 +1,4 @@
-"""Maps of many kinds, made from seeds, for tests of all that must hold on any map."""
+"""Random maps of many kinds, for tests of properties that hold on any map."""
 
 from __future__ import annotations
 
@@ -14,26 +14,25 @@ SQUARE = ((0.0, 0.0), (SIDE, 0.0), (SIDE, SIDE), (0.0, SIDE))
 BAYS = ((0, 0), (8, 0), (8, 4), (4, 4), (4, 6), (8, 6), (8, 8), (0, 8), (2, 4))
 
 
-def box(x0, y0, x1, y1):
+def build_box(x0, y0, x1, y1):
     return PolygonObstacle(((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
 
 
 def polygons(rng, count):
     """Slanted quadrilaterals that may overlap."""
-    turn = np.sort(rng.uniform(0.0, 2.0 * np.pi, (count, 4)), axis=1)
+    angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, (count, 4)), axis=1)
     radius = rng.uniform(0.2, 1.0, (count, 1)) * np.sqrt(10.0 / count)
-    rings = rng.uniform(0.0, SIDE, (count, 1, 2)) + (radius * np.exp(1j * turn)).view(float).reshape(
-        count, 4, 2
-    )
-    good = shapely.area(shapely.polygons(rings)) > 0.01
-    return [PolygonObstacle(tuple(map(tuple, ring))) for ring in rings[good].tolist()]
+    offsets = (radius * np.exp(1j * angle)).view(float).reshape(count, 4, 2)
+    rings = rng.uniform(0.0, SIDE, (count, 1, 2)) + offsets
+    has_area = shapely.area(shapely.polygons(rings)) > 0.01
+    return [PolygonObstacle(tuple(map(tuple, ring))) for ring in rings[has_area].tolist()]
 
 
 def blocks(rng, count):
     """Boxes on a coarse grid: many lines in common, shared edges, touching corners."""
     low = rng.integers(0, 16, (count, 2)) / 2
     high = low + rng.integers(1, 4, (count, 2)) / 2
-    return [box(*pair) for pair in np.hstack([low, high]).tolist()]
+    return [build_box(*pair) for pair in np.hstack([low, high]).tolist()]
 
 
 def maze(rng, count):
@@ -41,18 +40,19 @@ def maze(rng, count):
     side = max(2, int(np.sqrt(count)))
     step, width = SIDE / side, 0.02
     linked = set()
-    stack, seen = [(0, 0)], {(0, 0)}
+    stack = [(0, 0)]
+    visited = {(0, 0)}
     while stack:
         i, j = stack[-1]
-        ways = [(i + a, j + b) for a, b in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-        ways = [way for way in ways if way not in seen and min(way) >= 0 and max(way) < side]
-        if not ways:
+        neighbours = [(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)]
+        rooms = [room for room in neighbours if room not in visited and min(room) >= 0 and max(room) < side]
+        if not rooms:
             stack.pop()
             continue
-        way = ways[rng.integers(len(ways))]
-        linked.add(frozenset(((i, j), way)))
-        seen.add(way)
-        stack.append(way)
+        room = rooms[rng.integers(len(rooms))]
+        linked.add(frozenset(((i, j), room)))
+        visited.add(room)
+        stack.append(room)
     walls = []
     for i in range(side):
         for j in range(side):
@@ -72,18 +72,18 @@ def comb(rng, count):
     count = min(count, 12)
     edges = np.linspace(0.5, 7.5, count + 1)
     slit = rng.choice([1e-5, 1e-3, 0.1])
-    teeth = [box(a, 1.0, b - slit, 7.0) for a, b in itertools.pairwise(edges)]
-    return [*teeth, box(0.5, 6.5, 7.5 - slit, 7.0)][: count + int(rng.integers(2))]
+    teeth = [build_box(a, 1.0, b - slit, 7.0) for a, b in itertools.pairwise(edges)]
+    return [*teeth, build_box(0.5, 6.5, 7.5 - slit, 7.0)][: count + int(rng.integers(2))]
 
 
 def needles(rng, count):
     """Thin triangles."""
     tip = rng.uniform(0.0, SIDE, (count, 2))
-    along = rng.normal(size=(count, 2))
-    across = along[:, ::-1] * [-1, 1] * 0.01
-    rings = np.stack([tip, tip + along, tip + along + across], axis=1)
-    good = np.abs(shapely.area(shapely.polygons(rings))) > 1e-4
-    return [PolygonObstacle(tuple(map(tuple, ring))) for ring in rings[good].tolist()]
+    length = rng.normal(size=(count, 2))
+    width = length[:, ::-1] * [-1, 1] * 0.01
+    rings = np.stack([tip, tip + length, tip + length + width], axis=1)
+    has_area = np.abs(shapely.area(shapely.polygons(rings))) > 1e-4
+    return [PolygonObstacle(tuple(map(tuple, ring))) for ring in rings[has_area].tolist()]
 
 
 def circles(rng, count):
@@ -98,15 +98,15 @@ def circles(rng, count):
 
 def rooms(rng, count):
     """Walls across the whole map, some sealed, some with a door."""
-    walls = [box(x, 0.0, x + 0.2, SIDE - rng.choice([0.0, 0.6])) for x in (2.0, 4.0, 6.0)]
+    walls = [build_box(x, 0.0, x + 0.2, SIDE - rng.choice([0.0, 0.6])) for x in (2.0, 4.0, 6.0)]
     return [*walls, *polygons(rng, max(count - 3, 1))]
 
 
-KINDS = {maker.__name__: maker for maker in (polygons, blocks, maze, comb, needles, circles, rooms)}
+KINDS = {build.__name__: build for build in (polygons, blocks, maze, comb, needles, circles, rooms)}
 
 
-def drawn_map(kind, count, seed, scale=1.0, shift=(0.0, 0.0)):
-    """Return a map of a kind with about so many obstacles, None where hardly anything is free."""
+def build_random_map(kind, count, seed, scale=1.0, shift=(0.0, 0.0)):
+    """Return a map of a kind with about `count` obstacles, or None if hardly anything is free."""
     rng = np.random.default_rng(seed)
     boundary = SQUARE if seed % 3 else BAYS
     plain = Environment("drawn", boundary, tuple(KINDS[kind](rng, count)))
@@ -115,40 +115,41 @@ def drawn_map(kind, count, seed, scale=1.0, shift=(0.0, 0.0)):
     if scale == 1.0 and shift == (0.0, 0.0):
         return plain
 
-    def moved(points):
+    def transform(points):
         return tuple((x * scale + shift[0], y * scale + shift[1]) for x, y in points)
 
     obstacles = []
     for obstacle in plain.obstacles:
         if isinstance(obstacle, PolygonObstacle):
-            obstacles.append(PolygonObstacle(moved(obstacle.vertices)))
+            obstacles.append(PolygonObstacle(transform(obstacle.vertices)))
         elif isinstance(obstacle, WallObstacle):
-            obstacles.append(WallObstacle(moved(obstacle.points), obstacle.width * scale))
+            obstacles.append(WallObstacle(transform(obstacle.points), obstacle.width * scale))
         else:
-            obstacles.append(CircleObstacle(moved([obstacle.center])[0], obstacle.radius * scale))
-    return Environment("drawn", moved(boundary), tuple(obstacles))
+            obstacles.append(CircleObstacle(transform([obstacle.center])[0], obstacle.radius * scale))
+    return Environment("drawn", transform(boundary), tuple(obstacles))
 
 
-def drawn_places(environment, count, seed):
-    """Return (n, 2) m free places: anywhere, at vertices, on walls, in line with them, several in one."""
+def draw_positions(environment, count, seed):
+    """Return free positions, (n, 2) m: anywhere, at vertices, on walls, in line with them, or coincident."""
     rng = np.random.default_rng(seed)
     low_x, low_y, high_x, high_y = environment.region.bounds
     size = max(high_x - low_x, high_y - low_y)
     vertices = shapely.get_coordinates(environment.free)
-    here, there = rng.integers(0, len(vertices), (2, 8 * count))
-    part = rng.random((8 * count, 1))
+    first, second = rng.integers(0, len(vertices), (2, 8 * count))
+    fraction = rng.random((8 * count, 1))
+    # Successive vertices are mostly the ends of a wall.
+    start = first % (len(vertices) - 1)
+    on_walls = vertices[:-1][start] * fraction + vertices[1:][start] * (1 - fraction)
     kinds = [
         rng.uniform((low_x, low_y), (high_x, high_y), (8 * count, 2)),
-        vertices[here],
-        # on a wall, where the two follow each other
-        vertices[:-1][here % (len(vertices) - 1)] * part
-        + vertices[1:][here % (len(vertices) - 1)] * (1 - part),
-        np.column_stack([vertices[here, 0], vertices[there, 1]]),
+        vertices[first],
+        on_walls,
+        np.column_stack([vertices[first, 0], vertices[second, 1]]),
         (low_x, low_y) + (rng.integers(0, 32, (8 * count, 2)) + 0.5) / 32 * size,
     ]
-    mixed = np.choose(rng.integers(0, len(kinds), (8 * count, 1)), kinds)
+    points = np.choose(rng.integers(0, len(kinds), (8 * count, 1)), kinds)
     shapely.prepare(environment.free)
-    free = mixed[shapely.intersects_xy(environment.free, *mixed.T)]
-    if not len(free):
-        free = vertices[:1]
-    return free[rng.integers(0, min(len(free), 4 * count), count)]
+    free_points = points[shapely.intersects_xy(environment.free, *points.T)]
+    if len(free_points) == 0:
+        free_points = vertices[:1]
+    return free_points[rng.integers(0, min(len(free_points), 4 * count), count)]
