@@ -132,7 +132,7 @@ GENERATORS: dict[str, MapKind] = {
 """The kinds of maps by name."""
 
 
-def generate_map(
+def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     seed: int,
     *,
     kind: str = "polygons",
