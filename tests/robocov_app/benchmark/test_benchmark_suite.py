@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robocov.controllers.geodesic_lloyd import Plan
+from robocov.controllers.geodesic_lloyd import GeodesicPlanner
 from robocov.cost import CoverageCost
 from robocov.environment import DiscStart, Environment, WallObstacle
 from robocov.errors import InputError, ParameterError
@@ -86,11 +86,12 @@ def test_quick_has_one_map_of_each_family() -> None:
 
 
 def test_the_oracle_assigns_as_brute_force_does() -> None:
-    plan, rng = Plan(WALLED, 0.13, 8), np.random.default_rng(0)
+    planner = GeodesicPlanner(WALLED, 0.13, 8)
+    rng = np.random.default_rng(0)
     for _ in range(5):
         places, goals = rng.uniform((0.2, 0.2), (3.8, 2.8), (2, 4, 2)) * 1.0
-        far = plan.paths.compute_distances(*(np.clip(each, 0.2, (1.8, 2.8)) for each in (places, goals)))
-        found = assigned(plan, *(np.clip(each, 0.2, (1.8, 2.8)) for each in (places, goals)))
+        far = planner.paths.compute_distances(*(np.clip(each, 0.2, (1.8, 2.8)) for each in (places, goals)))
+        found = assigned(planner, *(np.clip(each, 0.2, (1.8, 2.8)) for each in (places, goals)))
         best = min(itertools.permutations(range(4)), key=lambda order: (far[range(4), order] ** 2).sum())
         assert found.tolist() == list(best)
 
