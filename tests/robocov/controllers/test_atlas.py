@@ -34,61 +34,67 @@ ROOMS = Environment(
     ),
 )
 CORNER = [[0.8, 0.8], [1.3, 0.8], [0.8, 1.3], [1.3, 1.3]]
+HALL = Environment("hall", ((0.0, 0.0), (20.0, 0.0), (20.0, 3.0), (0.0, 3.0)))
 
 
-def simulation(kind: type[Atlas] = Atlas, n: int = 4, **gains: float) -> Simulation:
-    return Simulation(ROOMS, kind(**gains), CORNER[:n], Team.homogeneous(n), dt=0.05)
+def build_simulation(kind: type[Atlas] = Atlas, n: int = 4) -> Simulation:
+    """Return a simulation of robots that start in a corner of the two rooms."""
+    return Simulation(ROOMS, kind(), CORNER[:n], Team.homogeneous(n), dt=0.05)
+
+
+def run_until(simulation: Simulation, time: float) -> None:
+    """Step a simulation until its time is at least this, s."""
+    while simulation.time < time:
+        simulation.step()
 
 
 @pytest.fixture(scope="module")
 def finished() -> Simulation:
-    some = simulation()
+    simulation = build_simulation()
     for _ in range(1000):
-        some.step()
-    return some
+        simulation.step()
+    return simulation
 
 
 @pytest.mark.slow
-def test_it_leaves_the_first_room_and_ends_far_below_rapf(finished: Simulation) -> None:
+def test_the_team_spreads_to_both_rooms_and_covers_more_than_with_rapf(finished: Simulation) -> None:
     cost = CoverageCost(ROOMS, lattice=32)
-    other = Simulation(ROOMS, Rapf(), CORNER, dt=0.05)
+    rapf = Simulation(ROOMS, Rapf(), CORNER, dt=0.05)
     for _ in range(1000):
-        other.step()
-    ours, theirs = (cost(each.positions).mean_distance for each in (finished, other))
-    assert ours < 0.9 * theirs
+        rapf.step()
+    assert cost(finished.positions).mean_distance < 0.9 * cost(rapf.positions).mean_distance
     assert (finished.positions[:, 0] > 4.1).sum() == 2
 
 
-def test_it_comes_to_rest(finished: Simulation) -> None:
-    before = finished.positions
-    twin = finished.copy()
+def test_the_team_comes_to_rest(finished: Simulation) -> None:
+    simulation = finished.copy()
     for _ in range(80):
-        twin.step()
-    assert np.abs(twin.positions - before).max() < 0.05
+        simulation.step()
+    assert np.abs(simulation.positions - finished.positions).max() < 0.05
 
 
 @pytest.mark.slow
-def test_who_rests_notices_that_all_others_have_come_to_rest(finished: Simulation) -> None:
-    """Only then it may relocate: it plans once more then, though nothing that it sees has changed."""
+def test_robots_plan_again_when_all_others_have_come_to_rest(finished: Simulation) -> None:
+    """Only then they may relocate, although nothing else has changed."""
     assert all(state.is_idle and state.was_quiet for state in finished.memory.states)
 
 
 @pytest.mark.slow
-def test_who_turns_back_before_a_gap_does_not_touch_its_rim() -> None:
-    """The gap turns out to be too narrow: then all acceleration would go into turning, none into braking."""
-    places = [
+def test_robots_that_turn_back_before_a_narrow_gap_do_not_touch_its_walls() -> None:
+    """When the gap turns out to be too narrow, turning must leave acceleration for braking."""
+    starts = [
         (6.606354578438451, 3.582792226112388), (5.82911286359781, 4.5164725372712775),
         (5.893535020701633, 3.786360212980583), (5.341358005239178, 3.400674457312083),
         (6.339880443956025, 4.543777359503736), (5.68626602446254, 3.4239886537883932),
     ]  # fmt: skip
     team = Team.homogeneous(6, sensing_range=6.0)
-    record = Simulation(load_map("gaps"), Atlas(), places, team, dt=0.02).run(11.0)
+    record = Simulation(load_map("gaps"), Atlas(), starts, team, dt=0.02).run(11.0)
     assert compute_clearances(record).min() > 0.005
 
 
 @pytest.mark.slow
-def test_nothing_is_touched_on_the_way() -> None:
-    record = simulation().run(25.0)
+def test_robots_move_without_contacts() -> None:
+    record = build_simulation().run(25.0)
     clearance = compute_clearances(record)
     assert count_contacts(record, clearance) == 0
     assert clearance.min() > 0.005
@@ -96,85 +102,92 @@ def test_nothing_is_touched_on_the_way() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [Atlas, AtlasShared])
-def test_copies_and_repeated_runs_go_on_identically(kind: type[Atlas]) -> None:
-    one, other = simulation(kind), simulation(kind)
+def test_runs_are_reproducible_and_copies_continue_identically(kind: type[Atlas]) -> None:
+    first = build_simulation(kind)
+    second = build_simulation(kind)
     for _ in range(60):
-        one.step()
-        other.step()
-    twin = one.copy()
-    for each in (one, other, twin):
+        first.step()
+        second.step()
+    copy = first.copy()
+    for simulation in (first, second, copy):
         for _ in range(60):
-            each.step()
-    assert one.positions.tobytes() == other.positions.tobytes() == twin.positions.tobytes()
+            simulation.step()
+    assert first.positions.tobytes() == second.positions.tobytes() == copy.positions.tobytes()
 
 
 @pytest.mark.slow
-def test_what_was_remembered_stays_as_it_was() -> None:
-    some = simulation()
+def test_decisions_do_not_change_earlier_memories() -> None:
+    simulation = build_simulation()
     for _ in range(40):
-        some.step()
-    memory: AtlasMemory = some.memory
+        simulation.step()
+    memory: AtlasMemory = simulation.memory
     assert memory.returns is not None
-    legs, returns = memory.legs.copy(), memory.returns.copy()
-    states = [each.state.copy() for each in memory.maps]
-    again = some.with_memory(memory)
+    legs = memory.legs.copy()
+    returns = memory.returns.copy()
+    map_states = [known_map.state.copy() for known_map in memory.maps]
+    restarted = simulation.with_memory(memory)
     for _ in range(40):
-        some.step()
-        again.step()
-    assert np.array_equal(memory.legs, legs)
-    assert np.array_equal(memory.returns, returns, equal_nan=True)
-    assert all(np.array_equal(each.state, was) for each, was in zip(memory.maps, states, strict=True))
-    assert some.positions.tobytes() == again.positions.tobytes()
+        simulation.step()
+        restarted.step()
+    np.testing.assert_array_equal(memory.legs, legs)
+    np.testing.assert_array_equal(memory.returns, returns)
+    np.testing.assert_array_equal([known_map.state for known_map in memory.maps], map_states)
+    assert simulation.positions.tobytes() == restarted.positions.tobytes()
 
 
 @pytest.mark.slow
-def test_maps_are_shared_where_it_says_so() -> None:
-    unknown = {}
+def test_only_shared_maps_are_equal_and_contain_more() -> None:
+    unknown_counts = {}
     for kind in (Atlas, AtlasShared):
-        some = simulation(kind)
+        simulation = build_simulation(kind)
         for _ in range(200):
-            some.step()
-        maps = some.memory.maps
-        unknown[kind] = [np.count_nonzero(each.state == UNKNOWN) for each in maps]
-        assert all(each.raster is maps[0].raster for each in maps)
-    # all know what all have seen
-    assert len(set(unknown[AtlasShared])) == 1
-    assert len(set(unknown[Atlas])) > 1
-    assert max(unknown[AtlasShared]) < min(unknown[Atlas])
+            simulation.step()
+        maps = simulation.memory.maps
+        assert all(known_map.raster is maps[0].raster for known_map in maps)
+        unknown_counts[kind] = [np.count_nonzero(known_map.state == UNKNOWN) for known_map in maps]
+    assert len(set(unknown_counts[AtlasShared])) == 1
+    assert len(set(unknown_counts[Atlas])) > 1
+    assert max(unknown_counts[AtlasShared]) < min(unknown_counts[Atlas])
+
+
+def test_the_information_is_stated() -> None:
     assert get_information(Atlas()) == "own"
     assert get_information(AtlasShared()) == "shared map"
 
 
 @pytest.mark.slow
-def test_a_robot_alone_and_a_crowd() -> None:
-    alone = simulation(n=1)
+def test_a_single_robot_moves_to_the_centre() -> None:
+    simulation = build_simulation(n=1)
     for _ in range(300):
-        alone.step()
-    assert np.isfinite(alone.observe_and_decide().decision.forces).all()
-    assert np.hypot(*(alone.positions[0] - CORNER[0])) > 1.0
+        simulation.step()
+    assert np.isfinite(simulation.observe_and_decide().decision.forces).all()
+    assert np.hypot(*(simulation.positions[0] - CORNER[0])) > 1.0
+
+
+@pytest.mark.slow
+def test_a_team_larger_than_a_planning_group_spreads() -> None:
     empty = Environment("empty", SQUARE)
     x, y = np.meshgrid(np.linspace(0.6, 2.4, 4), np.linspace(0.6, 2.4, 4))
     starts = np.column_stack([x.ravel(), y.ravel()])
     assert len(starts) > MAX_PLANNING_GROUP
-    crowd = Simulation(empty, Atlas(), starts, dt=0.05)
-    cost = CoverageCost(empty, lattice=16)
+    simulation = Simulation(empty, Atlas(), starts, dt=0.05)
     for _ in range(400):
-        crowd.step()
-    assert cost(crowd.positions).mean_distance < 0.5 * cost(starts).mean_distance
+        simulation.step()
+    cost = CoverageCost(empty, lattice=16)
+    assert cost(simulation.positions).mean_distance < 0.5 * cost(starts).mean_distance
 
 
-def test_it_plans_now_and_then() -> None:
-    """Not all robots at the same moment, and less often where nodes are far apart."""
-    some = simulation()
-    due = [state.next_plan_time for state in some.memory.states]
-    assert len(set(due)) == 4
-    assert max(due) < 0.5
-    while some.time < 0.5:
-        some.step()
-    due = [state.next_plan_time for state in some.memory.states]
-    assert len(set(due)) == 4
-    assert min(due) > 1.0
-    assert max(due) < 2.5
+def test_robots_plan_at_different_times() -> None:
+    """The period is longer if nodes are far apart."""
+    simulation = build_simulation()
+    plan_times = [state.next_plan_time for state in simulation.memory.states]
+    assert len(set(plan_times)) == 4
+    assert max(plan_times) < 0.5
+    run_until(simulation, 0.5)
+    plan_times = [state.next_plan_time for state in simulation.memory.states]
+    assert len(set(plan_times)) == 4
+    assert min(plan_times) > 1.0
+    assert max(plan_times) < 2.5
 
 
 def test_gains_are_checked() -> None:
@@ -184,216 +197,261 @@ def test_gains_are_checked() -> None:
 
 
 @pytest.mark.slow
-def test_what_must_be_saved_begins_anew_when_the_team_changes() -> None:
-    some = Simulation(ROOMS, Atlas(), CORNER, dt=0.05, conditions=Conditions(failures=((4, 2.0),)))
-    while some.time < 1.9:
-        some.step()
-    before = [state.start_time for state in some.memory.states[:3]]
-    assert max(before) < 1.0
-    while some.time < 5.0:
-        some.step()
-    assert all(2.0 <= state.start_time < 4.5 for state in some.memory.states[:3])
+def test_planning_starts_again_when_a_robot_fails() -> None:
+    conditions = Conditions(failures=((4, 2.0),))
+    simulation = Simulation(ROOMS, Atlas(), CORNER, dt=0.05, conditions=conditions)
+    run_until(simulation, 1.9)
+    assert max(state.start_time for state in simulation.memory.states[:3]) < 1.0
+    run_until(simulation, 5.0)
+    assert all(2.0 <= state.start_time < 4.5 for state in simulation.memory.states[:3])
 
 
 @pytest.mark.slow
-def test_what_relocations_and_goals_must_save_doubles_with_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[tuple[float, float]] = []
+def test_required_savings_double_with_the_path_length(monkeypatch: pytest.MonkeyPatch) -> None:
+    savings: list[float] = []
     find_own_goal = atlas.find_own_goal
 
     def record_saving(*args: Any) -> Any:
-        asked.append((some.time, args[-1]))
+        savings.append(args[-1])
         return find_own_goal(*args)
 
     monkeypatch.setattr(atlas, "find_own_goal", record_saving)
-    some = Simulation(ROOMS, Atlas(settling=0.1), CORNER[:2], Team.homogeneous(2), dt=0.05)
-    while some.time < 8.0:
-        some.step()
-    walked = max(state.path_length for state in some.memory.states)
-    rest = np.array([each for _, each in asked])
-    assert walked > 3.0 and min(rest) == 0.002
-    assert max(rest) == pytest.approx(0.002 * 2.0 ** (walked / (0.1 * ROOMS.region.diameter)), rel=0.1)
-    # who stands still stays as ready to move as it was
-    while some.time < 60.0:
-        some.step()
-    rested = [state.path_length for state in some.memory.states]
-    while some.time < 90.0:
-        some.step()
-    assert [state.path_length for state in some.memory.states] == rested
+    simulation = Simulation(ROOMS, Atlas(settling=0.1), CORNER[:2], Team.homogeneous(2), dt=0.05)
+    run_until(simulation, 8.0)
+    path_length = max(state.path_length for state in simulation.memory.states)
+    assert path_length > 3.0
+    assert min(savings) == 0.002
+    doublings = path_length / (0.1 * ROOMS.region.diameter)
+    assert max(savings) == pytest.approx(0.002 * 2.0**doublings, rel=0.1)
+
+
+@pytest.mark.slow
+def test_robots_at_rest_stay_as_ready_to_move_as_they_were() -> None:
+    """Required savings depend on the path length, not on time."""
+    simulation = Simulation(ROOMS, Atlas(settling=0.1), CORNER[:2], Team.homogeneous(2), dt=0.05)
+    run_until(simulation, 60.0)
+    path_lengths = [state.path_length for state in simulation.memory.states]
+    run_until(simulation, 90.0)
+    assert [state.path_length for state in simulation.memory.states] == path_lengths
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [Atlas, AtlasShared])
-def test_a_team_that_rests_moves_again_when_a_door_opens(kind: type[Atlas]) -> None:
-    outline = ((0.0, 0.0), (12.0, 0.0), (12.0, 6.0), (0.0, 6.0))
-    shut = Environment("shut", outline, (WallObstacle(((5.0, 0.0), (5.0, 6.0)), 0.2),))
-    halves = (WallObstacle(((5.0, 0.0), (5.0, 2.4)), 0.2), WallObstacle(((5.0, 3.6), (5.0, 6.0)), 0.2))
-    some = Simulation(shut, kind(), CORNER, Team.homogeneous(4), dt=0.05)
-    while some.time < 90.0:
-        some.step()
-    before = some.positions
-    while some.time < 100.0:
-        some.step()
-    assert np.abs(some.positions - before).max() < 1e-3
-    some = some.with_changes(environment=replace(shut, name="open", obstacles=halves))
-    while some.time < 140.0:
-        some.step()
-    # about as good as two in each room
-    halves = [[2.5, 1.5], [2.5, 4.5], [8.5, 1.5], [8.5, 4.5]]
-    cost = CoverageCost(some.environment, lattice=48)
-    assert cost(some.positions).mean_distance < cost(halves).mean_distance
+def test_a_team_at_rest_moves_again_when_a_door_opens(kind: type[Atlas]) -> None:
+    boundary = ((0.0, 0.0), (12.0, 0.0), (12.0, 6.0), (0.0, 6.0))
+    closed_wall = WallObstacle(((5.0, 0.0), (5.0, 6.0)), 0.2)
+    open_wall = (
+        WallObstacle(((5.0, 0.0), (5.0, 2.4)), 0.2),
+        WallObstacle(((5.0, 3.6), (5.0, 6.0)), 0.2),
+    )
+    closed = Environment("closed", boundary, (closed_wall,))
+    simulation = Simulation(closed, kind(), CORNER, Team.homogeneous(4), dt=0.05)
+    run_until(simulation, 90.0)
+    positions = simulation.positions
+    run_until(simulation, 100.0)
+    assert np.abs(simulation.positions - positions).max() < 1e-3
+    simulation = simulation.with_changes(environment=replace(closed, name="open", obstacles=open_wall))
+    run_until(simulation, 140.0)
+    two_in_each_room = [[2.5, 1.5], [2.5, 4.5], [8.5, 1.5], [8.5, 4.5]]
+    cost = CoverageCost(simulation.environment, lattice=48)
+    assert cost(simulation.positions).mean_distance < cost(two_in_each_room).mean_distance
 
 
-def test_robots_that_meet_pass_on_the_left() -> None:
-    meeting = [[3.0, 4.0], [5.0, 4.0]]
-    some = Simulation(Environment("empty", SQUARE), Atlas(), meeting, dt=0.05)
+def test_robots_that_meet_pass_each_other_on_the_left() -> None:
+    simulation = Simulation(Environment("empty", SQUARE), Atlas(), [[3.0, 4.0], [5.0, 4.0]], dt=0.05)
     goals = np.array([[[7.0, 4.0]], [[1.0, 4.0]]])
     sideways = np.zeros(2)
     for _ in range(120):
-        memory = some.memory
+        memory = simulation.memory
+        # No robot makes a plan of its own.
         states = tuple(
             replace(state, next_plan_time=math.inf, planned_map=state.known_map) for state in memory.states
         )
         legs = np.zeros(2, dtype=np.intp)
-        some = some.with_memory(replace(memory, states=states, routes=tuple(goals), legs=legs))
-        some.step()
-        between = some.positions[0] - some.positions[1]
-        assert np.hypot(*between) > 0.23
-        if abs(between[0]) < 0.5:
-            sideways = some.positions[:, 1] - 4.0
+        simulation = simulation.with_memory(replace(memory, states=states, routes=tuple(goals), legs=legs))
+        simulation.step()
+        offset = simulation.positions[0] - simulation.positions[1]
+        assert np.hypot(*offset) > 0.23
+        if abs(offset[0]) < 0.5:
+            sideways = simulation.positions[:, 1] - 4.0
     assert sideways[0] > 0.0 > sideways[1]
-    np.testing.assert_allclose(some.positions, goals[:, 0], atol=0.2)
+    np.testing.assert_allclose(simulation.positions, goals[:, 0], atol=0.2)
 
 
-def test_who_stays_is_noticed() -> None:
-    at = np.array([[0.0, 0.0], [1.0, 0.0]])
-    known = Teammates(np.array([1, 4]), at, np.array([1.0, 1.0]), np.ones(2), np.array([0.0, 0.5]), at)
-    seen = np.array([[0.05, 0.0], [3.0, 3.0], [1.2, 0.0]])
-    later = known.add_observation(
-        np.array([1, 2, 4]), seen, np.array([0.05, 4.0]), 2.0, np.zeros(2, dtype=bool)
+def test_a_robot_is_at_rest_while_it_stays_near_a_point() -> None:
+    """Robot 1 stays; robot 2 is new; robot 4 creeps away from where it was first seen."""
+    positions = np.array([[0.0, 0.0], [1.0, 0.0]])
+    teammates = Teammates(
+        robots=np.array([1, 4]),
+        positions=positions,
+        heard_times=np.array([1.0, 1.0]),
+        heard_distances=np.ones(2),
+        rest_times=np.array([0.0, 0.5]),
+        rest_positions=positions,
     )
-    assert later.rest_times.tolist() == [0.0, 2.0, 2.0] and later.heard_times.tolist() == [2.0] * 3
-    np.testing.assert_array_equal(later.positions, seen)
-    # creeping away is noticed as well
+    heard = np.array([[0.05, 0.0], [3.0, 3.0], [1.2, 0.0]])
+    own_position = np.array([0.05, 4.0])
+    later = teammates.add_observation(np.array([1, 2, 4]), heard, own_position, 2.0, np.zeros(2, dtype=bool))
+    assert later.rest_times.tolist() == [0.0, 2.0, 2.0]
+    assert later.heard_times.tolist() == [2.0, 2.0, 2.0]
+    np.testing.assert_array_equal(later.positions, heard)
     np.testing.assert_array_equal(later.rest_positions, [[0.0, 0.0], [3.0, 3.0], [1.2, 0.0]])
-    np.testing.assert_allclose(later.heard_distances, np.hypot(*(seen - [0.05, 4.0]).T))
-    nobody, nowhere = np.empty(0, dtype=np.intp), np.empty((0, 2))
-    silent = later.add_observation(nobody, nowhere, np.zeros(2), 3.0, np.array([False, True, False]))
-    assert silent.robots.tolist() == [1, 4] and silent.heard_times.tolist() == [2.0] * 2
+    np.testing.assert_allclose(later.heard_distances, np.hypot(*(heard - own_position).T))
 
 
-def test_the_latest_report_of_a_robot_counts() -> None:
-    def known(*rows: tuple[int, float, float]) -> Teammates:
-        robots, x, heard = np.array(rows, dtype=float).reshape(-1, 3).T
-        at = np.column_stack([x, x])
-        return Teammates(robots.astype(np.intp), at, heard, np.ones(len(x)), heard, at)
-
-    mine = known((2, 0.2, 5.0), (3, 0.3, 1.0), (6, 0.6, 4.0))
-    # itself, older, later, then missed before, missed since, and just as old news
-    report = known((0, 9.0, 9.0), (2, 9.0, 4.0), (3, 0.33, 2.0), (4, 0.4, 3.0), (5, 9.0, 3.0), (6, 9.0, 4.0))
-    told = mine.add_reports([report], 0, {4: 2.5, 5: 3.5})
-    assert (told.robots.tolist(), told.positions[:, 0].tolist()) == ([2, 3, 4, 6], [0.2, 0.33, 0.4, 0.6])
-    assert told.heard_times.tolist() == [5.0, 2.0, 3.0, 4.0]
-    # who was never near cannot be missed for its silence
-    assert told.heard_distances.tolist() == [1.0, math.inf, math.inf, 1.0]
+def test_silent_robots_are_kept_unless_they_are_gone() -> None:
+    positions = np.zeros((3, 2))
+    times = np.full(3, 2.0)
+    teammates = Teammates(np.array([1, 2, 4]), positions, times, np.ones(3), times, positions)
+    no_robots = np.empty(0, dtype=np.intp)
+    is_gone = np.array([False, True, False])
+    later = teammates.add_observation(no_robots, np.empty((0, 2)), np.zeros(2), 3.0, is_gone)
+    assert later.robots.tolist() == [1, 4]
+    assert later.heard_times.tolist() == [2.0, 2.0]
 
 
-@pytest.mark.parametrize(("kind", "whom"), [(Atlas, [1]), (AtlasShared, [1, 2])])
-def test_a_robot_in_the_middle_tells_where_the_others_are(kind: type[Atlas], whom: list[int]) -> None:
-    hall = Environment("hall", ((0.0, 0.0), (20.0, 0.0), (20.0, 3.0), (0.0, 3.0)))
+def test_the_latest_report_about_a_robot_counts() -> None:
+    def build_teammates(*rows: tuple[int, float, float]) -> Teammates:
+        """Return teammates by robot, coordinates, and the time when it was heard."""
+        robots, x, heard_times = np.array(rows, dtype=float).reshape(-1, 3).T
+        positions = np.column_stack([x, x])
+        distances = np.ones(len(x))
+        return Teammates(robots.astype(np.intp), positions, heard_times, distances, heard_times, positions)
+
+    own = build_teammates((2, 0.2, 5.0), (3, 0.3, 1.0), (6, 0.6, 4.0))
+    report = build_teammates(
+        (0, 9.0, 9.0),  # the robot itself
+        (2, 9.0, 4.0),  # older than its own knowledge
+        (3, 0.33, 2.0),  # newer
+        (4, 0.4, 3.0),  # considered missing before
+        (5, 9.0, 3.0),  # considered missing since
+        (6, 9.0, 4.0),  # as old as its own knowledge
+    )
+    later = own.add_reports([report], 0, {4: 2.5, 5: 3.5})
+    assert later.robots.tolist() == [2, 3, 4, 6]
+    assert later.positions[:, 0].tolist() == [0.2, 0.33, 0.4, 0.6]
+    assert later.heard_times.tolist() == [5.0, 2.0, 3.0, 4.0]
+    # A robot that may never have been in range cannot be considered failed because of its silence.
+    assert later.heard_distances.tolist() == [1.0, math.inf, math.inf, 1.0]
+
+
+@pytest.mark.parametrize(("kind", "expected"), [(Atlas, [1]), (AtlasShared, [1, 2])])
+def test_only_with_shared_maps_a_robot_reports_others_to_its_neighbours(
+    kind: type[Atlas], expected: list[int]
+) -> None:
+    """Robot 2, in the middle, hears robots 1 and 3, which do not hear each other."""
     team = Team.homogeneous(3, communication_range=5.0)
-    some = Simulation(hall, kind(), [[6.5, 1.5], [10.0, 1.5], [13.5, 1.5]], team)
-    while some.time < 2.5:
-        some.step()
-    state = some.memory.states[0]
-    assert state.teammates.robots.tolist() == whom and state.met == {*whom}
+    simulation = Simulation(HALL, kind(), [[6.5, 1.5], [10.0, 1.5], [13.5, 1.5]], team)
+    run_until(simulation, 2.5)
+    state = simulation.memory.states[0]
+    assert state.teammates.robots.tolist() == expected
+    assert state.met == set(expected)
+
+
+PAIR = [[9.8, 1.5], [10.2, 1.5]]
+"""Starts of two robots in the middle of the hall."""
 
 
 @pytest.mark.slow
-def test_who_is_out_of_range_is_presumed_at_its_place_and_who_falls_silent_in_range_is_forgotten() -> None:
+def test_robots_out_of_range_are_assumed_at_their_goals() -> None:
+    simulation = Simulation(HALL, Atlas(), PAIR, Team.homogeneous(2, communication_range=5.0), dt=0.05)
+    run_until(simulation, 40.0)
+    positions = simulation.positions
+    np.testing.assert_allclose(np.sort(positions, axis=0), [[5.0, 1.5], [15.0, 1.5]], atol=0.5)
+    first, second = [state.teammates for state in simulation.memory.states]
+    assert first.robots.tolist() == [1]
+    assert second.robots.tolist() == [0]
+    # They have been out of range for long.
+    assert max(first.heard_times[0], second.heard_times[0]) < 10.0
+    np.testing.assert_allclose(first.positions[0], positions[1], atol=0.7)
+
+
+@pytest.mark.slow
+def test_robots_that_become_silent_within_range_are_forgotten() -> None:
+    conditions = Conditions(failures=(Failure(2, 0.4),))
     team = Team.homogeneous(2, communication_range=5.0)
-    hall = Environment("hall", ((0.0, 0.0), (20.0, 0.0), (20.0, 3.0), (0.0, 3.0)))
-    both = Simulation(hall, Atlas(), [[9.8, 1.5], [10.2, 1.5]], team, dt=0.05)
-    dies = Conditions(failures=(Failure(2, 0.4),))
-    alone = Simulation(hall, Atlas(), both.positions, team, dt=0.05, conditions=dies)
-    for each in (both, alone):
-        while each.time < 40.0:
-            each.step()
-    np.testing.assert_allclose(np.sort(both.positions, axis=0), [[5.0, 1.5], [15.0, 1.5]], atol=0.5)
-    others = [state.teammates for state in both.memory.states]
-    assert [each.robots.tolist() for each in others] == [[1], [0]]
-    assert max(each.heard_times[0] for each in others) < 10.0, "out of range since then"
-    np.testing.assert_allclose(others[0].positions[0], both.positions[1], atol=0.7)
-    assert len(alone.memory.states[0].teammates.robots) == 0
-    np.testing.assert_allclose(alone.positions[0], [10.0, 1.5], atol=0.5)
+    simulation = Simulation(HALL, Atlas(), PAIR, team, dt=0.05, conditions=conditions)
+    run_until(simulation, 40.0)
+    assert len(simulation.memory.states[0].teammates.robots) == 0
+    np.testing.assert_allclose(simulation.positions[0], [10.0, 1.5], atol=0.5)
 
 
 @pytest.mark.slow
-def test_who_is_not_where_it_was_presumed_to_be_is_forgotten() -> None:
-    """Robot 2 fails out of range, and robot 1 is then set down near its place."""
+def test_robots_that_are_not_at_their_assumed_positions_are_forgotten() -> None:
+    """Robot 2 fails out of range, and robot 1 is then moved close to it."""
     team = Team.homogeneous(2, communication_range=5.0)
-    hall = Environment("hall", ((0.0, 0.0), (20.0, 0.0), (20.0, 3.0), (0.0, 3.0)))
-    some = Simulation(hall, Atlas(), [[9.8, 1.5], [10.2, 1.5]], team, dt=0.05)
-    while some.time < 20.0:
-        some.step()
-    since = some.memory.states[0].start_time
-    dies = Conditions(failures=(Failure(2, 20.0),))
-    near = some.positions.copy()
-    near[0, 0] += 0.8 * (near[1, 0] - near[0, 0])
-    some = some.with_changes(positions=near, conditions=dies).with_memory(some.memory)
-    some.step()
-    assert some.memory.states[0].teammates.robots.tolist() == [1], "it may be late"
-    while some.time < 50.0:
-        some.step()
-    state = some.memory.states[0]
-    assert len(state.teammates.robots) == 0 and state.start_time == since
-    np.testing.assert_allclose(some.positions[0], [10.0, 1.5], atol=0.7)
+    simulation = Simulation(HALL, Atlas(), PAIR, team, dt=0.05)
+    run_until(simulation, 20.0)
+    memory = simulation.memory
+    start_time = memory.states[0].start_time
+    positions = simulation.positions.copy()
+    positions[0, 0] += 0.8 * (positions[1, 0] - positions[0, 0])
+    conditions = Conditions(failures=(Failure(2, 20.0),))
+    simulation = simulation.with_changes(positions=positions, conditions=conditions).with_memory(memory)
+    simulation.step()
+    # At first, its messages may only be late.
+    assert simulation.memory.states[0].teammates.robots.tolist() == [1]
+    run_until(simulation, 50.0)
+    state = simulation.memory.states[0]
+    assert len(state.teammates.robots) == 0
+    assert state.start_time == start_time
+    np.testing.assert_allclose(simulation.positions[0], [10.0, 1.5], atol=0.7)
+
+
+def crosses_door(seed: int) -> bool:
+    """Return whether a team crosses a door, 1.6 to 2.2 diameters wide, in a wall at a random angle."""
+    rng = np.random.default_rng(seed)
+    width = 0.2 * rng.uniform(1.6, 2.2)
+    angle = rng.uniform(-0.6, 0.6)
+    door = rng.uniform(-1.5, 1.5)
+    center = np.array([4.0, 3.0])
+    along = np.array([-math.sin(angle), math.cos(angle)])
+    across = np.array([along[1], -along[0]])
+    ends = [
+        (center + along * distance).tolist() for distance in (-3.6, door - width / 2, door + width / 2, 3.6)
+    ]
+    walls = (WallObstacle(ends[:2], 0.1), WallObstacle(ends[2:], 0.1))
+    boundary = ((0.0, 0.0), (8.0, 0.0), (8.0, 6.0), (0.0, 6.0))
+    simulation = Simulation(Environment("door", boundary, walls), Atlas(), CORNER[:3])
+    while simulation.time < 30.0:
+        if ((simulation.positions - center) @ across).max() >= 0.15:
+            return True
+        simulation.step()
+    return False
 
 
 @pytest.mark.slow
-def test_doors_that_a_robot_fits_through_are_crossed() -> None:
-    """Random ones, 1.6 to 2.2 diameters wide, at any place of a wall at any angle."""
-
-    def crossed(seed: int) -> bool:
-        rng = np.random.default_rng(seed)
-        width, turn, middle = 0.2 * rng.uniform(1.6, 2.2), rng.uniform(-0.6, 0.6), np.array([4.0, 3.0])
-        along, door = np.array([-math.sin(turn), math.cos(turn)]), rng.uniform(-1.5, 1.5)
-        ends = [(middle + along * far).tolist() for far in (-3.6, door - width / 2, door + width / 2, 3.6)]
-        walls = WallObstacle(ends[:2], 0.1), WallObstacle(ends[2:], 0.1)
-        some = Simulation(
-            Environment("door", ((0.0, 0.0), (8.0, 0.0), (8.0, 6.0), (0.0, 6.0)), walls), Atlas(), CORNER[:3]
-        )
-        across = np.array([along[1], -along[0]])
-        while some.time < 30.0 and ((some.positions - middle) @ across).max() < 0.15:
-            some.step()
-        return some.time < 30.0
-
-    assert sum(map(crossed, range(12))) >= 11
+def test_robots_cross_doors_that_are_wide_enough() -> None:
+    assert sum(crosses_door(seed) for seed in range(12)) >= 11
 
 
-@pytest.mark.slow
-def test_more_robots_are_not_worse_and_a_short_range_hardly_is() -> None:
+def compute_final_cost(n: int, communication_range: float = math.inf, seed: int = 0) -> float:
+    """Return the coverage cost of n robots in the map "rooms" after 40 s."""
     rooms = load_map("rooms")
-    cost = CoverageCost(rooms, lattice=64)
-
-    def after_a_while(n: int, hears: float = math.inf, seed: int = 0) -> float:
-        team = Team.homogeneous(n, communication_range=hears)
-        some = Simulation(rooms, Atlas(), rooms.start(None).sample(n, seed=seed, radius=0.1), team)
-        while some.time < 40.0:
-            some.step()
-        return cost(some.positions).mean_distance
-
-    eight = after_a_while(8)
-    assert after_a_while(9) < 1.01 * eight
-    assert np.mean([after_a_while(8, 3.0, seed) for seed in range(2)]) < 1.3 * eight
+    team = Team.homogeneous(n, communication_range=communication_range)
+    simulation = Simulation(rooms, Atlas(), rooms.start(None).sample(n, seed=seed, radius=0.1), team)
+    run_until(simulation, 40.0)
+    return CoverageCost(rooms, lattice=64)(simulation.positions).mean_distance
 
 
-def test_copies_share_what_never_changes() -> None:
+@pytest.mark.slow
+def test_more_robots_and_longer_ranges_do_not_cover_less() -> None:
+    cost = compute_final_cost(8)
+    assert compute_final_cost(9) < 1.01 * cost
+    assert np.mean([compute_final_cost(8, 3.0, seed) for seed in range(2)]) < 1.3 * cost
+
+
+def test_copies_of_memories_share_immutable_parts() -> None:
     memory = Atlas().begin(ROOMS.region, Team.homogeneous(3))
-    twin = deepcopy(memory)
+    copy = deepcopy(memory)
     assert len(memory.maps) == 3
-    assert all(one is other for one, other in zip(memory.states, twin.states, strict=True))
-    assert twin.legs is not memory.legs
-    assert all((known.state == 0).all() for known in memory.maps)
+    assert all(state is copied for state, copied in zip(memory.states, copy.states, strict=True))
+    assert copy.legs is not memory.legs
+
+
+def test_at_the_start_all_cells_are_unknown() -> None:
+    memory = Atlas().begin(ROOMS.region, Team.homogeneous(3))
+    assert all((known_map.state == UNKNOWN).all() for known_map in memory.maps)
 
 
 def test_robots_that_share_a_map_plan_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -401,20 +459,16 @@ def test_robots_that_share_a_map_plan_once(monkeypatch: pytest.MonkeyPatch) -> N
     place_team = atlas.place_team
 
     def count_plan(*args: Any, **kwargs: Any) -> Any:
-        plan_times.append(simulated.time)
+        plan_times.append(simulation.time)
         return place_team(*args, **kwargs)
 
     monkeypatch.setattr(atlas, "place_team", count_plan)
-    simulated = simulation(AtlasShared)
-    while simulated.time < 3.0:
-        simulated.step()
+    simulation = build_simulation(AtlasShared)
+    run_until(simulation, 3.0)
     assert len(plan_times) == len(set(plan_times)) == 3
-    states = simulated.memory.states
-    assert (
-        len({id(state.known_map) for state in states})
-        == len({id(state.team_planner) for state in states})
-        == 1
-    )
+    states = simulation.memory.states
+    assert len({id(state.known_map) for state in states}) == 1
+    assert len({id(state.team_planner) for state in states}) == 1
     plans = [state.planned_goals[np.argsort(state.planned_robots)] for state in states]
     assert all(np.array_equal(plan, plans[0]) for plan in plans)
 
@@ -422,17 +476,19 @@ def test_robots_that_share_a_map_plan_once(monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.slow
 def test_a_jam_at_a_door_dissolves() -> None:
     """Thirty robots behind a door of 0.5 m."""
-    walls = WallObstacle(((3.0, 0.0), (3.0, 1.75)), 0.2), WallObstacle(((3.0, 2.25), (3.0, 4.0)), 0.2)
+    walls = (
+        WallObstacle(((3.0, 0.0), (3.0, 1.75)), 0.2),
+        WallObstacle(((3.0, 2.25), (3.0, 4.0)), 0.2),
+    )
     halls = Environment("halls", ((0.0, 0.0), (8.0, 0.0), (8.0, 4.0), (0.0, 4.0)), walls)
     x, y = np.meshgrid(np.linspace(1.3, 2.7, 5), np.linspace(1.2, 2.8, 6))
     crowd = Simulation(halls, AtlasShared(), np.column_stack([x.ravel(), y.ravel()]), dt=1 / 30)
-    while crowd.time < 80.0:
-        crowd.step()
+    run_until(crowd, 80.0)
     assert 16 <= (crowd.positions[:, 0] > 3.1).sum() <= 21
 
 
 def test_a_robot_is_missed_only_after_a_while() -> None:
-    """Robot 2 is presumed near robot 1 but is far away: for some seconds its messages may just be late."""
+    """Robot 2 is assumed near robot 1 but is far away: for some seconds its messages may only be late."""
     team = Team.homogeneous(2, communication_range=5.0)
     positions = np.array([[1.0, 1.0], [7.0, 7.0]])
     observations = Observations(
@@ -442,9 +498,15 @@ def test_a_robot_is_missed_only_after_a_while() -> None:
         np.full((2, 2), np.nan),
         ROOMS.region,
     )
-    presumed = np.array([[2.0, 1.0]])
-    zero = np.zeros(1)
-    teammates = Teammates(np.array([1]), presumed, zero, np.full(1, math.inf), zero, presumed)
+    assumed_position = np.array([[2.0, 1.0]])
+    teammates = Teammates(
+        robots=np.array([1]),
+        positions=assumed_position,
+        heard_times=np.zeros(1),
+        heard_distances=np.full(1, math.inf),
+        rest_times=np.zeros(1),
+        rest_positions=assumed_position,
+    )
     state = replace(Atlas().begin(ROOMS.region, team).states[0], teammates=teammates)
     for time, expected in ((1.0, [1]), (4.9, [1]), (5.1, [])):
         later = Atlas()._update_teammates(replace(observations, time=time), team, state, 0, [])
