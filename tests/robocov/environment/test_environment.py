@@ -112,7 +112,7 @@ def test_region_is_the_convex_hull_without_collinear_vertices() -> None:
     np.testing.assert_allclose(region.centroid, [4, 3])
     np.testing.assert_allclose(region.normals @ region.centroid < region.offsets, True)
     assert region.contains(np.array([[4.0, 5.0], [9.0, 1.0], [8.0, 6.0]])).tolist() == [True, False, True]
-    with pytest.raises(InputError, match="no area"):
+    with pytest.raises(InputError, match="with an area above 0"):
         Region(np.array([[0, 0], [1, 1], [2, 2]], dtype=float))
     with pytest.raises(ValueError, match="read-only"):
         region.vertices[0, 0] = 1.0
