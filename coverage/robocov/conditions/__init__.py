@@ -1,20 +1,20 @@
 """Conditions: imperfections and changes during a run.
 
-Without them the world of the paper is ideal: robots in range know each other's positions at all times, each
-robot knows exactly where it is, the range sensor is exact, and all robots work from the start to the end.
+Without them, the world is ideal, as in the paper: robots in range always know each other's positions, each
+robot knows exactly where it is, the range sensor is exact, and all robots work from start to end.
 
-- `conditions`, `events`: the conditions of a run; robots that fail and join
-- `perception`, `communication`: observations under these conditions, and messages of the robots
+- `conditions`, `events`: the conditions of a run, and robots that fail or join
+- `perception`, `communication`: observations under these conditions, and messages between robots
 - `random_streams`: random numbers for noise, loss and failures
 """
 
 from robocov.conditions.conditions import (
-    FAILING,
-    LOSS,
+    FAILURE_STREAM,
+    LOSS_STREAM,
     PARAMETERS,
-    POSITION,
-    SCANNING,
-    SENSING,
+    POSITION_STREAM,
+    SCANNING_STREAM,
+    SENSING_STREAM,
     TIME_TOLERANCE_S,
     UNITS,
     Conditions,
@@ -22,12 +22,12 @@ from robocov.conditions.conditions import (
 from robocov.conditions.events import Failure, Join, JoinedRobot, parse_event
 
 __all__ = [
-    "FAILING",
-    "LOSS",
+    "FAILURE_STREAM",
+    "LOSS_STREAM",
     "PARAMETERS",
-    "POSITION",
-    "SCANNING",
-    "SENSING",
+    "POSITION_STREAM",
+    "SCANNING_STREAM",
+    "SENSING_STREAM",
     "TIME_TOLERANCE_S",
     "UNITS",
     "Conditions",

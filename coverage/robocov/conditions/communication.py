@@ -1,9 +1,9 @@
 """Messages between robots, with loss, latency and a limited rate.
 
-A message contains the position that its sender believes to have. It is sent to all robots with which the
-sender is in communication range. For each of them it is lost or not, independently, and it arrives after the
-latency. A robot knows the newest message of each other robot that has arrived, until none has arrived for so
-long that the other one is assumed to be gone.
+A message contains its sender's own estimate of its position, and is sent to all robots in communication
+range. For each receiver independently, the message is either lost or arrives after the latency. A robot
+remembers the newest message from each other robot. If none arrives for `Conditions.forget_after`, it forgets
+that robot.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.conditions.conditions import LOSS, TIME_TOLERANCE_S, Conditions
+from robocov.conditions.conditions import LOSS_STREAM, TIME_TOLERANCE_S, Conditions
 from robocov.conditions.random_streams import RandomStream
 from robocov.observation.neighbours import Neighbours
 
@@ -24,12 +24,12 @@ NEVER = -1
 
 
 class Broadcast(NamedTuple):
-    """Messages of all robots from one step.
+    """The messages that all robots sent in one step.
 
     Attributes
     ----------
     arrives, sent : int
-        Steps since time zero.
+        Numbers of the steps, from time zero, in which the messages arrive and were sent.
     positions : (n, 2) array, m
         Reported positions of the senders.
     is_received : (n, n) bool array
@@ -49,8 +49,8 @@ class Inbox:
     Attributes
     ----------
     sent, arrived : (n, n) int array
-        Steps at which the newest message that the row's robot has from the column's robot was sent, and
-        arrived; `NEVER` if there is none.
+        Numbers of the steps in which the newest message from the column's robot to the row's robot was sent
+        and arrived; `NEVER` if there is none.
     positions : (n, n, 2) array, m
         Positions in these messages.
     in_flight : tuple of Broadcast
@@ -79,12 +79,12 @@ class Inbox:
         return cls(sent=never, arrived=never.copy(), positions=np.zeros((count, count, 2)))
 
     def select_robots(self, rows: IntArray) -> Inbox:
-        """Return the inbox of a team that consists of robots of this one and of new robots.
+        """Return the inbox of a team of m robots, some of this team and some new.
 
         Parameters
         ----------
         rows : (m,) int array
-            Robot of this team that each robot of the new team was; -1 for a new robot.
+            Index in this team of each robot in the new team; -1 for new robots.
 
         Returns
         -------
@@ -126,10 +126,10 @@ class Radio:
         self._ranges = ranges
         self._dt = dt
         self._latency_steps = math.ceil(conditions.delay / dt - TIME_TOLERANCE_S)
-        self._loss_stream = RandomStream(conditions.seed, LOSS)
+        self._loss_stream = RandomStream(conditions.seed, LOSS_STREAM)
 
     def exchange_messages(
-        self, inbox: Inbox, step: int, reported: Array, positions: Array, working: BoolArray
+        self, inbox: Inbox, step: int, reported_positions: Array, true_positions: Array, working: BoolArray
     ) -> Inbox:
         """Send and deliver the messages of one step.
 
@@ -139,11 +139,12 @@ class Radio:
             Messages before the step.
         step : int
             Number of the step since time zero.
-        reported : (n, 2) array, m
-            Positions that the robots believe to have.
-        positions : (n, 2) array, m
-            True positions, which decide which robots are in range.
+        reported_positions : (n, 2) array, m
+            The robots' own estimates of their positions.
+        true_positions : (n, 2) array, m
+            True positions, which determine which robots are in range.
         working : (n,) bool array
+            Mask of the robots that work.
 
         Returns
         -------
@@ -154,8 +155,8 @@ class Radio:
             broadcast = Broadcast(
                 arrives=step + self._latency_steps,
                 sent=step,
-                positions=np.array(reported),
-                is_received=self._find_receivers(step, positions, working),
+                positions=np.array(reported_positions),
+                is_received=self._find_receivers(step, true_positions, working),
             )
             in_flight = (*in_flight, broadcast)
         due = [broadcast for broadcast in in_flight if broadcast.arrives <= step]
@@ -172,7 +173,7 @@ class Radio:
         return Inbox(sent, arrived, newest_positions, in_flight[len(due) :])
 
     def read_reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbours, Array, Array]:
-        """Read the newest message that each working robot has from each other one and has not forgotten.
+        """Read the newest message that each working robot has from every robot that it has not forgotten.
 
         Parameters
         ----------
@@ -180,15 +181,16 @@ class Radio:
         step : int
             Number of the step since time zero.
         working : (n,) bool array
+            Mask of the robots that work.
 
         Returns
         -------
         neighbours : Neighbours
-            Robots from which each robot has such a message.
+            The robots from which each robot has such a message.
         positions : (m, 2) array, m
             Positions in the messages, in the order of ``neighbours.indices``.
         ages : (m,) array, s
-            Times since they were sent.
+            Times since the messages were sent.
         """
         silence = (step - inbox.arrived) * self._dt
         is_recent = silence <= self._conditions.forget_after + TIME_TOLERANCE_S
@@ -202,13 +204,13 @@ class Radio:
         rate = self._conditions.message_rate
         if rate is None:
             return True
-        messages_per_step = self._dt * rate
-        count = math.floor(step * messages_per_step + TIME_TOLERANCE_S)
-        previous_count = math.floor((step - 1) * messages_per_step + TIME_TOLERANCE_S)
-        return count > previous_count
+        periods_per_step = self._dt * rate
+        periods = math.floor(step * periods_per_step + TIME_TOLERANCE_S)
+        previous_periods = math.floor((step - 1) * periods_per_step + TIME_TOLERANCE_S)
+        return periods > previous_periods
 
     def _find_receivers(self, step: int, positions: Array, working: BoolArray) -> BoolArray:
-        """Find the receivers of the messages of each robot, (receiver, sender) bool."""
+        """Find the receivers of each robot's message, an (n, n) mask of receivers by senders."""
         links = Neighbours.from_ranges(positions, self._ranges).restrict_to_working(working)
         receiver, sender = links.list_pairs()
         is_received = np.zeros((len(positions), len(positions)), dtype=bool)

@@ -15,18 +15,18 @@ from robocov.conditions.events import MAX_TIME_S, Failure, Join, build_events
 from robocov.conditions.random_streams import RandomStream
 from robocov.errors import ParameterError, is_number, quote, require_number
 
-LOSS = 0
+LOSS_STREAM = 0
 """Number of the random stream for the loss of messages."""
-POSITION = 1
+POSITION_STREAM = 1
 """Number of the random stream for localization noise."""
-SENSING = 2
+SENSING_STREAM = 2
 """Number of the random stream for the noise of obstacle points."""
-SCANNING = 3
+SCANNING_STREAM = 3
 """Number of the random stream for the noise of scans."""
-FAILING = 4
+FAILURE_STREAM = 4
 """Number of the random stream for lifetimes."""
 TIME_TOLERANCE_S = 1e-9
-"""Difference of times that count as equal, because sums of steps have rounding errors."""
+"""Difference up to which two times count as equal, because sums of steps have rounding errors."""
 
 
 class ConditionParameter(NamedTuple):
@@ -66,17 +66,17 @@ UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
 class Conditions:
     """Imperfections and changes during a run, with the seed of its random numbers.
 
-    Communication is ideal, as without conditions, unless there is loss, delay, a message rate or localization
-    noise. With ideal communication, a robot that fails is forgotten at once, otherwise after `forget_after`.
+    Communication is ideal unless there is message loss, delay, a message rate or localization noise. With
+    ideal communication, the others forget a robot as soon as it fails, otherwise after `forget_after`.
 
     Attributes
     ----------
     loss : float
-        Probability with which a message does not reach a receiver.
+        Probability that a message does not reach a receiver.
     delay : float, s
         Latency of messages.
     message_rate : float or None, Hz
-        Rate at which robots broadcast their positions to those in range. None: in every control step.
+        Rate at which robots broadcast their positions. None: in every control step.
     forget_after : float, s
         Time without messages after which a robot is no longer assumed to be at its last reported position.
     position_noise : float, m
@@ -85,12 +85,13 @@ class Conditions:
     sensing_noise : float, m
         Standard deviation of the noise of the range sensor.
     failure_rate : float, 1/s
-        Failures per second of each working robot: lifetimes are exponentially distributed.
+        Failures per second of each working robot. Lifetimes are exponentially distributed.
     failures : tuple of Failure
         At most one per robot; also accepted as ``(robot, time)``.
     joins : tuple of Join
         At most one per robot; also accepted as ``(robot, time)`` or ``(robot, time, place)``.
     seed : int
+        Seed of the random numbers.
 
     Raises
     ------
@@ -120,13 +121,8 @@ class Conditions:
             value = getattr(self, name)
             if value is None and parameter.may_be_null:
                 continue
-            number = require_number(
-                f"conditions.{name}",
-                value,
-                parameter.minimum,
-                parameter.maximum,
-                f"{parameter.unit} or null" if parameter.may_be_null else parameter.unit,
-            )
+            unit = f"{parameter.unit} or null" if parameter.may_be_null else parameter.unit
+            number = require_number(f"conditions.{name}", value, parameter.minimum, parameter.maximum, unit)
             object.__setattr__(self, name, number)
         object.__setattr__(self, "failures", build_events("failures", Failure, self.failures))
         object.__setattr__(self, "joins", build_events("joins", Join, self.joins))
@@ -136,7 +132,7 @@ class Conditions:
         self._check_order_of_events()
 
     def _check_forget_after(self) -> None:
-        """Raise an error if robots would be forgotten between two of their messages."""
+        """Raise an error if a robot would be forgotten before its next message is due."""
         if self.message_rate is not None and self.forget_after * self.message_rate < 1.0:
             period = 1.0 / self.message_rate
             raise ParameterError(
@@ -157,12 +153,12 @@ class Conditions:
 
     @property
     def is_ideal(self) -> bool:
-        """Whether everything is as without conditions."""
+        """Whether these conditions have no effect."""
         return not (self.uses_messages or self.sensing_noise or self.has_team_changes)
 
     @property
     def uses_messages(self) -> bool:
-        """Whether robots know of each other only by messages."""
+        """Whether robots know each other's positions only from messages."""
         has_rate = self.message_rate is not None
         return bool(self.loss or self.delay or has_rate or self.position_noise)
 
@@ -177,7 +173,7 @@ class Conditions:
         Returns
         -------
         Conditions or None
-            None if the others are ideal.
+            None if the remaining conditions are ideal.
         """
         remaining = replace(self, failure_rate=0.0, failures=(), joins=())
         return None if remaining.is_ideal else remaining
@@ -211,7 +207,7 @@ class Conditions:
             )
 
     def compute_working_periods(self, count: int) -> tuple[Array, Array]:
-        """Compute from when and until when each robot works.
+        """Compute when each robot starts and stops working.
 
         Parameters
         ----------
@@ -221,14 +217,15 @@ class Conditions:
         Returns
         -------
         starts, stops : (n,) arrays, s
-            -inf for robots that are present from the start, inf for those that do not fail.
+            `starts` is -inf for robots that are present from the start; `stops` is inf for robots that do not
+            fail.
         """
         starts = np.full(count, -np.inf)
         stops = np.full(count, np.inf)
         for join in self.joins:
             starts[join.robot - 1] = join.time
         if self.failure_rate:
-            uniform = RandomStream(self.seed, FAILING).draw_uniform(0, np.arange(count))
+            uniform = RandomStream(self.seed, FAILURE_STREAM).draw_uniform(0, np.arange(count))
             stops = np.maximum(starts, 0.0) - np.log(uniform) / self.failure_rate
         for failure in self.failures:
             stops[failure.robot - 1] = min(stops[failure.robot - 1], failure.time)
@@ -282,7 +279,7 @@ class Conditions:
         return np.asarray(starts <= np.asarray(time)[..., None] + TIME_TOLERANCE_S)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the conditions as plain JSON, with units in the names of the keys.
+        """Return the conditions as a JSON object, whose keys contain the units.
 
         Returns
         -------
@@ -305,7 +302,7 @@ class Conditions:
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Conditions:
-        """Build the conditions that `to_dict` returned.
+        """Build conditions from the result of `to_dict`.
 
         Parameters
         ----------

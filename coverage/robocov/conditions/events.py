@@ -19,12 +19,12 @@ _EVENT = re.compile(rf"(\d{{1,9}})@({_NUMBER})(?::({_NUMBER}),({_NUMBER}))?", re
 
 
 class Failure(NamedTuple):
-    """A robot that fails: from then on it is an obstacle that does not communicate.
+    """The failure of a robot, which then becomes an obstacle and no longer communicates.
 
     Attributes
     ----------
     robot : int
-        From 1.
+        Number of the robot, from 1.
     time : float, s
     """
 
@@ -36,16 +36,16 @@ class Failure(NamedTuple):
 
 
 class Join(NamedTuple):
-    """A robot that joins the team.
+    """The arrival of a robot that joins the team.
 
     Attributes
     ----------
     robot : int
-        From 1.
+        Number of the robot, from 1.
     time : float, s
     place : (x, y) or None, m
-        Position, or the nearest one where the robot fits at that time. By default that at which it would
-        have started.
+        Requested position; the robot joins at the nearest one where it fits. By default, the
+        position at which it would have started.
     """
 
     robot: int
@@ -65,10 +65,10 @@ class JoinedRobot(NamedTuple):
     Attributes
     ----------
     robot : int
-        From 1.
+        Number of the robot, from 1.
     time : float, s
     place, requested : (x, y), m
-        Position at which it joined, and the one that was requested.
+        Position at which it joined, and the position that was requested.
     """
 
     robot: int
@@ -78,7 +78,7 @@ class JoinedRobot(NamedTuple):
 
     @property
     def offset(self) -> float:
-        """Distance from the requested position, m: above 0 if a wall or another robot was too near."""
+        """Distance from the requested position, m; above 0 if a wall or another robot was too close to it."""
         return math.dist(self.place, self.requested)
 
 
@@ -115,12 +115,12 @@ def parse_event(kind: type[Event], text: str) -> Event:
         raise ParameterError(f"expected {form}, got {quote(text)}")
     robot = int(match[1])
     time = float(match[2])
-    places = [] if match[3] is None else [(float(match[3]), float(match[4]))]
-    return kind(robot, time, *places)
+    optional_place = [] if match[3] is None else [(float(match[3]), float(match[4]))]
+    return kind(robot, time, *optional_place)
 
 
 def build_events(name: str, kind: type[Event], values: Iterable[Any]) -> tuple[Event, ...]:
-    """Build failures or joins from tuples, in the order of the robots.
+    """Build failures or joins from tuples, sorted by robot.
 
     Parameters
     ----------
@@ -152,16 +152,16 @@ def build_events(name: str, kind: type[Event], values: Iterable[Any]) -> tuple[E
 def _build_event(path: str, kind: type[Event], value: Any) -> Event:
     """Build a failure or a join from a tuple."""
     try:
-        robot, time, *rest = value
-        kind(robot, time, *rest)
+        robot, time, *optional_place = value
+        kind(robot, time, *optional_place)  # Fails if there are too many values.
     except (TypeError, ValueError):
         raise ParameterError(f"{path}: expected a robot and a time, got {quote(value)}") from None
     if not is_number(robot, Integral) or robot < 1:
         raise ParameterError(f"{path}: expected the number of a robot, from 1, got {quote(robot)}")
     if not is_number(time) or not 0.0 <= time <= MAX_TIME_S:
         raise ParameterError(f"{path}: expected a time from 0 to {MAX_TIME_S:g} s, got {quote(time)}")
-    places = [None if place is None else _build_place(path, place) for place in rest]
-    return kind(int(robot), float(time), *places)
+    optional_place = [None if place is None else _build_place(path, place) for place in optional_place]
+    return kind(int(robot), float(time), *optional_place)
 
 
 def _build_place(path: str, value: Any) -> tuple[float, float]:

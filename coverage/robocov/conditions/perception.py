@@ -8,7 +8,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, compute_point_distances
 from robocov.conditions.communication import Inbox, Radio
-from robocov.conditions.conditions import POSITION, SCANNING, SENSING, Conditions
+from robocov.conditions.conditions import POSITION_STREAM, SCANNING_STREAM, SENSING_STREAM, Conditions
 from robocov.conditions.random_streams import RandomStream
 from robocov.observation import Decision, Observations, Scans
 from robocov.team import Team
@@ -18,7 +18,7 @@ MIN_MEASURED_DISTANCE_M = 1e-3
 
 
 class Perception:
-    """Turns the true state into the observations of the robots. Row i is known to robot i alone.
+    """Turns the true state into the observations of the robots. Only robot i knows row i.
 
     Parameters
     ----------
@@ -34,12 +34,12 @@ class Perception:
         self._dt = dt
         self._robots = np.arange(len(team))
         self._radio = Radio(conditions, team.communication_range, dt)
-        self._position_stream = RandomStream(conditions.seed, POSITION)
-        self._sensing_stream = RandomStream(conditions.seed, SENSING)
-        self._scanning_stream = RandomStream(conditions.seed, SCANNING)
+        self._position_stream = RandomStream(conditions.seed, POSITION_STREAM)
+        self._sensing_stream = RandomStream(conditions.seed, SENSING_STREAM)
+        self._scanning_stream = RandomStream(conditions.seed, SCANNING_STREAM)
 
     def create_inbox(self) -> Inbox | None:
-        """Return the messages before the first step.
+        """Create the inbox before the first step.
 
         Returns
         -------
@@ -86,12 +86,15 @@ class Perception:
         inbox = self._radio.exchange_messages(inbox, step, positions, truth.positions, working)
         neighbours, reported_positions, ages = self._radio.read_reports(inbox, step, working)
         observations = replace(
-            observations, neighbours=neighbours, reported_positions=reported_positions, report_ages=ages
+            observations,
+            neighbours=neighbours,
+            reported_positions=reported_positions,
+            report_ages=ages,
         )
         return observations, inbox
 
     def _add_position_noise(self, step: int, positions: Array) -> Array:
-        """Return the positions that the robots believe to have, (n, 2) m."""
+        """Return the robots' own estimates of their positions, (n, 2) m."""
         sigma = self._conditions.position_noise
         if not sigma:
             return positions
@@ -100,7 +103,7 @@ class Perception:
         return np.asarray(noisy)
 
     def _add_sensing_noise(self, step: int, truth: Observations, positions: Array) -> Array:
-        """Return the obstacle points as measured by robots that believe to be at `positions`, (n, 2) m."""
+        """Return the measured obstacle points, (n, 2) m; the robots think that they are at `positions`."""
         sigma = self._conditions.sensing_noise
         if not sigma and positions is truth.positions:
             return truth.obstacle_points
@@ -109,7 +112,7 @@ class Perception:
             distance = compute_point_distances(truth.obstacle_points, truth.positions)
             noise = sigma * self._sensing_stream.draw_normal(step, self._robots)[:, 0]
             measured = np.maximum(distance + noise, MIN_MEASURED_DISTANCE_M)
-            # The direction of a point at distance zero is unknown; it remains there.
+            # A point at distance zero has no direction in which it could be moved.
             has_direction = distance > 0.0
             divisor = np.where(has_direction, distance, 1.0)
             offset *= np.where(has_direction, measured / divisor, 1.0)[:, None]
@@ -139,7 +142,7 @@ def ignore_idle_robots(decision: Decision, working: BoolArray) -> Decision:
     Returns
     -------
     Decision
-        The same one, if all robots work.
+        The same object if all robots work.
     """
     if working.all():
         return decision

@@ -1,7 +1,7 @@
 """Random numbers that depend only on a seed, a step, and the robots for which they are drawn.
 
-A generator with a state would have to be copied, rewound and branched together with a run. Here each number
-is a function of its seed and its purpose. It is computed by the counter-based generator Philox-4x32-10 of
+A generator with a state would have to be copied, rewound and branched together with a run. Here, each number
+is a function of the seed and of its indices. It is computed by the counter-based generator Philox-4x32-10 of
 Salmon, Moraes, Dror and Shaw, *Parallel random numbers: as easy as 1, 2, 3* (SC 2011), for any number of
 counters at once; NumPy's generator of that name computes one stream at a time.
 """
@@ -21,18 +21,18 @@ _KEY_STEP_SECOND = 0xBB67AE85
 
 
 def compute_philox(counter: NDArray[np.uint64], key: tuple[int, int]) -> NDArray[np.uint64]:
-    """Compute Philox-4x32-10.
+    """Compute the random words of counters by Philox-4x32-10.
 
     Parameters
     ----------
     counter : (4, ...) array
-        Words of 32 bits.
-    key : tuple of two words
+        32-bit words.
+    key : tuple of two 32-bit words
 
     Returns
     -------
     (4, ...) array
-        Words of 32 bits.
+        32-bit words.
     """
     a, b, c, d = counter
     first, second = key
@@ -64,46 +64,49 @@ class RandomStream:
         first, second = sequence.generate_state(2, np.uint32)
         self._key = (int(first), int(second))
 
-    def draw_uniform(self, step: int, one: IntArray, other: IntArray | int = 0) -> Array:
+    def draw_uniform(self, step: int, first_index: IntArray, second_index: IntArray | int = 0) -> Array:
         """Draw numbers between 0 and 1, both excluded.
 
         Parameters
         ----------
         step : int
             From 0, below 2⁶⁴.
-        one, other : int arrays of shapes that broadcast together
-            Purpose of each number, such as the numbers of two robots; from 0, below 2³².
+        first_index, second_index : int arrays of shapes that broadcast together
+            Indices of each number, such as those of two robots, from 0, below 2³².
 
         Returns
         -------
         (...) array
         """
-        return np.asarray(self._draw_pairs(step, one, other)[0])
+        return np.asarray(self._draw_pairs(step, first_index, second_index)[0])
 
-    def draw_normal(self, step: int, one: IntArray, other: IntArray | int = 0) -> Array:
+    def draw_normal(self, step: int, first_index: IntArray, second_index: IntArray | int = 0) -> Array:
         """Draw pairs of independent standard normal numbers, by the Box-Muller transform.
 
         Parameters
         ----------
-        step, one, other
+        step, first_index, second_index
             See `draw_uniform`.
 
         Returns
         -------
         (..., 2) array
         """
-        uniform_radius, uniform_angle = self._draw_pairs(step, one, other)
+        uniform_radius, uniform_angle = self._draw_pairs(step, first_index, second_index)
         radius = np.sqrt(-2.0 * np.log(uniform_radius))
         angle = 2.0 * np.pi * uniform_angle
         return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
 
-    def _draw_pairs(self, step: int, one: IntArray, other: IntArray | int) -> Array:
+    def _draw_pairs(self, step: int, first_index: IntArray, second_index: IntArray | int) -> Array:
         """Return pairs of independent uniform numbers, (2, ...)."""
-        one, other = np.broadcast_arrays(np.asarray(one, np.uint64), np.asarray(other, np.uint64))
-        low = np.broadcast_to(np.uint64(step & _WORD), one.shape)
-        high = np.broadcast_to(np.uint64(step >> 32), one.shape)
-        words = compute_philox(np.stack([low, one, other, high]), self._key).astype(np.float64)
-        # 26 bits of each of two words, and half of the last bit in addition: never 0, never 1.
+        first, second = np.broadcast_arrays(
+            np.asarray(first_index, np.uint64), np.asarray(second_index, np.uint64)
+        )
+        low = np.broadcast_to(np.uint64(step & _WORD), first.shape)
+        high = np.broadcast_to(np.uint64(step >> 32), first.shape)
+        counters = np.stack([low, first, second, high])
+        words = compute_philox(counters, self._key).astype(np.float64)
+        # 26 bits from each of two words. The additional half of the last bit excludes 0 and 1.
         coarse = words[0::2] // 64.0
         fine = words[1::2] // 64.0
         return np.asarray((coarse * 2.0**26 + fine + 0.5) * 2.0**-52)

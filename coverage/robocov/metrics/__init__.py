@@ -3,8 +3,8 @@
 - `cost_history`: the coverage cost along a run
 - `motion`: settling, path lengths and stuck robots
 - `clearance`: distances to walls and other robots, and contacts
-- `summary`: the summary of a run that ``run.json`` contains
-- `advice`: signs that the parameters of a run do not suit each other
+- `summary`: the summary of a run in ``run.json``
+- `advice`: signs that the parameters of a run are unsuitable
 - `run_metrics`: areas, energy and connectivity over time
 - `connectivity`, `visible_area`: the communication graph, and the area that a team sees
 - `results`: the results of a sweep, read from its folder

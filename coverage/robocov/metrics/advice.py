@@ -1,4 +1,4 @@
-"""Advice on a run whose parameters do not suit each other, measured on its record."""
+"""Advice on runs with unsuitable parameters, based on their records."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from robocov.metrics.clearance import MAX_CONTACT_GAP_M
 from robocov.record import Record
 
 TREMBLE_WINDOW_S = 5.0
-"""Time at the end of a run in which robots may tremble."""
+"""Length of the period at the end of a run in which trembling is looked for."""
 MIN_TREMBLE_STEP_M = 0.05
-"""Mean displacement in one control step of a robot that trembles; a robot at rest moves less in 4 s."""
+"""Minimum mean displacement of a trembling robot per control step; a robot at rest moves less in 4 s."""
 MIN_TREMBLE_TURN = np.pi / 6.0
-"""Mean turn in one control step, rad: an oscillation has at most 12 steps, and is hardly controlled."""
+"""Minimum mean turn of a trembling robot per control step, rad: it oscillates in at most 12 steps."""
 MIN_TREMBLE_DETOUR = 5.0
-"""Ratio of path length to net displacement of a robot that trembles."""
+"""Minimum ratio of path length to net displacement of a trembling robot."""
 
 MAX_ZIGZAG_PERIOD_S = 3.0
-"""Time between contacts with opposite walls that belong together."""
+"""Maximum time between contacts with opposite walls that count as one zigzag."""
 MAX_OPPOSITE_COSINE = -0.5
-"""Cosine of the angle between the directions away from two opposite walls."""
+"""Walls are opposite if the cosine of the angle between the directions away from them is below this."""
 MIN_ZIGZAGS = 5
-"""Number of times that a robot goes from contact with one wall to contact with the opposite one."""
+"""Minimum number of zigzags of a robot that are reported."""
 
 
 def advise(record: Record, clearances: Array) -> list[str]:
-    """Find signs that the control period or the acceleration does not suit a run.
+    """Find signs that the control period or the maximum acceleration is unsuitable.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def advise(record: Record, clearances: Array) -> list[str]:
     Returns
     -------
     list of str
-        One sentence or two for each finding; empty for an ordinary run.
+        One or two sentences for each finding; empty if there is none.
 
     Notes
     -----
@@ -46,12 +46,12 @@ def advise(record: Record, clearances: Array) -> list[str]:
     by a stiffness K, such as the slope of the repulsion at its position, is stable under sampling only while
     K is below about 2 nu / dt: at longer periods it reacts too late, and swings with a period of a few
     steps. Such robots stay in one place, although they move by centimetres in every step and turn sharply
-    between steps. A control period that is short enough cannot give such a record.
+    between steps. This does not happen if the control period is short enough.
 
-    In a passage the same happens if a robot cannot accelerate enough: a swing of amplitude A across it
-    needs the acceleration A K / m. If the limit is lower, the robot reaches the opposite wall before it
-    has stopped. Therefore contacts with opposite walls within a short time are counted. Robots that slide
-    along a wall, or bump into one again and again, are not counted.
+    In a passage, the same happens if a robot cannot accelerate enough: a swing of amplitude A across it
+    requires the acceleration A K / m. If the limit is lower, the robot reaches the opposite wall before it
+    has stopped. Contacts with opposite walls within a short time are therefore counted; sliding along a wall
+    or bumping into the same wall again and again is not.
 
     Examples
     --------
@@ -77,12 +77,12 @@ def find_trembling(record: Record) -> IntArray:
     Parameters
     ----------
     record : Record
-        A record without every control step has none: its displacements are not those of single steps.
+        Must contain every control step; otherwise, no robots are found.
 
     Returns
     -------
     (k,) int array
-        Numbers of their rows, ascending.
+        Indices of the robots, ascending.
     """
     steps = round(TREMBLE_WINDOW_S / record.dt)
     if steps < 2 or len(record) <= steps:

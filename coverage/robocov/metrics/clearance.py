@@ -17,7 +17,7 @@ MAX_CONTACT_GAP_M = 1e-3
 """Gap below which two bodies are in contact."""
 
 _FIRST_REACH_M = 1.0
-"""Range of the first query for a nearest wall; the time of a query grows with its range."""
+"""Range of the first query for a nearest wall; a query with a larger range takes longer."""
 _REACH_FACTOR = 4.0
 """Factor between the ranges of successive queries."""
 
@@ -41,7 +41,7 @@ def compute_clearances(record: Record) -> Array:
     Returns
     -------
     (T, n) array, m
-        inf for robots that do not work. Moving obstacles and robots that have failed are walls.
+        inf for robots that do not work. Moving obstacles and robots that have failed count as walls.
     """
     if record.conditions is not None or record.environment.has_moving_obstacles:
         return _compute_clearances_by_queries(record)
@@ -49,9 +49,9 @@ def compute_clearances(record: Record) -> Array:
 
 
 def _compute_clearances_from_record(record: Record) -> Array:
-    """Return the clearances among walls that do not change, from the obstacle points that robots sensed.
+    """Return the clearances if the walls never change, using the obstacle points that robots sensed.
 
-    The nearest walls of robots that sensed none are queried here.
+    Where a robot sensed no obstacle, the nearest wall is queried.
     """
     positions = record.positions.reshape(-1, 2)
     nearest = record.obstacle_points.reshape(-1, 2).copy()
@@ -68,7 +68,7 @@ def _compute_clearances_from_record(record: Record) -> Array:
 
 
 def _compute_clearances_by_queries(record: Record) -> Array:
-    """Return the clearances where robots sensed with noise, or walls change."""
+    """Return the clearances if sensing is noisy or the walls change: query the walls at each moment."""
     environment = record.environment
     working = record.working
     radius = record.team.radius
@@ -94,7 +94,7 @@ def count_contacts(record: Record, clearances: Array) -> int:
     ----------
     record : Record
     clearances : (T, n) array, m
-        As `compute_clearances` returns them. A robot that has failed is a wall.
+        Returned by `compute_clearances`. A robot that has failed counts as a wall.
 
     Returns
     -------
@@ -148,12 +148,13 @@ def _measure_gaps(positions: Array, radius: Array, order: IntArray, smallest: Ar
                 if not min_gap <= max(smallest[t], MAX_CONTACT_GAP_M):
                     break
                 radii = radius[i] + radius[j]
+                contact_distance = radii + MAX_CONTACT_GAP_M
                 distance = _compute_distance(positions, t, i, j)
                 smallest[t] = min(smallest[t], distance - radii)
-                if distance <= radii + MAX_CONTACT_GAP_M and not (
-                    t > 0 and _compute_distance(positions, t - 1, i, j) <= radii + MAX_CONTACT_GAP_M
-                ):
-                    contacts += 1
+                if distance <= contact_distance:
+                    was_in_contact = t > 0 and _compute_distance(positions, t - 1, i, j) <= contact_distance
+                    if not was_in_contact:
+                        contacts += 1
     return contacts
 
 

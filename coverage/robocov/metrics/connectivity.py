@@ -12,7 +12,7 @@ from robocov.arrays import Array
 from robocov.observation.neighbours import Neighbours
 
 _EIGENVALUE_DECIMALS = 12
-"""The Laplacian consists of whole numbers; further decimals of its eigenvalues are rounding errors."""
+"""Decimals to which eigenvalues are rounded; the others are rounding errors."""
 
 
 class Connectivity(NamedTuple):
@@ -27,7 +27,7 @@ class Connectivity(NamedTuple):
 def measure_connectivity(positions: Array, ranges: Array) -> Connectivity:
     """Measure the connectivity of the communication graph.
 
-    Two robots are linked if each is in the communication range of the other.
+    Two robots are linked if each is within the communication range of the other.
 
     Parameters
     ----------
@@ -41,8 +41,8 @@ def measure_connectivity(positions: Array, ranges: Array) -> Connectivity:
 
     Notes
     -----
-    The algebraic connectivity is n if all n robots are linked, and 0 for a single one. Source: M. Fiedler,
-    *Algebraic connectivity of graphs*, Czechoslovak Mathematical Journal 23 (1973).
+    The algebraic connectivity is n if all pairs of the n robots are linked, and 0 for a single robot. Source:
+    M. Fiedler, *Algebraic connectivity of graphs*, Czechoslovak Mathematical Journal 23 (1973).
 
     Examples
     --------

@@ -16,12 +16,12 @@ from robocov.record import Record, select_nearest_moments
 DEFAULT_RATE_HZ = 10.0
 """Samples of the coverage cost per simulated second."""
 MAX_RATE_WITH_MOVING_OBSTACLES_HZ = 1.0
-"""The same if obstacles move, and each moment has a map of its own."""
+"""Maximum number of samples per simulated second if obstacles move: each sample needs its own map."""
 
 
 @dataclass(frozen=True, eq=False)
 class CostHistory(Drawable):
-    """The coverage cost (22) along a run, at K of its moments."""
+    """The coverage cost of equation (22) along a run, at K of its moments."""
 
     _drawing_name = "history"
 
@@ -34,8 +34,8 @@ class CostHistory(Drawable):
     uncovered_area: Array
     """(K,) m²"""
     mean_time: Array | None = None
-    """(K,) s, mean over the area of the time after which the first robot can be there, each at its own
-    maximum speed. None if all robots have the same."""
+    """(K,) s, mean over the area of the time that the first robot needs to arrive, each at its own maximum
+    speed. None if all robots have the same maximum speed."""
 
     def __repr__(self) -> str:
         first = float(self.mean_distance[0])
@@ -52,7 +52,7 @@ def compute_cost_history(
 ) -> CostHistory:
     """Compute the coverage cost along a run.
 
-    Only working robots count, and moving obstacles are at their positions of each moment.
+    Only working robots count, and each moment has its own positions of moving obstacles.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def compute_cost_history(
     moments = select_sampled_moments(record, rate)
     samples = len(moments)
     mean_distance = np.empty(samples)
-    value = np.empty(samples)
+    cost_values = np.empty(samples)
     uncovered_area = np.empty(samples)
     has_mixed_speeds = record.team.has_mixed_speeds
     mean_time = np.full(samples, np.nan)
@@ -97,7 +97,7 @@ def compute_cost_history(
         positions = record.positions[moment]
         working = None if record.conditions is None else record.working[moment]
         figures = cost_at_time.compute_figures(time, positions, working)
-        mean_distance[sample], value[sample], uncovered_area[sample] = figures
+        mean_distance[sample], cost_values[sample], uncovered_area[sample] = figures
         if has_mixed_speeds:
             result = cost_at_time(time, positions, working, record.team.max_speed)
             if result is not None:
@@ -107,25 +107,25 @@ def compute_cost_history(
     return CostHistory(
         time=record.time[moments],
         mean_distance=mean_distance,
-        cost=value,
+        cost=cost_values,
         uncovered_area=uncovered_area,
         mean_time=mean_time if has_mixed_speeds else None,
     )
 
 
 def select_sampled_moments(record: Record, rate: float) -> list[int]:
-    """Return the moments nearest to multiples of 1/rate, and the last moment.
+    """Select the moments nearest to multiples of 1/rate, and the last moment.
 
     Parameters
     ----------
     record : Record
     rate : float, Hz
-        At most `MAX_RATE_WITH_MOVING_OBSTACLES_HZ` is used if obstacles move.
+        Limited to `MAX_RATE_WITH_MOVING_OBSTACLES_HZ` if obstacles move.
 
     Returns
     -------
     list of int
-        Numbers of their rows, ascending.
+        Indices of the moments, ascending.
     """
     if record.environment.has_moving_obstacles:
         rate = min(rate, MAX_RATE_WITH_MOVING_OBSTACLES_HZ)

@@ -8,12 +8,12 @@ from robocov.arrays import Array, BoolArray, compute_point_distances
 from robocov.record import TIME_ROUNDING_S
 
 SETTLED_WINDOW_S = 4.0
-"""Time within which a robot at rest does not get away from its position."""
+"""Time over which the net displacement of a robot at rest is measured."""
 SETTLED_DISTANCE_M = 0.05
 """Net displacement in this time below which a robot is at rest."""
 
 STUCK_WINDOW_S = 5.0
-"""Time within which a stuck robot does not get away from its position."""
+"""Time over which the net displacement of a stuck robot is measured."""
 STUCK_DISTANCE_M = 0.05
 """Net displacement in this time below which a robot may be stuck."""
 MIN_STUCK_GOAL_DISTANCE_M = 0.5
@@ -39,12 +39,12 @@ def find_settling_time(
     Returns
     -------
     float or None
-        The first time from which on no robot's net displacement over any `window` reaches `distance`, in
-        seconds; None if the team still moved at the end.
+        Earliest time, s, such that in every window that starts then or later, the net displacement of each
+        robot is below `distance`; None if the team was still moving at the end.
 
     Notes
     -----
-    Speed is no criterion: a robot may tremble in one place for ever.
+    Speed is not a suitable criterion, because a robot may tremble in one place forever.
 
     Examples
     --------
@@ -54,10 +54,10 @@ def find_settling_time(
     3.0
     """
     dt = float(time[1] - time[0]) if len(time) > 1 else 0.0
-    span = round(window / dt) if dt > 0 else 0
-    if span == 0 or len(time) <= span:
+    window_steps = round(window / dt) if dt > 0 else 0
+    if window_steps == 0 or len(time) <= window_steps:
         return None
-    displacement = compute_point_distances(positions[span:], positions[:-span])
+    displacement = compute_point_distances(positions[window_steps:], positions[:-window_steps])
     is_moving = np.asarray((displacement >= distance).any(axis=1))
     first_at_rest = int(np.flatnonzero(is_moving).max(initial=-1)) + 1
     return float(time[first_at_rest]) if first_at_rest < len(is_moving) else None
@@ -70,7 +70,7 @@ def compute_path_lengths(positions: Array, travelled: BoolArray | None = None) -
     ----------
     positions : (T, n, 2) array, m
     travelled : (T - 1, n) bool array, optional
-        Mask of the displacements that count, as `Record.travelled`; by default all do.
+        Mask of the displacements that count, such as `Record.travelled`. By default, all count.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def compute_path_lengths(positions: Array, travelled: BoolArray | None = None) -
 
 
 def count_stuck_robots(time: Array, positions: Array, goals: Array) -> int | None:
-    """Count the robots that are far from their goals at the end, but no longer approach them.
+    """Count the robots that are far from their goals at the end and no longer approach them.
 
     A robot is stuck if its distance from its goal exceeds `MIN_STUCK_GOAL_DISTANCE_M` and its net
     displacement over the last `STUCK_WINDOW_S` is below `STUCK_DISTANCE_M`.
@@ -103,7 +103,7 @@ def count_stuck_robots(time: Array, positions: Array, goals: Array) -> int | Non
     Returns
     -------
     int or None
-        None if no robot has a goal, or the run is shorter than this time.
+        None if no robot has a goal, or the run is shorter than `STUCK_WINDOW_S`.
     """
     window_start = float(time[-1]) - STUCK_WINDOW_S
     has_goal = ~np.isnan(goals[-1]).any(axis=1)

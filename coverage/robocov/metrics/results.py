@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _HISTORY_COLUMNS = ("time_s", "mean_distance_m", "cost_m3", "uncovered_area_m2")
 """Columns of ``cost.csv``."""
 _MEAN_TIME_COLUMN = "mean_time_s"
-"""A last column, if robots have different maximum speeds."""
+"""Additional last column if robots have different maximum speeds."""
 
 _COLUMN_KINDS = {
     "map": "string",
@@ -38,7 +38,7 @@ _COLUMN_KINDS = {
     "contacts": "int64",
     "stuck_robots": "int64",
 }
-"""Kinds of the columns of every study that do not contain floats."""
+"""Kinds of the columns that every study may have and that do not contain floats."""
 
 _MAX_SHOWN_ROWS = 10
 """Number of rows that notebooks show."""
@@ -47,7 +47,7 @@ _MAX_SHOWN_ROWS = 10
 class Results:
     """The table of a sweep, one row for each run, and the folders of the runs.
 
-    Files are read when their content is asked for.
+    Files are read when they are needed.
 
     Parameters
     ----------
@@ -58,8 +58,8 @@ class Results:
     ----------
     folder : Path
     columns : tuple of str
-        Parameters that vary (``map``, ``controller``, ``robots``, ``start``, ``seed``, gains, ...), figures
-        by names that end in their units, the name of the run's folder (``run``), and its ``error``.
+        Parameters that vary (``map``, ``controller``, ``robots``, ``start``, ``seed``, gains, ...), results
+        whose names end in their units, the name of the run's folder (``run``), and its ``error``.
 
     Examples
     --------
@@ -75,7 +75,7 @@ class Results:
             raise InputError(f"{self._table}: line 1: expected the header of a table of results")
 
     def __len__(self) -> int:
-        """Return the number of runs, failed ones included."""
+        """Return the number of runs, including failed ones."""
         return sum(1 for _ in _read_lines(self._table)) - 1
 
     def __repr__(self) -> str:
@@ -115,7 +115,7 @@ class Results:
     def to_pandas(self, columns: Sequence[str] | None = None) -> DataFrame:
         """Return the rows as a data frame.
 
-        It needs ``robocov[pandas]``.
+        Requires ``robocov[pandas]``.
 
         Parameters
         ----------
@@ -187,7 +187,7 @@ class Results:
         return read_history(self._find_run_folder(run) / "cost.csv")
 
     def _read_kinds(self) -> dict[str, str]:
-        """Return the kinds of the columns that are known; a table without its study can be read, too."""
+        """Return the known kinds of columns: those of every study if ``study.json`` cannot be read."""
         try:
             study_kinds = {column["name"]: str(column["kind"]) for column in self.study["columns"]}
         except (InputError, KeyError, TypeError, ValueError):
@@ -212,7 +212,7 @@ class Results:
         number = int(run)
         count = len(self)
         if not -count <= number < count:
-            raise InputError(f"{self.folder}: row {number}, but there are {format_count(count, 'row')}")
+            raise InputError(f"{self.folder}: there is no row {number} (of {format_count(count, 'row')})")
         row = next(islice(self.rows(["run"]), number % count, None))
         return str(row["run"])
 
@@ -237,7 +237,7 @@ class Results:
 def read_results(folder: Path | str) -> Results:
     """Read the results of a sweep.
 
-    While the sweep is running, or if it was stopped, they are those of the finished runs.
+    If the sweep is still running or was interrupted, the results contain only finished runs.
 
     Parameters
     ----------
@@ -267,7 +267,7 @@ def read_rows(
     ----------
     table : Path
     kinds : mapping of str to str
-        Kinds of columns, as those of Parquet: "string", "int64" or "double".
+        Kinds of the columns, named as in Parquet: "string", "int64" or "double".
     columns : sequence of str, or None
         By default all columns.
 
@@ -295,7 +295,7 @@ def read_rows(
 
 
 def _read_lines(table: Path) -> Iterator[list[str]]:
-    """Yield the header of a table, and then its rows, as texts."""
+    """Yield the header of a table, and then its rows, as lists of strings."""
     try:
         with table.open(encoding="utf-8", newline="") as file:
             yield from csv.reader(file)

@@ -19,7 +19,7 @@ from robocov.record import Record, select_nearest_moments
 DEFAULT_RATE_HZ = 2.0
 """Moments per simulated second at which areas and graphs are measured."""
 NEAR_FINAL_TOLERANCE = 0.05
-"""Relative deviation from the final cost within which a cost counts as final."""
+"""Relative deviation from the final cost up to which a cost counts as near the final one."""
 
 COLUMNS = {
     "time": "time_s",
@@ -34,7 +34,7 @@ COLUMNS = {
     "wall_clearance": "wall_clearance_m",
     "robot_clearance": "robot_clearance_m",
 }
-"""The columns of ``metrics.csv``, in their order, by the attributes of `RunMetrics`."""
+"""The columns of ``metrics.csv``, in order, with the attributes of `RunMetrics` as keys."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,27 +42,28 @@ class RunMetrics:
     """Metrics along a run, at K of its moments. Only working robots count."""
 
     time: Array
-    """Simulation time, s; (K,), as all arrays."""
+    """Simulation time, s. All arrays have shape (K,)."""
     sensed_area: Array
     """Free area within the sensing range of a robot and in its line of sight, m²."""
     range_area: Array
     """Free area within the sensing range of a robot, regardless of walls, m² (blanket coverage by discs)."""
     visible_area: Array
-    """Free area in line of sight of a robot at any distance, m² (the guards of an art gallery)."""
+    """Free area in line of sight of a robot at any distance, m² (as in the art gallery problem)."""
     work: Array
-    """Integral of ``|F v|`` so far, sum over the robots, J; F is the controller's force before any limit."""
+    """Integral of ``|F v|`` so far, summed over the robots, J; F is the controller's force before any
+    limit."""
     effort: Array
-    """Integral of ``|F|²`` so far, sum over the robots, N² s."""
+    """Integral of ``|F|²`` so far, summed over the robots, N² s."""
     path_length: Array
-    """Path length so far, mean over the robots, m."""
+    """Path length so far, averaged over the robots, m."""
     components: IntArray
     """Number of components of the communication graph, see `connectivity.measure_connectivity`."""
     algebraic_connectivity: Array
     """Second smallest eigenvalue of the Laplacian of this graph; 0 for several components."""
     wall_clearance: Array
-    """Smallest gap between a robot's rim and a wall since the previous moment, m; inf for none."""
+    """Smallest gap between a robot's rim and a wall since the previous moment, m; inf if there is none."""
     robot_clearance: Array
-    """Smallest gap between the rims of two robots since the previous moment, m; inf for none."""
+    """Smallest gap between the rims of two robots since the previous moment, m; inf if there is none."""
     free_area: float
     """Free area of the map, m²."""
 
@@ -84,13 +85,12 @@ class RunMetrics:
         return list(zip(*(getattr(self, name).tolist() for name in COLUMNS), strict=True))
 
     def final(self) -> dict[str, float | None]:
-        """Return the figures at the end of the run.
+        """Return the metrics at the end of the run.
 
         Returns
         -------
         dict of str to float or None
-            By names that end in their units. Clearances are the smallest of the run, and None if they are
-            infinite.
+            The names end in the units. Clearances are the smallest of the run, and None if they are infinite.
         """
         figures: dict[str, float | None] = {}
         for name, column in COLUMNS.items():
@@ -119,7 +119,7 @@ def compute_run_metrics(
     ----------
     record : Record
     rate : float, Hz
-        Moments per simulated second at which the metrics are given. The last moment is always one of them.
+        Moments per simulated second at which the metrics are evaluated. The last moment is always included.
         Energy and path lengths are integrated over all moments of the record.
     on_sample : callable or None
         Called after each moment, to report progress.
@@ -175,7 +175,7 @@ def compute_run_metrics(
 
 
 def find_time_near_final(history: CostHistory, tolerance: float = NEAR_FINAL_TOLERANCE) -> float:
-    """Find the time from which on the mean distance stays near its final value.
+    """Find the time after which the mean distance stays near its final value.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def find_time_near_final(history: CostHistory, tolerance: float = NEAR_FINAL_TOL
 
 
 def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, float | None]:
-    """Return the metrics at the end of a run, and the time from which on its cost was near the final one.
+    """Compute the metrics at the end of a run, and the time after which the cost stayed near its final value.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, 
     Returns
     -------
     mapping of str to float or None
-        By names that end in their units.
+        The names end in the units.
     """
     return {
         **compute_run_metrics(record, rate=0.0).final(),
@@ -216,7 +216,7 @@ def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, 
 def _integrate(record: Record) -> _Integrals:
     """Return work, effort and mean path length from the start of a run to each moment.
 
-    A force is constant until the next moment; its power in between follows the trapezoidal rule.
+    Forces are constant between moments. Power is integrated by the trapezoidal rule.
     """
     forces = np.where(record.working[:, :, None], record.forces, 0.0)
     power = np.abs((forces * record.velocities).sum(axis=-1)).sum(axis=1)
@@ -232,5 +232,5 @@ def _integrate(record: Record) -> _Integrals:
 
 
 def _accumulate(increments: Array) -> Array:
-    """Return sums of the increments before each moment, starting with 0."""
+    """Return the cumulative sum of the increments, starting with 0."""
     return np.concatenate([[0.0], np.cumsum(increments)])

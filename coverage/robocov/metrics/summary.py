@@ -1,4 +1,4 @@
-"""The summary of a run that ``run.json`` contains."""
+"""The summary of a run in ``run.json``."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from robocov.metrics.motion import compute_path_lengths, count_stuck_robots, fin
 from robocov.record import Record
 
 MIN_REPORTED_OFFSET_M = 5e-4
-"""Distance between the requested and the actual position of a robot that joins, from which it is reported."""
+"""Distance from the requested position above which it is reported that a robot joined elsewhere."""
 
 
 def summarise(record: Record, history: CostHistory) -> dict[str, Any]:
-    """Summarise a run, as ``run.json`` contains it.
+    """Summarise a run for ``run.json``.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def summarise(record: Record, history: CostHistory) -> dict[str, Any]:
     Returns
     -------
     dict
-        Figures by names that end in their units; ``notes`` lists remarks, if there are any.
+        Results whose names end in their units, and ``notes``, a list of remarks, if there are any.
 
     Examples
     --------
@@ -61,7 +61,7 @@ def summarise(record: Record, history: CostHistory) -> dict[str, Any]:
 
 
 def _describe_moved_joins(record: Record) -> list[str]:
-    """Return a sentence for each robot that joined at another position than the requested one."""
+    """Return a sentence for each robot that joined at a position other than the requested one."""
     notes = []
     for joined in record.joined:
         if joined.offset >= MIN_REPORTED_OFFSET_M:
@@ -69,7 +69,7 @@ def _describe_moved_joins(record: Record) -> list[str]:
             requested = _format_point(joined.requested)
             notes.append(
                 f"Robot {joined.robot} joined at {joined.time:.4g} s at {place}, {joined.offset:.2g} m from "
-                f"{requested}, which is too near to a wall or another robot."
+                f"{requested}, which is too close to a wall or another robot."
             )
     return notes
 

@@ -23,7 +23,7 @@ from robocov.geodesic.walls import Walls, build_walls
 _BINS = 512
 """Angular bins of a robot's view."""
 _QUARTER_SEGMENTS = 128
-"""Sides of a quarter of the polygon that stands for a sensing disc: its area is 2.5e-5 too small."""
+"""Sides per quadrant of the polygon that represents a sensing disc; its relative area error is 2.5e-5."""
 
 
 class CoveredAreas(NamedTuple):
@@ -56,7 +56,7 @@ def compute_covered_areas(free: BaseGeometry, positions: Array, ranges: Array) -
     free : polygon or multipolygon, m
         The free space.
     positions : (n, 2) array, m
-        A robot outside of the free space covers nothing.
+        A robot outside the free space covers nothing.
     ranges : (n,) array, m
         Sensing ranges; may be infinite.
 
@@ -66,10 +66,10 @@ def compute_covered_areas(free: BaseGeometry, positions: Array, ranges: Array) -
 
     Notes
     -----
-    Areas in line of sight are exact up to rounding if the ranges are infinite. Sensing discs are polygons of
-    512 sides, whose areas are 2.5e-5 too small. Sources: D. Gage, *Command control for many-robot systems*,
-    1992, for blanket coverage by discs; J. O'Rourke, *Art Gallery Theorems and Algorithms*, 1987, for areas
-    in line of sight.
+    Areas in line of sight are exact up to rounding if the ranges are infinite. Sensing discs are represented
+    by polygons with 512 sides, whose areas are too small by a fraction of 2.5e-5. Sources: D. Gage, *Command
+    control for many-robot systems*, 1992, for blanket coverage by discs; J. O'Rourke, *Art Gallery Theorems
+    and Algorithms*, 1987, for areas in line of sight.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterato
     grid = Grid.from_square(np.array([low_x, low_y]), max(high_x - low_x, high_y - low_y))
     components = shapely.orient_polygons(shapely.get_parts(free))
     walls = build_walls(shapely.transform(shapely.multipolygons(components), grid.snap))
-    # The hull of the map hides nothing, but is visible itself.
+    # The map's outer hull hides no free space, but it bounds the view.
     walls.hides[:] = True
     index = AngularWallIndex.allocate(1, _BINS, 64 * _BINS)
     for position in grid.snap(positions):
@@ -171,7 +171,7 @@ def _find_sectors(walls: Walls, index: AngularWallIndex, entries: int, position:
 
 @kernel
 def _find_nearest_walls(ends: Array, index: AngularWallIndex, rays: Array, nearest: IntArray) -> None:
-    """Write the number of the wall that each of (m, 2) rays from the source hits first, -1 for none."""
+    """Write the index of the wall that each of (m, 2) rays from the source hits first, -1 for none."""
     for m in range(len(rays)):
         x, y = rays[m, 0], rays[m, 1]
         nearest[m] = -1
@@ -196,7 +196,7 @@ def _find_nearest_walls(ends: Array, index: AngularWallIndex, rays: Array, neare
 
 
 def _intersect(walls: Array, angles: Array) -> Array:
-    """Return the points on (m, 4) walls nearest to where rays from the origin meet their lines, (m, 2)."""
+    """Return where rays from the origin meet (m, 4) walls, (m, 2); clipped to the ends of the walls."""
     x = np.cos(angles)
     y = np.sin(angles)
     along = walls[:, 2:] - walls[:, :2]

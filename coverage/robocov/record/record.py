@@ -35,7 +35,7 @@ from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partitio
 FORMAT = "robocov-run"
 """Name of the format of ``run.json``."""
 FORMAT_VERSION = 1
-"""Its present version."""
+"""Current version of the format."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,14 +45,14 @@ class Record(Drawable):
     Attributes
     ----------
     controller, label : str
-        Its name, as `make_controller` takes it, and its label in figures.
+        Name of the controller, as `make_controller` accepts it, and its label in figures.
     gains : mapping of str to float, str or None
     start : str or None
         Name of the start from which the initial positions were sampled.
     seed : int or None
         Seed with which they were sampled.
     dt : float, s
-        Control period; also the step between moments, unless the record was thinned.
+        Control period; also the time between moments, unless the record was thinned.
     time : (T,) s
     positions, velocities : (T, n, 2) m, m/s
     forces : (T, n, 2) N
@@ -66,9 +66,9 @@ class Record(Drawable):
     session : dict
         Origin of the run, if it is part of a session in the window.
     conditions : Conditions or None
-        None: ideal ones.
+        None if they are ideal.
     joined : tuple of JoinedRobot
-        The robots that joined during the run, and their positions then.
+        The robots that joined during the run, and the positions at which they joined.
     """
 
     _drawing_name = "record"
@@ -94,14 +94,14 @@ class Record(Drawable):
 
     @cached_property
     def working(self) -> BoolArray:
-        """Mask of robots present and not failed, (T, n) bool; read-only."""
+        """Mask of the robots that are present and have not failed, (T, n) bool; read-only."""
         if self.conditions is None:
             return self.present
         return _protect(self.conditions.find_working(self.time, len(self.team)))
 
     @cached_property
     def present(self) -> BoolArray:
-        """Mask of robots present, failed ones included, (T, n) bool; read-only."""
+        """Mask of the robots that are present, including failed ones, (T, n) bool; read-only."""
         if self.conditions is None:
             return _protect(np.ones(self.positions.shape[:2], dtype=bool))
         return _protect(self.conditions.find_present(self.time, len(self.team)))
@@ -110,8 +110,8 @@ class Record(Drawable):
     def travelled(self) -> BoolArray:
         """Mask of the displacements that belong to a path, (T - 1, n) bool; read-only.
 
-        A robot that has not joined yet, or that the user put to another position, does not travel between
-        the two moments.
+        A robot does not travel between two moments if it has not joined yet, or if the user moved it to
+        another position in between.
         """
         mask = self.present[:-1].copy()
         numbers = self.session.get("robots") or range(1, len(self.team) + 1)
@@ -130,7 +130,7 @@ class Record(Drawable):
 
     @property
     def has_travel_time_cells(self) -> bool:
-        """Whether the controller divided the region by travel time, and that differs from by distance."""
+        """Whether the controller used cells by travel time and they differ from cells by distance."""
         return self.gains.get("cells") == "time" and self.team.has_mixed_speeds
 
     def __len__(self) -> int:
@@ -152,7 +152,7 @@ class Record(Drawable):
         Returns
         -------
         VoronoiPartition or WeightedCells
-            Weighted ones if `has_travel_time_cells`. Communication is taken to be unlimited.
+            `WeightedCells` if `has_travel_time_cells`. Communication is assumed to be unlimited.
         """
         working = slice(None) if self.conditions is None else self.working[k]
         positions = self.positions[k][working]
@@ -164,7 +164,7 @@ class Record(Drawable):
         return partition(positions, region, density=density)
 
     def snapshot(self, k: int) -> Snapshot:
-        """Return a moment as far as it was recorded: without force terms.
+        """Return the state and the decision at a moment, without the force terms, which are not recorded.
 
         Parameters
         ----------
@@ -209,7 +209,7 @@ class Record(Drawable):
         Raises
         ------
         ParameterError
-            If it is outside of the run by more than a control period.
+            If it is outside the run by more than a control period.
         """
         first = float(self.time[0])
         last = float(self.time[-1])
@@ -244,7 +244,7 @@ class Record(Drawable):
         Parameters
         ----------
         rate : float, Hz
-            Moments per simulated second, see `select_nearest_moments`; 0 keeps the first and the last one.
+            Moments per simulated second, see `select_nearest_moments`; 0 keeps only the first and the last.
 
         Returns
         -------
@@ -260,14 +260,14 @@ class Record(Drawable):
         return self._select_moments(select_nearest_moments(self.time, rate))
 
     def _select_moments(self, moments: slice | IntArray) -> Record:
-        """Return the record of some of the moments; its arrays are copies."""
+        """Return a record of some of the moments, with copies of the arrays."""
         arrays = {name: getattr(self, name)[moments].copy() for name in self.arrays}
         return replace(self, **arrays)
 
     def to_pandas(self) -> Any:
         """Return the run as a tidy data frame, one row for each moment and robot, by time, then robot.
 
-        It needs ``robocov[pandas]``.
+        Requires ``robocov[pandas]``.
 
         Returns
         -------
@@ -300,7 +300,7 @@ class Record(Drawable):
         summary : mapping or None
             The summary of the run, see `metrics.summarise`.
         lattice : int or None
-            Lattice on which its cost was computed.
+            Lattice on which the cost of the run was computed.
 
         Returns
         -------
@@ -332,13 +332,13 @@ class Record(Drawable):
     def save(
         self, folder: Path | str, summary: Mapping[str, Any] | None = None, *, lattice: int | None = None
     ) -> None:
-        """Write ``record.npz`` and ``run.json`` to a folder, each completely or not at all.
+        """Write ``record.npz`` and ``run.json`` to a folder. Each file is written completely or not at all.
 
         Parameters
         ----------
         folder : Path or str
         summary, lattice
-            As those of `to_json`.
+            See `to_json`.
 
         Raises
         ------
@@ -350,10 +350,10 @@ class Record(Drawable):
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise OutputError(f"{folder}: cannot be made: {describe_error(error)}") from error
+            raise OutputError(f"{folder}: cannot be created: {describe_error(error)}") from error
         arrays = {name: getattr(self, name) for name in self.arrays}
         with replace_file(folder / "record.npz") as temporary, temporary.open("wb") as file:
-            # Compression would save 10 % of the size and take 20 times as long.
+            # Compression would make the file 10 % smaller and take 20 times as long.
             np.savez(file, **arrays)
         text = json.dumps(self.to_json(summary, lattice=lattice), indent=1, allow_nan=False)
         with replace_file(folder / "run.json") as temporary:
@@ -361,9 +361,9 @@ class Record(Drawable):
 
     @classmethod
     def load(cls, folder: Path | str) -> Record:
-        """Load a record that `save` wrote.
+        """Load a record that was written by `save`.
 
-        The controller is named, but not loaded: no code from the folder is executed.
+        Only the name of the controller is loaded, and no code from the folder is executed.
 
         Parameters
         ----------
@@ -429,7 +429,7 @@ def _to_event(joined: JoinedRobot) -> dict[str, Any]:
 
 
 def _from_event(event: JoinEvent) -> JoinedRobot:
-    """Return the robot that joined by an event of ``run.json``."""
+    """Return the robot that joined, from an event of ``run.json``."""
     return JoinedRobot(
         robot=event.robot,
         time=event.time_s,

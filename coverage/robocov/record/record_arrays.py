@@ -14,7 +14,7 @@ from robocov.team import Team
 ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points")
 """Names of the arrays of every record."""
 STEERING = "steering"
-"""Name of the array that only records of unicycles have in addition."""
+"""Name of the additional array in records of unicycles."""
 COLUMNS = {
     "positions": ("x_m", "y_m"),
     "velocities": ("vx_m_s", "vy_m_s"),
@@ -25,7 +25,7 @@ COLUMNS = {
 }
 """Names of the columns of data frames, by array."""
 _MAX_VALUES = {"time": 1e9, "positions": 1e7, "velocities": 1e300, "forces": 1e300, STEERING: 1e9}
-"""Largest numbers in the arrays that are finite throughout, s, m, m/s, N, rad and rad/s."""
+"""Maximum absolute values in s, m, m/s, N, rad and rad/s; the other arrays may contain nan."""
 
 
 def list_array_names(team: Team) -> tuple[str, ...]:

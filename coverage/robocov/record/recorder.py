@@ -47,7 +47,7 @@ class Recorder:
     dt: float
     _: KW_ONLY
     name: str | None = None
-    """Name under which the controller was found, as ``mine.py:MyController``; by default its own."""
+    """Name under which the controller was found, such as ``mine.py:MyController``. By default, its own."""
     start: str | None = None
     """Name of the start from which the positions were sampled."""
     seed: int | None = None
@@ -93,7 +93,7 @@ class Recorder:
         Parameters
         ----------
         joined : tuple of JoinedRobot
-            The robots that joined in them.
+            The robots that joined during these steps.
 
         Returns
         -------

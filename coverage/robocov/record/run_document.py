@@ -1,4 +1,4 @@
-"""The model of ``run.json``, by which it is checked when it is read."""
+"""The model of ``run.json``, against which the file is checked when it is read."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ Seconds: TypeAlias = Annotated[float, Field(gt=0, le=1e6), expect("a number abov
 """A duration above 0, s."""
 Time: TypeAlias = Annotated[float, Field(ge=0, le=1e9), expect("a number from 0 (s)")]
 """A simulation time, s."""
-Number: TypeAlias = Annotated[int, Field(ge=1, le=MAX_ROBOTS), expect("the number of a robot, from 1")]
+RobotNumber: TypeAlias = Annotated[int, Field(ge=1, le=MAX_ROBOTS), expect("the number of a robot, from 1")]
 """The number of a robot, from 1."""
-Key: TypeAlias = Annotated[str, Field(pattern=r"^[1-9]\d{0,8}$"), expect("the number of a robot")]
+RobotKey: TypeAlias = Annotated[str, Field(pattern=r"^[1-9]\d{0,8}$"), expect("the number of a robot")]
 """The number of a robot as the key of an object."""
 Point: TypeAlias = Annotated[list[float], Field(min_length=2, max_length=2), expect("a point [x, y]")]
 """x and y, m."""
@@ -25,7 +25,7 @@ Seed: TypeAlias = Annotated[int, Field(ge=0), expect("a whole number from 0")]
 
 
 class _Failure(Document):
-    robot: Number
+    robot: RobotNumber
     time_s: Time
 
 
@@ -64,25 +64,25 @@ class _Controller(Document):
 
 
 class _Touch(Document):
-    """A time during which the user moved robots."""
+    """A period during which the user moved robots."""
 
     from_s: Time
     to_s: Time
-    robots: list[Number]
+    robots: list[RobotNumber]
 
 
 class _Placement(Document):
-    """Robots that the user put to other positions at a time."""
+    """Robots that the user placed at other positions at a certain time."""
 
     time_s: Time
-    robots: list[Number]
+    robots: list[RobotNumber]
 
 
 class JoinEvent(Document):
-    """A robot that joined, its position then, and the requested one."""
+    """A robot that joined, with its actual and its requested position."""
 
     kind: Literal["join"]
-    robot: Number
+    robot: RobotNumber
     time_s: Time
     place_m: Point
     requested_m: Point
@@ -93,8 +93,8 @@ class _Session(Document):
 
     began_at_s: Time = 0.0
     start_velocities_m_per_s: list[Point] = Field([])
-    robots: list[Number] = Field([])
-    failed: dict[Key, Point] = Field({})
+    robots: list[RobotNumber] = Field([])
+    failed: dict[RobotKey, Point] = Field({})
     touched: list[_Touch] = Field([])
     placed: list[_Placement] = Field([])
     control_dt_s: Seconds = 1.0

@@ -7,25 +7,25 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 
 TIME_ROUNDING_S = 5e-7
-"""Difference between times that is taken for rounding: times are sums of control periods."""
+"""Difference between times that is attributed to rounding: times are sums of control periods."""
 _TIE_DECIMALS = 6
-"""Decimals of a period within which two times are equally near; further ones are rounding errors."""
+"""Decimals of a period to which distances are compared; the others are rounding errors."""
 
 
 def select_nearest_moments(time: Array, rate: float) -> IntArray:
-    """Return the row numbers of the times nearest to multiples of 1/rate, and of the first and last time.
+    """Select the moments nearest to multiples of 1/rate, and the first and last moments.
 
     Parameters
     ----------
     time : (T,) array, s
         Ascending.
     rate : float, Hz
-        0 selects the first and the last time only.
+        0 selects only the first and the last moment.
 
     Returns
     -------
     (K,) int array
-        Ascending. The earlier one of two times that are equally near.
+        Indices of the moments, ascending. Of two moments that are equally near, the earlier one is selected.
 
     Examples
     --------

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov.conditions import LOSS, Conditions
+from robocov.conditions import LOSS_STREAM, Conditions
 from robocov.conditions.communication import NEVER, Inbox, Radio
 from robocov.conditions.random_streams import RandomStream
 from robocov.controllers import CONTROLLERS, Controller, atlas, inform_controller
@@ -49,7 +49,7 @@ def simulate_messages(
     conditions: Conditions, ranges: np.ndarray, walks: np.ndarray, working: np.ndarray
 ) -> list[dict[tuple[int, int], Message]]:
     """Return the message that each robot knows of each other one in each step, from a list of all."""
-    loss_stream = RandomStream(conditions.seed, LOSS)
+    loss_stream = RandomStream(conditions.seed, LOSS_STREAM)
     rate = conditions.message_rate
     messages = []
     known_messages = []

@@ -85,7 +85,7 @@ def test_a_robot_that_joins_elsewhere_is_reported(tmp_path: Path, capsys: pytest
     out = tmp_path / "out"
     words = ["run", "rooms", "--join", "6@0.5:1,8", "--duration", "1", "--lattice", "16", "--no-pictures"]
     assert main([*words, "--out", str(out)]) == 0
-    note = "Robot 6 joined at 0.5 s at [1, 7.499], 0.5 m from [1, 8], which is too near to a wall"
+    note = "Robot 6 joined at 0.5 s at [1, 7.499], 0.5 m from [1, 8], which is too close to a wall"
     assert f"note: {note}" in capsys.readouterr().out
     run = json.loads((out / "run.json").read_text())
     assert run["summary"]["notes"][0].startswith(note)
