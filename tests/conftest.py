@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 from pathlib import Path
@@ -19,38 +20,40 @@ from robocov.environment import (
 )
 from robocov_app.terminal import progress
 
-# no test finds, or leaves, anything in the cache of whoever runs it
+# Tests neither use nor change the cache of the user.
 os.environ["ROBOCOV_CACHE"] = ""
 os.environ["ROBOCOV_DRAFTS"] = ""
-# but for what is compiled: every process of a test would take its time over that
+# Machine code is kept: otherwise every process of a test would compile the kernels again.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "kernels"))
 
-# which kernels are compiled already depends on the tests before: of that commands tell nothing here
+# Which kernels are compiled already depends on earlier tests, so that commands do not report it here.
 progress._tell = lambda kernel: None
 
-# what is started in the background of a script ignores Ctrl-C, and hands that on to all that it starts
+# A process in the background of a script ignores SIGINT, and so do its children.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
-# what is started by nohup ignores SIGHUP, and hands that on as well
+# A process that is started by nohup ignores SIGHUP, and so do its children.
 if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
-# examples differ in cost by orders of magnitude, and machines are shared: time says nothing here
-QUIET = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
-# the same examples every time, so that a failure is the fault of the change that is tested; a sixth of them
-# unless `pytest --hypothesis-profile=thorough` asks for all, or `=explore` for new ones
-settings.register_profile("thorough", derandomize=True, database=None, **QUIET)
-settings.register_profile("explore", max_examples=500, print_blob=True, **QUIET)
+# The times of examples differ by orders of magnitude, and machines are shared.
+WITHOUT_DEADLINE = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+# Examples are the same every time, so that a new failure is caused by the change under test. A sixth of them
+# is run, unless `pytest --hypothesis-profile=thorough` asks for all, or `=explore` for new ones.
+settings.register_profile("thorough", derandomize=True, database=None, **WITHOUT_DEADLINE)
+settings.register_profile("explore", max_examples=500, print_blob=True, **WITHOUT_DEADLINE)
 settings.load_profile("thorough")
 
 
-@pytest.hookimpl(trylast=True)  # hypothesis marks its tests in a hook of its own
+# Hypothesis marks its tests in the same hook, before this one.
+@pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if config.getoption("--hypothesis-profile"):
         return
     for test in {item.function for item in items if item.get_closest_marker("hypothesis")}:  # type: ignore[attr-defined]
-        wanted = getattr(test, "_hypothesis_internal_use_settings", None) or settings.default
-        test._hypothesis_internal_use_settings = settings(wanted, max_examples=-(-wanted.max_examples // 6))
+        thorough = getattr(test, "_hypothesis_internal_use_settings", None) or settings.default
+        max_examples = math.ceil(thorough.max_examples / 6)
+        test._hypothesis_internal_use_settings = settings(thorough, max_examples=max_examples)
 
 
 SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
