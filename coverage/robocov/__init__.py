@@ -8,7 +8,7 @@
     cost = rc.CoverageCost(environment, lattice=128)
     cost(record.positions[-1]).mean_distance
 
-Public names are loaded on first use: importing the package costs next to nothing. They are listed in
+Public names are loaded on first use, so that importing the package takes almost no time. They are listed in
 ``__init__.pyi``.
 """
 

@@ -1,7 +1,7 @@
 """The public names of robocov, each with the module that defines it.
 
-This is the only list of them. Type checkers read it, and ``__init__.py`` loads a name from its module on
-first use, for which each name needs a line of its own: ``from .module import Name as Name``.
+This is the only list of public names. It is read by type checkers and by ``__init__.py``, which loads names
+on first use and expects one line for each: ``from .module import Name as Name``.
 """
 
 from .conditions import Conditions as Conditions

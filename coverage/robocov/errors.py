@@ -1,15 +1,15 @@
-"""The errors that robocov raises on purpose, and helpers for their messages.
+"""The errors that robocov raises, and helpers for their messages.
 
     RobocovError
     ├── InputError            an input cannot be used (exit status 2)
     │   ├── MapError          a map file, with line, column and JSON path of the mistake
     │   ├── StartError        a start without room for the team
-    │   └── ParameterError    a gain, a limit, a name of a controller
+    │   └── ParameterError    a gain, a limit, the name of a controller
     ├── ControllerEndedError  a user's controller ended Python (exit status 1)
     └── OutputError           a result cannot be written (exit status 2)
 
-Every message is one line with the source (a file or an argument), the place in it, the expected value, and
-the actual one.
+Every message is one line that names the source (a file or an argument), the place in it, the expected value
+and the actual value.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ JsonPath: TypeAlias = tuple[str | int, ...]
 """Keys and indices, from the whole document inwards."""
 _MAX_QUOTED_CHARACTERS = 60
 """Longer values and names are cut in messages."""
-_MAX_SUMMARIZED_NAMES = 3
+_MAX_LISTED_NAMES = 3
 _MIN_SIMILARITY = 0.5
-"""Similarity, as `difflib` measures it, from which a known name is suggested."""
+"""Minimum similarity, as measured by `difflib`, of a known name that is suggested."""
 
 
 class RobocovError(Exception):
-    """Base class of every error that robocov raises on purpose."""
+    """Base class of all errors that robocov raises."""
 
 
 class InputError(RobocovError):
@@ -51,7 +51,7 @@ class Mistake(NamedTuple):
     path : tuple of str and int
         Path of the value that is wrong or missing.
     text : str
-        The place, the expected value, and the actual one.
+        The place, the expected value and the actual value.
     at_key : bool
         Whether the last key of the path is wrong, rather than its value.
     line, column : int or None
@@ -162,11 +162,11 @@ class ParameterError(InputError):
 
 
 class ControllerEndedError(RobocovError):
-    """A user's controller ended Python, tried to, or closed its output."""
+    """A user's controller ended the Python process, tried to do so, or closed its output."""
 
 
 class OutputError(RobocovError):
-    """A result cannot be written: no permission, no space, a folder that is in use."""
+    """A result cannot be written: no permission, no space, or the folder is in use."""
 
 
 def quote(value: object) -> str:
@@ -187,7 +187,7 @@ def quote(value: object) -> str:
     """
     try:
         text = repr(value)
-    except Exception:  # Objects of users may have no usable one.
+    except Exception:  # The `__repr__` of a user's class may fail.
         text = f"<{type(value).__name__}>"
     return _cut(" ".join(text.split()))
 
@@ -212,7 +212,7 @@ def quote_json(value: object) -> str:
 
 
 def to_one_line(text: object) -> str:
-    """Return a text as one line of a message, with escapes for line breaks and other control characters.
+    """Return a text as one line, with escapes for line breaks and other control characters.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def to_one_line(text: object) -> str:
 
 
 def describe_error(error: Exception) -> str:
-    """Return why the operating system refused something, on one line.
+    """Return the reason of an error on one line, without the file name that the operating system adds.
 
     Parameters
     ----------
@@ -279,7 +279,7 @@ def _is_plain_key(name: str) -> bool:
 
 
 def is_number(value: object, kind: type = Real) -> TypeGuard[Any]:
-    """Return whether a value is a number of some kind, also one of numpy's, but not a `bool`.
+    """Return whether a value is a number of a given kind. NumPy scalars are, but a `bool` is not.
 
     Parameters
     ----------
@@ -302,7 +302,7 @@ def is_number(value: object, kind: type = Real) -> TypeGuard[Any]:
 def require_number(
     name: str, value: Any, minimum: float, maximum: float, unit: str = "", *, whole: bool = False
 ) -> float:
-    """Return a number, or raise an error if it is none or out of range.
+    """Return a value as a float, or raise an error unless it is a number in a range.
 
     Parameters
     ----------
@@ -310,7 +310,7 @@ def require_number(
         Name of the parameter in the message.
     value : object
     minimum, maximum : float
-        Range, including both.
+        Limits of the range, inclusive.
     unit : str
     whole : bool
         Whether only whole numbers are accepted.
@@ -350,7 +350,7 @@ def to_floats(
     expected : str
         Description of the numbers in the message.
     error_type : type
-        Kind of the error.
+        Type of the error.
 
     Returns
     -------
@@ -359,7 +359,7 @@ def to_floats(
     Raises
     ------
     InputError
-        Of the given kind, if the values cannot be converted.
+        Of type `error_type`, if the values cannot be converted.
 
     Examples
     --------
@@ -404,8 +404,8 @@ def _describe_mismatch(name: str, value: object, expected: str) -> str:
     return f"{name}: expected {expected}, got {quote(value)}"
 
 
-def summarize_names(names: Sequence[str]) -> str:
-    """Return the first three names, and the number of the others.
+def summarise_names(names: Sequence[str]) -> str:
+    """List the first three names and the number of the others.
 
     Parameters
     ----------
@@ -417,11 +417,11 @@ def summarize_names(names: Sequence[str]) -> str:
 
     Examples
     --------
-    >>> summarize_names(["a", "b", "c", "d"])
+    >>> summarise_names(["a", "b", "c", "d"])
     'a, b, c and 1 more'
     """
-    text = ", ".join(names[:_MAX_SUMMARIZED_NAMES])
-    others = len(names) - _MAX_SUMMARIZED_NAMES
+    text = ", ".join(names[:_MAX_LISTED_NAMES])
+    others = len(names) - _MAX_LISTED_NAMES
     return f"{text} and {others} more" if others > 0 else text
 
 
@@ -447,7 +447,7 @@ def format_count(count: int, noun: str) -> str:
 
 
 def describe_unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
-    """Return the message for an unknown name, with the most similar known one.
+    """Return the message for an unknown name, which suggests the most similar known name.
 
     Parameters
     ----------

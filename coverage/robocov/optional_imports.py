@@ -1,4 +1,4 @@
-"""Modules of optional dependencies, which ``pip install robocov`` does not install."""
+"""Import of optional dependencies, which ``pip install robocov`` does not install."""
 
 import importlib
 from typing import Any
@@ -7,7 +7,7 @@ from robocov.errors import RobocovError
 
 
 def import_optional(module: str, extra: str, prefix: str = "") -> Any:
-    """Import a module that an optional dependency provides.
+    """Import a module of an optional dependency.
 
     Parameters
     ----------
@@ -37,5 +37,5 @@ def import_optional(module: str, extra: str, prefix: str = "") -> Any:
     except ModuleNotFoundError as error:
         package = module.partition(".")[0]
         if error.name != package:
-            raise  # The package is installed, and misses another one itself.
+            raise  # The package is installed, but one of its own dependencies is missing.
         raise RobocovError(f'{prefix}{module} is not installed: pip install "robocov[{extra}]"') from error

@@ -25,7 +25,7 @@ MAX_ROBOTS = 10_000
 DEFAULT_RADIUS = 0.1
 """Default radius of a robot, m."""
 DEFAULT_TURNING_RATE = 4.0
-"""Default of the largest turning rate of a unicycle, rad/s."""
+"""Default maximum turning rate of a unicycle, rad/s."""
 DEFAULT_TRACK_PER_RADIUS = 1.6
 """Default track width of a unicycle divided by its radius; the wheels are within the disc."""
 KINEMATICS = ("point", "unicycle")
@@ -43,7 +43,7 @@ class TeamParameter(NamedTuple):
     json_key : str
         Name in ``run.json``, with the unit.
     may_be_infinite : bool
-        Whether infinity, which JSON writes as null, means that there is no limit.
+        Whether the value may be infinite, which means no limit. JSON contains null instead.
     """
 
     minimum: float
@@ -53,7 +53,7 @@ class TeamParameter(NamedTuple):
     may_be_infinite: bool = False
 
     def describe(self, infinity: str = "null for no limit") -> str:
-        """Return which values are expected, for messages.
+        """Describe the valid values, for messages.
 
         Parameters
         ----------
@@ -84,24 +84,24 @@ UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
 """Units of the parameters."""
 
 _POINT_ROBOT_VALUES = {"track_width": 0.0, "turning_rate": DEFAULT_TURNING_RATE}
-"""Parameters that matter for unicycles alone, with their values in a team of points."""
+"""Parameters that matter only for unicycles, with their values in a team of points."""
 
 
 def _build_default_column() -> Array:
-    """Return the placeholder for a column of default values, whose length is not known yet."""
+    """Return a placeholder for a column of default values, because the number of robots is not known yet."""
     return np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Team:
-    """Bodies, limits and ranges of n robots.
+    """Sizes, limits and ranges of n robots.
 
     Every attribute is a read-only array of shape (n,).
 
     Attributes
     ----------
     radius, mass : m, kg
-        Robots are discs; their mass is the virtual one of the paper, where it is 1.
+        Robots are discs. Their mass is the virtual mass of the paper, where it is 1.
     max_speed, max_acceleration : m/s, m/s²
         The kinematic limits, the same for every controller.
     viscosity : N s/m
@@ -111,11 +111,11 @@ class Team:
     communication_range : m
         Two robots are neighbours if each is within the range of the other. Infinity: no limit.
     track_width : m
-        Distance between the two driven wheels of a unicycle, a differential drive. 0, the default, is a point
-        robot, which moves in any direction. No wheel is faster than `max_speed`, or changes its speed by more
-        than `max_acceleration`; see `robocov.world.unicycles`.
+        Distance between the two driven wheels of a unicycle, a differential drive. 0, the default, stands for
+        a point robot, which moves in any direction. Each wheel is limited to `max_speed` and
+        `max_acceleration`; see `robocov.world.unicycles`.
     turning_rate : rad/s
-        Largest turning rate of a unicycle, by default 4. The wheels may allow less:
+        Maximum turning rate of a unicycle, by default 4. The wheels may allow less:
         ``2 max_speed / track_width``.
 
     Raises
@@ -153,7 +153,7 @@ class Team:
             object.__setattr__(self, name, values)
 
     def __reduce__(self) -> tuple[type[Team], tuple[Array, ...]]:
-        """Return how to rebuild the team: pickles do not contain that its arrays are read-only."""
+        """Rebuild the team when it is unpickled, because pickled arrays lose their read-only flag."""
         return Team, tuple(getattr(self, name) for name in PARAMETERS)
 
     @classmethod
@@ -183,7 +183,7 @@ class Team:
         track_width, turning_rate : float, m and rad/s
             See the attributes of `Team`.
         kinematics : {"point", "unicycle"} or None
-            "unicycle" stands for a track width of 1.6 radii unless one is given, "point" for none. By default
+            "unicycle" sets the track width to 1.6 radii unless it is given, "point" sets it to 0. By default,
             the track width decides.
 
         Returns
@@ -252,7 +252,7 @@ class Team:
         return np.asarray(self.track_width > 0.0)
 
     def _list_relevant_parameters(self) -> list[str]:
-        """Return the parameters that matter: a team of points has neither wheels nor turning rate."""
+        """Return the parameters that matter: a team of points has neither wheels nor a turning rate."""
         if self.is_unicycle.any():
             return list(PARAMETERS)
         return [name for name in PARAMETERS if name not in _POINT_ROBOT_VALUES]
@@ -275,12 +275,12 @@ class Team:
         return f"<Team of {format_count(len(self), 'robot')}: {', '.join(descriptions)}>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the team as plain JSON.
+        """Return the team as a JSON object.
 
         Returns
         -------
         dict
-            Null stands for no limit, and a value that all robots share is written once.
+            None stands for no limit, and a value that all robots share is written once.
         """
         plain: dict[str, Any] = {"robots": len(self)}
         for name in self._list_relevant_parameters():
@@ -291,7 +291,7 @@ class Team:
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Team:
-        """Build the team that `to_dict` returned.
+        """Build a team from the result of `to_dict`.
 
         Parameters
         ----------
@@ -330,7 +330,7 @@ def _check_column(name: str, values: Array, size: int) -> None:
 
 
 def _read_column(plain: Mapping[str, Any], name: str, n: int) -> Array:
-    """Return the values of a parameter for n robots from JSON, where all may share one."""
+    """Return the values of a parameter for n robots from JSON, which contains a list or one shared value."""
     parameter = PARAMETERS[name]
     value = plain.get(parameter.json_key, _POINT_ROBOT_VALUES.get(name, "missing"))
     values = value if isinstance(value, list) else [value] * n

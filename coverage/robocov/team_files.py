@@ -32,10 +32,10 @@ from robocov.files.strictjson import parse_json, parse_toml, read_bytes
 from robocov.team import KINEMATICS, MAX_ROBOTS, PARAMETERS, Team
 
 TeamDefaults: TypeAlias = Mapping[str, float | str | None]
-"""Arguments of `Team.homogeneous` that a group does not set; None is a range without limit."""
+"""Arguments of `Team.homogeneous` for groups that do not set them; None stands for an unlimited range."""
 
 _NO_LIMIT = "null"
-"""Stands for a range without limit in TOML, which has no null."""
+"""Stands for an unlimited range in TOML, which has no null."""
 _GROUP_KEYS = ["count", "kinematics", *PARAMETERS]
 
 
@@ -44,11 +44,11 @@ def read_team(path: Path | str, defaults: TeamDefaults | None = None) -> Team:
 
     Parameters
     ----------
-    path : path
+    path : Path or str
         A TOML file, or a JSON file of the same structure if its name ends in .json.
     defaults : mapping or None
         Parameters for groups that do not set them. Any other parameter has the default of
-        `Team.homogeneous`. None as a value is a range without limit.
+        `Team.homogeneous`. None as a value stands for an unlimited range.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def read_team(path: Path | str, defaults: TeamDefaults | None = None) -> Team:
     else:
         document = parse_toml(content, file_name)
     if not isinstance(document, dict):
-        raise InputError(f"{file_name}: expected an object with a list group, got {quote(document)}")
+        raise InputError(f'{file_name}: expected an object with a list "group", got {quote(document)}')
     for key in document:
         if key != "group":
             raise InputError(f"{file_name}: {describe_unknown_name('key', key, ['group'])}")
@@ -156,7 +156,7 @@ def _read_count(group: Mapping[str, object], path: JsonPath) -> int:
 
 
 def _read_value(name: str, value: object, key: str) -> float | None:
-    """Return the value of a parameter of a group; None is a range without limit."""
+    """Return the value of a parameter of a group; None stands for an unlimited range."""
     if PARAMETERS[name].may_be_infinite and value in (None, _NO_LIMIT):
         return None
     if not is_number(value):

@@ -1,4 +1,4 @@
-"""Control characters in texts from files, keyboards and users' controllers."""
+"""Escaping and removal of control characters in text from files, keyboards and users' controllers."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _UNSAFE_IN_LINE = re.compile(f"[{_CONTROLS}\t\n]")
 
 
 def escape_controls(text: str, *, single_line: bool = False) -> str:
-    r"""Replace the control characters of a text by visible escapes.
+    r"""Replace control characters in a text with visible escapes.
 
     Names and messages from files and from users' controllers may contain characters that colour or overwrite
-    a terminal, or that change the order in which text is displayed. Joiners, which some scripts need, stay.
+    the terminal, or change the order in which text is displayed. Joiners, which some scripts need, are kept.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def escape_controls(text: str, *, single_line: bool = False) -> str:
     Returns
     -------
     str
-        Equal to `text` if it has no such characters.
+        Equal to `text` if it contains no such characters.
 
     Examples
     --------
@@ -44,11 +44,11 @@ def escape_controls(text: str, *, single_line: bool = False) -> str:
 
 
 def remove_controls(text: str, *, single_line: bool = False) -> str:
-    r"""Remove the control characters of a text.
+    r"""Remove control characters from a text.
 
     All text that enters a window passes through this function: from the clipboard, the keyboard, input
     methods and the messages of a web page. SDL rejects NUL and unpaired surrogates; other control characters
-    would spoil names and files.
+    do not belong in names and files.
 
     Parameters
     ----------

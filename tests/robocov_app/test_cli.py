@@ -139,7 +139,7 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ("run rooms --set target=3", "rapf.target: expected one of centroid, sensing, median, got 3"),
         ("run rooms --set krep=1", "did you mean 'k_rep'?"),
         ("run rooms --robots 0", "--robots: expected a number from 1"),
-        ("run rooms --robots 5000", "but 5000 were asked for"),
+        ("run rooms --robots 5000", "but 5000 were requested"),
         ("run rooms --robots many", "--robots: expected a whole number, got 'many'"),
         ("run rooms --start coridor", "did you mean 'corridor'?"),
         ("run rooms --max-speed -1", "--max-speed: expected a number from"),

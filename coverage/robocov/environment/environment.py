@@ -22,7 +22,7 @@ from robocov.errors import StartError, describe_unknown_name, format_count, requ
 from robocov.observation.region import Region
 
 _DISPLACEMENT_DIGITS = 9
-"""Displacements are rounded to the nanometre, so that an obstacle that returns is exactly where it was."""
+"""Displacements are rounded to the nanometre, so that an obstacle returns to exactly the same position."""
 _GEOMETRY_PROPERTIES = ("region", "boundary_polygon", "free", "blocked")
 """Cached properties that do not depend on the density."""
 
@@ -39,14 +39,15 @@ class Environment(Drawable):
     ----------
     name : str
     boundary : (k, 2) sequence, m
-        As given: clockwise or counter-clockwise, convex or not.
+        Clockwise or counter-clockwise, convex or not.
     obstacles : tuple of Obstacle
-        Moving ones at time zero. They may overlap, touch and extend beyond the boundary.
+        Moving obstacles are at their positions at time zero. Obstacles may overlap, touch and extend beyond
+        the boundary.
     starts : mapping of str to DiscStart, UniformStart or PointsStart
         Named starts; the first is the default.
     description : str
     extra : mapping
-        Free keys of the map file, kept unchanged.
+        Additional keys of the map file, kept unchanged.
     schema : str or None
         ``$schema`` of the map file, kept unchanged.
     density : Density or None
@@ -115,14 +116,14 @@ class Environment(Drawable):
 
     @cached_property
     def static(self) -> Environment:
-        """Map without the moving obstacles; this one if there are none."""
+        """Map without the moving obstacles; the same object if there are none."""
         if not self.has_moving_obstacles:
             return self
-        still_obstacles = tuple(obstacle for obstacle in self.obstacles if obstacle.path is None)
-        return replace(self, obstacles=still_obstacles)
+        fixed_obstacles = tuple(obstacle for obstacle in self.obstacles if obstacle.path is None)
+        return replace(self, obstacles=fixed_obstacles)
 
     def at(self, time: float) -> Environment:
-        """Return the map at a time, with all obstacles at rest; this one if no obstacle moves.
+        """Return the map at a time, as a map without moving obstacles.
 
         Parameters
         ----------
@@ -131,6 +132,7 @@ class Environment(Drawable):
         Returns
         -------
         Environment
+            The same object if no obstacle moves.
         """
         if not self.has_moving_obstacles:
             return self
@@ -173,11 +175,11 @@ class Environment(Drawable):
         -------
         Environment
         """
-        twin = replace(self, density=density)
+        environment = replace(self, density=density)
         for name in _GEOMETRY_PROPERTIES:
             if name in vars(self):
-                vars(twin)[name] = vars(self)[name]
-        return twin
+                vars(environment)[name] = vars(self)[name]
+        return environment
 
     def has_same_geometry(self, other: Environment) -> bool:
         """Return whether another map has the same boundary and obstacles.
@@ -195,7 +197,7 @@ class Environment(Drawable):
     def start(self, name: str | None = None) -> Start:
         """Return a start of the map.
 
-        Every map has a start ``uniform``, anywhere in the free space, even if the file does not name it.
+        Every map has a start ``uniform``, anywhere in the free space, even if its file does not define one.
 
         Parameters
         ----------

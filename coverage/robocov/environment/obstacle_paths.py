@@ -24,10 +24,10 @@ _PARALLEL_TOLERANCE_M2 = 1e-12
 
 @dataclass(frozen=True)
 class ObstaclePath:
-    """A poly-line, (x, y) m, along which an obstacle is shifted at a constant speed, m/s, without turning.
+    """A polyline along which an obstacle moves at constant speed, without turning.
 
-    At time zero the obstacle is where its map has it, and the path's point is the first of `points`. Later
-    the obstacle is displaced by as much as the path's point.
+    A point moves along the polyline and is at the first of `points` at time zero. The obstacle starts at its
+    position in the map and is always displaced by as much as the point.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ def compute_swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
 
 
 def _sweep(polygon: Polygon, start: Array, end: Array) -> BaseGeometry:
-    """Return the Minkowski sum of a polygon and a line: both end positions, and the areas swept by edges."""
+    """Return the Minkowski sum of a polygon and a line: both end positions and what the edges sweep."""
     pieces: list[BaseGeometry] = []
     motion = end - start
     for ring in (polygon.exterior, *polygon.interiors):

@@ -24,7 +24,7 @@ _MITRE_LIMIT = 4.0
 
 @dataclass(frozen=True)
 class PolygonObstacle:
-    """A solid polygon, with holes where given (a courtyard).
+    """A solid polygon, which may have holes (courtyards).
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class PolygonObstacle:
 
 @dataclass(frozen=True)
 class CircleObstacle:
-    """A round pillar, for physics and cost alike an inscribed regular polygon.
+    """A round pillar, represented by an inscribed regular polygon for both physics and cost.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class CircleObstacle:
 
     Notes
     -----
-    The polygon is nowhere further than `MAX_SAGITTA_M` from the circle.
+    The polygon deviates from the circle by at most `MAX_SAGITTA_M`.
     """
 
     center: Point
@@ -82,7 +82,7 @@ class CircleObstacle:
 
 @dataclass(frozen=True)
 class WallObstacle:
-    """A poly-line of some width, with flat ends at its first and last point and mitred corners.
+    """A polyline with a width, flat ends and mitred corners.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Random and dense packings of points that keep a distance from each other."""
+"""Random and dense packings of points with a minimum spacing."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ _PACKING_TRIALS = 6
 """Number of random packings that are tried if there is room for at most `_MAX_FEW_POINTS`; otherwise one."""
 _MAX_FEW_POINTS = 300
 _LATTICE_TRIALS = 20
-"""Number of random positions and directions in which a lattice is tried."""
+"""Number of random positions and orientations in which a lattice is tried."""
 _MAX_LATTICE_STEPS = 2000
 """Larger lattices are not tried: darts fill such areas well enough."""
 _MIN_DARTS = 64
 """Minimum number of darts that are thrown at a time."""
 _DARTS_PER_POINT = 4
-"""Darts inside the area that are thrown for each missing point."""
+"""Expected number of darts inside the area that are thrown for each missing point."""
 _MAX_DARTS_PER_HIT = 100
-"""Throwing ends when it takes more darts inside the area than this for one of them to find room."""
+"""Throwing ends when fewer than one in so many darts inside the area finds room."""
 _MIN_AREA_FRACTION = 1e-3
-"""The fraction of the bounding box that an area fills is taken to be at least this."""
+"""Lower limit of the fraction of its bounding box that an area is assumed to fill."""
 
 
 def compute_max_points(area: BaseGeometry, spacing: float) -> int:
-    """Compute a number of points that no packing in an area exceeds.
+    """Compute an upper bound of the number of points in any packing of an area.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def compute_max_points(area: BaseGeometry, spacing: float) -> int:
 
 
 def estimate_max_points(area: BaseGeometry, spacing: float) -> int:
-    """Estimate from its size how many points the densest packing in a large area has, at least 1.
+    """Estimate how many points the densest packing of a large area has, from the size of the area.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def estimate_max_points(area: BaseGeometry, spacing: float) -> int:
 
 
 def pack_densely(area: BaseGeometry, spacing: float) -> Array:
-    """Pack as many points as possible into an area; the same ones for the same area.
+    """Pack as many points as possible into an area. The result is deterministic.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def pack_densely(area: BaseGeometry, spacing: float) -> Array:
     for trial in range(trials):
         rng = np.random.default_rng(trial)
         lattice = pack_lattice(rng, area, max_points, spacing)
-        # In passages that are hardly wider than a robot, darts are denser than lattices.
+        # In passages that are hardly wider than a robot, darts pack more densely than lattices.
         darts = throw_darts(rng, area, max_points, spacing)
         for points in (lattice, darts):
             if len(points) > len(best):
@@ -91,7 +91,7 @@ def pack_densely(area: BaseGeometry, spacing: float) -> Array:
 
 
 def throw_darts(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
-    """Choose up to n random points one after the other, until hardly any further one finds room.
+    """Choose up to n random points one after the other, until hardly any more find room.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def throw_darts(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: f
     """
     low_x, low_y, high_x, high_y = area.bounds
     bounding_box_area = (high_x - low_x) * (high_y - low_y)
-    # Most darts at the bounding box of a thin area miss it.
+    # Most darts thrown at the bounding box of a thin area miss the area.
     area_fraction = max(area.area / bounding_box_area, _MIN_AREA_FRACTION)
     points = np.empty((0, 2))
     shapely.prepare(area)
@@ -127,7 +127,7 @@ def throw_darts(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: f
 
 
 def _drop_close_points(points: Array, spacing: float) -> Array:
-    """Return the points that are at least `spacing` from each returned point before them."""
+    """Drop each point that is closer than `spacing` to an earlier point that is kept."""
     if len(points) == 0:
         return points
     is_kept = np.ones(len(points), dtype=bool)
@@ -140,7 +140,7 @@ def _drop_close_points(points: Array, spacing: float) -> Array:
 
 
 def pack_lattice(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
-    """Choose up to n points of a hexagonal lattice, the best of some in random positions and directions.
+    """Choose up to n points of a hexagonal lattice, the best of several random positions and orientations.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def pack_lattice(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: 
 
 
 def _build_lattice(steps: int) -> Array:
-    """Return the hexagonal lattice of spacing 1 round the origin, with `steps` rows and columns each way."""
+    """Return the hexagonal lattice of spacing 1 with `steps` rows and columns on each side of the origin."""
     numbers = np.arange(-steps, steps + 1)
     columns, rows = np.meshgrid(numbers, numbers)
     x = (columns + 0.5 * (rows % 2)).ravel()
@@ -186,7 +186,7 @@ def _build_lattice(steps: int) -> Array:
 
 
 def choose_points(rng: np.random.Generator, points: Array, n: int) -> Array:
-    """Choose n of some points at random, in their order.
+    """Choose n points at random, in their original order.
 
     Parameters
     ----------

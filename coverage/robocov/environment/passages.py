@@ -1,4 +1,4 @@
-"""Passages of the free space: where walls face each other, and how wide a disc fits through."""
+"""Passages of the free space: where walls face each other, and the widest disc that fits through."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from robocov.environment.polygons import GRID_M
 from robocov.team import DEFAULT_RADIUS
 
 MIN_POCKET_AREA_M2 = math.pi * DEFAULT_RADIUS**2
-"""Gaps to smaller pockets are no passages: no robot would go there."""
+"""A gap that leads only to a smaller pocket is not a passage: no robot would go there."""
 _MAX_CRACK_M = 2 * MAX_SAGITTA_M
-"""Walls closer than this touch: a circle that touches a wall is a polygon that nearly does."""
+"""Walls closer than this count as touching, because the polygon of a touching circle may leave a crack."""
 _FUSED_CRACK_M = 1e-9
-"""Width of what remains of a crack, so that walls do not touch in a single point."""
+"""Width that is left of a closed crack, so that walls do not touch in a single point."""
 _MITRE_LIMIT = 100.0
 """Corners of less than about a degree are cut off."""
 _CORNERS_AT_ONCE = 256
-"""Corners that are examined together, so that memory stays bounded."""
+"""Corners that are examined together; limits the use of memory."""
 _CANDIDATES_AT_ONCE = 512
 _FIRST_RANGE_FRACTION = 1 / 4096
-"""The search starts in this fraction of the diagonal round each corner, and doubles it."""
-_LEAN_TOLERANCE = 1e-9
+"""First range of the search around each corner, as a fraction of the diagonal; it is then doubled."""
+_COSINE_TOLERANCE = 1e-9
 _DISC_RELATIVE_TOLERANCE = 1e-9
 _DISC_TOLERANCE_M = 1e-12
 _DIGITS = 6
@@ -53,9 +53,9 @@ class Gap(NamedTuple):
 def find_narrowest_gap(free: MultiPolygon) -> Gap | None:
     """Find the narrowest passage of a free space.
 
-    A passage leads round an obstacle, or to a part of the free space that is larger than
-    `MIN_POCKET_AREA_M2` and than the square over the gap: neither a niche that is shallower than wide is one,
-    nor an acute corner.
+    A passage leads around an obstacle, or to a part of the free space that is larger than both
+    `MIN_POCKET_AREA_M2` and the square of the gap's width. Acute corners, and niches that are wider than they
+    are deep, are therefore not passages.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def find_narrowest_gap(free: MultiPolygon) -> Gap | None:
     narrowest: Gap | None = None
     low = _MAX_CRACK_M / 2
     high = diagonal * _FIRST_RANGE_FRACTION
-    # The gap of most maps is far narrower than the map is wide: search near each corner first.
+    # On most maps, the narrowest gap is far narrower than the map: search near each corner first.
     while narrowest is None and low < diagonal:
         for corners in search.split_corners():
             limit = high if narrowest is None else narrowest.width
@@ -102,7 +102,7 @@ def find_narrow_gaps(free: MultiPolygon, width: float) -> tuple[Gap, ...]:
     Returns
     -------
     tuple of Gap
-        The narrowest first. One passage may be several gaps, as at all corners of a door.
+        The narrowest first. One passage may have several gaps, for example at all corners of a door.
     """
     search = _PassageSearch(free)
     gaps: set[Gap] = set()
@@ -142,9 +142,10 @@ class _Candidates(NamedTuple):
 class _PassageSearch:
     """The edges of a free space, which lies to the left of each, and the search for passages among them.
 
-    A disc of growing radius can reach the same points along the same routes until its diameter exceeds the
-    width of a gap. There two wall points face each other, and the disc over the segment between them contains
-    no other wall point. One of the two is a corner that juts into the free space.
+    As a disc grows, it can reach the same points along the same routes until its diameter exceeds the width
+    of a gap. At a gap, two wall points face each other, and the disc whose diameter is the segment between
+    them contains no other wall point. At least one of the two points is a reflex corner, which juts into the
+    free space.
     """
 
     def __init__(self, free: MultiPolygon) -> None:
@@ -165,16 +166,16 @@ class _PassageSearch:
         self._previous = np.arange(len(self._start)) - 1
         self._previous[self._first] = self._stop - 1
         turns = _cross(self._start - self._start[self._previous], self._end - self._start)
-        self._jutting_corners = np.flatnonzero(turns < 0)
-        # Bounding boxes are all that the index needs, and they are built in one call.
+        self._reflex_corners = np.flatnonzero(turns < 0)
+        # The index only needs bounding boxes, which can be built in one call.
         low = np.minimum(self._start, self._end)
         high = np.maximum(self._start, self._end)
         self._tree = shapely.STRtree(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
 
     def split_corners(self) -> list[IntArray]:
-        """Return the corners that jut into the free space, in groups of bounded size."""
-        groups = math.ceil(len(self._jutting_corners) / _CORNERS_AT_ONCE)
-        return np.array_split(self._jutting_corners, max(groups, 1))
+        """Return the reflex corners in groups of bounded size."""
+        groups = math.ceil(len(self._reflex_corners) / _CORNERS_AT_ONCE)
+        return np.array_split(self._reflex_corners, max(groups, 1))
 
     def list_gaps(self, corners: IntArray, low: float, high: float) -> Iterator[Gap]:
         """Yield the passages at some corners that are wider than `low` and narrower than `high`, by width."""
@@ -206,20 +207,20 @@ class _PassageSearch:
         offset = q - p
         width = compute_lengths(offset)
         is_candidate = (width > low) & (width < high)
-        # The disc does not contain a part of the corner's own sides.
-        for side_end in (self._start[self._previous[corner]], self._end[corner]):
-            side = side_end - p
+        # The disc must not contain part of the two edges that meet at the corner.
+        for other_end in (self._start[self._previous[corner]], self._end[corner]):
+            side = other_end - p
             side_length = compute_lengths(side)
-            is_candidate &= _dot(side, offset) <= _LEAN_TOLERANCE * width * side_length
+            is_candidate &= _dot(side, offset) <= _COSINE_TOLERANCE * width * side_length
         rows = np.flatnonzero(is_candidate)
         rows = rows[np.argsort(width[rows], kind="stable")]
         return _Candidates(corner, edge, p, q, width).select(rows)
 
     def _has_empty_disc(self, candidates: _Candidates) -> BoolArray:
-        """Return for each pair whether the disc over its segment lies in the free space, (k,)."""
+        """Return whether the disc over the segment of each pair lies in the free space, (k,)."""
         middles = shapely.points((candidates.p + candidates.q) / 2)
         radii = candidates.width / 2 * (1 - _DISC_RELATIVE_TOLERANCE) - _DISC_TOLERANCE_M
-        # Unlike `shapely.distance`, this uses the prepared boundary, which matters with thousands of walls.
+        # Unlike `shapely.distance`, this uses the prepared boundary, which is faster with thousands of walls.
         is_empty: BoolArray = ~shapely.dwithin(self._boundary, middles, radii)
         is_empty[is_empty] = shapely.contains_properly(self.free, middles[is_empty])
         return is_empty
@@ -238,7 +239,7 @@ class _PassageSearch:
         near_side = np.vstack([points[:cut], q])
         far_side = np.vstack([q, points[cut:], points[:1]])
         areas = np.array([_compute_ring_area(near_side), _compute_ring_area(far_side)])
-        # Outside of a hole there is no pocket: only a side of positive area is one.
+        # The outside of a hole has a negative area and is not a pocket.
         pocket_area = areas.min(where=areas > 0, initial=np.inf)
         return bool(pocket_area >= max(MIN_POCKET_AREA_M2, width * width))
 
@@ -246,8 +247,8 @@ class _PassageSearch:
 def _close_cracks(free: MultiPolygon) -> MultiPolygon:
     """Return the free space without parts that are narrower than `_MAX_CRACK_M`.
 
-    Walls that nearly touch become one, with a nanometre between them. Corners of less than a degree are cut,
-    and vertices that bend a wall by less than a micrometre are removed.
+    Cracks between walls that nearly touch shrink to a nanometre. Corners of less than a degree are cut off,
+    and vertices that deviate from a straight wall by less than a micrometre are removed.
     """
     for distance in (-_MAX_CRACK_M / 2, _MAX_CRACK_M / 2 - _FUSED_CRACK_M):
         free = free.buffer(distance, join_style="mitre", mitre_limit=_MITRE_LIMIT)

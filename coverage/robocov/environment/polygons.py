@@ -14,10 +14,10 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array
 
 GRID_M = 1e-6
-"""Derived geometry is computed on a grid of one micrometre, so that unions and differences are robust: shapes
-that touch to within rounding touch exactly, and no sliver survives."""
+"""Grid of derived geometry, which makes unions and differences robust: shapes that touch up to rounding touch
+exactly, and no slivers remain."""
 _MIN_OVERLAP_M2 = 1e-6
-"""Smaller overlaps are rounding errors of shapes that touch."""
+"""Minimum area of an overlap; smaller ones are rounding errors of shapes that touch."""
 
 Name = TypeVar("Name", bound=Hashable)
 """Type of the names of shapes."""
@@ -26,7 +26,9 @@ Name = TypeVar("Name", bound=Hashable)
 def find_overlaps(
     area: BaseGeometry, others: Mapping[Name, BaseGeometry], inside: BaseGeometry | None = None
 ) -> tuple[dict[Name, BaseGeometry], BaseGeometry | None]:
-    """Find which shapes overlap an area, apart from touching it, and where the area leaves another.
+    """Find the shapes that overlap an area, and the part of the area outside a container.
+
+    Shapes that only touch the area do not overlap it.
 
     Parameters
     ----------
@@ -62,11 +64,11 @@ def unite_shapes(shapes: NDArray[np.object_]) -> BaseGeometry:
     geometry, m
     """
     pairs = STRtree(shapes).query(shapes, "dwithin", 2.0 * GRID_M)
-    # Every shape meets itself. Uniting takes most of the time, and only those that meet others need it.
+    # Every shape is paired with itself. Computing a union is slow, and only shapes that meet others need it.
     meets_others = np.bincount(pairs[0]) > 1
-    alone = shapely.get_parts(shapely.set_precision(shapes[~meets_others], GRID_M))
+    separate = shapely.get_parts(shapely.set_precision(shapes[~meets_others], GRID_M))
     united = shapely.union_all(shapes[meets_others], grid_size=GRID_M)
-    return shapely.multipolygons([*alone, *extract_polygons(united).geoms])
+    return shapely.multipolygons([*separate, *extract_polygons(united).geoms])
 
 
 def extract_polygons(geometry: BaseGeometry) -> MultiPolygon:
@@ -98,7 +100,7 @@ def find_nearest_inside(area: Any, positions: Array) -> Array:
     Returns
     -------
     (n, 2) array, m
-        The same array if all positions are inside.
+        The same object if all positions are inside.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Starts: where the robots of a team begin."""
+"""Starts: where the robots of a team are at the beginning of a run."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from robocov.errors import StartError, format_count, is_number, quote
 from robocov.team import DEFAULT_RADIUS
 
 MIN_START_GAP_RADII = 0.02
-"""Smallest gap, in radii of a robot, between two robots and to walls at the start."""
+"""Minimum gap between two robots, and between robots and walls, at the start, in radii of a robot."""
 MAX_COUNTED_ROBOTS = 2000
-"""Robots of a start that are counted one by one; the capacity of larger ones is estimated from the area."""
+"""Maximum number of robots for which the capacity of a start is found by packing; above, from the area."""
 _DISC_QUADRANT_SEGMENTS = 64
 """Edges per quadrant of the polygon that represents the disc of a start."""
 
 
 @dataclass(frozen=True)
 class DiscStart:
-    """The robots start somewhere in a disc: a team that was unloaded in one place.
+    """The robots start somewhere in a disc, as if the team had been unloaded in one place.
 
     Attributes
     ----------
@@ -68,10 +68,10 @@ StartSpec: TypeAlias = DiscStart | UniformStart | PointsStart
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A named start of one environment, ready to sample positions from.
+    """A named start of one environment, from which positions are sampled.
 
-    Positions depend on the start, the number of robots, their radius and the seed only, so that every
-    controller gets the same positions for the same seed.
+    Positions depend only on the start, the number of robots, their radius and the seed, so every controller
+    gets the same positions for the same seed.
 
     Attributes
     ----------
@@ -86,14 +86,14 @@ class Start:
     free: BaseGeometry
 
     def sample(self, n: int, seed: int = 0, radius: float = DEFAULT_RADIUS) -> Array:
-        """Sample positions of robots that touch neither walls nor each other.
+        """Sample positions at which the robots touch neither walls nor each other.
 
         Parameters
         ----------
         n : int
             Number of robots.
         seed : int
-            Not used if the start has given positions.
+            Ignored if the start is a `PointsStart`.
         radius : float, m
             Radius of the robots.
 
@@ -129,10 +129,10 @@ class Start:
     def estimate_capacity(self, radius: float = DEFAULT_RADIUS) -> int:
         """Estimate how many robots of a radius fit.
 
-        The result depends on the start and the radius alone: it is the number of robots in the densest
-        packing that is found, with the gaps that `sample` leaves. `sample` finds positions for that many
-        robots with any seed; by chance, one or two more may fit. Where there is room for thousands, the
-        result is estimated from the area. Given positions are counted.
+        The result depends only on the start and the radius: it is the number of robots in the densest packing
+        that is found, with the same gaps as in `sample`. `sample` finds positions for that many robots with
+        any seed; by chance, one or two more may fit. If there is room for thousands, the result is estimated
+        from the area. For a `PointsStart`, it is the number of its positions.
 
         Parameters
         ----------
@@ -154,7 +154,7 @@ class Start:
         return len(pack_densely(area, spacing))
 
     def compute_center_area(self, radius: float) -> BaseGeometry:
-        """Compute where the centre of a robot may start, unless positions are given.
+        """Compute the area in which the centre of a robot may start. Not for a `PointsStart`.
 
         Parameters
         ----------
@@ -179,13 +179,13 @@ class Start:
 
     def _describe_lack_of_space(self, n: int, radius: float) -> str:
         capacity = self.estimate_capacity(radius)
-        ways_out = ["fewer or smaller robots"]
+        suggestions = ["fewer or smaller robots"]
         if not isinstance(self.spec, UniformStart):
             capacity_everywhere = Start("uniform", UniformStart(), self.free).estimate_capacity(radius)
-            ways_out.append(f"start 'uniform' (room for about {capacity_everywhere})")
+            suggestions.append(f"start 'uniform' (room for about {capacity_everywhere})")
         return (
-            f"room for about {capacity} robots of radius {radius:g} m, but {n} were asked for. "
-            f"Try {', '.join(ways_out)} or another map."
+            f"room for about {capacity} robots of radius {radius:g} m, but {n} were requested. "
+            f"Try {', '.join(suggestions)} or another map."
         )
 
     def _take_given_positions(self, n: int, radius: float, positions: Ring) -> Array:
@@ -227,7 +227,7 @@ class Start:
 
 
 def compute_start_clearance(radius: float) -> float:
-    """Compute the smallest distance of the centre of a robot from walls at the start.
+    """Compute the minimum distance between the centre of a robot and walls at the start.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def compute_start_clearance(radius: float) -> float:
 
 
 def compute_start_spacing(radius: float) -> float:
-    """Compute the smallest distance between the centres of two robots at the start.
+    """Compute the minimum distance between the centres of two robots at the start.
 
     Parameters
     ----------
@@ -257,8 +257,8 @@ def compute_start_spacing(radius: float) -> float:
 def _sample_apart(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
     """Return n random points at least `spacing` apart, or fewer if no more are found.
 
-    Darts are the most random; where they leave too little room, lattices are denser, and at last the
-    densest packing is tried that `Start.estimate_capacity` counts.
+    Darts give the most random points. If they do not find enough, a denser lattice is tried, and finally the
+    densest packing, which `Start.estimate_capacity` counts.
     """
     if n > compute_max_points(area, spacing):
         return np.empty((0, 2))

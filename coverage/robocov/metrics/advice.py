@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from robocov.arrays import Array, IntArray, compute_point_distances
-from robocov.errors import format_count, summarize_names
+from robocov.errors import format_count, summarise_names
 from robocov.metrics.clearance import MAX_CONTACT_GAP_M
 from robocov.record import Record
 
@@ -156,4 +156,4 @@ def _format_robots(record: Record, robots: IntArray) -> str:
     if len(robots) == len(record.team) > 1:
         return f"all {format_count(len(robots), 'robot')}"
     names = [str(numbers[robot]) for robot in robots.tolist()]
-    return f"robot{'s' if len(names) > 1 else ''} {summarize_names(names)}"
+    return f"robot{'s' if len(names) > 1 else ''} {summarise_names(names)}"

@@ -25,7 +25,7 @@ def test_robots_start_clear_of_walls_and_of_each_other(
     try:
         points = cluttered.start(name).sample(n, seed, radius)
     except StartError as error:
-        assert f"but {n} were asked for" in str(error)
+        assert f"but {n} were requested" in str(error)
         assert np.pi * radius**2 * n > 0.5 * np.pi * 0.8**2, "refused though there is room"
         return
     assert points.shape == (n, 2)
@@ -59,7 +59,7 @@ def test_a_tight_start_is_filled_by_a_lattice() -> None:
     apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)) + 99 * np.eye(62)
     assert apart.min() >= 0.2
     with pytest.raises(
-        StartError, match=r"start 'tight': room for about \d+ robots of radius 0.1 m, but 200 were asked for"
+        StartError, match=r"start 'tight': room for about \d+ robots of radius 0.1 m, but 200 were requested"
     ):
         start.sample(200, seed=0)
 

@@ -116,7 +116,7 @@ def test_files_that_are_none(tmp_path: Path) -> None:
         read_team(tmp_path / "none.toml")
     with pytest.raises(RobocovError, match=r"bad.json"):
         read_team(written(tmp_path, "[1,", "bad.json"))
-    with pytest.raises(InputError, match="expected an object with a list group"):
+    with pytest.raises(InputError, match='expected an object with a list "group"'):
         read_team(written(tmp_path, "[1]", "list.json"))
     (tmp_path / "latin.toml").write_bytes(b"# \xff")
     with pytest.raises(InputError, match="not UTF-8"):
