@@ -59,6 +59,12 @@ def has_memory(controller: object) -> bool:
     ----------
     controller : Controller
 
+    Returns
+    -------
+    bool
+        True for all individual controllers: they may assign ``own.memory`` in any step, with or without a
+        method ``begin``.
+
     Examples
     --------
     >>> has_memory(Rapf()), has_memory(Atlas())
