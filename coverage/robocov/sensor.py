@@ -15,7 +15,7 @@ import pymunk
 
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import IS_COMPILER_ENABLED, is_interpreting
-from robocov.observation import compute_headings
+from robocov.observation import compute_ray_directions
 from robocov.world.bodies import build_obstacle_space
 from robocov.world.obstacle_pieces import Mover, Obstacles
 
@@ -134,7 +134,7 @@ class RangeSensor:
             Whether an obstacle is in range. Read-only.
         """
         limits = np.minimum(ranges, _MAX_RANGE_M)
-        ends = positions[:, None, :] + limits[:, None, None] * compute_headings(rays)
+        ends = positions[:, None, :] + limits[:, None, None] * compute_ray_directions(rays)
         queries = _get_compiled_queries()
         if queries is not None:
             fractions, is_hit = queries.cast_rays(self._space, np.ascontiguousarray(positions), ends)
@@ -162,7 +162,7 @@ class RangeSensor:
             Ends of the rays.
         """
         distances, _ = self.scan(np.asarray(position)[None], rays, np.array([sensing_range]))
-        return distances[0], position + distances[0][:, None] * compute_headings(rays)
+        return distances[0], position + distances[0][:, None] * compute_ray_directions(rays)
 
     def _cast_rays(self, positions: Array, ends: Array) -> tuple[Array, BoolArray]:
         """Cast rays by pymunk's public query, as `compiled_queries.cast_rays` does."""

@@ -22,7 +22,7 @@ from robocov.controllers.driving import (
     update_returns,
 )
 from robocov.controllers.gains import choice, gain, response_time_gain
-from robocov.observation import Decision, NearNeighbours, Observations, Scanning, compute_headings
+from robocov.observation import Decision, NearNeighbours, Observations, Scanning, compute_ray_directions
 from robocov.observation.scanned_view import (
     View,
     Windows,
@@ -286,7 +286,7 @@ class Boosting(BaseController):
         reach : (n,) array, m
             Maximum distance of each robot's view.
         """
-        directions = compute_headings(view.distances.shape[1])
+        directions = compute_ray_directions(view.distances.shape[1])
         pairs = seen.find_near_neighbours(2.0 * float(reach.max()))
         samples = self._sample_views(seen, view, pairs, directions, reach)
         windows = find_windows(view, directions, reach, self.jump)

@@ -112,7 +112,7 @@ def update_returns(seen: Observations, previous: Array | None) -> Array | None:
     if scans is None:
         return previous
     distances = np.where(scans.hit, scans.distances, np.nan)
-    return np.asarray(seen.positions[:, None] + distances[:, :, None] * scans.headings)
+    return np.asarray(seen.positions[:, None] + distances[:, :, None] * scans.directions)
 
 
 def collect_obstacle_points(seen: Observations, returns: Array | None) -> Array:

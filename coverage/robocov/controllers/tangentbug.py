@@ -22,7 +22,7 @@ from robocov.controllers.driving import (
 )
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.known_cells import cells_choice, compute_known_cells
-from robocov.observation import Decision, Observations, Scanning, compute_headings
+from robocov.observation import Decision, Observations, Scanning, compute_ray_directions
 from robocov.team import Team
 
 _SQUARE_SIDE_M = 0.1
@@ -206,7 +206,7 @@ class TangentBug(BaseController):
         met_squares: tuple[ComplexArray, ...],
     ) -> tuple[BugState, ...]:
         """Return the navigation states of all robots after a scan."""
-        directions = compute_headings(self.scanning.rays)
+        directions = compute_ray_directions(self.scanning.rays)
         later = []
         for i, bug in enumerate(bugs):
             position = seen.positions[i]

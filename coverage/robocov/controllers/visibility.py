@@ -17,7 +17,7 @@ from robocov.controllers.driving import (
     update_returns,
 )
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.observation import Decision, Observations, Scanning, compute_headings
+from robocov.observation import Decision, Observations, Scanning, compute_ray_directions
 from robocov.observation.observations import NearNeighbours
 from robocov.observation.scanned_view import (
     View,
@@ -127,7 +127,7 @@ class Visibility(BaseController):
             Growth of the area, weighted by φ, per metre of the robot's motion.
         """
         n, rays = view.distances.shape
-        directions = compute_headings(rays)
+        directions = compute_ray_directions(rays)
         depths = view.distances[..., None] * _SAMPLE_FRACTIONS
         walls = np.where(view.hit, view.distances, np.inf)
         pairs = seen.find_near_neighbours(2.0 * float(reach.max()))

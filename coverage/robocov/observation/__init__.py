@@ -16,7 +16,7 @@ control is distributed and that the obstacles are unknown.
 from robocov.observation.cells import Cells
 from robocov.observation.decisions import Decision, check_decision, check_forces, copy_decision, to_numbers
 from robocov.observation.observations import NearNeighbours, Observations
-from robocov.observation.scans import MAX_RAYS, Scanning, Scans, compute_headings
+from robocov.observation.scans import MAX_RAYS, Scanning, Scans, compute_ray_directions
 from robocov.observation.snapshot import Snapshot
 
 __all__ = [
@@ -30,7 +30,7 @@ __all__ = [
     "Snapshot",
     "check_decision",
     "check_forces",
-    "compute_headings",
+    "compute_ray_directions",
     "copy_decision",
     "to_numbers",
 ]

@@ -74,13 +74,13 @@ class Scans:
         return int(self.distances.shape[1])
 
     @property
-    def headings(self) -> Array:
+    def directions(self) -> Array:
         """Unit vectors along the rays, (rays, 2)."""
-        return compute_headings(self.rays)
+        return compute_ray_directions(self.rays)
 
 
-def compute_headings(rays: int) -> Array:
-    """Compute unit vectors evenly round a full turn.
+def compute_ray_directions(rays: int) -> Array:
+    """Compute unit vectors along evenly spaced rays.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
-from robocov.observation import compute_headings
+from robocov.observation import compute_ray_directions
 from robocov.planning.raster import CellGrid, Raster, find_column, find_row
 
 UNKNOWN = 0
@@ -101,7 +101,7 @@ class DiscoveredMap:
         state = self.state.copy()
         # Nothing beyond the region matters.
         lengths = np.minimum(distances, self.raster.region.diameter)
-        directions = compute_headings(len(distances))
+        directions = compute_ray_directions(len(distances))
         grid = self.raster.grid
         _mark_passed_cells(state, grid, position, directions, lengths)
         ends = _compute_ray_ends(grid, position, directions, lengths)

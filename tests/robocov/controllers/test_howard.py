@@ -8,7 +8,7 @@ import pytest
 from robocov.controllers import Howard
 from robocov.controllers.driving import collect_obstacle_points, update_returns
 from robocov.environment import Environment
-from robocov.observation import Observations, Scans, compute_headings
+from robocov.observation import Observations, Scans, compute_ray_directions
 from robocov.observation.neighbours import Neighbours
 from robocov.simulation import Simulation, TeamState
 from robocov.team import Team
@@ -32,7 +32,7 @@ def compute_forces(controller: Howard, seen: Observations) -> np.ndarray:
 
 def scan_wall(distance: float, rays: int) -> Scans:
     """Return the scan of an infinite wall at x = distance from the robot."""
-    cosine = compute_headings(rays)[:, 0]
+    cosine = compute_ray_directions(rays)[:, 0]
     is_hit = cosine > 1e-9
     distances = np.where(is_hit, distance / np.where(is_hit, cosine, 1.0), 1e6)
     return Scans(distances[None], is_hit[None])

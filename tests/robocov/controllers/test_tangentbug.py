@@ -13,7 +13,7 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
 from robocov.metrics import find_settling_time
-from robocov.observation import compute_headings
+from robocov.observation import compute_ray_directions
 from robocov.simulation import Simulation
 from robocov.team import Team
 
@@ -94,7 +94,7 @@ def test_a_disc_can_move_until_it_meets_a_point(seed: int, clearance: float) -> 
     rng = np.random.default_rng(seed)
     points = rng.uniform(-3, 3, size=(40, 2))
     points = points[np.hypot(*points.T) > clearance / 0.95]
-    directions = compute_headings(24)
+    directions = compute_ray_directions(24)
     free_distances = compute_free_distances(points, directions, clearance, 2.5)
     for direction, free_distance in zip(directions, free_distances, strict=True):
         path = np.linspace(0.0, free_distance, 200)[:, None] * direction
@@ -104,12 +104,12 @@ def test_a_disc_can_move_until_it_meets_a_point(seed: int, clearance: float) -> 
 
 
 def test_without_points_all_directions_are_free() -> None:
-    free_distances = compute_free_distances(np.full((3, 2), np.nan), compute_headings(4), 0.1, 2.0)
+    free_distances = compute_free_distances(np.full((3, 2), np.nan), compute_ray_directions(4), 0.1, 2.0)
     np.testing.assert_array_equal(free_distances, 2.0)
 
 
 def test_a_disc_that_is_too_near_may_move_away_and_along() -> None:
-    free_distances = compute_free_distances(np.array([[0.05, 0.0]]), compute_headings(4), 0.15, 2.0)
+    free_distances = compute_free_distances(np.array([[0.05, 0.0]]), compute_ray_directions(4), 0.15, 2.0)
     assert free_distances[0] < 0.05
     np.testing.assert_array_equal(free_distances[1:], 2.0)
 
@@ -118,7 +118,7 @@ def test_a_disc_that_is_too_near_may_move_away_and_along() -> None:
 def test_the_ends_of_a_wall_are_found(turn: int, low: float, high: float) -> None:
     """A wall from (1, -1) to (1, 0.5), seen from the origin, ends at angles between two slopes."""
     wall = np.column_stack([np.ones(60), np.linspace(-1.0, 0.5, 60)])
-    directions = compute_headings(360)
+    directions = compute_ray_directions(360)
     free_distances = compute_free_distances(wall, directions, 0.1, 3.0)
     end = find_contour_end(free_distances, directions, 0, turn, 0.9, 0.5, 3.0)
     assert end is not None
@@ -127,7 +127,7 @@ def test_the_ends_of_a_wall_are_found(turn: int, low: float, high: float) -> Non
 
 
 def test_a_closed_contour_has_no_end() -> None:
-    assert find_contour_end(np.full(360, 1.0), compute_headings(360), 7, 1, 1.0, 0.5, 3.0) is None
+    assert find_contour_end(np.full(360, 1.0), compute_ray_directions(360), 7, 1, 1.0, 0.5, 3.0) is None
 
 
 def test_the_goal_is_fixed_while_a_robot_follows_a_boundary() -> None:

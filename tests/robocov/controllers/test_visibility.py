@@ -13,7 +13,7 @@ from robocov.controllers.boosting import Ascent, BoostLimits, Mode, compute_unde
 from robocov.controllers.visibility import find_cells_in_view
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, PolygonObstacle
-from robocov.observation import NearNeighbours, Observations, compute_headings
+from robocov.observation import NearNeighbours, Observations, compute_ray_directions
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
 from robocov.observation.scanned_view import View, compute_step_fractions, find_windows
@@ -33,7 +33,7 @@ def scan_room(position: np.ndarray, rays: int, reach: float) -> View:
     rings = [np.array(ring.coords) for ring in (ROOM.exterior, *ROOM.interiors)]
     starts = np.concatenate([ring[:-1] for ring in rings])
     walls = np.concatenate([np.diff(ring, axis=0) for ring in rings])
-    directions = compute_headings(rays)[:, None]
+    directions = compute_ray_directions(rays)[:, None]
     offsets = starts - position
     cross = directions[..., 0] * walls[:, 1] - directions[..., 1] * walls[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -65,7 +65,7 @@ def integrate_view(
     depths = distances[:, None] * (np.arange(rings) + 0.5) / rings
     values = np.ones_like(depths) if decay is None else np.exp(-decay * depths)
     if density is not None:
-        points = position + depths[..., None] * compute_headings(rays)[:, None]
+        points = position + depths[..., None] * compute_ray_directions(rays)[:, None]
         values = values * density.evaluate(points.reshape(-1, 2)).reshape(depths.shape)
     return float((values * depths * distances[:, None]).sum() / rings * 2.0 * np.pi / rays)
 
@@ -114,7 +114,7 @@ def test_a_point_belongs_to_the_robot_with_the_lowest_power(seed: int, n: int) -
     rng = np.random.default_rng(seed)
     positions = rng.uniform((1, 1), (9, 7), size=(n, 2))
     reach = rng.uniform(1.0, 4.0, n)
-    directions = compute_headings(16)
+    directions = compute_ray_directions(16)
     depths = reach[:, None, None] * np.broadcast_to(rng.uniform(0.0, 1.0, 5), (n, 16, 5))
     pairs = observe(positions).find_near_neighbours(np.inf)
     is_own = find_cells_in_view(depths, np.full((n, 16), np.inf), directions, pairs, reach)
@@ -128,13 +128,15 @@ def test_neighbours_behind_walls_do_not_share_the_view() -> None:
     positions = np.random.default_rng(0).uniform((1, 1), (9, 7), size=(4, 2))
     pairs = observe(positions).find_near_neighbours(np.inf)
     walls = np.full((4, 16), 1e-9)
-    is_own = find_cells_in_view(np.ones((4, 16, 5)), walls, compute_headings(16), pairs, np.full(4, 3.0))
+    is_own = find_cells_in_view(
+        np.ones((4, 16, 5)), walls, compute_ray_directions(16), pairs, np.full(4, 3.0)
+    )
     assert is_own.all()
 
 
 def test_a_wall_at_a_low_angle_is_no_window() -> None:
     """Along a straight wall the distance jumps from ray to ray, but nothing is hidden."""
-    directions = compute_headings(180)
+    directions = compute_ray_directions(180)
     with np.errstate(divide="ignore"):
         wall = np.where(directions[:, 1] < 0.0, -0.3 / directions[:, 1], np.inf)
     view = View(distances=np.minimum(wall, 20.0)[None], hit=(wall < 20.0)[None])
@@ -143,7 +145,7 @@ def test_a_wall_at_a_low_angle_is_no_window() -> None:
 
 def test_the_end_of_a_wall_is_a_window() -> None:
     """A wall at y = -0.3 ends at x = 1: a robot that moves up sees more behind it."""
-    directions = compute_headings(180)
+    directions = compute_ray_directions(180)
     with np.errstate(divide="ignore"):
         wall = np.where(directions[:, 1] < 0.0, -0.3 / directions[:, 1], np.inf)
     wall = np.where(directions[:, 0] * wall > 1.0, np.inf, wall)
@@ -189,7 +191,7 @@ def test_steps_are_halved_when_the_gradient_turns_back() -> None:
 
 def test_a_neighbour_behind_a_wall_detects_nothing_here() -> None:
     """Φ is the product over the neighbours whose line to the point is in front of walls."""
-    directions = compute_headings(72)
+    directions = compute_ray_directions(72)
     depths = np.full((1, 72, 1), 1.0)
     walls = np.full((1, 72), np.inf)
     pairs = NearNeighbours(np.array([0]), np.array([1]), np.array([[-2.0, 0.0]]), np.array([2.0]))

@@ -7,7 +7,7 @@ import pytest
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError
-from robocov.observation import Decision, Observations, Scanning, compute_headings
+from robocov.observation import Decision, Observations, Scanning, compute_ray_directions
 from robocov.sensor import RangeSensor
 from robocov.simulation import Simulation
 from robocov.world.obstacle_pieces import build_solid_pieces
@@ -52,7 +52,7 @@ def test_a_team_scan_equals_the_scans_of_single_robots(cluttered: Environment) -
     for i in range(3):
         own_distances, ends = sensor.scan_from(positions[i], 36, float(ranges[i]))
         np.testing.assert_array_equal(own_distances, distances[i])
-        expected_ends = positions[i] + distances[i][:, None] * compute_headings(36)
+        expected_ends = positions[i] + distances[i][:, None] * compute_ray_directions(36)
         np.testing.assert_allclose(ends, expected_ends, atol=1e-9)
         np.testing.assert_array_equal(is_hit[i], distances[i] < min(ranges[i], 1e6))
     assert is_hit[2].all()
@@ -79,4 +79,4 @@ def test_periods_are_rounded_to_whole_steps() -> None:
     assert Scanning(period=0.0).count_steps(0.02) == 1
     # The nearest number of control periods, not the next lower one.
     assert Scanning(period=0.29).count_steps(0.1) == 3
-    np.testing.assert_allclose(compute_headings(4), [[1, 0], [0, 1], [-1, 0], [0, -1]], atol=1e-15)
+    np.testing.assert_allclose(compute_ray_directions(4), [[1, 0], [0, 1], [-1, 0], [0, -1]], atol=1e-15)
