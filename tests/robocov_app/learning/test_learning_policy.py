@@ -48,7 +48,7 @@ class Shying:
 
     def decide(self, seen: Observations, memory: np.ndarray) -> Decision:
         if seen.scans is not None:
-            memory = seen.scans.headings[seen.scans.distances.argmax(axis=1)]
+            memory = seen.scans.directions[seen.scans.distances.argmax(axis=1)]
         return Decision(memory.copy(), memory=memory)
 
 
