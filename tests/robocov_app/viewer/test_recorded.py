@@ -238,7 +238,7 @@ def test_a_thinned_record_goes_on_at_its_own_pace(record: Record) -> None:
 
 
 def test_moments_at_uneven_times_are_refused(record: Record) -> None:
-    with pytest.raises(InputError, match=r"record.npz: time: expected moments .* s apart"):
+    with pytest.raises(InputError, match=r"record.npz: time: expected times .* s apart"):
         replayed(record.thin(1.0 / (7 * record.dt)))
 
 
@@ -299,7 +299,7 @@ def test_robots_that_failed_at_different_places_stay_there() -> None:
         (lambda record: recorded(robots=3), r"saved/1: team: "),
         (
             lambda record: replace(record, time=record.time**2),
-            "saved/1/record.npz: time: moments 0.0166667 s apart",
+            "saved/1/record.npz: time: expected times 0.0166667 s apart",
         ),
         (
             lambda record: replace(record, team=replace(record.team, radius=np.array([0.1, 0.1, 0.1, 0.2]))),

@@ -145,8 +145,8 @@ def _check(saved: Sequence[Saved]) -> None:
             ("conditions", record.conditions, first.conditions),
         ):
             if mine != others:
-                wanted = f"expected {others} as in {saved[0].folder}; --frames and --video show both"
-                raise InputError(f"{where}: {what}: {wanted}, got {mine}")
+                wanted = f"expected {others} as in {saved[0].folder}, got {mine}"
+                raise InputError(f"{where}: {what}: {wanted}; --frames and --video show both")
 
 
 def _standing(law: ControllerChoice) -> ControllerChoice:
