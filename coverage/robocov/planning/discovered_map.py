@@ -1,9 +1,10 @@
-"""Occupancy grid of one robot, filled by its own range scans.
+"""The occupancy grid of one robot, built from its own range scans.
 
-A cell is *unknown* until a ray passes it, or a robot is there (then it is *free*), or a ray ends in it (then
-it is a *wall*, until rays have passed it several times and none has ended there). The ends of neighbouring
-rays that are close together belong to one surface: the cells between them are *presumed* to be wall, until a
-ray passes there. Routes may lead through unknown cells; their `openness` says how much they count.
+All cells are *unknown* at first. A cell becomes *free* when a ray or a robot passes through it. It becomes a
+*wall* when a ray ends in it, and remains one until several rays have passed through it since a ray last ended
+there. If the ends of neighbouring rays are close together, they belong to one surface: the cells between them
+are *presumed* to be wall until a ray passes through them. Routes may lead through unknown cells. In the
+coverage cost, these count by their `openness`.
 """
 
 from __future__ import annotations
@@ -26,31 +27,32 @@ FREE = 1
 PRESUMED_WALL = 2
 WALL = 3
 CERTAIN_WALL = 6
-"""States of a cell. The values from `WALL` to `CERTAIN_WALL` are walls, the more certain the higher."""
+"""States of a cell. All values from `WALL` to `CERTAIN_WALL` are walls; higher ones are more certain."""
 
 MAX_BRIDGED_GAP_M = 0.5
 """Longest gap between the ends of neighbouring rays that is presumed to be wall.
 
-It is no wider than the passages that a robot should find: doors seen from afar would be closed.
+It must not exceed the width of the passages that a robot should find. Otherwise, doors seen from afar would
+be closed.
 """
 _RAY_STEP_CELLS = 0.7
-"""Distance between the points of a ray at which its cell is looked up."""
+"""Distance between the sampled points of a ray."""
 _END_DEPTH_CELLS = 0.25
-"""Depth of the obstacle's cell behind the end of a ray, which may lie on the border between two cells."""
+"""A hit is attributed to the cell this far behind the end of the ray, which may lie on a cell border."""
 _CORE_HALF_WIDTH_CELLS = 0.3
-"""A ray frees a presumed wall only if it passes this close to the centre of the cell."""
+"""A ray clears a presumed wall only if it passes this close to the centre of the cell."""
 
 
 @dataclass(frozen=True, eq=False)
 class DiscoveredMap:
-    """Occupancy grid of a robot. Immutable: methods that add to it return another map.
+    """The occupancy grid of a robot. It is immutable: methods that add to it return a new map.
 
     Attributes
     ----------
     raster : Raster
     state : (rows, columns) uint8 array
         `UNKNOWN`, `FREE`, `PRESUMED_WALL`, or a value from `WALL` to `CERTAIN_WALL`, the lowest row first.
-        It becomes read-only.
+        The array is made read-only.
     """
 
     raster: Raster
@@ -61,7 +63,7 @@ class DiscoveredMap:
 
     @classmethod
     def build_unknown(cls, raster: Raster) -> DiscoveredMap:
-        """Build the map of a robot that has not seen anything yet.
+        """Build the map of a robot that has seen nothing yet.
 
         Parameters
         ----------
@@ -78,7 +80,7 @@ class DiscoveredMap:
 
     @cached_property
     def is_blocked(self) -> BoolArray:
-        """Whether each cell is a wall, a presumed one, or outside the region, (rows, columns)."""
+        """Whether each cell is a wall, a presumed wall, or outside the region, (rows, columns)."""
         return np.asarray((self.state >= PRESUMED_WALL) | self.raster.is_outside)
 
     def add_scan(self, position: Array, distances: Array, is_hit: BoolArray) -> DiscoveredMap:
@@ -89,14 +91,14 @@ class DiscoveredMap:
         position : (2,) array, m
             Position from which the scan was taken.
         distances : (rays,) array, m
-            Lengths of rays evenly round a full turn, the first along +x.
+            Lengths of rays that are evenly spaced around a full turn, the first along +x.
         is_hit : (rays,) bool array
             Whether each ray ends at an obstacle.
 
         Returns
         -------
         DiscoveredMap
-            The same map if the scan adds nothing to it.
+            This map itself if the scan adds nothing to it.
         """
         state = self.state.copy()
         # Nothing beyond the region matters.
@@ -110,7 +112,7 @@ class DiscoveredMap:
         return self._replace_state(state)
 
     def add_robots(self, positions: Array, radius: float) -> DiscoveredMap:
-        """Mark cells where robots are as free: they fit there. Walls remain.
+        """Mark the cells where robots are as free, since robots fit there. Walls remain.
 
         Parameters
         ----------
@@ -120,14 +122,14 @@ class DiscoveredMap:
         Returns
         -------
         DiscoveredMap
-            The same map if nothing changes.
+            This map itself if nothing changes.
         """
         state = self.state.copy()
         _mark_robots(state, self.raster.grid, positions, radius)
         return self._replace_state(state)
 
     def merge(self, others: Iterable[DiscoveredMap]) -> DiscoveredMap:
-        """Add what other maps of the same raster contain about cells that this one has not seen.
+        """Fill in cells that are unseen in this map from other maps of the same raster.
 
         Parameters
         ----------
@@ -137,17 +139,17 @@ class DiscoveredMap:
         Returns
         -------
         DiscoveredMap
-            The same map if the others add nothing to it.
+            This map itself if the others add nothing to it.
         """
         state = self.state
         for other in others:
-            # What somebody has seen replaces a presumption; what this robot has seen itself stays.
+            # An observation by any robot replaces a presumption; this robot's own observations stay.
             is_unseen = (state == UNKNOWN) | ((state == PRESUMED_WALL) & (other.state != UNKNOWN))
             state = np.where(is_unseen, other.state, state)
         return self._replace_state(state)
 
     def count_changed_walls(self, earlier: DiscoveredMap) -> int:
-        """Count the cells where walls have disappeared, or appeared in the open, since an earlier map.
+        """Count the cells where walls have disappeared, or appeared in open space, since an earlier map.
 
         Parameters
         ----------
@@ -164,20 +166,20 @@ class DiscoveredMap:
         return disappeared + appeared
 
     def _replace_state(self, state: NDArray[np.uint8]) -> DiscoveredMap:
-        """Return the map with another state; the same map if the state is equal."""
+        """Return a map with another state, or this map itself if the state is equal."""
         if np.array_equal(state, self.state):
             return self
         return DiscoveredMap(self.raster, state)
 
 
 def dilate(is_blocked: BoolArray, reach: float) -> BoolArray:
-    """Find the cells close to blocked ones; everything next to the raster counts as blocked.
+    """Find the cells close to blocked ones. Everything outside the array counts as blocked.
 
     Parameters
     ----------
     is_blocked : (rows, columns) bool array
     reach : float
-        Maximum distance between the centres of two cells, in sides of cells.
+        Maximum distance between the centres of two cells, in cells.
 
     Returns
     -------
@@ -206,7 +208,7 @@ def dilate(is_blocked: BoolArray, reach: float) -> BoolArray:
 def _count_opened_walls(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> int:
     """Count the cells that were walls before and are now free, with only free cells around them.
 
-    At the border of walls a cell is sometimes free and sometimes a wall, depending on where it is seen from.
+    Cells at the border of a wall do not count: they may be free or wall, depending on the point of view.
     """
     count = 0
     rows, columns = before.shape
@@ -225,7 +227,7 @@ def _count_opened_walls(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> 
 def _mark_passed_cells(
     state: NDArray[np.uint8], grid: CellGrid, position: Array, directions: Array, lengths: Array
 ) -> None:
-    """Mark the cells that rays pass as free; walls only become less certain."""
+    """Mark the cells that rays pass through as free; walls only become less certain."""
     rows, columns = state.shape
     step = _RAY_STEP_CELLS * grid.cell_size
     for ray in range(len(lengths)):
@@ -235,12 +237,12 @@ def _mark_passed_cells(
             y = position[1] + along * directions[ray, 1]
             row = find_row(y, grid, rows)
             column = find_column(x, grid, columns)
-            evidence = state[row, column]
-            if evidence in (UNKNOWN, WALL):
+            cell_state = state[row, column]
+            if cell_state in (UNKNOWN, WALL):
                 state[row, column] = FREE
-            elif evidence > WALL:
-                state[row, column] = evidence - 1
-            elif evidence == PRESUMED_WALL:
+            elif cell_state > WALL:
+                state[row, column] = cell_state - 1
+            elif cell_state == PRESUMED_WALL:
                 off_x = (x - grid.low_x) / grid.cell_size - column - 0.5
                 off_y = (y - grid.low_y) / grid.cell_size - row - 0.5
                 if max(abs(off_x), abs(off_y)) < _CORE_HALF_WIDTH_CELLS:
@@ -261,7 +263,7 @@ def _compute_ray_ends(grid: CellGrid, position: Array, directions: Array, length
 
 @kernel
 def _mark_presumed_walls(state: NDArray[np.uint8], grid: CellGrid, ends: Array, is_hit: BoolArray) -> None:
-    """Mark unknown cells between the ends of neighbouring rays as presumed walls, and confirm walls there."""
+    """Mark unknown cells between the ends of neighbouring rays as presumed walls; confirm walls there."""
     rows, columns = state.shape
     half_cell = 0.5 * grid.cell_size
     steps = math.ceil(MAX_BRIDGED_GAP_M / half_cell)
@@ -283,7 +285,7 @@ def _mark_presumed_walls(state: NDArray[np.uint8], grid: CellGrid, ends: Array, 
 
 @kernel
 def _mark_hit_cells(state: NDArray[np.uint8], grid: CellGrid, ends: Array, is_hit: BoolArray) -> None:
-    """Mark the cells in which rays have met an obstacle as walls."""
+    """Mark the cells in which rays have hit an obstacle as walls."""
     rows, columns = state.shape
     for ray in range(len(ends)):
         if is_hit[ray]:

@@ -1,4 +1,4 @@
-"""Distances and routes among known walls, on the lattice of a window of a discovered map."""
+"""Distances and routes around known walls, on the lattice of a window of a discovered map."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ from robocov.planning.map_window import MapWindow
 from robocov.planning.window import Window
 
 _MAX_ROUTE_ENDS = 12
-"""Number of nodes that are tried for the first, and the last, one of a route."""
-_MIN_SOURCES = 180
-"""A plan chooses among this number of nodes, or among one of `_NODES_PER_SOURCE` if that is more."""
+"""Number of nodes that are tried as the first node of a route, and as the last."""
+_MAX_SOURCES = 180
+"""A plan chooses among at most this many nodes, or one in `_NODES_PER_SOURCE` nodes if that is more."""
 _NODES_PER_SOURCE = 9
-_MAX_REMEMBERED_POSITIONS = 1000
-"""Positions whose visible nodes are remembered: robots move on, though the map stays the same."""
+_MAX_CACHED_POSITIONS = 1000
+"""Maximum number of positions whose visible nodes are cached."""
 
 
 @dataclass(eq=False)
 class GridPlanner(MapWindow):
     """Distances and routes in a window of a discovered map, around its walls.
 
-    Planners compute each result once, and are shared by robots that share a map.
+    A planner computes each result only once, and robots that share a map share the planner.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class GridPlanner(MapWindow):
 
     @classmethod
     def get_shared(cls, known_map: DiscoveredMap, window: Window, clearance: float) -> GridPlanner:
-        """Return the planner in use for this very map and window; build one if there is none.
+        """Return the planner that is in use for this very map and window, or build one.
 
         Parameters
         ----------
@@ -69,7 +69,7 @@ class GridPlanner(MapWindow):
         -------
         GridPlanner
         """
-        # A planner in use keeps its map alive, therefore no other map has the same id.
+        # A planner in use keeps its map alive, so no other map can have the same id.
         key = id(known_map), window, clearance
         planner = _PLANNERS_IN_USE.get(key)
         if planner is None:
@@ -87,7 +87,7 @@ class GridPlanner(MapWindow):
         Returns
         -------
         GridPlanner
-            The same planner if its cells are the same.
+            This planner itself if its cells have not changed.
         """
         later = GridPlanner.get_shared(known_map, window, self.clearance)
         if (
@@ -100,7 +100,7 @@ class GridPlanner(MapWindow):
 
     @cached_property
     def _edges(self) -> Edges:
-        """Edges between nodes; unknown cells count as longer."""
+        """Edges between nodes, which are longer through unknown cells."""
         return build_edges(
             cells=LatticeCells(self.is_tight, self.is_blocked, self.is_unknown, self.is_roomy),
             rows=self.window.rows,
@@ -112,13 +112,13 @@ class GridPlanner(MapWindow):
     @cached_property
     def _graph(self) -> csr_array:
         """The edges as a sparse matrix."""
-        count_of_nodes = len(self.nodes)
         edges = self._edges
-        return csr_array((edges.lengths, edges.ends, edges.starts), shape=(count_of_nodes, count_of_nodes))
+        shape = (len(self.nodes), len(self.nodes))
+        return csr_array((edges.lengths, edges.ends, edges.first_edge), shape=shape)
 
     @cached_property
     def _frame(self) -> Frame:
-        """Position of the window's cells; the last row and column are at most those of the raster."""
+        """Position of the window's cells. The last row and column do not exceed those of the raster."""
         rows, columns = self.known_map.raster.shape
         height, width = self.window.shape
         low_x, low_y = self.known_map.raster.origin
@@ -134,8 +134,8 @@ class GridPlanner(MapWindow):
 
     @cached_property
     def sources(self) -> IntArray:
-        """Nodes that a plan for a team chooses among: every k-th one in both directions, (c,)."""
-        max_sources = max(_MIN_SOURCES, len(self.nodes) // _NODES_PER_SOURCE)
+        """The nodes among which a plan for a team chooses: every k-th one in both directions, (c,)."""
+        max_sources = max(_MAX_SOURCES, len(self.nodes) // _NODES_PER_SOURCE)
         row, column = np.divmod(np.arange(len(self.nodes)), self.window.columns)
         for k in count(1):
             sources = np.flatnonzero(self.is_roomy & (row % k == k // 2) & (column % k == k // 2))
@@ -158,20 +158,20 @@ class GridPlanner(MapWindow):
         Returns
         -------
         (m,) array, m
-            Infinite where no path leads.
+            Infinite for nodes that no path leads to.
         """
         if node not in self._distances_of_node:
             self._distances_of_node[node] = self.compute_distance_table(np.array([node]))[0]
         return self._distances_of_node[node]
 
     def compute_distances_within(self, nodes: Sequence[int], limit: float) -> list[Array]:
-        """Compute the distances from each of some nodes to all nodes up to a limit.
+        """Compute the distances from each of the given nodes to all nodes within a limit.
 
         Parameters
         ----------
         nodes : sequence of int
         limit : float, m
-            Nodes farther away may be infinitely far. The lower it is, the faster this is.
+            Nodes farther away may be reported as infinitely far. A lower limit is faster.
 
         Returns
         -------
@@ -185,7 +185,7 @@ class GridPlanner(MapWindow):
         ]
 
     def compute_distance_table(self, nodes: IntArray) -> Array:
-        """Compute the distances from some nodes to all nodes.
+        """Compute the distances from each of the given nodes to all nodes.
 
         Parameters
         ----------
@@ -199,7 +199,7 @@ class GridPlanner(MapWindow):
         return table.reshape(-1, len(self.nodes))
 
     def compute_distances_from(self, positions: Array) -> Array:
-        """Compute the distances of all nodes from the nearest of some positions.
+        """Compute the distance from each node to the nearest of the given positions.
 
         Parameters
         ----------
@@ -217,7 +217,7 @@ class GridPlanner(MapWindow):
         return self._search(np.concatenate([[], *visible]), np.concatenate([[], *lengths]))
 
     def _search(self, nodes: ArrayLike, offsets: ArrayLike, limit: float = math.inf) -> Array:
-        """Compute the distances from the nearest of some nodes, which have distances themselves."""
+        """Compute the distance from each node to the nearest of `nodes`, plus the offset of that one."""
         return compute_distances(
             self._edges,
             self.spacing,
@@ -244,7 +244,7 @@ class GridPlanner(MapWindow):
         return int(square.argmin())
 
     def find_own_node(self, position: Array) -> int:
-        """Find the node at which a robot is: the nearest roomy one in sight, or at all.
+        """Find the node of a robot: the nearest roomy one in sight, or else the nearest roomy one.
 
         Parameters
         ----------
@@ -259,10 +259,10 @@ class GridPlanner(MapWindow):
         return int(visible[0]) if len(visible) else -1
 
     def _find_visible_nodes(self, position: Array) -> IntArray:
-        """Return the close roomy nodes in sight of a position; if there are none, the nearest one."""
+        """Return the close roomy nodes in sight of a position, or the nearest one if none is in sight."""
         key = position.tobytes()
         if key not in self._visible_nodes:
-            if len(self._visible_nodes) >= _MAX_REMEMBERED_POSITIONS:
+            if len(self._visible_nodes) >= _MAX_CACHED_POSITIONS:
                 self._visible_nodes.clear()
             close = self._find_close_nodes(position, self.is_roomy)
             visible = close[self.find_clear_lines(position, self.nodes[close], self.is_blocked)]
@@ -271,13 +271,13 @@ class GridPlanner(MapWindow):
         return self._visible_nodes[key]
 
     def _find_close_nodes(self, position: Array, is_candidate: BoolArray) -> IntArray:
-        """Return some candidates close to a position, the nearest first."""
+        """Return a limited number of candidates close to a position, the nearest first."""
         return find_nearest_nodes(position, self.nodes, is_candidate, _MAX_ROUTE_ENDS)
 
     def find_clear_lines(
         self, position: Array, ends: Array, is_obstructing: BoolArray, ignored_length: float = 0.0
     ) -> BoolArray:
-        """Find the straight lines from a position that meet no obstructing cell.
+        """Find which of the straight lines from a position cross no obstructing cell.
 
         Parameters
         ----------
@@ -286,8 +286,8 @@ class GridPlanner(MapWindow):
         is_obstructing : (h, w) bool array
             For example `is_blocked` or `is_tight`.
         ignored_length : float, m
-            Unknown cells closer to the position do not count: a robot may be where no route leads, but only
-            away from there.
+            Cells closer to the position do not count: a robot may stand too close to a wall, where a route
+            can start but not pass.
 
         Returns
         -------
@@ -305,9 +305,9 @@ class GridPlanner(MapWindow):
         Returns
         -------
         (w, 2) array, m
-            Way-points, each in sight of the one before. The last one is the goal, or the closest node to it
-            that a path leads to; the position itself if no path leads anywhere. No tight cell is crossed
-            between way-points; a position that is tight itself is left straight.
+            Waypoints, each in sight of the one before. The last one is the goal, or the node closest to it
+            that a path leads to, or the position itself if no path leads anywhere. No tight cell is crossed
+            between waypoints. If the position itself is tight, the route leaves it in a straight line.
         """
         is_direct = self.find_clear_lines(position, goal[None], self.is_tight, self.clearance)[0]
         if is_direct:
@@ -329,12 +329,12 @@ class GridPlanner(MapWindow):
         return self._remove_detours(position, points)
 
     def _find_shortest_paths(self, node: int) -> tuple[Array, IntArray]:
-        """Return the distances of all nodes from one, m, and the node before each on the shortest path."""
+        """Return the distances from a node to all nodes, m, and the node before each on the shortest path."""
         distances, predecessors = dijkstra(self._graph, indices=[node], return_predecessors=True)
         return distances[0], predecessors[0]
 
     def _find_first_node(self, position: Array) -> int:
-        """Return the first node of a route: close, roomy, and in sight; -1 if there is none."""
+        """Return the first node of a route, which is close, roomy and in sight, or -1 if there is none."""
         close = self._find_close_nodes(position, self.is_roomy)
         is_visible = self.find_clear_lines(position, self.nodes[close], self.is_tight, 2.0 * self.clearance)
         if not is_visible.any():
@@ -342,7 +342,7 @@ class GridPlanner(MapWindow):
         return int(close[is_visible.argmax()]) if is_visible.any() else -1
 
     def _remove_detours(self, position: Array, points: Array) -> Array:
-        """Return the waypoints without those that are unnecessary, because later ones are in sight."""
+        """Return the waypoints without those that can be skipped, because later ones are in sight."""
         remaining: list[Array] = []
         current = position
         k = 0

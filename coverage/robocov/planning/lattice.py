@@ -1,8 +1,8 @@
 """A lattice of nodes in a window: its graph, shortest distances on it, and lines of sight.
 
-A node is joined to those one step away, diagonally, and a knight's move away: 16 directions, so that a path
-on the lattice is at most 2.8 % longer than the shortest one. Two nodes are joined if no cell on the straight
-line between them is too close to a wall; nodes close to walls can be reached, but not passed.
+A node is joined to its neighbours in 16 directions: straight, diagonal, and a knight's move away. A path on
+the lattice is therefore at most 2.8 % longer than the shortest one. Two nodes are joined if no cell on the
+straight line between them is too close to a wall. Nodes close to walls can be reached, but not passed.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 
 _MOVES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
-"""Rows and columns of half the directions; the others are their opposites."""
+"""Rows and columns of half of the moves; the others are their opposites."""
 _UNKNOWN_DETOUR = 0.4
-"""Fraction by which routes through unknown cells are assumed to be longer, as walls turn up there."""
+"""Fraction by which routes through unknown cells are assumed to be longer, since walls may turn up there."""
 _SIGHT_STEP_CELLS = 0.5
-"""Distance between the points of a straight line at which its cell is looked up."""
+"""Maximum distance between the sampled points of a line of sight."""
 
 
 class LatticeCells(NamedTuple):
@@ -38,14 +38,14 @@ class LatticeCells(NamedTuple):
 
 
 class Edges(NamedTuple):
-    """Edges of a directed graph in compressed rows: those of node k are starts[k] to starts[k + 1] - 1."""
+    """The edges of a directed graph in compressed sparse rows."""
 
     lengths: Array
     """(e,) m"""
     ends: IntArray
-    """(e,) Node that each edge leads to."""
-    starts: IntArray
-    """(m + 1,)"""
+    """(e,) The node that each edge leads to."""
+    first_edge: IntArray
+    """(m + 1,) The edges of node k are those from ``first_edge[k]`` up to ``first_edge[k + 1]``."""
 
 
 class Frame(NamedTuple):
@@ -54,28 +54,32 @@ class Frame(NamedTuple):
     low_x: float
     """Lower left corner of the raster, m."""
     low_y: float
+    """m"""
     cell_size: float
     """m"""
     first_row: int
-    """First and last row and column of the raster that the window contains."""
+    """The first row of the raster that the window contains."""
     first_column: int
+    """The first column."""
     last_row: int
+    """The last row."""
     last_column: int
+    """The last column."""
 
 
 class _Moves(NamedTuple):
-    """The moves from a node to its neighbours, (k,) of them."""
+    """The moves from a node to its neighbours."""
 
     rows: IntArray
-    """(k,) Rows of nodes up."""
+    """(k,) Number of rows of nodes up."""
     columns: IntArray
-    """(k,) Columns of nodes to the right."""
+    """(k,) Number of columns of nodes to the right."""
     lengths: Array
     """(k,) m"""
     crossed: IntArray
-    """(c, 2) Rows and columns of the cells that the moves cross, from that of the node on."""
-    starts: IntArray
-    """(k + 1,) Those of move k are starts[k] to starts[k + 1] - 1."""
+    """(c, 2) Rows and columns of the cells that the moves cross, relative to the cell of the node."""
+    first_crossed: IntArray
+    """(k + 1,) The cells of move k are those from ``first_crossed[k]`` up to ``first_crossed[k + 1]``."""
 
 
 def build_edges(cells: LatticeCells, rows: int, columns: int, stride: int, spacing: float) -> Edges:
@@ -94,9 +98,8 @@ def build_edges(cells: LatticeCells, rows: int, columns: int, stride: int, spaci
     Returns
     -------
     Edges
-        As long as they are, but unknown cells count as longer. Nodes in tight cells are ends of paths and
-        nothing more: no edge leads on from there, for example through a hole in a wall that has not been seen
-        completely.
+        Their lengths are those of the lines, increased for unknown cells. Nodes in tight cells are dead ends:
+        no edge leads on from there, for example through a hole in a wall that has been seen only in part.
     """
     moves = _build_moves(stride, spacing)
     lengths = _compute_move_lengths(cells, moves, rows, columns, stride)
@@ -104,7 +107,7 @@ def build_edges(cells: LatticeCells, rows: int, columns: int, stride: int, spaci
 
 
 def _build_moves(stride: int, spacing: float) -> _Moves:
-    """Build the moves with the cells that they cross."""
+    """Build the moves and find the cells that they cross."""
     crossed = [_list_crossed_cells(up, right, stride) for up, right in _MOVES]
     counts = np.array([len(cells) for cells in crossed])
     steps = np.array(_MOVES)
@@ -113,13 +116,13 @@ def _build_moves(stride: int, spacing: float) -> _Moves:
         columns=steps[:, 1].copy(),
         lengths=np.array([math.hypot(*move) for move in _MOVES]) * spacing,
         crossed=np.concatenate(crossed),
-        starts=np.concatenate([[0], np.cumsum(counts)]),
+        first_crossed=np.concatenate([[0], np.cumsum(counts)]),
     )
 
 
 @lru_cache(maxsize=512)
 def _list_crossed_cells(up: int, right: int, stride: int) -> tuple[tuple[int, int], ...]:
-    """Return row and column, relative to a node, of the cells that the line to a neighbour crosses."""
+    """Return the row and column, relative to a node, of each cell that the line to a neighbour crosses."""
     along = np.linspace(0.0, 1.0, 2 * max(up, abs(right)) * stride + 1)
     row = np.rint(along * up * stride).astype(int)
     column = np.rint(along * right * stride).astype(int)
@@ -128,26 +131,26 @@ def _list_crossed_cells(up: int, right: int, stride: int) -> tuple[tuple[int, in
 
 @kernel
 def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns: int, stride: int) -> Array:
-    """Compute the lengths of all moves, (m, 5, 5) m, infinite where there is no edge.
+    """Compute the lengths of all moves from all nodes, (m, 5, 5) m, infinite where there is no edge.
 
-    The entry [2 + up, 2 + right] belongs to the move by that many rows and columns.
+    The entry [node, 2 + up, 2 + right] belongs to the move by that many rows and columns.
     """
     lengths = np.full((rows * columns, 5, 5), np.inf)
     for move in range(len(moves.lengths)):
         up = moves.rows[move]
         right = moves.columns[move]
-        first = moves.starts[move]
-        stop = moves.starts[move + 1]
+        first = moves.first_crossed[move]
+        stop = moves.first_crossed[move + 1]
         for row in range(rows - up):
             for column in range(max(0, -right), columns - max(0, right)):
-                top = stride // 2 + row * stride
-                left = stride // 2 + column * stride
+                node_row = stride // 2 + row * stride
+                node_column = stride // 2 + column * stride
                 is_passable = True
                 is_without_wall = True
                 unknown_cells = 0
                 for k in range(first, stop):
-                    i = top + moves.crossed[k, 0]
-                    j = left + moves.crossed[k, 1]
+                    i = node_row + moves.crossed[k, 0]
+                    j = node_column + moves.crossed[k, 1]
                     is_passable = is_passable and not cells.is_tight[i, j]
                     is_without_wall = is_without_wall and not cells.is_blocked[i, j]
                     unknown_cells += cells.is_unknown[i, j]
@@ -165,11 +168,11 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
 
 @kernel
 def _compress_edges(lengths: Array, columns: int) -> Edges:
-    """Collect the edges of finite length of all moves, (m, 5, 5) m."""
+    """Collect the edges from the lengths of all moves, (m, 5, 5) m, skipping infinite ones."""
     count = 0
     edge_lengths = np.empty(lengths.size)
     ends = np.empty(lengths.size, dtype=np.intp)
-    starts = np.zeros(len(lengths) + 1, dtype=np.intp)
+    first_edge = np.zeros(len(lengths) + 1, dtype=np.intp)
     for node in range(len(lengths)):
         for up in range(5):
             for right in range(5):
@@ -177,24 +180,24 @@ def _compress_edges(lengths: Array, columns: int) -> Edges:
                     edge_lengths[count] = lengths[node, up, right]
                     ends[count] = node + (up - 2) * columns + right - 2
                     count += 1
-        starts[node + 1] = count
-    return Edges(edge_lengths[:count].copy(), ends[:count].copy(), starts)
+        first_edge[node + 1] = count
+    return Edges(edge_lengths[:count].copy(), ends[:count].copy(), first_edge)
 
 
 @kernel
 def compute_distances(
     edges: Edges, shortest_edge: float, sources: IntArray, offsets: Array, limit: float
 ) -> Array:
-    """Compute the distances of all nodes from the nearest of some sources.
+    """Compute the distance from each node to the nearest of several sources.
 
     Parameters
     ----------
     edges : Edges
     shortest_edge : float, m
-        Length that no edge falls below.
+        Lower bound on the lengths of the edges.
     sources : (k,) int array
     offsets : (k,) array, m
-        Distances at the sources.
+        Distances with which the sources start.
     limit : float, m
         Nodes farther away are not reached.
 
@@ -205,10 +208,11 @@ def compute_distances(
 
     Notes
     -----
-    Dijkstra's algorithm, but all nodes are settled at once that are farther than the nearest one by less than
-    the shortest edge: no shorter path to one of them leads over another.
+    This is Dijkstra's algorithm, except that several nodes are settled together: the nearest one, and all
+    that are farther away by less than the shortest edge. No path via one of them can shorten the path to
+    another.
     """
-    nodes = len(edges.starts) - 1
+    nodes = len(edges.first_edge) - 1
     distance = np.full(nodes, np.inf)
     front = np.empty(nodes, dtype=np.intp)
     is_in_front = np.zeros(nodes, dtype=np.bool_)
@@ -239,7 +243,7 @@ def compute_distances(
         front_size = remaining
         for k in range(settled_count):
             node = settled[k]
-            for edge in range(edges.starts[node], edges.starts[node + 1]):
+            for edge in range(edges.first_edge[node], edges.first_edge[node + 1]):
                 end = edges.ends[edge]
                 length = distance[node] + edges.lengths[edge]
                 if length < distance[end] and length <= limit:
@@ -253,7 +257,7 @@ def compute_distances(
 
 @kernel
 def find_nearest_nodes(position: Array, nodes: Array, is_candidate: BoolArray, max_count: int) -> IntArray:
-    """Find the candidates nearest to a position, the nearest first.
+    """Find the candidates that are nearest to a position, in order of distance.
 
     Parameters
     ----------
@@ -289,7 +293,7 @@ def find_nearest_nodes(position: Array, nodes: Array, is_candidate: BoolArray, m
 def find_clear_lines(
     position: Array, ends: Array, is_obstructing: BoolArray, frame: Frame, ignored_length: float
 ) -> BoolArray:
-    """Find the straight lines from a position that meet no obstructing cell.
+    """Find which of the straight lines from a position cross no obstructing cell.
 
     Parameters
     ----------

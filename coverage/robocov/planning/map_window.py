@@ -1,4 +1,4 @@
-"""The cells of a discovered map in a window, and the nodes that stand for blocks of them."""
+"""The cells of a discovered map in a window, and the nodes that represent blocks of cells."""
 
 from __future__ import annotations
 
@@ -16,32 +16,32 @@ from robocov.planning.window import Window
 
 
 class Frontier(NamedTuple):
-    """Unknown cells next to free ones with room for a robot, (b,) of them."""
+    """The unknown cells next to free cells with room for a robot."""
 
     rows: IntArray
     """(b,) Row in the window."""
     columns: IntArray
     """(b,) Column in the window."""
     patches: IntArray
-    """(b,) Number of the unknown patch that each belongs to, from 1."""
+    """(b,) Label of the unknown patch that each cell belongs to, from 1."""
     is_side_free: BoolArray
-    """(b, 4) Whether there is such a free cell to the right, above, to the left, below."""
+    """(b, 4) Whether there is such a free cell to the right, above, to the left and below."""
 
 
 class UnknownArea(NamedTuple):
-    """Free cells that are expected in unknown patches, by nodes, (p,) pairs of both."""
+    """The expected numbers of free cells in unknown patches, for each pair of a patch and a node."""
 
     patches: IntArray
-    """(p,) Number of the patch, from 1."""
+    """(p,) Label of the patch, from 1."""
     nodes: IntArray
-    """(p,) Node."""
+    """(p,) The node that represents the cells."""
     expected_cells: Array
     """(p,) Expected number of free cells."""
 
 
 @dataclass(eq=False)
 class MapWindow:
-    """Cells of a discovered map in a window, (h, w), and the nodes of the window, (m,).
+    """The cells of a discovered map in a window, (h, w), and the nodes of the window, (m,).
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class MapWindow:
 
     @cached_property
     def patches(self) -> IntArray:
-        """Numbers of the connected patches of unknown cells, from 1; 0 for all other cells, (h, w)."""
+        """Label of the connected patch of each unknown cell, from 1; 0 for all other cells, (h, w)."""
         labels, _ = ndimage.label(self.is_unknown & ~self.is_outside)
         return np.asarray(labels)
 
@@ -111,17 +111,17 @@ class MapWindow:
 
     @cached_property
     def free_cells(self) -> Array:
-        """Number of free cells that each node stands for, (m,)."""
+        """Number of free cells that each node represents, (m,)."""
         return self.sum_by_node(self.is_free)
 
     @cached_property
     def expected_free_cells(self) -> Array:
-        """The same with unknown cells, which count by their openness, (m,)."""
+        """Number of free cells that each node represents, (m,); unknown cells count by their openness."""
         return self.sum_by_node(self.is_free + self.openness)
 
     @cached_property
     def frontier(self) -> Frontier:
-        """The unknown cells next to free ones with room for a robot."""
+        """The unknown cells next to free cells with room for a robot."""
         is_usable = np.pad(self.is_free & ~self.is_tight, 1)
         is_side_free = np.stack(
             [is_usable[1:-1, 2:], is_usable[2:, 1:-1], is_usable[1:-1, :-2], is_usable[:-2, 1:-1]], axis=-1
@@ -136,7 +136,7 @@ class MapWindow:
 
     @cached_property
     def unknown_area(self) -> UnknownArea:
-        """The free cells that are expected in unknown patches."""
+        """The expected numbers of free cells in unknown patches."""
         rows, columns = self.patches.nonzero()
         stride = self.window.stride
         nodes = rows // stride * self.window.columns + columns // stride
@@ -146,7 +146,7 @@ class MapWindow:
         return UnknownArea(patches=pairs // count, nodes=pairs % count, expected_cells=expected_cells)
 
     def sum_by_node(self, values: Array | BoolArray) -> Array:
-        """Sum values of cells by the nodes that stand for them.
+        """Sum the values of the cells that each node represents.
 
         Parameters
         ----------

@@ -12,13 +12,13 @@ from robocov.compiled import kernel
 from robocov.planning.discovered_map import FREE, UNKNOWN
 
 PRIOR_OPENNESS = 0.8
-"""Openness of cells that are far from everything known."""
+"""Openness of cells that are far from all known cells."""
 WALK_LENGTH_BLOCKS = 30.0
-"""Distance that a random walk gets from where it began before it usually ends by itself."""
+"""Typical distance that a random walk gets from its start before it ends by itself."""
 MAX_BLOCKS = 1000
-"""Number of blocks that a map is divided into."""
+"""Default maximum number of blocks into which a map is divided."""
 
-_RELAXATION_FACTOR = 1.9  # the best one for walks of that length
+_RELAXATION_FACTOR = 1.9  # the best factor for walks of that length
 _MAX_ITERATIONS = 1000
 _TOLERANCE = 1e-5
 _OUTSIDE = 255
@@ -26,31 +26,31 @@ _OUTSIDE = 255
 
 
 class _BlockGrid(NamedTuple):
-    """Square blocks of cells, and the number of sides of cells that they share with their neighbours."""
+    """Square blocks of cells, with counts of the cell sides at which unknown cells border on other cells."""
 
     unknown_cells: Array
     """(rows, columns) Number of unknown cells in each block."""
     free_sides: Array
-    """(rows, columns) Sides between its unknown cells and free ones."""
+    """(rows, columns) Number of sides between unknown cells of each block and free cells."""
     wall_sides: Array
-    """(rows, columns) Sides between its unknown cells and walls."""
+    """(rows, columns) Number of sides between unknown cells of each block and walls."""
     links_up: Array
-    """(rows + 1, columns + 1) Sides between its unknown cells and those of the block above."""
+    """(rows + 1, columns + 1) Number of sides between its unknown cells and those of the block above."""
     links_right: Array
-    """(rows + 1, columns + 1) The same with the block to the right."""
+    """(rows + 1, columns + 1) Number of sides between its unknown cells and those of the right block."""
 
 
 def compute_openness(state: NDArray[np.uint8], is_outside: BoolArray, max_blocks: int = MAX_BLOCKS) -> Array:
-    """Compute how likely each unknown cell is free.
+    """Compute the probability that each unknown cell is free.
 
     Parameters
     ----------
     state : (rows, columns) uint8 array
-        That of a `DiscoveredMap`.
+        State of each cell; see `DiscoveredMap`.
     is_outside : (rows, columns) bool array
-        Cells outside the region, which do not count at all.
+        Whether each cell is outside the region and therefore ignored.
     max_blocks : int
-        Maximum number of square blocks of cells; each is one unknown of the equation.
+        Maximum number of square blocks of cells. Each block is one unknown of the equation.
 
     Returns
     -------
@@ -59,15 +59,15 @@ def compute_openness(state: NDArray[np.uint8], is_outside: BoolArray, max_blocks
 
     Notes
     -----
-    The openness u of an unknown cell is the probability that a random walk among unknown cells that begins
-    there comes to a free cell before it comes to a wall:
+    The openness u of an unknown cell is the probability that a random walk through unknown cells that starts
+    there reaches a free cell before it reaches a wall:
 
         Laplace(u) = 0,   u = 1 at free cells,   u = 0 at walls,   no flow through the border of the region.
 
-    The inside of an obstacle has only walls around it; cells in the shadow of an obstacle are open to where
-    the shadow begins; the rock around a cave, though connected with everything unknown, is closed a few cells
-    behind its walls. Very long walks end by themselves with the value `PRIOR_OPENNESS`: far from everything
-    known, all that is known is the free fraction of a usual region.
+    The inside of an obstacle is surrounded by walls, so its openness is low. The shadow behind an obstacle
+    borders on free cells, so its openness is high. The rock around a cave is connected to all other unknown
+    cells, but its openness is low behind the walls. Very long walks end by themselves with the value
+    `PRIOR_OPENNESS`, the free fraction of a typical region: far from all known cells, it is the best guess.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def compute_openness(state: NDArray[np.uint8], is_outside: BoolArray, max_blocks
 
 @kernel
 def _build_blocks(cells: NDArray[np.uint8], block_side: int) -> _BlockGrid:
-    """Build the blocks of a grid, in which `_OUTSIDE` marks cells that do not count."""
+    """Build the blocks of a grid, in which `_OUTSIDE` marks the cells to ignore."""
     rows, columns = cells.shape
     block_rows = -(-rows // block_side)
     block_columns = -(-columns // block_side)
@@ -106,23 +106,23 @@ def _build_blocks(cells: NDArray[np.uint8], block_side: int) -> _BlockGrid:
             if state == UNKNOWN:
                 blocks.unknown_cells[i, j] += 1.0
             if row + 1 < rows:
-                a = (row + 1) // block_side
-                if state == UNKNOWN and cells[row + 1, column] == UNKNOWN and a > i:
+                i_above = (row + 1) // block_side
+                if state == UNKNOWN and cells[row + 1, column] == UNKNOWN and i_above > i:
                     blocks.links_up[i, j] += 1.0
                 _count_side(state, cells[row + 1, column], i, j, blocks)
-                _count_side(cells[row + 1, column], state, a, j, blocks)
+                _count_side(cells[row + 1, column], state, i_above, j, blocks)
             if column + 1 < columns:
-                b = (column + 1) // block_side
-                if state == UNKNOWN and cells[row, column + 1] == UNKNOWN and b > j:
+                j_right = (column + 1) // block_side
+                if state == UNKNOWN and cells[row, column + 1] == UNKNOWN and j_right > j:
                     blocks.links_right[i, j] += 1.0
                 _count_side(state, cells[row, column + 1], i, j, blocks)
-                _count_side(cells[row, column + 1], state, i, b, blocks)
+                _count_side(cells[row, column + 1], state, i, j_right, blocks)
     return blocks
 
 
 @kernel
 def _count_side(state: int, neighbour_state: int, i: int, j: int, blocks: _BlockGrid) -> None:
-    """Count the side between a cell in block (i, j) and a neighbour, if only the cell is unknown."""
+    """Count the side between a cell in block (i, j) and its neighbour if only the cell itself is unknown."""
     if state == UNKNOWN and neighbour_state != UNKNOWN and neighbour_state != _OUTSIDE:
         if neighbour_state == FREE:
             blocks.free_sides[i, j] += 1.0
@@ -134,7 +134,7 @@ def _count_side(state: int, neighbour_state: int, i: int, j: int, blocks: _Block
 def _solve_laplace(blocks: _BlockGrid, block_side: int) -> Array:
     """Compute the openness of blocks, (rows + 1, columns + 1), by successive over-relaxation.
 
-    The last row and the last column are spare ones without links, which index -1 leads to as well.
+    The last row and the last column are padding without links, to which the index -1 also leads.
     """
     block_rows, block_columns = blocks.unknown_cells.shape
     up = blocks.links_up
@@ -146,10 +146,11 @@ def _solve_laplace(blocks: _BlockGrid, block_side: int) -> Array:
             for j in range(block_columns):
                 if blocks.unknown_cells[i, j] == 0.0:
                     continue
-                # Centres of two blocks are one side apart; its own border is half a side from a centre.
-                ended = blocks.unknown_cells[i, j] / (block_side * WALK_LENGTH_BLOCKS**2)
-                flow = 2.0 * blocks.free_sides[i, j] + ended * PRIOR_OPENNESS
-                links = 2.0 * (blocks.free_sides[i, j] + blocks.wall_sides[i, j]) + ended
+                # The centres of two blocks are one side apart, but the border of a block is only half a side
+                # from its centre, so that the flow across it is twice as large.
+                leak = blocks.unknown_cells[i, j] / (block_side * WALK_LENGTH_BLOCKS**2)
+                flow = 2.0 * blocks.free_sides[i, j] + leak * PRIOR_OPENNESS
+                links = 2.0 * (blocks.free_sides[i, j] + blocks.wall_sides[i, j]) + leak
                 flow += up[i, j] * u[i + 1, j] + up[i - 1, j] * u[i - 1, j]
                 flow += right[i, j] * u[i, j + 1] + right[i, j - 1] * u[i, j - 1]
                 links += up[i, j] + up[i - 1, j] + right[i, j] + right[i, j - 1]
@@ -163,7 +164,7 @@ def _solve_laplace(blocks: _BlockGrid, block_side: int) -> Array:
 
 @kernel
 def _spread_to_cells(cells: NDArray[np.uint8], block_openness: Array, block_side: int) -> Array:
-    """Give each unknown cell the openness of its block, and 0 to all others."""
+    """Give each unknown cell the openness of its block, and all other cells 0."""
     rows, columns = cells.shape
     openness = np.zeros((rows, columns))
     for row in range(rows):

@@ -1,4 +1,4 @@
-"""The best position of one robot while all others stay where they are."""
+"""The best position for one robot while all others stay where they are."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.team_placement import UNREACHABLE_M
 
 _MAX_STEPS = 6
-"""Number of nodes by which a search moves the goal at most."""
+"""Maximum number of steps of a search, each to a neighbouring node."""
 
 
 class OwnGoal(NamedTuple):
-    """A local minimum of the coverage cost by the position of one robot."""
+    """A local minimum of the coverage cost as a function of the position of one robot."""
 
     goal: Array
     """(2,) m"""
     node: int
     """Node nearest to it."""
     cell_distances: Array
-    """(m,) m, distances from there to the nodes of the robot's own cell, 0 for all other nodes."""
+    """(m,) m, distances from that node to the nodes of the robot's own cell, 0 for all other nodes."""
     cost: float
     """Coverage cost J of the whole team, in cells times metres."""
 
@@ -37,21 +37,21 @@ def find_own_goal(
     former_goal: Array,
     min_saving: float,
 ) -> OwnGoal:
-    """Find a local minimum of the coverage cost by the position of one robot alone.
+    """Find a local minimum of the coverage cost as a function of the position of one robot.
 
     Parameters
     ----------
     planner : GridPlanner
     weights : (m,) array
-        Of the nodes, as `compute_node_weights` returns them.
+        Weights of the nodes; see `compute_node_weights`.
     other_positions : (k, 2) array, m
-        Of all other robots.
+        Positions of all other robots.
     first_node : int
-        Position from which the search starts.
+        Node at which the search starts.
     former_goal : (2,) array, m
-        It is kept if the new one is hardly better; nan if there is none.
+        Kept if the new goal is hardly better; nan if there is none.
     min_saving : float
-        Fraction of the cost of its own cell that a new goal must save.
+        Fraction of the cost of the robot's own cell that a new goal must save.
 
     Returns
     -------
@@ -59,8 +59,8 @@ def find_own_goal(
 
     Notes
     -----
-    The search moves to a neighbouring node as long as one is better, by a few nodes at most. The goal is the
-    minimum of the parabolas, in x and in y, through the costs of the last node and its neighbours.
+    The search moves to a neighbouring node as long as one is better, for a few steps at most. The goal is the
+    minimum of two parabolas, in x and in y, through the costs of the last node and its neighbours.
     """
     search = _NodeSearch(planner, weights, other_positions, first_node)
     node = first_node
@@ -82,7 +82,7 @@ def find_own_goal(
 
 
 class _NodeSearch:
-    """Coverage costs with the robot at some nodes, computed when the search comes near these."""
+    """Coverage costs with the robot at different nodes, computed as the search comes near them."""
 
     def __init__(self, planner: GridPlanner, weights: Array, other_positions: Array, first_node: int) -> None:
         self._planner = planner
@@ -93,14 +93,14 @@ class _NodeSearch:
         self._other_distances: Array = np.minimum(other_distances, UNREACHABLE_M)
         own_distances = distances[self.targets]
         cell_radius = float(own_distances[own_distances < self._other_distances].max(initial=0.0))
-        # Nodes farther away do not come into the robot's cell within the few steps of the search.
+        # Nodes farther away cannot become part of the robot's cell within the few steps of the search.
         self._limit = 1.5 * cell_radius + 4.0 * planner.spacing
         self._node_count = len(weights)
         self._distances: dict[int, Array] = {}
         self.costs: dict[int, float] = {}
 
     def list_neighbours(self, node: int) -> list[int]:
-        """Return the neighbours of a node as `_list_neighbours` does; `costs` then contains all of them."""
+        """Return the neighbours of a node like `_list_neighbours`, and add their costs to `costs`."""
         neighbours = _list_neighbours(self._planner, node)
         new_nodes = [k for k in (node, *neighbours) if k >= 0 and k not in self._distances]
         tables = self._planner.compute_distances_within(new_nodes, self._limit)
@@ -112,7 +112,7 @@ class _NodeSearch:
         return neighbours
 
     def compute_cell_distances(self, node: int) -> Array:
-        """Compute the distances from a node to those of the robot's cell, 0 for all others, (m,) m."""
+        """Compute the distances from a node to those of the robot's own cell, 0 for all others, (m,) m."""
         distances = self._distances[node]
         is_own = distances < self._other_distances
         cell_distances = np.zeros(self._node_count)
@@ -121,7 +121,7 @@ class _NodeSearch:
 
 
 def _list_neighbours(planner: GridPlanner, node: int) -> list[int]:
-    """Return the roomy nodes to the right, above, to the left and below; -1 if there is none."""
+    """Return the nodes to the right, above, to the left and below; -1 where there is no roomy node."""
     rows = planner.window.rows
     columns = planner.window.columns
     row, column = divmod(node, columns)
@@ -136,9 +136,9 @@ def _list_neighbours(planner: GridPlanner, node: int) -> list[int]:
 def _refine_goal(
     planner: GridPlanner, node: int, neighbours: list[int], costs: Mapping[int, float], former_goal: Array
 ) -> tuple[Array, float]:
-    """Return the minimum of the parabolas around a node, and the excess of the former goal over it.
+    """Return the minimum of the parabolas around a node, and the excess cost of the former goal over it.
 
-    The latter is infinite if the former goal is outside the parabolas, more than one spacing away.
+    The excess is infinite if the former goal is more than one spacing away, where the parabolas do not hold.
     """
     right, up, left, down = neighbours
     goal = planner.nodes[node].copy()
@@ -155,6 +155,6 @@ def _refine_goal(
             shift = min(max(-slope / curvature, -0.5), 0.5)
             goal[axis] += shift * planner.spacing
             former_cost = slope * offset + 0.5 * curvature * offset * offset
-            minimal_cost = slope * shift + 0.5 * curvature * shift * shift
-            excess += former_cost - minimal_cost
+            min_cost = slope * shift + 0.5 * curvature * shift * shift
+            excess += former_cost - min_cost
     return goal, excess

@@ -66,7 +66,7 @@ class Raster:
     def shape(self) -> tuple[int, int]:
         """Number of rows and of columns."""
         low_x, low_y, high_x, high_y = self.region.bounds
-        # A region that ends within rounding of a border between cells needs no further row.
+        # Rounding errors at a border between cells must not add a row or column.
         rows = max(1, math.ceil((high_y - low_y) / self.cell_size - 1e-9))
         columns = max(1, math.ceil((high_x - low_x) / self.cell_size - 1e-9))
         return rows, columns
@@ -92,7 +92,7 @@ class Raster:
         return np.stack([x + (columns + 0.5) * self.cell_size, y + (rows + 0.5) * self.cell_size], axis=-1)
 
     def find_cells(self, points: Array) -> tuple[IntArray, IntArray]:
-        """Find the cells that contain points; the nearest cell for a point next to the raster.
+        """Find the cells that contain points. A point outside the raster belongs to the nearest cell.
 
         Parameters
         ----------
@@ -110,7 +110,7 @@ class Raster:
 
 @kernel
 def find_row(y: float, grid: CellGrid, rows: int) -> int:
-    """Return the row of cells at a height; the nearest one next to the raster.
+    """Return the row of cells at a y coordinate, or the nearest row if it is outside the raster.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def find_row(y: float, grid: CellGrid, rows: int) -> int:
 
 @kernel
 def find_column(x: float, grid: CellGrid, columns: int) -> int:
-    """Return the column of cells at a position in x; the nearest one next to the raster.
+    """Return the column of cells at an x coordinate, or the nearest column if it is outside the raster.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
-"""Goals for a team by the knowledge of one robot: a k-median on the nodes of its map.
+"""Goals for a team, based on what one robot knows: a k-median on the nodes of its map.
 
-The cost is (22) on the nodes of a `GridPlanner`, each weighted with its area (times the density):
+The cost is (22) on the nodes of a `GridPlanner`, each weighted by its area (times the density):
 
     J(P) = sum over q of w_q min_j d(q, p_j)
 
-with geodesic distances d. An unknown cell counts by how likely it is free (see `openness`).
+with geodesic distances d. An unknown cell counts by the probability that it is free (see `openness`).
 """
 
 from typing import NamedTuple
@@ -18,33 +18,33 @@ from robocov.k_median import improve_sources, move_first_source
 from robocov.planning.grid_planner import GridPlanner
 
 UNREACHABLE_M = 1e9
-"""Distance that stands for "no robot comes there", where a number must be finite."""
-_MAX_ROBOTS_OF_THOROUGH_SEARCH = 8
-"""Plans for larger teams are not also searched by removing two or three goals at once."""
+"""Finite stand-in for the distance to a node that no robot can reach."""
+_MAX_ROBOTS_FOR_THOROUGH_SEARCH = 8
+"""Up to this team size, the search also tries to remove two or three goals at once."""
 
 
 class TeamSituation(NamedTuple):
-    """Positions and former goals of the robots of a team, as known to the first one, which plans."""
+    """Positions and former goals of the robots of a team, as known to the first robot, which plans."""
 
     positions: Array
     """(k, 2) m"""
     former_goals: Array
     """(k, 2) m, goals in the former plan."""
     is_fixed: BoolArray
-    """(k,) Whether each robot stays at its former goal; never the first one."""
+    """(k,) Whether each robot keeps its former goal. The first robot never does."""
     other_positions: Array
-    """(o, 2) m, of robots that do not move and are not part of the plan."""
+    """(o, 2) m, positions of robots that do not move and are not part of the plan."""
 
 
 class MinSavings(NamedTuple):
-    """Fractions of the cost that changes of a plan must save."""
+    """Fractions of the cost that changes to a plan must save."""
 
     relocation: float
-    """Saving of all relocations together."""
+    """Minimum saving of all relocations together."""
     own_cell: float
-    """Saving of a relocation of the first robot within its own cell, if all others are fixed."""
+    """Minimum saving if all others are fixed and only the first robot is relocated, within its own cell."""
     swap: float = 0.0
-    """Fraction of the sum of squared path lengths that an exchange of goals must save."""
+    """Fraction of the sum of squared path lengths that an exchange of goals between robots must save."""
 
 
 def compute_node_weights(
@@ -56,14 +56,14 @@ def compute_node_weights(
     ----------
     planner : GridPlanner
     density : Density or None
-        Factor of each node; None is 1 everywhere.
+        Density at each node; None is 1 everywhere.
     only_known : bool
-        Whether unknown cells do not count at all. Otherwise they count by their openness.
+        If true, unknown cells do not count. Otherwise, they count by their openness.
 
     Returns
     -------
     (m,) array
-        Number of cells that each node stands for, times the density.
+        Number of free cells that each node represents, times the density.
     """
     weights = planner.free_cells if only_known else planner.expected_free_cells
     if density is not None and not density.is_uniform:
@@ -72,29 +72,29 @@ def compute_node_weights(
 
 
 def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_savings: MinSavings) -> Array:
-    """Compute goals of a team with a low coverage cost, by few relocations.
+    """Compute goals for a team that have a low coverage cost and need few relocations.
 
     Parameters
     ----------
     planner : GridPlanner
-        Of the robot that plans.
+        Planner of the robot that makes the plan.
     weights : (m,) array
-        Of the nodes, as `compute_node_weights` returns them.
+        Weights of the nodes; see `compute_node_weights`.
     team : TeamSituation
     min_savings : MinSavings
 
     Returns
     -------
     (k, 2) array, m
-        The former goals if the planning robot cannot go anywhere.
+        The former goals if the robot that makes the plan cannot go anywhere.
 
     Notes
     -----
-    Lloyd's iteration from the former plan on, in turn with interchange (`robocov.k_median`); if all but the
-    first robot are fixed, that one goes to the best position of its own cell. Goals are assigned such that
-    the sum of the squared path lengths is minimal: the assignment then stays the same while the robots move,
-    and their paths do not cross. As they also go elsewhere, to look around, they exchange goals only if that
-    saves the fraction `MinSavings.swap` of the sum.
+    Starting from the former plan, Lloyd's iteration alternates with interchange (`robocov.k_median`). If all
+    robots but the first are fixed, the first one goes to the best position in its own cell. Goals are
+    assigned so that the sum of the squared path lengths is minimal: then the assignment stays the same while
+    the robots move, and their paths do not cross. Since robots also leave these paths to look around, they
+    exchange goals only if that saves the fraction `MinSavings.swap` of the sum.
     """
     home = planner.find_own_node(team.positions[0])
     if home < 0:
@@ -124,7 +124,7 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
 
 
 def _choose_former_sources(nodes: Array, team: TeamSituation) -> IntArray:
-    """Return the source nearest to each former goal, no two the same; fixed robots choose first."""
+    """Return the source nearest to each former goal, all different; fixed robots choose first."""
     chosen = np.full(len(team.positions), -1, dtype=np.intp)
     for robot in np.argsort(~team.is_fixed, kind="stable").tolist():
         square = ((nodes - team.former_goals[robot]) ** 2).sum(axis=1)
@@ -134,8 +134,8 @@ def _choose_former_sources(nodes: Array, team: TeamSituation) -> IntArray:
 
 
 def _improve_sources(table: Array, chosen: IntArray, team: TeamSituation, min_saving: float) -> IntArray:
-    """Return sources, (k,), of a lower cost; the last column of the table stands for all other robots."""
-    # The order does not depend on who plans, so that all choose the same of two equally good plans.
+    """Return sources, (k,), with a lower cost. The last column of the table represents all other robots."""
+    # The order does not depend on who plans, so that all robots choose the same of two equally good plans.
     order = np.lexsort(team.former_goals.T)
     others = table.shape[1] - 1
     improved_sources = improve_sources(
@@ -143,7 +143,7 @@ def _improve_sources(table: Array, chosen: IntArray, team: TeamSituation, min_sa
         np.append(chosen[order], others),
         np.append(team.is_fixed[order], True),
         min_saving,
-        removals=len(chosen) <= _MAX_ROBOTS_OF_THOROUGH_SEARCH,
+        removals=len(chosen) <= _MAX_ROBOTS_FOR_THOROUGH_SEARCH,
     )
     result = chosen.copy()
     result[order] = improved_sources[:-1]
@@ -153,9 +153,9 @@ def _improve_sources(table: Array, chosen: IntArray, team: TeamSituation, min_sa
 def _assign_goals(
     nodes: Array, distances: Array, chosen: IntArray, team: TeamSituation, min_saving: float
 ) -> Array:
-    """Return the goals in the order of the robots, (k, 2) m, such that squared paths are short.
+    """Assign goals to robots with the smallest sum of squared path lengths; return them by robot, (k, 2) m.
 
-    `distances` are those from all sources, whose positions are `nodes`, to the chosen ones, (c, k) m.
+    `distances`, (c, k) m, are those from all sources, which are at `nodes`, to the chosen ones.
     """
     mobile = np.flatnonzero(~team.is_fixed)
     starts = [int(((nodes - team.positions[robot]) ** 2).sum(axis=1).argmin()) for robot in mobile]

@@ -1,4 +1,4 @@
-"""Viewpoints from which a robot sees the unseen parts of its own cell."""
+"""Viewpoints from which a robot can see the unknown parts of its own cell."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from robocov.arrays import Array
 from robocov.planning.grid_planner import GridPlanner
 
 _MIN_VIEWPOINT_DISTANCE_M = 0.6
-"""A robot does not go to look from closer to a point from which it has looked already."""
+"""Minimum distance of a viewpoint from all viewpoints that the robot has already visited."""
 
 
 def find_viewpoint(
@@ -18,7 +18,7 @@ def find_viewpoint(
     min_stake: float,
     former_viewpoints: Sequence[Array],
 ) -> Array | None:
-    """Find where to look at the unknown patch of a robot's own cell that may matter most.
+    """Find a viewpoint for the unknown patch in a robot's own cell that may matter most.
 
     Parameters
     ----------
@@ -26,21 +26,21 @@ def find_viewpoint(
     cell_distances : (m,) array, m
         Distances from the robot's goal to the nodes of its own cell, 0 for all other nodes.
     path_lengths : (m,) array, m
-        Distances of all nodes from where the robot is.
+        Distances from the robot to all nodes.
     min_stake : float
-        Stake below which a patch is not worth a look, in cells times metres.
+        Stake below which a patch is not worth a visit, in cells times metres.
     former_viewpoints : sequence of (2,) arrays, m
-        Viewpoints at which the robot has already been.
+        Viewpoints that the robot has already visited.
 
     Returns
     -------
     (2,) array or None, m
-        Centre of a free cell at the border of the patch. None if no stake is high enough.
+        Centre of a free cell at the border of the patch. None if no patch is worth a visit.
 
     Notes
     -----
-    The stake of a patch is its expected contribution to the cost: the inside of an obstacle hardly adds
-    anything. The viewpoint maximises the stake over one metre plus the path length.
+    The stake of a patch is its expected contribution to the cost; it is close to zero for the inside of an
+    obstacle. The viewpoint maximises the stake divided by (1 m + path length).
     """
     window = planner.window
     raster = planner.known_map.raster
@@ -52,15 +52,16 @@ def find_viewpoint(
         minlength=1 + unknown.patches.max(initial=0),
     )
     frontier_stakes = stakes[frontier.patches]
-    is_worth = frontier_stakes > min_stake
-    if not is_worth.any():
+    is_worth_visiting = frontier_stakes > min_stake
+    if not is_worth_visiting.any():
         return None
     # The free cells to the right of, above, to the left of and below each unknown one.
-    row = frontier.rows[is_worth, None] + [0, 1, 0, -1]
-    column = frontier.columns[is_worth, None] + [1, 0, -1, 0]
+    row = frontier.rows[is_worth_visiting, None] + [0, 1, 0, -1]
+    column = frontier.columns[is_worth_visiting, None] + [1, 0, -1, 0]
     node = row // window.stride * window.columns + column // window.stride
     node = np.clip(node, 0, len(path_lengths) - 1)
-    value = frontier.is_side_free[is_worth] * frontier_stakes[is_worth, None] / (1.0 + path_lengths[node])
+    stake_per_length = frontier_stakes[is_worth_visiting, None] / (1.0 + path_lengths[node])
+    value = frontier.is_side_free[is_worth_visiting] * stake_per_length
     corner = raster.compute_centers(np.array(window.first_row), np.array(window.first_column))
     min_distance = _MIN_VIEWPOINT_DISTANCE_M / raster.cell_size
     for x, y in (np.array(former_viewpoints).reshape(-1, 2) - corner) / raster.cell_size:

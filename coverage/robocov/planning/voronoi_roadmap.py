@@ -1,7 +1,7 @@
-"""Generalized Voronoi graph of free space: the points as far from one wall as from another.
+"""The generalized Voronoi graph of free space: the points that are equally far from two walls.
 
-It is the roadmap of Choset and Burdick (IJRR 19, 2000), on a grid: a thinning of the free cells that keeps
-how they are connected, loops, and the points halfway between two walls that face each other.
+It is the roadmap of Choset and Burdick (IJRR 19, 2000) on a grid. The free cells are thinned in a way that
+preserves their connections, loops, and the points halfway between two walls that face each other.
 """
 
 from __future__ import annotations
@@ -18,33 +18,33 @@ from robocov.arrays import Array, BoolArray, IntArray, compute_point_distances
 from robocov.compiled import kernel
 
 _MIN_FACING_ANGLE_RAD = math.radians(120.0)
-"""Angle between the directions to two walls from which they face each other."""
+"""Two walls face each other at a point if the directions to them differ by at least this angle."""
 _NEIGHBOURS = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)])
-"""The neighbours of a cell in a circle; every second one, from the first on, shares a side with it."""
+"""The eight neighbours of a cell, in circular order. The even ones share a side with it."""
 
 
 class VoronoiRoadmap(NamedTuple):
-    """Vertices along the generalized Voronoi graph of free space, each with the cells next to it."""
+    """Vertices along the generalized Voronoi graph of free space, each with the cells that belong to it."""
 
     vertices: IntArray
-    """(v, 2) Row and column of the cells where they are."""
+    """(v, 2) Row and column of the cell of each vertex."""
     distances: Array
-    """(v, v) Distances along the graph, in sides of cells; infinite if it is in pieces."""
+    """(v, v) Distances along the graph, in cells; infinite between vertices that it does not connect."""
     vertex_of_cell: IntArray
-    """(rows, columns) The vertex that each cell belongs to, -1 for none."""
+    """(rows, columns) The vertex that each cell belongs to, or -1 if there is none."""
 
     @classmethod
     def build(
         cls, is_roomy: BoolArray, is_free: BoolArray, spacing: float, max_vertices: int
     ) -> VoronoiRoadmap:
-        """Build the roadmap of the cells in which a robot fits.
+        """Build the roadmap of the cells where a robot fits.
 
         Parameters
         ----------
         is_roomy : (rows, columns) bool array
-            Cells that the graph may consist of.
+            Whether each cell may be part of the graph.
         is_free : (rows, columns) bool array
-            Cells that are divided among the vertices.
+            Whether each cell is to be assigned to a vertex.
         spacing : float
             Minimum distance from one vertex to the next, in cells.
         max_vertices : int
@@ -75,7 +75,7 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
     Parameters
     ----------
     is_free : (rows, columns) bool array
-        Everything next to the array counts as wall.
+        Everything outside the array counts as wall.
 
     Returns
     -------
@@ -85,8 +85,8 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
     Notes
     -----
     Cells are removed from the walls inwards if that changes no connection (distance-ordered homotopic
-    thinning, Pudney 1998), except for those whose nearest wall is in quite another direction than that of the
-    next cell: branches into corners vanish, those into rooms do not.
+    thinning, Pudney 1998). A cell stays if its nearest wall is in a very different direction from that of the
+    next cell. Branches into corners therefore vanish, while those into rooms remain.
     """
     is_graph = np.pad(is_free, 1)
     wall_distance, nearest_wall = ndimage.distance_transform_edt(is_graph, return_indices=True)
@@ -95,7 +95,7 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
         before = (*(slice(None),) * axis, slice(None, -1))
         after = (*(slice(None),) * axis, slice(1, None))
         gap = np.sqrt((np.diff(nearest_wall, axis=axis + 1) ** 2).sum(axis=0))
-        # Two walls at that distance, in directions that differ by the angle, are this far apart.
+        # Two points at this distance, in directions that differ by the angle, are this far apart.
         distance = np.maximum(wall_distance[before], wall_distance[after])
         is_facing = gap > 2.0 * distance * math.sin(0.5 * _MIN_FACING_ANGLE_RAD) + 1.0
         is_between_walls[before] |= is_facing
@@ -108,7 +108,7 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
 
 @kernel
 def _thin(is_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbours: IntArray) -> None:
-    """Remove cells in an order, again and again, as long as there are some that connect nothing."""
+    """Remove cells that no connection depends on, in the given order, until none is left to remove."""
     columns = is_graph.shape[1]
     has_changed = True
     while has_changed:
@@ -140,9 +140,9 @@ def _count_crossings(is_graph: BoolArray, row: int, column: int, neighbours: Int
 
 @kernel
 def _group_cells(is_graph: BoolArray, max_steps: int, neighbours: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the first cell of each group, and the group of each cell, (rows, columns), -1 for none.
+    """Return the first cell of each group, and the group of each cell, (rows, columns), or -1 for none.
 
-    A group consists of the cells that are at most a number of steps from its first one, and in no other one.
+    A group consists of the cells within `max_steps` of its first cell that are not in an earlier group.
     """
     rows, columns = is_graph.shape
     group = np.full(is_graph.shape, -1)
@@ -192,7 +192,7 @@ def _list_adjacent_groups(group: IntArray) -> tuple[IntArray, IntArray]:
 
 @kernel
 def _spread_groups(group: IntArray, is_free: BoolArray, neighbours: IntArray) -> None:
-    """Give each free cell the group of the nearest cell that is in one, by the number of steps."""
+    """Give each free cell the group of the nearest cell that has one, measured in steps between cells."""
     rows, columns = is_free.shape
     queue = np.empty(is_free.size, dtype=np.intp)
     head = 0

@@ -1,4 +1,4 @@
-"""The part of a raster that carries the nodes of a lattice."""
+"""The part of a raster on which a lattice of nodes lies."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ CellValue = TypeVar("CellValue", bound=np.generic)
 
 
 class Window(NamedTuple):
-    """The part of a raster that carries nodes, one in the middle of each square block of cells."""
+    """The part of a raster on which nodes lie, one in the middle of each square block of cells."""
 
     first_row: int
-    """Row of the lowest cells."""
+    """The lowest row of cells."""
     first_column: int
-    """Column of the leftmost cells."""
+    """The leftmost column of cells."""
     rows: int
     """Number of rows of nodes."""
     columns: int
@@ -30,16 +30,17 @@ class Window(NamedTuple):
 
     @classmethod
     def build_around(cls, raster: Raster, center: Array, reach: float, max_nodes: int) -> Window:
-        """Build the window of the finest blocks that covers the surroundings of a point.
+        """Build the window around a point, with the finest possible blocks.
 
         Parameters
         ----------
         raster : Raster
         center : (2,) array, m
         reach : float, m
-            All points up to this distance are in the window; infinite for the whole raster. The window moves
-            in steps of a quarter of the reach, and therefore stays the same while the centre hardly moves.
+            The window contains all points up to this distance; infinite for the whole raster. It moves in
+            steps of a quarter of the reach, so that it stays the same while the centre hardly moves.
         max_nodes : int
+            Maximum number of nodes.
 
         Returns
         -------
@@ -68,12 +69,12 @@ class Window(NamedTuple):
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Number of rows and columns of cells; the last ones may be beyond the raster."""
+        """Number of rows and columns of cells. The last ones may lie beyond the raster."""
         return self.rows * self.stride, self.columns * self.stride
 
     @property
     def block_shape(self) -> tuple[int, int, int, int]:
-        """Shape of the cells by blocks: nodes along y, cells of each, nodes along x, cells of each."""
+        """Shape of the cells by block: rows of blocks, rows in each, columns of blocks, columns in each."""
         return self.rows, self.stride, self.columns, self.stride
 
     def crop(self, cells: NDArray[CellValue], fill: CellValue | bool) -> NDArray[CellValue]:
@@ -82,13 +83,13 @@ class Window(NamedTuple):
         Parameters
         ----------
         cells : (rows of the raster, columns of the raster) array
-        fill
-            Value of the window's cells beyond the raster.
+        fill : scalar
+            Value for the cells of the window that lie beyond the raster.
 
         Returns
         -------
         (h, w) array
-            Its shape is that of the window, `shape`.
+            Its shape is `shape`.
         """
         height, width = self.shape
         cropped = cells[
@@ -116,7 +117,7 @@ class Window(NamedTuple):
 
 
 def _compute_stepped_interval(middle: int, half_width: int, count: int) -> tuple[int, int]:
-    """Return the first cell and the cell past the last one, both in steps, within `count` cells."""
+    """Return the bounds of an interval of cells, rounded outwards to whole steps and clipped to `count`."""
     step = max(1, half_width // 4)
     low = (middle - half_width) // step * step
     high = -((-middle - half_width - 1) // step) * step
