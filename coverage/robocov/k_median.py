@@ -17,7 +17,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 
-Beat: TypeAlias = Callable[[], None]
+Heartbeat: TypeAlias = Callable[[], None]
 """Called once per iteration. It may raise, to cancel the computation."""
 
 _MIN_SAVING = 1e-9
@@ -99,7 +99,7 @@ def choose_greedily(table: Array, count: int) -> IntArray:
 
 
 def run_lloyd(
-    table: Array, sources: IntArray, fixed: BoolArray | None = None, beat: Beat = lambda: None
+    table: Array, sources: IntArray, fixed: BoolArray | None = None, heartbeat: Heartbeat = lambda: None
 ) -> IntArray:
     """Improve sources by Lloyd's iteration: each moves to the best source for the targets nearest to it.
 
@@ -109,8 +109,8 @@ def run_lloyd(
     sources : (k,) int array
     fixed : (k,) bool array or None
         Sources that do not change. By default all may change.
-    beat : callable
-        See `Beat`.
+    heartbeat : callable
+        See `Heartbeat`.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def run_lloyd(
     previous = sources
     previous_cost = np.inf
     while True:
-        beat()
+        heartbeat()
         cost, next_sources = _apply_lloyd_step(table, sources, fixed)
         if not cost < previous_cost * (1.0 - _MIN_SAVING):
             return previous
@@ -151,15 +151,15 @@ def apply_best_swap(table: Array, sources: IntArray, fixed: BoolArray, threshold
     return swapped if swapped_cost < cost * (1.0 - threshold) else sources
 
 
-def apply_best_swaps(table: Array, sources: IntArray, beat: Beat = lambda: None) -> IntArray:
+def apply_best_swaps(table: Array, sources: IntArray, heartbeat: Heartbeat = lambda: None) -> IntArray:
     """Apply best swaps as long as they lower the cost.
 
     Parameters
     ----------
     table : (m, c) array
     sources : (k,) int array
-    beat : callable
-        See `Beat`.
+    heartbeat : callable
+        See `Heartbeat`.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def apply_best_swaps(table: Array, sources: IntArray, beat: Beat = lambda: None)
     """
     fixed = np.zeros(len(sources), dtype=bool)
     while True:
-        beat()
+        heartbeat()
         swapped = apply_best_swap(table, sources, fixed, _MIN_SAVING)
         if swapped is sources:
             return sources

@@ -219,7 +219,7 @@ def test_giving_up():
 
     for iteration in (run_lloyd, apply_best_swaps):
         with pytest.raises(KeyboardInterrupt):
-            iteration(table, np.arange(3), beat=stop)
+            iteration(table, np.arange(3), heartbeat=stop)
 
 
 @given(seed=st.integers(0, 10_000), k=st.integers(1, 4))

@@ -1,8 +1,8 @@
 """The coverage cost (22): the mean distance that the nearest robot must travel to reach a point.
 
-Contents: `CoverageCost` computes a `CoverageResult` for the positions of a team, and `TimeVaryingCost` does
-so on maps with moving obstacles. The cost is a mean over the `Sites` of a lattice (`lattice`); `corner_views`
-and `site_paths` contain the kernels that find the nearest robot of each site.
+`CoverageCost` computes a `CoverageResult` for the positions of a team; `TimeVaryingCost` does the same on
+maps with moving obstacles. The cost is a mean over the `Sites` of a lattice (`lattice`). The kernels in
+`corner_views` and `site_paths` find the nearest robot of each site.
 """
 
 from robocov.cost.coverage_cost import CoverageCost

@@ -15,22 +15,22 @@ from robocov.geodesic.walls import Walls, can_bend_at_corner
 
 
 class CornerViews(NamedTuple):
-    """The sites that each corner sees, with one row for each corner and tile, sorted by tile."""
+    """The sites that each corner sees. There is a row for each corner and tile, sorted by tile."""
 
     first_row: IntArray
     """(t + 1,) The rows of tile k are those from ``first_row[k]`` up to ``first_row[k + 1]``."""
     corner: IntArray
-    """(r,)"""
+    """(r,) The corner of each row."""
     mask: IntArray
     """(r,) Bit s is set if the corner sees the site in slot s, and a shortest path to it can bend there."""
     nearest: Array
-    """(r,) Distance of the nearest of these sites, grid steps."""
+    """(r,) Distance from the corner to the nearest of these sites, grid steps."""
     farthest: Array
-    """(r,) Distance of the farthest of these sites, grid steps."""
+    """(r,) Distance from the corner to the farthest of these sites, grid steps."""
 
 
 def build_corner_views(tiles: int, numbers: IntArray, lengths: Array) -> CornerViews:
-    """Sort what `find_corner_views` has written by tile.
+    """Build the views from the rows that `find_corner_views` has written.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def build_corner_views(tiles: int, numbers: IntArray, lengths: Array) -> CornerV
     numbers : (r, 3) int array
         Corner, tile and mask.
     lengths : (r, 2) array, grid steps
-        Distances of the nearest and of the farthest site.
+        Distances of the nearest and the farthest site.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def find_corner_views(
     numbers: IntArray,
     lengths: Array,
 ) -> int:
-    """Find the sites that some corners see.
+    """Find the sites that are visible from a range of corners.
 
     Parameters
     ----------
@@ -78,14 +78,14 @@ def find_corner_views(
     index : AngularWallIndex
         Scratch space for one source.
     numbers : (m, 3) int array
-        Result: corner, tile and mask, see `CornerViews`.
+        Result: corner, tile and mask; see `CornerViews`.
     lengths : (m, 2) array, grid steps
-        Result: distances of the nearest and of the farthest site.
+        Result: distances of the nearest and the farthest site.
 
     Returns
     -------
     int
-        Number of rows, -1 if there is not enough space.
+        Number of rows, or -1 if there is not enough space.
     """
     corners = walls.corners
     tree = tiles.tree
@@ -120,9 +120,9 @@ def find_corner_views(
 
 @kernel
 def _find_visible_sites(
-    walls: Walls, index: AngularWallIndex, tiles: Tiles, corner: int, tile: int, span: Array
+    walls: Walls, index: AngularWallIndex, tiles: Tiles, corner: int, tile: int, distances: Array
 ) -> int:
-    """Return the mask of the sites of a tile that a corner sees; write the smallest and largest distance."""
+    """Return the mask of the sites of a tile that a corner sees; write the nearest and farthest distance."""
     corner_x = walls.corners[corner, 0]
     corner_y = walls.corners[corner, 1]
     mask = 0
@@ -142,6 +142,6 @@ def _find_visible_sites(
             length = np.sqrt(dx * dx + dy * dy)
             nearest = min(nearest, length)
             farthest = max(farthest, length)
-    span[0] = nearest
-    span[1] = farthest
+    distances[0] = nearest
+    distances[1] = farthest
     return mask

@@ -39,7 +39,7 @@ class CoverageCost:
     progress : callable, optional
         Called with the fraction of the preparation that is done. It may raise an exception to stop.
     geodesics : Geodesics, optional
-        The shortest paths of this very environment, if they are known already.
+        The shortest paths of the same environment, if they have been computed already.
 
     Attributes
     ----------
@@ -50,13 +50,13 @@ class CoverageCost:
     points : (m, 2) array, m
         Positions of the sites.
     cells : (m,) int array
-        Numbers of their cells.
+        Index of the cell of each site.
     spacing : float, m
         Side of a cell.
     corners : (k, 2) array, m
         All points where paths can bend.
     weights : (m,) array or None
-        Mean of φ over the cell of each site, None if all are equal.
+        Mean of φ over the cell of each site, or None if all are equal.
 
     Raises
     ------
@@ -82,8 +82,8 @@ class CoverageCost:
         require_environment(environment)
         self.lattice = int(require_number("lattice", lattice, 1, MAX_LATTICE, whole=True))
         if geodesics is None:
-            beat = None if progress is None else partial(progress, 0.0)
-            geodesics = Geodesics(environment, beat)
+            heartbeat = None if progress is None else partial(progress, 0.0)
+            geodesics = Geodesics(environment, heartbeat)
         self.geodesics = geodesics
         self.corners = freeze(geodesics.corners)
         self.sites, tiles = build_lattice(geodesics, self.lattice)
@@ -109,7 +109,7 @@ class CoverageCost:
         Returns
         -------
         CoverageCost
-            It shares everything else with this one.
+            It shares all other data with this one.
         """
         twin = copy(self)
         twin._set_density(environment)
@@ -132,8 +132,8 @@ class CoverageCost:
         positions : (n, 2) array, m
             Positions of the robots, in the free space.
         speeds : (n,) array, m/s, optional
-            If they are given, the first robot to arrive counts instead of the nearest one, and the cost is in
-            seconds.
+            If given, the first robot to arrive counts instead of the nearest one, and the cost is based on
+            travel times.
 
         Returns
         -------
@@ -142,25 +142,25 @@ class CoverageCost:
         Raises
         ------
         InputError
-            If there is no robot, a robot is outside the free space, or the speeds are not positive numbers,
-            one for each robot. The message names the robot.
+            If there is no robot, a robot is outside the free space, or `speeds` is not one positive number
+            per robot. The message names the robot.
         """
         positions = to_floats("positions", positions, "[x, y] of each robot in metres", InputError)
         if not positions.size:
             raise InputError("positions: expected at least one robot, got none")
-        grid_positions, is_inside = self.geodesics.snap_to_free_space(positions)
+        grid_points, is_inside = self.geodesics.snap_to_free_space(positions)
         is_covered: BoolArray = np.asarray(is_inside.any(axis=0))
         if speeds is None:
-            paths = self._find_paths(grid_positions[None], is_covered[None])
+            paths = self._find_paths(grid_points[None], is_covered[None])
             return self._build_result(positions, is_covered, paths, 0)
         checked_speeds = _require_speeds(speeds, len(positions))
-        paths = self._find_first_arrivals(grid_positions, is_inside, checked_speeds)
+        paths = self._find_first_arrivals(grid_points, is_inside, checked_speeds)
         return self._build_result(positions, is_covered, paths, 0, checked_speeds)
 
     def evaluate_teams(self, positions: Array) -> list[CoverageResult]:
         """Compute the coverage cost of each of several teams of the same size.
 
-        The results are those of separate calls, but are computed faster.
+        The results are the same as those of separate calls, but are computed faster.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class CoverageCost:
         Raises
         ------
         InputError
-            If the array has another shape, there is no robot, or one is outside the free space.
+            If the array has the wrong shape, there is no robot, or a robot is outside the free space.
 
         Examples
         --------
@@ -188,30 +188,31 @@ class CoverageCost:
             raise InputError(
                 f"positions: expected an array of shape (r, n, 2) with n >= 1, got shape {teams.shape}"
             )
-        grid_positions, is_inside = self.geodesics.snap_to_free_space(teams.reshape(-1, 2))
+        grid_points, is_inside = self.geodesics.snap_to_free_space(teams.reshape(-1, 2))
         is_covered = np.asarray(is_inside.reshape(*teams.shape[:2], is_inside.shape[1]).any(axis=1))
-        paths = self._find_paths(grid_positions.reshape(teams.shape), is_covered)
+        paths = self._find_paths(grid_points.reshape(teams.shape), is_covered)
         return [self._build_result(teams[row], is_covered[row], paths, row) for row in range(len(teams))]
 
-    def _find_paths(self, grid_positions: Array, is_covered: BoolArray) -> SitePaths:
-        """Find the paths to the sites from teams at (r, n, 2) grid steps that cover components, (r, c)."""
-        teams, robots, _ = grid_positions.shape
+    def _find_paths(self, grid_points: Array, is_covered: BoolArray) -> SitePaths:
+        """Find the paths to the sites from teams at (r, n, 2) grid steps.
+
+        `is_covered`, (r, c), says which components of the free space contain robots of each team.
+        """
+        teams, robots, _ = grid_points.shape
         tiles = len(self._map.tiles.boxes)
         paths = SitePaths.allocate(teams, len(self.points))
         while True:
             entries = self._entries_per_robot * robots + 2 * SOURCE_BINS
             index = AngularWallIndex.allocate(robots, SOURCE_BINS, entries)
             search = Search.allocate(index, robots, len(self.corners), tiles)
-            if find_site_paths(
-                self._map, search, grid_positions, is_covered, self.geodesics.grid.unit, paths
-            ):
+            if find_site_paths(self._map, search, grid_points, is_covered, self.geodesics.grid.unit, paths):
                 return paths
             self._entries_per_robot *= 2
 
-    def _find_first_arrivals(self, grid_positions: Array, is_inside: BoolArray, speeds: Array) -> SitePaths:
-        """Find the paths of the robots that arrive first, as those of one team.
+    def _find_first_arrivals(self, grid_points: Array, is_inside: BoolArray, speeds: Array) -> SitePaths:
+        """Find the path to each site from the robot that arrives first.
 
-        Of robots that are equally fast, the nearest one is the first: there is one search for each speed.
+        Among robots of the same speed, the nearest one arrives first. There is one search for each speed.
         """
         first = SitePaths(
             distance=np.full((1, len(self.points)), np.inf),
@@ -223,7 +224,7 @@ class CoverageCost:
         for speed in np.unique(speeds)[::-1]:
             rows = np.flatnonzero(speeds == speed)
             is_covered = is_inside[None, rows].any(axis=1)
-            paths = self._find_paths(grid_positions[None, rows], np.asarray(is_covered))
+            paths = self._find_paths(grid_points[None, rows], np.asarray(is_covered))
             is_sooner = paths.distance / speed < times
             times[is_sooner] = paths.distance[is_sooner] / speed
             first.distance[is_sooner] = paths.distance[is_sooner]
@@ -240,7 +241,10 @@ class CoverageCost:
         team: int,
         speeds: Array | None = None,
     ) -> CoverageResult:
-        """Build the result of a team at (n, 2) m that covers some components, (c,), from its paths."""
+        """Build the result of a team at (n, 2) m from its row of the paths.
+
+        `is_covered`, (c,), says which components of the free space contain robots of the team.
+        """
         distances = paths.distance[team]
         owner = paths.owner[team]
         covered_distances = distances
@@ -289,7 +293,7 @@ class CoverageCost:
         Returns
         -------
         (rows, columns) array
-            As `Sites.to_grid` returns it.
+            See `Sites.to_grid`.
         """
         return self.sites.to_grid(values)
 
@@ -305,7 +309,7 @@ class CoverageCost:
         Returns
         -------
         (w, 2) array, m
-            Waypoints, with both ends; of shape (0, 2) if no robot can reach the point.
+            Waypoints, including both ends; empty, of shape (0, 2), if no robot can reach the point.
 
         Raises
         ------
@@ -319,7 +323,7 @@ class CoverageCost:
 
 
 def _require_speeds(speeds: object, robots: int) -> Array:
-    """Return the speeds of a number of robots, (n,) m/s; raise InputError unless they are positive."""
+    """Return the speeds as an array, (n,) m/s; raise InputError unless there is one above 0 per robot."""
     try:
         values = np.array(speeds, dtype=float)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""The lattice of sites over which the coverage cost is summed, and its division into tiles for kernels."""
+"""The lattice of sites over which the coverage cost is averaged, and its division into tiles for kernels."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ TILE_SIDE = 4
 """Number of cells along a side of a tile."""
 
 SLOTS = TILE_SIDE**2
-"""Number of cells of a tile."""
+"""Number of cells per tile."""
 
 TILES_PER_GROUP = 16
-"""Number of consecutive tiles that are bounded together."""
+"""Number of consecutive tiles that share a bounding box."""
 
 _CELLS_PER_BLOCK = 1 << 18
 """Number of cells that are located at the same time, which limits the memory."""
@@ -45,7 +45,7 @@ class Sites:
     points : (m, 2) array, m
         Positions, row by row from the lower left.
     cells : (m,) int array
-        Numbers of their cells among all cells, ``row * lattice + column``.
+        Index of the cell of each site, ``row * lattice + column``.
     """
 
     lattice: int
@@ -74,21 +74,21 @@ class Sites:
 class Tiles(NamedTuple):
     """The sites of a lattice in square tiles of `SLOTS` cells, in grid steps.
 
-    Neighbouring tiles have close numbers. A slot whose cell is not free repeats another site of its tile.
+    Nearby tiles have nearby indices. A slot whose cell is not free repeats another site of its tile.
     """
 
     x: Array
-    """(t, SLOTS) Positions."""
+    """(t, SLOTS) x coordinate of each site."""
     y: Array
-    """(t, SLOTS)"""
+    """(t, SLOTS) y coordinate of each site."""
     site: IntArray
-    """(t, SLOTS) Number of the site in the lattice, -1 if the cell is not free."""
+    """(t, SLOTS) Index of the site in the lattice, or -1 if the cell is not free."""
     component: IntArray
     """(t, SLOTS) Component of the free space."""
     boxes: Array
     """(t, 4) Low x, low y, high x and high y of the sites of each tile."""
     group_boxes: Array
-    """(g, 4) The same of `TILES_PER_GROUP` consecutive tiles each."""
+    """(g, 4) The bounding box of each group of `TILES_PER_GROUP` consecutive tiles."""
     tree: Array
     """The box tree of the tiles."""
 
@@ -101,7 +101,7 @@ def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     Parameters
     ----------
     geodesics : Geodesics
-        Of the environment.
+        The shortest paths of the environment.
     side : int
         Number of cells along a side.
 
@@ -128,8 +128,8 @@ def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     cells = np.concatenate(all_cells)
     if not len(cells):
         raise ParameterError(
-            f"lattice: expected at least one site in the free space, got none with {side} cells a side; "
-            "choose a finer lattice"
+            f"lattice: expected at least one site in the free space, got none with {side} cells along a "
+            "side; choose a finer lattice"
         )
     cells.setflags(write=False)
     points = freeze(_compute_centres(cells, side, spacing, geodesics.grid.origin))
@@ -143,7 +143,7 @@ def _compute_centres(cells: IntArray, side: int, spacing: float, origin: Array) 
     return (column_row + 0.5) * spacing + origin
 
 
-def _build_tiles(sites: Sites, grid_positions: Array, component: IntArray) -> Tiles:
+def _build_tiles(sites: Sites, grid_points: Array, component: IntArray) -> Tiles:
     """Arrange sites at (m, 2) grid steps in tiles."""
     column = sites.cells % sites.lattice
     row = sites.cells // sites.lattice
@@ -154,8 +154,8 @@ def _build_tiles(sites: Sites, grid_positions: Array, component: IntArray) -> Ti
     slot = np.arange(SLOTS)
     is_empty = slot >= count[:, None]
     site = order[np.where(is_empty, 0, slot) + first[:, None]]
-    x = np.ascontiguousarray(grid_positions[site, 0])
-    y = np.ascontiguousarray(grid_positions[site, 1])
+    x = np.ascontiguousarray(grid_points[site, 0])
+    y = np.ascontiguousarray(grid_points[site, 1])
     low = np.column_stack([x.min(axis=1), y.min(axis=1)])
     high = np.column_stack([x.max(axis=1), y.max(axis=1)])
     group_starts = np.arange(0, len(low), TILES_PER_GROUP)

@@ -1,4 +1,4 @@
-"""The coverage cost of one set of positions, with everything that explains it."""
+"""The coverage cost of one set of positions, with the owner of every site and the path to it."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from robocov.errors import format_count
 
 @dataclass(frozen=True, eq=False)
 class CoverageResult(Drawable):
-    """The coverage cost (22) of n robots, and its m sites.
+    """The coverage cost (22) of n robots, evaluated at m sites.
 
     Attributes
     ----------
     mean_distance : float, m
-        Mean geodesic distance of the sites to their nearest robot, over the components of the free space that
-        contain robots, each site weighted by φ; nan if these are too small to contain a site.
+        Mean geodesic distance from a site to its nearest robot, weighted by φ, over the components of the
+        free space that contain robots; nan if these are too small to contain a site.
     value : float, m³
-        Equation (22), with φ as in (4): `mean_distance` times the integral of φ over these components, their
-        area without a density. With `speeds`, `mean_time` times that integral, in m² s.
+        Equation (22), with φ as in (4): `mean_distance` times the integral of φ over these components, which
+        is their area if there is no density. With `speeds`, `mean_time` times that integral, in m² s.
     uncovered_area : float, m²
         Area of the components without a robot.
     distances : (m,) array, m
-        Distance to the owner, inf if there is none.
+        Distance to the owner; inf if there is none.
     owner : (m,) int array
-        The nearest robot (the geodesic Voronoi partition), or with `speeds` the first one to arrive; the
-        first of equals, -1 if no robot can reach the site.
+        The nearest robot (the geodesic Voronoi partition), or with `speeds` the first one to arrive. Ties go
+        to the lowest index. -1 if no robot can reach the site.
     first_corner, last_corner : (m,) int array
-        Rows of `corners` where the path from the owner to the site bends first and last, -1 if it is
+        Rows of `corners` where the path from the owner to the site bends first and last; -1 if it is
         straight.
     positions : (n, 2) array, m
     points : (m, 2) array, m
@@ -46,9 +46,9 @@ class CoverageResult(Drawable):
     sites : Sites or None
         The lattice, for plots.
     weights : (m,) array or None
-        Mean of φ over the cell of each site, None if all are equal.
+        Mean of φ over the cell of each site, or None if all are equal.
     speeds : (n,) array or None, m/s
-        If they are given, the first robot to arrive counts instead of the nearest one.
+        If given, the first robot to arrive counts instead of the nearest one.
     mean_time : float or None, s
         With `speeds`, the mean time until the first robot arrives at a site.
     """
@@ -104,8 +104,8 @@ class CoverageResult(Drawable):
         """Derivative of `value` with respect to the positions, (n, 2) m²; with `speeds` in m s.
 
         Each site pulls its owner towards its first waypoint, by a unit vector times the site's share of the
-        integral of φ, divided by the owner's speed. Exact if `value` is differentiable and owners and corners
-        do not change.
+        integral of φ, divided by the owner's speed. The gradient is exact where `value` is differentiable and
+        a small move changes neither owners nor corners.
         """
         count = len(self.positions)
         site = np.flatnonzero(self.owner >= 0)

@@ -1,8 +1,7 @@
 """The nearest robot of every site, and the path to it: equation (22) without the mean.
 
-Most sites see the robot that is nearest in a straight line. The others are reached by way of a corner, or
-from another robot that they see and that is nearer than that. Of robots that are equally far, the one of the
-lowest number counts.
+Most sites see the robot that is nearest in a straight line. The others are reached via a corner, or from
+another visible robot if that path is shorter. If several robots are equally far, the first one counts.
 
 All lengths are in grid steps, except for the result.
 """
@@ -21,7 +20,7 @@ from robocov.geodesic.angular_index import (
     AngularWallIndex,
     add_walls,
     is_box_hidden,
-    is_surely_visible,
+    is_certainly_visible,
     is_visible,
 )
 from robocov.geodesic.box_tree import LEAF_SIZE, compute_squared_box_distance
@@ -29,14 +28,14 @@ from robocov.geodesic.corner_graph import CornerGraph, CornerPaths, CornerQueue,
 from robocov.geodesic.walls import Walls, can_bend_at_corner
 
 _MAX_SMALL_TEAM = 12
-"""Maximum number of robots whose views are not limited: each of so few is tested with most sites."""
+"""Teams up to this size see without a limit: each of so few robots is tested with most sites anyway."""
 
 _REACH_PADDING = 1e-9
-"""Added to the reach of a robot's view, relative to it: far more than rounding."""
+"""Relative margin added to the reach of a robot's view, far larger than rounding."""
 
 
 class CostMap(NamedTuple):
-    """Everything that is known before the robots."""
+    """The data of a map, which do not depend on the robots."""
 
     walls: Walls
     graph: CornerGraph
@@ -48,16 +47,17 @@ class Search(NamedTuple):
     """Scratch space and results of the search from n robots."""
 
     wall_index: AngularWallIndex
-    """The walls that each robot sees."""
+    """The walls around each robot."""
     reach: Array
-    """(n,) Distance of the farthest site to which a robot is the nearest in a straight line."""
+    """(n,) Distance from each robot to the farthest site to which it is the nearest in a straight line."""
     all_robots: IntArray
-    """(n,) Numbers of all robots."""
+    """(n,) Indices of all robots."""
     group_robots: IntArray
-    """(n,) Robots that may be the nearest to a site of a group of tiles."""
+    """(n,) The robots that may be nearest to a site of the current group of tiles."""
     tile_robots: IntArray
-    """(n,) Robots that may be the nearest to a site of a tile."""
+    """(n,) The robots that may be nearest to a site of the current tile."""
     queue: CornerQueue
+    """The corners from which paths to other corners may be shortened."""
     corner_paths: CornerPaths
     """The shortest paths from the robots to the corners."""
     hidden: IntArray
@@ -65,11 +65,11 @@ class Search(NamedTuple):
     nearest_robot: IntArray
     """(t, SLOTS) The robot that is nearest to each site in a straight line."""
     site_length: Array
-    """(t, SLOTS) Length of the shortest path to each site, inf if there is none."""
+    """(t, SLOTS) Length of the shortest path to each site; inf if there is none."""
     site_robot: IntArray
-    """(t, SLOTS) The robot from which it leads, -1 for none."""
+    """(t, SLOTS) The robot where that path starts, or -1 if there is none."""
     site_corner: IntArray
-    """(t, SLOTS) The last corner at which it bends, -1 for none."""
+    """(t, SLOTS) The last corner at which that path bends, or -1 if there is none."""
 
     @classmethod
     def allocate(cls, wall_index: AngularWallIndex, robots: int, corners: int, tiles: int) -> Search:
@@ -79,7 +79,7 @@ class Search(NamedTuple):
         ----------
         wall_index : AngularWallIndex
         robots, corners, tiles : int
-            Maximum number of each.
+            Number of each.
 
         Returns
         -------
@@ -105,17 +105,17 @@ class SitePaths(NamedTuple):
     """The shortest paths to m sites from the robots of r teams."""
 
     distance: Array
-    """(r, m) m, inf if no robot can reach the site."""
+    """(r, m) Length of each path, m; inf if no robot can reach the site."""
     owner: IntArray
-    """(r, m) The robot from which the path leads, -1 for none."""
+    """(r, m) The robot where the path starts, or -1 if there is none."""
     first_corner: IntArray
-    """(r, m) The first corner at which it bends, -1 for none."""
+    """(r, m) The first corner at which the path bends, or -1 if there is none."""
     last_corner: IntArray
-    """(r, m) The last corner at which it bends, -1 for none."""
+    """(r, m) The last corner at which the path bends, or -1 if there is none."""
 
     @classmethod
     def allocate(cls, teams: int, sites: int) -> SitePaths:
-        """Allocate paths for a number of teams and sites.
+        """Allocate paths for a given number of teams and sites.
 
         Parameters
         ----------
@@ -157,7 +157,7 @@ def find_site_paths(
     Returns
     -------
     bool
-        Whether there were enough entries in the index.
+        Whether the index had enough entries.
     """
     tiles = cost_map.tiles
     for team in range(len(teams)):
@@ -178,7 +178,7 @@ def find_site_paths(
 
 @kernel
 def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covered: BoolArray) -> bool:
-    """Find the paths from robots at (n, 2); return whether there were enough entries in the index."""
+    """Find the paths from robots at (n, 2); return whether the index had enough entries."""
     tiles = cost_map.tiles
     _find_nearest_robots(tiles, search, robots)
     used = 0
@@ -223,7 +223,7 @@ def _find_nearest_robots(tiles: Tiles, search: Search, robots: Array) -> None:
 def _list_possibly_nearest(
     boxes: Array, box: int, robots: Array, candidates: IntArray, count: int, result: IntArray
 ) -> int:
-    """List which of the first `count` candidates may be nearest to a point of a box; return how many."""
+    """List those of the first `count` candidates that may be nearest to a point of a box; return how many."""
     bound2 = np.inf
     for k in range(count):
         x = robots[candidates[k], 0]
@@ -238,8 +238,8 @@ def _list_possibly_nearest(
 def _list_within(
     boxes: Array, box: int, robots: Array, bound2: float, candidates: IntArray, count: int, result: IntArray
 ) -> int:
-    """List the first `count` candidates that are within a squared distance of a box; return their number."""
-    size = 0
+    """List those of the first `count` candidates within a squared distance of a box; return how many."""
+    found = 0
     for k in range(count):
         i = candidates[k]
         if compute_squared_box_distance(boxes, box, robots[i, 0], robots[i, 1]) <= bound2:
@@ -250,7 +250,7 @@ def _list_within(
 
 @kernel
 def _find_nearest_robots_of_tile(tiles: Tiles, search: Search, robots: Array, tile: int, count: int) -> None:
-    """Find which of the first `count` of `tile_robots` is nearest to each site, the first of equals."""
+    """Find which of the first `count` robots in `tile_robots` is nearest to each site, the first if tied."""
     length = search.site_length
     nearest_robot = search.nearest_robot
     for slot in range(SLOTS):
@@ -259,7 +259,7 @@ def _find_nearest_robots_of_tile(tiles: Tiles, search: Search, robots: Array, ti
         i = search.tile_robots[k]
         x = robots[i, 0]
         y = robots[i, 1]
-        # Without branches, so that several slots are computed at once. The lengths are still squared.
+        # There are no branches, so that the compiler can vectorise the loop. The lengths are still squared.
         for slot in range(SLOTS):
             dx = tiles.x[tile, slot] - x
             dy = tiles.y[tile, slot] - y
@@ -288,7 +288,7 @@ def _find_hidden_sites(cost_map: CostMap, search: Search, tile: int, is_covered:
             x = tiles.x[tile, slot]
             y = tiles.y[tile, slot]
             robot = search.nearest_robot[tile, slot]
-            if is_surely_visible(search.wall_index, robot, x, y):
+            if is_certainly_visible(search.wall_index, robot, x, y):
                 continue
             if not is_visible(cost_map.walls, search.wall_index, robot, x, y):
                 search.site_length[tile, slot] = np.inf
@@ -305,6 +305,7 @@ def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None
     paths = search.corner_paths
     waiting = 0
     count = 0
+    # Find good paths quickly: at first, try only the robot that is nearest to each corner.
     for corner in range(len(walls.corners)):
         if corner % LEAF_SIZE == 0:
             leaf = first_leaf + corner // LEAF_SIZE
@@ -317,9 +318,9 @@ def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None
         nearest = _find_nearest_candidate(
             robots, search.group_robots, count, walls.corners[corner, 0], walls.corners[corner, 1]
         )
-        waiting = _take_straight_path(walls, search, corner, nearest, waiting)
+        waiting = _try_straight_path(walls, search, corner, nearest, waiting)
     relax_paths(cost_map.graph, paths, search.queue, waiting)
-    # Only robots that are closer than the length of these paths can shorten them.
+    # Then try all robots that are closer to a corner than the length of its path: only these can shorten it.
     waiting = 0
     for corner in range(len(walls.corners)):
         if corner % LEAF_SIZE == 0:
@@ -331,13 +332,13 @@ def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None
                 boxes, leaf, robots, bound * bound, search.all_robots, len(robots), search.group_robots
             )
         for k in range(count):
-            waiting = _take_straight_path(walls, search, corner, search.group_robots[k], waiting)
+            waiting = _try_straight_path(walls, search, corner, search.group_robots[k], waiting)
     relax_paths(cost_map.graph, paths, search.queue, waiting)
 
 
 @kernel
 def _find_nearest_candidate(robots: Array, candidates: IntArray, count: int, x: float, y: float) -> int:
-    """Return which of the first `count` candidates is nearest to a point in a straight line."""
+    """Return the one of the first `count` candidates that is nearest to a point in a straight line."""
     best2 = np.inf
     nearest = -1
     for k in range(count):
@@ -351,8 +352,11 @@ def _find_nearest_candidate(robots: Array, candidates: IntArray, count: int, x: 
 
 
 @kernel
-def _take_straight_path(walls: Walls, search: Search, corner: int, robot: int, waiting: int) -> int:
-    """Take the straight path from a robot to a corner if it is the shortest; return how many corners wait."""
+def _try_straight_path(walls: Walls, search: Search, corner: int, robot: int, waiting: int) -> int:
+    """Use the straight path from a robot to a corner if it is the shortest so far.
+
+    Return the number of corners in the queue.
+    """
     paths = search.corner_paths
     corner_x = walls.corners[corner, 0]
     corner_y = walls.corners[corner, 1]
@@ -385,11 +389,11 @@ def _find_hidden_site_paths(cost_map: CostMap, search: Search, robots: Array) ->
         bound = -1.0
         for tile in range(first, end):
             if search.hidden[tile]:
-                _take_corner_paths(cost_map, search, tile)
+                _try_corner_paths(cost_map, search, tile)
                 bound = max(bound, _find_longest_hidden(search, tile))
         if bound < 0.0:
             continue
-        # A site may see another robot that is nearer than by way of a corner.
+        # A site may see another robot, from which the path is shorter than via a corner.
         group_count = _list_within(
             tiles.group_boxes,
             group,
@@ -412,12 +416,12 @@ def _find_hidden_site_paths(cost_map: CostMap, search: Search, robots: Array) ->
                     search.tile_robots,
                 )
                 for k in range(count):
-                    _take_straight_paths(cost_map, search, tile, search.tile_robots[k])
+                    _try_straight_paths(cost_map, search, tile, search.tile_robots[k])
 
 
 @kernel
-def _take_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
-    """Take the shortest paths to the hidden sites of a tile by way of a corner."""
+def _try_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
+    """Find the shortest paths via a corner to the hidden sites of a tile."""
     tiles = cost_map.tiles
     views = cost_map.views
     corners = cost_map.walls.corners
@@ -425,7 +429,7 @@ def _take_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
     hidden = search.hidden[tile]
     first = views.first_row[tile]
     end = views.first_row[tile + 1]
-    # A corner cannot be the best for any site if another one is better for all of them.
+    # If a corner sees all hidden sites, none of their paths needs to be longer than the one via that corner.
     bound = np.inf
     for row in range(first, end):
         if hidden & ~views.mask[row] == 0:
@@ -449,9 +453,9 @@ def _take_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
 
 
 @kernel
-def _is_better(length: float, robot: int, known_length: float, known_robot: int) -> bool:
-    """Return whether a path is shorter than the known one, or as long from a robot of a lower number."""
-    return length < known_length or (length == known_length and robot < known_robot)
+def _is_better(length: float, robot: int, best_length: float, best_robot: int) -> bool:
+    """Return whether a path is shorter than the best one, or equally long from a robot of a lower index."""
+    return length < best_length or (length == best_length and robot < best_robot)
 
 
 @kernel
@@ -466,8 +470,8 @@ def _find_longest_hidden(search: Search, tile: int) -> float:
 
 
 @kernel
-def _take_straight_paths(cost_map: CostMap, search: Search, tile: int, robot: int) -> None:
-    """Take the straight paths from a robot to the hidden sites of a tile if they are the shortest."""
+def _try_straight_paths(cost_map: CostMap, search: Search, tile: int, robot: int) -> None:
+    """Use the straight paths from a robot to the hidden sites of a tile where they are the shortest."""
     tiles = cost_map.tiles
     index = search.wall_index
     if is_box_hidden(tiles.boxes, tile, index, robot):

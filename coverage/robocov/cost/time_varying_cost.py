@@ -12,22 +12,22 @@ from robocov.arrays import Array, BoolArray
 from robocov.cost.coverage_cost import CoverageCost
 from robocov.cost.result import CoverageResult
 
-_MAX_KEPT_MAPS = 64
-"""Maximum number of maps whose costs are kept: a moving obstacle returns to the same positions."""
+_MAX_CACHED_MAPS = 64
+"""Maximum number of maps whose costs are cached: moving obstacles return to the same positions."""
 
 
 class TimeVaryingCost:
-    """The coverage cost (22) at any time, of the robots that count.
+    """The coverage cost (22) at any time, over the robots that count.
 
-    Robots that have failed do not count, since they go nowhere. Neither do robots that a moving obstacle has
-    run over, until they are free again.
+    Robots that have failed do not count, since they cannot go anywhere. Neither do robots that a moving
+    obstacle has run over, until they are free again.
 
     Parameters
     ----------
     cost : CoverageCost
-        The cost of the map as it was given, at time zero.
+        The cost of the map at time zero.
     progress : callable, optional
-        As of `CoverageCost`, for the maps of other times.
+        See `CoverageCost`; used for the maps at other times.
 
     Examples
     --------
@@ -55,7 +55,7 @@ class TimeVaryingCost:
         Returns
         -------
         CoverageCost
-            The given one if no obstacle moves.
+            The one passed to the constructor if no obstacle moves.
         """
         environment = self._cost.environment
         if not environment.has_moving_obstacles:
@@ -63,7 +63,7 @@ class TimeVaryingCost:
         current = environment.at(time)
         key = current.free.wkb
         if key not in self._cost_by_map:
-            if len(self._cost_by_map) >= _MAX_KEPT_MAPS:
+            if len(self._cost_by_map) >= _MAX_CACHED_MAPS:
                 oldest = next(iter(self._cost_by_map))
                 del self._cost_by_map[oldest]
             self._cost_by_map[key] = CoverageCost(current, self._cost.lattice, progress=self._progress)
@@ -79,7 +79,7 @@ class TimeVaryingCost:
         time : float, s
         positions : (n, 2) array, m
         working : (n,) bool array, optional
-            Whether each robot works; by default all do.
+            Whether each robot works. By default, all do.
 
         Returns
         -------
@@ -101,14 +101,14 @@ class TimeVaryingCost:
         time : float, s
         positions : (n, 2) array, m
         working : (n,) bool array, optional
-            Whether each robot works; by default all do.
+            Whether each robot works. By default, all do.
         speeds : (n,) array, m/s, optional
-            As of `CoverageCost`.
+            See `CoverageCost`.
 
         Returns
         -------
         CoverageResult or None
-            With a row for each robot that counts; None if no robot does.
+            It has a row for each robot that counts. None if no robot counts.
         """
         is_counted = self.find_counted_robots(time, positions, working)
         if not is_counted.any():
@@ -126,12 +126,12 @@ class TimeVaryingCost:
         time : float, s
         positions : (n, 2) array, m
         working : (n,) bool array, optional
-            Whether each robot works; by default all do.
+            Whether each robot works. By default, all do.
 
         Returns
         -------
         CoverageResult or None
-            A robot that does not count owns no site; None if no robot counts.
+            A robot that does not count owns no site. None if no robot counts.
         """
         result = self(time, positions, working)
         if result is None or len(result.positions) == len(positions):
@@ -140,17 +140,17 @@ class TimeVaryingCost:
         owner = np.where(result.owner >= 0, rows[result.owner], -1)
         return replace(result, positions=np.array(positions), owner=owner)
 
-    def compute_figures(
+    def compute_summary(
         self, time: float, positions: Array, working: BoolArray | None = None
     ) -> tuple[float, float, float]:
-        """Compute the figures of the coverage cost at a time.
+        """Compute the numbers that summarise the coverage cost at a time.
 
         Parameters
         ----------
         time : float, s
         positions : (n, 2) array, m
         working : (n,) bool array, optional
-            Whether each robot works; by default all do.
+            Whether each robot works. By default, all do.
 
         Returns
         -------
@@ -159,7 +159,7 @@ class TimeVaryingCost:
         value : float, m³
             nan if no robot counts.
         uncovered_area : float, m²
-            The whole free area if no robot counts.
+            The entire free area if no robot counts.
         """
         result = self(time, positions, working)
         if result is None:

@@ -1,9 +1,9 @@
-"""Visibility among walls: for each source, the walls that face it in angular bins.
+"""Visibility among walls: for each source, the walls that face it, sorted into angular bins.
 
 A wall a → b (free space on its left) hides a target q from a source p if and only if p is not behind it, q is
-behind it, and the segment from p to q meets it, ends included. Touching a vertex of an obstacle from outside
-may therefore hide; a path by way of that vertex is as short. The walls that end in p are left out: there, the
-sectors decide.
+behind it, and the segment from p to q meets it, ends included. A target may therefore be hidden by a vertex
+that the segment only touches; the path via that vertex is just as short. Walls that end at p are left out. If
+p is a vertex, its sectors decide in which directions there is free space.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from robocov.geodesic.grid import cross
 from robocov.geodesic.walls import Walls, contains_direction, find_vertex, get_relative_ends
 
 _PADDING = 1e-9
-"""Added to the angles that a wall spans, and taken off its distance: far more than rounding, at no cost."""
+"""Margin added to the angles that a wall spans and subtracted from its distance, far larger than rounding."""
 
 _MAX_CHAIN = 16
 """Maximum number of consecutive walls that are examined together."""
 
 _MAX_SIDE_ERROR = 2.0**55
-"""More than the rounding errors of sums of products of grid coordinates."""
+"""Bound on the rounding error of sums of products of grid coordinates."""
 
 _MAX_TREE_DEPTH = 64
-"""Nodes that may wait for a visit, at most one for each level of the tree."""
+"""Size of the stack of a tree search, which contains at most one node for each level of the tree."""
 
 
 class AngularWallIndex(NamedTuple):
@@ -42,42 +42,42 @@ class AngularWallIndex(NamedTuple):
     reach2: Array
     """(n,) Distances up to which walls are in the index."""
     clear2: Array
-    """(n, bins) Distances up to which nothing is hidden, -1 if the source is a vertex: there, the sectors
-    decide first."""
+    """(n, bins) Distances up to which nothing is hidden; -1 if the source is a vertex, whose sectors must be
+    checked first."""
     horizon2: Array
     """(n, bins) Distances beyond which everything is hidden."""
     head: IntArray
-    """(n, bins) The last entry of each bin, -1 for none."""
+    """(n, bins) The last entry of each bin, or -1 if it is empty."""
     entry_wall: IntArray
     """(m,) The wall of each entry."""
     entry_before: IntArray
-    """(m,) The entry before in the same bin, -1 for none."""
+    """(m,) The previous entry in the same bin, or -1 if there is none."""
     stack: IntArray
-    """Nodes of the tree that wait for a visit."""
+    """Nodes of the box tree that are still to be visited."""
 
     @classmethod
-    def allocate(cls, n: int, bins: int, entries: int) -> AngularWallIndex:
+    def allocate(cls, sources: int, bins: int, entries: int) -> AngularWallIndex:
         """Allocate an index, to be filled by `add_walls`.
 
         Parameters
         ----------
-        n : int
+        sources : int
             Number of sources.
         bins : int
             Number of angular bins of each source, a power of 2.
         entries : int
-            Maximum number of entries of all sources together.
+            Maximum number of entries, for all sources together.
 
         Returns
         -------
         AngularWallIndex
         """
         return cls(
-            positions=np.empty((n, 2)),
-            reach2=np.empty(n),
-            clear2=np.empty((n, bins)),
-            horizon2=np.empty((n, bins)),
-            head=np.empty((n, bins), np.int64),
+            positions=np.empty((sources, 2)),
+            reach2=np.empty(sources),
+            clear2=np.empty((sources, bins)),
+            horizon2=np.empty((sources, bins)),
+            head=np.empty((sources, bins), np.int64),
             entry_wall=np.empty(entries, np.int64),
             entry_before=np.empty(entries, np.int64),
             stack=np.empty(_MAX_TREE_DEPTH, np.int64),
@@ -108,17 +108,17 @@ def compute_pseudo_angle(dx: float, dy: float) -> float:
 
 @kernel
 def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int) -> bool:
-    """Return whether all of a box is beyond the horizon of a source, in every bin that the box meets.
+    """Return whether a box lies entirely beyond the horizon of a source, in every bin that it meets.
 
     Parameters
     ----------
     boxes : (nodes, 4) array, m
         Boxes of a tree, as `box_tree` builds it.
     node : int
-        Number of the box.
+        The node of the box.
     index : AngularWallIndex
     source : int
-        Number of the source in the index.
+        Row of the source in the index.
 
     Returns
     -------
@@ -134,8 +134,8 @@ def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int)
     half_height = 0.5 * (boxes[node, 3] - boxes[node, 1])
     dx = boxes[node, 0] + half_width - x
     dy = boxes[node, 1] + half_height - y
-    # A pseudo-angle grows at most as fast as the angle. The angle of half the box is at most pi/2 times its
-    # sine, which is the half diagonal over the distance of the centre.
+    # The angle that half the box spans is at most pi/2 times its sine, and its sine is the half diagonal
+    # divided by the distance of the centre. A pseudo-angle grows at most as fast as the angle.
     sine2 = (half_width * half_width + half_height * half_height) / (dx * dx + dy * dy)
     half_angle = np.sqrt(sine2) * (0.5 * np.pi) + _PADDING
     angle = compute_pseudo_angle(dx, dy)
@@ -158,20 +158,20 @@ def add_walls(
     ----------
     walls : Walls
     index : AngularWallIndex
-        Is changed.
+        Modified in place.
     source : int
-        Number of the source.
+        Row of the source in the index.
     x, y : float, grid steps
         Its position, not inside an obstacle.
     reach2 : float
         Squared distance up to which walls are added.
     used : int
-        Number of entries that other sources use.
+        Number of entries that the other sources already use.
 
     Returns
     -------
     int
-        Number of entries that are used now, -1 if there are too few.
+        Number of entries used now, or -1 if the index has too few.
     """
     boxes = walls.boxes
     stack = index.stack
@@ -188,7 +188,7 @@ def add_walls(
         if is_box_hidden(boxes, node, index, source):
             continue
         if node < leaves:
-            # The nearer half comes first: boxes that it hides need not be visited.
+            # Visit the nearer half first: boxes that it hides need not be visited.
             left2 = compute_squared_box_distance(boxes, 2 * node, x, y)
             right2 = compute_squared_box_distance(boxes, 2 * node + 1, x, y)
             nearer = 2 * node + int(right2 < left2)
@@ -210,7 +210,7 @@ def add_walls(
 
 @kernel
 def _reset_source(index: AngularWallIndex, source: int, x: float, y: float, reach2: float) -> None:
-    """Place a source where no wall is in its way."""
+    """Set the position of a source, with no walls around it yet."""
     index.positions[source, 0] = x
     index.positions[source, 1] = y
     index.reach2[source] = reach2
@@ -222,14 +222,14 @@ def _reset_source(index: AngularWallIndex, source: int, x: float, y: float, reac
 
 @kernel
 def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, used: int) -> int:
-    """Add a wall to the bins that it spans, if it faces the source; return the number of used entries."""
+    """Add a wall to the bins that it spans if it faces the source; return the number of entries used."""
     x = index.positions[source, 0]
     y = index.positions[source, 1]
     ax, ay, bx, by = get_relative_ends(walls.ends, wall, x, y)
     ux = bx - ax
     uy = by - ay
     side = cross(ax, ay, ux, uy)
-    # A wall in line with the source hides nothing, unless the source is on it, but not at its ends.
+    # A wall in line with the source hides nothing, unless the source is in its interior.
     if side < 0.0 or (side == 0.0 and ax * bx + ay * by >= 0.0):
         return used
     along = min(max(-(ax * ux + ay * uy) / (ux * ux + uy * uy), 0.0), 1.0)
@@ -239,18 +239,19 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
     if near2 >= index.reach2[source]:
         return used
     far2 = max(ax * ax + ay * ay, bx * bx + by * by) * (1.0 + _PADDING)
-    # Seen from its front, a wall runs counter-clockwise from a to b, by at most a half turn.
+    # Seen from its front, a wall runs counter-clockwise from a to b, by at most half a turn.
     bins = index.head.shape[1]
     scale = bins * 0.25
     start = compute_pseudo_angle(ax, ay)
     stop = compute_pseudo_angle(bx, by)
     if stop < start:
         stop += 4.0
-    low = int(np.floor((start - _PADDING) * scale))
-    high = int(np.floor((stop + _PADDING) * scale))
-    inner_low = int(np.ceil((start + _PADDING) * scale))
-    inner_high = int(np.floor((stop - _PADDING) * scale))
-    for unwrapped_bin in range(low, min(high, low + bins - 1) + 1):
+    first_bin = int(np.floor((start - _PADDING) * scale))
+    last_bin = int(np.floor((stop + _PADDING) * scale))
+    # The wall covers the bins from `covered_first` up to `covered_end` completely.
+    covered_first = int(np.ceil((start + _PADDING) * scale))
+    covered_end = int(np.floor((stop - _PADDING) * scale))
+    for unwrapped_bin in range(first_bin, min(last_bin, first_bin + bins - 1) + 1):
         k = unwrapped_bin & (bins - 1)
         if near2 > index.horizon2[source, k]:
             continue
@@ -259,14 +260,13 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
         index.entry_before[used] = index.head[source, k]
         index.head[source, k] = used
         used += 1
-        # Everything farther than a wall across the whole bin is hidden by that wall.
-        if inner_low <= unwrapped_bin < inner_high:
+        if covered_first <= unwrapped_bin < covered_end:
             index.horizon2[source, k] = min(index.horizon2[source, k], far2)
     # The last bin is covered only in part; the walls that follow this one may cover the rest.
-    last = inner_high & (bins - 1)
-    if inner_low <= inner_high < low + bins and far2 < index.horizon2[source, last]:
-        chain_far2 = _find_chain_end(walls, wall, x, y, stop, (inner_high + 1) / scale, far2)
-        index.horizon2[source, last] = min(index.horizon2[source, last], chain_far2)
+    k = covered_end & (bins - 1)
+    if covered_first <= covered_end < first_bin + bins and far2 < index.horizon2[source, k]:
+        chain_far2 = _find_chain_end(walls, wall, x, y, stop, (covered_end + 1) / scale, far2)
+        index.horizon2[source, k] = min(index.horizon2[source, k], chain_far2)
     return used
 
 
@@ -276,7 +276,7 @@ def _find_chain_end(
 ) -> float:
     """Follow walls that face (x, y) from one pseudo-angle to another; return their largest squared distance.
 
-    The result is inf if the walls do not reach the last angle. `far2` is the distance of those before.
+    The result is inf if the walls do not reach the last angle. `far2` is the distance of the wall so far.
     """
     for _ in range(_MAX_CHAIN):
         ax = walls.ends[wall, 2] - x
@@ -305,7 +305,7 @@ def find_bin(bins: int, dx: float, dy: float) -> int:
     Parameters
     ----------
     bins : int
-        Number of bins of a full turn.
+        Number of bins in a full turn.
     dx, dy : float
         The direction, of any length.
 
@@ -318,14 +318,16 @@ def find_bin(bins: int, dx: float, dy: float) -> int:
 
 @kernel
 def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: float) -> bool:
-    """Return whether a source sees a point at any distance; from a vertex only into its free space.
+    """Return whether a source sees a point at any distance.
+
+    A source at a vertex sees only the directions that lead into free space.
 
     Parameters
     ----------
     walls : Walls
     index : AngularWallIndex
     source : int
-        Number of the source in the index.
+        Row of the source in the index.
     x, y : float, m
         The point.
 
@@ -337,7 +339,7 @@ def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: 
     dy = y - index.positions[source, 1]
     distance2 = dx * dx + dy * dy
     k = find_bin(index.clear2.shape[1], dx, dy)
-    # These two comparisons decide most cases.
+    # These two comparisons settle most cases.
     if distance2 <= index.clear2[source, k]:
         return True
     if distance2 > index.horizon2[source, k]:
@@ -346,7 +348,7 @@ def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: 
 
 
 @kernel
-def is_surely_visible(index: AngularWallIndex, source: int, x: float, y: float) -> bool:
+def is_certainly_visible(index: AngularWallIndex, source: int, x: float, y: float) -> bool:
     """Return whether a point is so close to a source that nothing can hide it.
 
     Loops that test many points call this before `is_visible`, which is too large for the compiler to inline.
@@ -355,7 +357,7 @@ def is_surely_visible(index: AngularWallIndex, source: int, x: float, y: float) 
     ----------
     index : AngularWallIndex
     source : int
-        Number of the source in the index.
+        Row of the source in the index.
     x, y : float, m
         The point.
 
@@ -374,7 +376,7 @@ def is_surely_visible(index: AngularWallIndex, source: int, x: float, y: float) 
 def _is_visible_past_walls(
     walls: Walls, index: AngularWallIndex, source: int, k: int, dx: float, dy: float
 ) -> bool:
-    """Return whether a source sees the point at (dx, dy) from it, in bin k, by testing every wall there."""
+    """Return whether a source sees the point at offset (dx, dy), by testing every wall in bin k."""
     x = index.positions[source, 0]
     y = index.positions[source, 1]
     if index.clear2[source, k] < 0.0:
@@ -393,7 +395,7 @@ def _is_visible_past_walls(
 
 @kernel
 def _hides(ends: Array, wall: int, x: float, y: float, dx: float, dy: float) -> bool:
-    """Return whether a wall that faces (x, y) hides the point at (dx, dy) from there."""
+    """Return whether a wall that faces (x, y) hides the point at offset (dx, dy) from there."""
     ax, ay, bx, by = get_relative_ends(ends, wall, x, y)
     return (
         cross(bx - ax, by - ay, dx - ax, dy - ay) < 0.0
@@ -404,7 +406,7 @@ def _hides(ends: Array, wall: int, x: float, y: float, dx: float, dy: float) -> 
 
 @kernel
 def _faces(ends: Array, wall: int, x: float, y: float) -> bool:
-    """Return whether (x, y) is in front of a wall, or on it, but not at its ends."""
+    """Return whether (x, y) is in front of a wall, or in its interior."""
     ax, ay, bx, by = get_relative_ends(ends, wall, x, y)
     side: float = cross(ax, ay, bx - ax, by - ay)
     return side > 0.0 or (side == 0.0 and ax * bx + ay * by < 0.0)
@@ -412,7 +414,7 @@ def _faces(ends: Array, wall: int, x: float, y: float) -> bool:
 
 @kernel
 def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> bool:
-    """Return whether no wall hides the point at (dx, dy) from (x, y), by a search along the segment."""
+    """Return whether no wall hides the point at offset (dx, dy) from (x, y), searching along the segment."""
     boxes = walls.boxes
     leaves = len(boxes) // 2
     node = 1
@@ -436,14 +438,16 @@ def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> 
 
 @kernel
 def _is_box_off_segment(boxes: Array, node: int, x: float, y: float, dx: float, dy: float) -> bool:
-    """Return whether a box certainly does not meet the segment of length (dx, dy) from (x, y)."""
+    """Return whether a box certainly does not meet the segment from (x, y) to (x + dx, y + dy)."""
     if boxes[node, 0] > x + max(dx, 0.0) or boxes[node, 2] < x + min(dx, 0.0):
         return True
     if boxes[node, 1] > y + max(dy, 0.0) or boxes[node, 3] < y + min(dy, 0.0):
         return True
     half_width = 0.5 * (boxes[node, 2] - boxes[node, 0])
     half_height = 0.5 * (boxes[node, 3] - boxes[node, 1])
+    # Compare the distance of the centre from the line with the extent of the box across the line, both times
+    # the length of the segment.
     side = dx * (boxes[node, 1] + half_height - y) - dy * (boxes[node, 0] + half_width - x)
-    size: float = abs(dx) * half_height + abs(dy) * half_width
+    half_extent: float = abs(dx) * half_height + abs(dy) * half_width
     distance: float = abs(side) * (1.0 - _PADDING)
-    return distance > size * (1.0 + _PADDING) + _MAX_SIDE_ERROR
+    return distance > half_extent * (1.0 + _PADDING) + _MAX_SIDE_ERROR

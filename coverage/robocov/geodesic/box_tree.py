@@ -1,8 +1,8 @@
-"""Trees of bounding boxes, with which searches skip everything that is far away.
+"""Trees of bounding boxes, which let searches skip everything that is far away.
 
-A tree is an (2 k, 4) array with rows of low x, low y, high x and high y. Node 1 is the root, and node k
+A tree is a (2 k, 4) array with rows of low x, low y, high x and high y. Node 1 is the root, and node k
 contains nodes 2 k and 2 k + 1. The second half of the rows are leaves of `LEAF_SIZE` consecutive items
-each; leaves without any are boxes that start at infinity. Row 0 is not used.
+each; the boxes of empty leaves start at infinity. Row 0 is not used.
 """
 
 import numpy as np
@@ -11,19 +11,19 @@ from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 
 LEAF_SIZE = 8
-"""Number of items of a leaf."""
+"""Number of items per leaf."""
 
 _Z_ORDER_BITS = 16
-"""Bits of the coordinates of `compute_z_order`."""
+"""Number of bits of each coordinate in `compute_z_order`."""
 
 
 def build_box_tree(low: Array, high: Array) -> Array:
-    """Build the tree of boxes around items.
+    """Build the box tree of items.
 
     Parameters
     ----------
     low, high : (m, 2) array
-        Lower left and upper right corners of the items. Neighbours should be close together in this order.
+        Lower left and upper right corners of the items, in an order in which neighbours are close together.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def compute_z_order(column: IntArray, row: IntArray) -> IntArray:
 
 @kernel
 def skip_subtree(node: int) -> int:
-    """Return the node that a search visits after a node and all below it.
+    """Return the node that a search visits next if it skips a node and everything below it.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def skip_subtree(node: int) -> int:
     Returns
     -------
     int
-        0 at the end.
+        0 at the end of the search.
     """
     while node & 1:
         node >>= 1
@@ -95,14 +95,14 @@ def compute_squared_box_distance(boxes: Array, node: int, x: float, y: float) ->
     ----------
     boxes : (nodes, 4) array, m
     node : int
-        Number of the box.
+        The node of the box.
     x, y : float, m
         The point.
 
     Returns
     -------
     float, m²
-        0 inside.
+        0 inside the box.
     """
     dx: float = max(boxes[node, 0] - x, x - boxes[node, 2], 0.0)
     dy: float = max(boxes[node, 1] - y, y - boxes[node, 3], 0.0)

@@ -34,11 +34,11 @@ class CornerPaths(NamedTuple):
     first_corner: IntArray
     """(k,) The first corner at which the path bends, or where it ends if it is straight."""
     previous_corner: IntArray
-    """(k,) The last corner at which the path bends before its end, -1 if it is straight."""
+    """(k,) The last corner at which the path bends before its end, or -1 if it is straight."""
 
     @classmethod
     def allocate(cls, corners: int) -> CornerPaths:
-        """Allocate paths to a number of corners.
+        """Allocate paths to a given number of corners.
 
         Parameters
         ----------
@@ -87,13 +87,13 @@ def build_corner_graph(corners: int, pairs: IntArray, lengths: Array) -> CornerG
     corners : int
         Number of corners.
     pairs : (l, 2) int array
-        Linked corners, each pair once.
+        The two corners of each link, each pair once.
     lengths : (l,) array, grid steps
 
     Returns
     -------
     CornerGraph
-        With each link in both directions.
+        Each link appears in both directions.
     """
     start = np.concatenate([pairs[:, 0], pairs[:, 1]])
     end = np.concatenate([pairs[:, 1], pairs[:, 0]])
@@ -109,19 +109,19 @@ def build_corner_graph(corners: int, pairs: IntArray, lengths: Array) -> CornerG
 def find_visible_corners(
     walls: Walls, index: AngularWallIndex, source: int, first: int, visible: IntArray
 ) -> int:
-    """Find the corners that a source sees, and at which a shortest path from it can bend.
+    """Find the corners that a source sees and at which a shortest path from it can bend.
 
     Parameters
     ----------
     walls : Walls
     index : AngularWallIndex
-        With an unlimited reach.
+        Its reach must be unlimited.
     source : int
-        Number of the source.
+        Row of the source in the index.
     first : int
-        Corners of lower numbers are left out.
+        The first corner to consider; those before it are skipped.
     visible : (k,) int array
-        Result: the numbers of the corners.
+        Result: the corners that were found.
 
     Returns
     -------
@@ -162,7 +162,7 @@ def find_links(
     pairs: IntArray,
     lengths: Array,
 ) -> int:
-    """Find the links of some corners to those of higher numbers.
+    """Find the links from a range of corners to the corners after them.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def find_links(
     Returns
     -------
     int
-        Number of links, -1 if there is not enough space.
+        Number of links, or -1 if there is not enough space.
     """
     corners = walls.corners
     used = 0
@@ -196,7 +196,7 @@ def find_links(
         for k in range(count):
             other_x = corners[visible[k], 0]
             other_y = corners[visible[k], 1]
-            # A shortest path must be able to bend at both of them.
+            # A shortest path must be able to bend at both ends of the link.
             if can_bend_at_corner(corners, walls.corner_walls, corner, other_x, other_y):
                 dx = other_x - x
                 dy = other_y - y
@@ -209,17 +209,17 @@ def find_links(
 
 @kernel
 def relax_paths(graph: CornerGraph, paths: CornerPaths, queue: CornerQueue, waiting: int) -> None:
-    """Shorten paths to corners by way of other corners until none can be shortened.
+    """Shorten the paths to corners via other corners until none can be shortened further.
 
-    Of equally short paths, the one from the source of the lowest number is taken.
+    If paths are equally short, the one from the first source is taken.
 
     Parameters
     ----------
     graph : CornerGraph
     paths : CornerPaths
-        On entry the straight paths from the sources, of infinite length if there is none.
+        On entry, the straight paths from the sources; their length is infinite where there is none.
     queue : CornerQueue
-        On entry the corners to which there are straight paths, at the beginning of the queue.
+        On entry, the corners to which there are straight paths, at the beginning of the queue.
     waiting : int
         Number of corners in the queue.
     """

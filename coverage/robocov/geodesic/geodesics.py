@@ -27,28 +27,28 @@ from robocov.geodesic.grid import Grid
 from robocov.geodesic.walls import Walls, build_walls, count_windings
 
 SOURCE_BINS = 128
-"""Number of angular bins of a source."""
+"""Number of angular bins per source."""
 _CORNER_BINS = 256
-"""The same for a corner, from which many targets are tested."""
+"""Number of angular bins for a corner. There are more, since many targets are tested from it."""
 _CORNERS_PER_REPORT = 64
-"""Number of corners between two reports of progress."""
+"""Number of corners that are processed between two progress reports."""
 _TARGETS_PER_BLOCK = 1024
-"""Number of targets whose walls are indexed at the same time."""
+"""Number of targets that are indexed at the same time, which limits the memory."""
 _MIN_ENTRIES_PER_SOURCE = {SOURCE_BINS: 256, _CORNER_BINS: 1 << 14}
-"""Initial number of entries of the index for each source; it is doubled whenever it is too small."""
+"""Initial number of index entries per source, by number of bins. It is doubled whenever it is too small."""
 _SNAP_STEPS = 2
-"""Grid steps around the nearest point of a slanted wall among which a free grid point is sought."""
+"""Number of grid steps around the nearest point of a slanted wall within which a free point is searched."""
 
 
-class IndexUser(Protocol):
-    """A computation with an index, which returns the number of rows that it has written, -1 if too few."""
+class IndexComputation(Protocol):
+    """A computation that uses an index. It returns the number of rows written, or -1 if space ran out."""
 
     def __call__(self, index: AngularWallIndex, numbers: IntArray, lengths: Array, /) -> int:
         """Write rows of `numbers` and `lengths`."""
 
 
-class CornerUser(Protocol):
-    """A computation for the corners from `first` up to `end`; see `IndexUser`."""
+class CornerComputation(Protocol):
+    """A computation for the corners from `first` up to `end`; see `IndexComputation`."""
 
     def __call__(
         self, first: int, end: int, index: AngularWallIndex, numbers: IntArray, lengths: Array, /
@@ -59,15 +59,15 @@ class CornerUser(Protocol):
 class Geodesics:
     """The shortest paths in the free space of one environment.
 
-    The distance of two points is the infimum over the paths in the *open* free space, extended to its
+    The distance between two points is the infimum over the paths in the *open* free space, extended to its
     closure: no path leads through a point or along an edge where two obstacles touch. A shortest path is a
     chain of segments that bends only at corners.
 
     Parameters
     ----------
     environment : Environment
-    beat : callable, optional
-        Is called now and then while the graph of the corners is computed. It may raise an exception to stop.
+    heartbeat : callable, optional
+        Called regularly while the graph of the corners is computed. It may raise an exception to stop.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Geodesics:
     array([[5.118, 2.   ]])
     """
 
-    def __init__(self, environment: Environment, beat: Callable[[], None] | None = None) -> None:
+    def __init__(self, environment: Environment, heartbeat: Callable[[], None] | None = None) -> None:
         low_x, low_y, high_x, high_y = environment.region.bounds
         self.size = max(high_x - low_x, high_y - low_y)
         self.grid = Grid.from_square(np.array([low_x, low_y]), self.size)
@@ -104,25 +104,25 @@ class Geodesics:
         self.corners = self.grid.to_metres(self.walls.corners)
         self._name = environment.name
         self._entries_per_source = dict(_MIN_ENTRIES_PER_SOURCE)
-        self.graph = self._build_graph(beat)
+        self.graph = self._build_graph(heartbeat)
 
-    def _build_graph(self, beat: Callable[[], None] | None) -> CornerGraph:
+    def _build_graph(self, heartbeat: Callable[[], None] | None) -> CornerGraph:
         count = len(self.corners)
         visible = np.empty(count, np.int64)
-        progress = None if beat is None else lambda _: beat()
+        progress = None if heartbeat is None else lambda _: heartbeat()
         pairs, lengths = self.run_for_corners(partial(find_links, self.walls, visible), progress)
         return build_corner_graph(count, pairs[:, :2], lengths[:, 0])
 
     def run_for_corners(
-        self, compute: CornerUser, progress: Callable[[float], None] | None = None
+        self, compute: CornerComputation, progress: Callable[[float], None] | None = None
     ) -> tuple[IntArray, Array]:
-        """Run a computation for all corners, some at a time.
+        """Run a computation for all corners, a batch at a time.
 
         Parameters
         ----------
         compute : callable
             Called as ``compute(first, end, index, numbers, lengths)`` for the corners from `first` up to
-            `end`, with an index of one source as scratch space.
+            `end`. The index has space for one source.
         progress : callable, optional
             Called with the fraction that is done. It may raise an exception to stop.
 
@@ -145,9 +145,9 @@ class Geodesics:
         return np.concatenate(all_numbers), np.concatenate(all_lengths)
 
     def run_with_index(
-        self, sources: int, bins: int, compute: IndexUser
+        self, sources: int, bins: int, compute: IndexComputation
     ) -> tuple[AngularWallIndex, IntArray, Array]:
-        """Run a computation with a new index, again with a larger one as long as there is not enough space.
+        """Run a computation with a new index; repeat it with a larger one until there is enough space.
 
         Parameters
         ----------
@@ -157,7 +157,7 @@ class Geodesics:
             Number of bins of each source.
         compute : callable
             Called as ``compute(index, numbers, lengths)``. It returns the number of rows that it has written
-            to `numbers` and `lengths`, -1 if there is not enough space there or in the index.
+            to `numbers` and `lengths`, or -1 if there was not enough space there or in the index.
 
         Returns
         -------
@@ -178,7 +178,7 @@ class Geodesics:
     def snap_to_free_space(self, points: Array, name: str = "positions") -> tuple[Array, BoolArray]:
         """Convert points of the free space to grid coordinates.
 
-        Points that are outside it by no more than rounding, 2 µm and 1e-9 of the map's size, are moved to the
+        Points that are outside by no more than rounding (2 µm plus 1e-9 of the map's size) are moved to the
         nearest point inside.
 
         Parameters
@@ -189,36 +189,36 @@ class Geodesics:
 
         Returns
         -------
-        grid_positions : (n, 2) array, grid steps
+        grid_points : (n, 2) array, grid steps
         is_inside : (n, c) bool array
             Whether each point is in the closure of each component of the free space.
 
         Raises
         ------
         InputError
-            If the points have another shape, are not finite, or are outside the free space.
+            If the points have the wrong shape, are not finite, or are outside the free space.
         """
         points = np.asarray(points, dtype=float)
         if points.ndim != 2 or points.shape[1] != 2:
             raise InputError(
                 f"{name}: expected an array of shape (n, 2), [x, y] in metres each, got shape {points.shape}"
             )
-        grid_positions = self.grid.snap(points)
-        # A point that is not finite is to the right of all walls, or above them.
-        is_inside = self.count_windings(grid_positions) > 0
+        grid_points = self.grid.snap(points)
+        # A point that is not finite counts as outside, like a point to the right of all walls, or above them.
+        is_inside = self.count_windings(grid_points) > 0
         for i in np.flatnonzero(~is_inside.any(axis=1)).tolist():
-            grid_positions[i] = self._move_inside(points[i], f"{name}[{i}]")
-            is_inside[i] = self.count_windings(grid_positions[i : i + 1])[0] > 0
-        return grid_positions, is_inside
+            grid_points[i] = self._move_inside(points[i], f"{name}[{i}]")
+            is_inside[i] = self.count_windings(grid_points[i : i + 1])[0] > 0
+        return grid_points, is_inside
 
     def _move_inside(self, point: Array, name: str) -> Array:
-        """Return the free grid point next to a point in metres; raise InputError if it is too far away."""
+        """Return the free grid point nearest to a point in metres; raise InputError if it is too far away."""
         coordinates = f"[{point[0]:.12g}, {point[1]:.12g}]"
         if not np.isfinite(point).all():
             raise InputError(f"{name}: expected finite numbers, got {coordinates}")
-        grid_position = self.grid.snap(point)
-        nearest = self._find_nearest_free(grid_position)
-        depth = float(np.hypot(*(nearest - grid_position))) * self.grid.unit
+        grid_point = self.grid.snap(point)
+        nearest = self._find_nearest_free(grid_point)
+        depth = float(np.hypot(*(nearest - grid_point))) * self.grid.unit
         if depth > 2.0 * GRID_M + 1e-9 * self.size:
             raise InputError(
                 f"{name}: expected a point inside the boundary and outside every obstacle of map "
@@ -226,25 +226,25 @@ class Geodesics:
             )
         return nearest
 
-    def count_windings(self, grid_positions: Array) -> IntArray:
+    def count_windings(self, grid_points: Array) -> IntArray:
         """Count how often the components of the free space wind around points.
 
         Parameters
         ----------
-        grid_positions : (n, 2) array, grid steps
+        grid_points : (n, 2) array, grid steps
 
         Returns
         -------
         (n, c) int array
             1 inside a component, more on its boundary, 0 outside.
         """
-        windings = np.empty((len(grid_positions), len(self.free.geoms)), dtype=np.int64)
-        count_windings(self.walls, np.ascontiguousarray(grid_positions), windings)
+        windings = np.empty((len(grid_points), len(self.free.geoms)), dtype=np.int64)
+        count_windings(self.walls, np.ascontiguousarray(grid_points), windings)
         return windings
 
-    def _find_nearest_free(self, grid_position: Array) -> Array:
+    def _find_nearest_free(self, grid_point: Array) -> Array:
         """Return the nearest grid point of the closed free space, to within a few steps."""
-        line = shapely.shortest_line(self.free, shapely.Point(grid_position))
+        line = shapely.shortest_line(self.free, shapely.Point(grid_point))
         foot = np.rint(shapely.get_coordinates(line)[0])
         # The nearest point of a slanted wall is not a grid point: take the nearest one not behind the wall.
         steps = np.arange(-_SNAP_STEPS, _SNAP_STEPS + 1.0)
@@ -252,7 +252,7 @@ class Geodesics:
         free = around[(self.count_windings(around) > 0).any(axis=1)]
         if not len(free):
             free = self.walls.vertices
-        distance = compute_lengths(free - grid_position)
+        distance = compute_lengths(free - grid_point)
         return np.asarray(free[distance.argmin()])
 
     def compute_distances(self, sources: Array, targets: Array) -> Array:
@@ -271,7 +271,7 @@ class Geodesics:
         Raises
         ------
         InputError
-            If a point is outside the free space, see `snap_to_free_space`.
+            If a point is outside the free space; see `snap_to_free_space`.
         """
         starts, _ = self.snap_to_free_space(sources, "sources")
         ends, _ = self.snap_to_free_space(targets, "targets")
@@ -300,20 +300,20 @@ class Geodesics:
         return distances
 
     def _compute_corner_distances(
-        self, grid_positions: Array, *, must_be_straight: bool
+        self, grid_points: Array, *, must_be_straight: bool
     ) -> tuple[AngularWallIndex, Array, CornerPaths]:
-        """Return the index of positions, their distances to corners, (n, k), and paths from the last one."""
+        """Return an index of grid points, their distances to corners, (n, k), and the last one's paths."""
         corners = len(self.corners)
-        distances = np.empty((len(grid_positions), corners))
+        distances = np.empty((len(grid_points), corners))
         paths = CornerPaths.allocate(corners)
 
         def fill(index: AngularWallIndex, _numbers: IntArray, _lengths: Array) -> int:
             used: int = _find_corner_distances(
-                self.walls, index, self.graph, grid_positions, must_be_straight, distances, paths
+                self.walls, index, self.graph, grid_points, must_be_straight, distances, paths
             )
             return used
 
-        index, _, _ = self.run_with_index(len(grid_positions), SOURCE_BINS, fill)
+        index, _, _ = self.run_with_index(len(grid_points), SOURCE_BINS, fill)
         return index, distances, paths
 
     def find_path(self, source: Array, target: Array) -> Array:
@@ -333,17 +333,17 @@ class Geodesics:
         InputError
             If a point is outside the free space.
         """
-        ends, _ = self.snap_to_free_space(np.stack([source, target]), "ends of the path")
+        ends, _ = self.snap_to_free_space(np.stack([source, target]), "endpoints")
         index, from_source, paths = self._compute_corner_distances(ends[:1], must_be_straight=False)
         _, to_target, _ = self._compute_corner_distances(ends[1:], must_be_straight=True)
         distance = np.empty((1, 1))
         _combine_distances(self.walls, index, from_source, ends[1:], to_target, distance)
         if np.isinf(distance[0, 0]):
             return np.empty((0, 2))
-        by_corner = from_source[0] + to_target[0]
+        via_corner = from_source[0] + to_target[0]
         corner = -1
-        if by_corner.min(initial=np.inf) <= distance[0, 0]:
-            corner = int(by_corner.argmin())
+        if via_corner.min(initial=np.inf) <= distance[0, 0]:
+            corner = int(via_corner.argmin())
         bends = []
         while corner >= 0:
             bends.append(corner)
@@ -362,9 +362,9 @@ def _find_corner_distances(
     distances: Array,
     paths: CornerPaths,
 ) -> int:
-    """Write the distances of (n, 2) points from the corners, (n, k); `paths` are those of the last point.
+    """Write the distances from (n, 2) points to the corners, (n, k); `paths` are those from the last point.
 
-    Return the number of used entries of the index, -1 if there are too few.
+    Return the number of index entries that are used, or -1 if there are too few.
     """
     corners = len(walls.corners)
     queue = CornerQueue(np.empty(corners + 1, np.int64), np.empty(corners, np.bool_))
@@ -403,10 +403,10 @@ def _combine_distances(
     to_targets: Array,
     distances: Array,
 ) -> None:
-    """Write the distances of the sources of an index from (m, 2) targets, (n, m).
+    """Write the distances from the sources of an index to (m, 2) targets, (n, m).
 
-    A path is straight, or it consists of a path from the source to a corner, (n, k), and a straight line from
-    there to the target, (m, k).
+    A path is straight, or it leads to a corner, over a distance in `from_sources`, (n, k), and from there
+    straight to the target, over a distance in `to_targets`, (m, k).
     """
     corners = np.empty(to_targets.shape[1], np.int64)
     for j in range(len(targets)):

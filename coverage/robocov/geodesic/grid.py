@@ -1,4 +1,4 @@
-"""Integer coordinates in which the side of a line that a point lies on is computed exactly."""
+"""Integer coordinates, in which the side of a line on which a point lies is computed exactly."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from robocov.compiled import kernel
 GRID_BITS = 48
 """The square that contains the map is at most 2**48 grid steps wide.
 
-A step is 4e-15 of its side, below a double's rounding for a map that does not start at zero, yet few enough
-bits are used for `cross` to be exact.
+A step is then 4e-15 of the side, which is less than the rounding of doubles in a map away from the origin. At
+the same time, the coordinates are short enough for `cross` to be exact.
 """
 
 _MAX_CROSS_ERROR = 2.0**48
-"""More than the rounding errors of a cross product of two differences, whose products are below 2**98."""
+"""Bound on the rounding error of a cross product of two differences, whose products are below 2**98."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grid:
-    """Whole-number coordinates, stored as floats, for the points of one map.
+    """Integer coordinates, stored as floats, for the points of one map.
 
     Attributes
     ----------
     origin : (2,) array, m
         Lower left corner of the map.
     unit : float, m
-        Length of a grid step. It is a power of two, so that the change of scale rounds no length.
+        Length of a grid step, a power of two: multiplying by it does not round.
     """
 
     origin: Array
@@ -94,13 +94,12 @@ def cross(ux: float, uy: float, vx: float, vy: float) -> float:
     Parameters
     ----------
     ux, uy, vx, vy : float
-        Components of two vectors, whole numbers of magnitude up to 2**49, as differences of grid coordinates
-        are.
+        Components of two vectors: integers of magnitude up to 2**49, such as differences of grid coordinates.
 
     Returns
     -------
     float
-        Positive if v points to the left of u. The value is rounded as usual.
+        Positive if v points to the left of u. The sign is exact, the value may be rounded.
 
     Examples
     --------
@@ -110,13 +109,13 @@ def cross(ux: float, uy: float, vx: float, vy: float) -> float:
     """
     value = ux * vy - uy * vx
     if abs(value) < _MAX_CROSS_ERROR:
-        # Integers wrap around at 2**64, so that a small difference of large products is right.
+        # Integers wrap around at 2**64: the products may overflow, but their small difference is still exact.
         value = float(int(ux) * int(vy) - int(uy) * int(vx))
     return value
 
 
 def compute_crosses(u: Array, v: Array) -> Array:
-    """Compute `cross` of many pairs of vectors.
+    """Compute `cross` for many pairs of vectors.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from robocov.geodesic.box_tree import LEAF_SIZE, build_box_tree, compute_z_order
 from robocov.geodesic.grid import GRID_BITS, compute_crosses, cross
 
 _ON_BOUNDARY = 1000
-"""Contribution of a wall through a point to its winding number: more than any number of turns."""
+"""Contribution of a wall through a point to the point's winding number: more than any number of turns."""
 
 
 class Walls(NamedTuple):
@@ -23,19 +23,19 @@ class Walls(NamedTuple):
 
     A vertex where walls touch (a pinch) has several sectors: wedges of free space, each between an
     outgoing wall and the next incoming wall counter-clockwise. A *corner* is a sector wider than a
-    half turn; only there a shortest path can bend. A sector of exactly a half turn is a corner too if
+    half turn; a shortest path can bend only there. A sector of exactly half a turn is a corner too if
     other sectors share its vertex. A vertex has at most one corner.
     """
 
     ends: Array
-    """(e, 4) Start x, start y, end x and end y of the walls. The free space is on their left. Walls that are
-    close to each other have close numbers."""
+    """(e, 4) Start x, start y, end x and end y of the walls, with the free space on their left. They are
+    sorted so that nearby walls have nearby indices."""
     following: IntArray
-    """(e,) The wall that starts where this one ends, -1 if several do."""
+    """(e,) The wall that starts where this one ends, or -1 if several do."""
     component: IntArray
     """(e,) Component of the free space that the wall bounds."""
     hides: BoolArray
-    """(e,) Whether free space can be behind the wall; not so on the convex hull of the map."""
+    """(e,) Whether free space can be behind the wall; false for walls on the convex hull of the map."""
     boxes: Array
     """The box tree of the walls."""
     vertices: Array
@@ -43,13 +43,13 @@ class Walls(NamedTuple):
     first_sector: IntArray
     """(v + 1,) The sectors of vertex k are those from ``first_sector[k]`` up to ``first_sector[k + 1]``."""
     sector_walls: Array
-    """(s, 4) Directions (x, y) of the incoming and of the outgoing wall; free space is left of both."""
+    """(s, 4) Directions (x, y) of the incoming and the outgoing wall; free space is to the left of both."""
     sector_is_corner: BoolArray
     """(s,) Whether the sector is a corner."""
     corners: Array
-    """(k, 2) Positions of the corners. Neighbours have close numbers."""
+    """(k, 2) Positions of the corners, sorted so that nearby ones have nearby indices."""
     corner_walls: Array
-    """(k, 4) Directions (x, y) of the incoming and of the outgoing wall of each corner."""
+    """(k, 4) Directions (x, y) of the incoming and the outgoing wall of each corner."""
     corner_boxes: Array
     """The box tree of the corners."""
 
@@ -71,7 +71,7 @@ class _Sectors(NamedTuple):
     """Wedges of free space at the vertices, sorted by vertex."""
 
     vertex: IntArray
-    """(s,)"""
+    """(s,) The vertex of each sector."""
     before: IntArray
     """(s,) The vertex where the incoming wall starts."""
     after: IntArray
@@ -137,7 +137,7 @@ def _list_segments(free: MultiPolygon) -> _Segments:
 
 
 def _sort_neighbours_together(segments: _Segments) -> _Segments:
-    """Sort walls such that those that are close to each other have close numbers."""
+    """Sort walls so that nearby ones have nearby indices."""
     middles = (segments.vertices[segments.start] + segments.vertices[segments.end]) / 2.0
     order = _compute_neighbour_order(middles)
     return _Segments(
@@ -149,13 +149,13 @@ def _sort_neighbours_together(segments: _Segments) -> _Segments:
 
 
 def _compute_neighbour_order(points: Array) -> IntArray:
-    """Return the order of (n, 2) points along a Z-curve."""
+    """Return the indices that sort (n, 2) points along a Z-curve."""
     cells = (points * 2.0 ** (16 - GRID_BITS)).clip(0, 65535).astype(np.int64)
     return np.argsort(compute_z_order(cells[:, 0], cells[:, 1]), kind="stable")
 
 
 def _find_sectors(segments: _Segments) -> _Sectors:
-    """Find which incoming and outgoing walls bound the same wedge of free space."""
+    """Find the pairs of incoming and outgoing walls that bound the same wedge of free space."""
     vertices = segments.vertices
     leaving = np.argsort(segments.start, kind="stable")
     arriving = np.argsort(segments.end, kind="stable")
@@ -181,12 +181,13 @@ def _find_corners(vertex: IntArray, incoming: Array, outgoing: Array) -> BoolArr
     """Find the sectors that are corners, given their vertices and the directions of their walls."""
     crosses = compute_crosses(incoming, outgoing)
     is_pinch = np.bincount(vertex)[vertex] > 1
-    # At a pinch a straight wall is a corner, too: the walls of the other sector would hide the points ahead.
-    return np.asarray((crosses < 0.0) | ((crosses == 0.0) & is_pinch))
+    # At a pinch, even a straight wall has a corner: otherwise the walls of the other sector would hide the
+    # points ahead.
+    return np.asarray((turn < 0.0) | ((turn == 0.0) & is_pinch))
 
 
 def _find_following(segments: _Segments) -> IntArray:
-    """Find the wall that starts where each one ends, -1 if several do."""
+    """Find the wall that starts where each one ends, or -1 if several do."""
     count = len(segments.vertices)
     starting = np.full(count, -1)
     starting[segments.start] = np.arange(len(segments.start))
@@ -228,7 +229,7 @@ def get_relative_ends(ends: Array, wall: int, x: float, y: float) -> tuple[float
 def can_bend_at_corner(corners: Array, corner_walls: Array, corner: int, x: float, y: float) -> bool:
     """Return whether a shortest path that bends at a corner can come from, or go to, a point.
 
-    The point must lie in the corner's sector, but not in front of both of its walls: from there a path that
+    The point must lie in the corner's sector, but not in front of both of its walls: a path from there that
     bends at the corner could be shortened.
 
     Parameters
@@ -267,7 +268,7 @@ def find_vertex(vertices: Array, x: float, y: float) -> int:
     Returns
     -------
     int
-        -1 for none.
+        The vertex, or -1 if there is none.
     """
     low = 0
     high = len(vertices)
@@ -312,7 +313,7 @@ def contains_direction(walls: Walls, vertex: int, dx: float, dy: float) -> bool:
 def count_windings(walls: Walls, points: Array, windings: IntArray) -> None:
     """Count how often the boundary of each component winds around points.
 
-    The winding number is the number of walls to the right of a point that run up, less those that run down.
+    The winding number is the number of walls to the right of a point that run up, minus those that run down.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The lower bound of the coverage cost: a search for prices, and a proof; see `lower_bound`."""
+"""The lower bound on the coverage cost: a search for prices and a proof; see `lower_bound`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from robocov.geodesic.angular_index import AngularWallIndex
 from robocov.geodesic.geodesics import SOURCE_BINS
 from robocov.lower_bound.price_table import PriceTable, add_paid_shares
 from robocov.lower_bound.worth_bounds import (
-    SiteDistances,
+    SiteData,
     TriangleScratch,
     bound_worths,
     halve_triangles,
@@ -31,10 +31,10 @@ MIN_PRECISION = 1e-5
 """The smallest precision that may be requested."""
 
 _ROUGH_SMOOTHINGS = (0.02, 0.007)
-"""Fractions of the cost over which the maximal worth is smoothed in the first searches for prices."""
+"""Smoothing of the maximal worth in the first searches for prices, as fractions of the cost."""
 
 _SMOOTHING = 0.0025
-"""The same before the first proof; it is halved before each later one."""
+"""Smoothing before the first proof. It is halved before each later proof."""
 
 _SLACK = 0.3
 """Tolerance of a proof, as a fraction of the smoothing."""
@@ -42,44 +42,44 @@ _SLACK = 0.3
 _MAX_ITERATIONS = 100
 """Maximum number of iterations of each search for prices."""
 
-_MIN_POSITIONS = 500
-"""About the minimum number of positions in the table."""
+_MIN_CANDIDATES = 500
+"""Approximate minimum number of positions in the table."""
 
-_POSITIONS_PER_ROBOT = 60
-"""About the minimum number of these for each robot."""
+_CANDIDATES_PER_ROBOT = 60
+"""Approximate minimum number of positions in the table per robot."""
 
-_SERVING_ROBOTS = 4
-"""Number of robots of the placement from which a site is at least as far as its price, at most."""
+_MAX_PRICE_RANK = 4
+"""The price of a site is at most its distance to the robot of this rank, here the fourth-nearest one."""
 
-_POSITIONS_PER_BLOCK = 256
-"""Number of positions whose distances are computed at the same time."""
+_CANDIDATES_PER_BLOCK = 256
+"""Number of positions whose distances are computed at the same time, which limits the memory."""
 
 _MAX_TRIANGLES = 1_000_000
-"""A proof ends after this number of triangles with the bound it has by then."""
+"""A proof ends after this number of triangles, with the bound that it has reached."""
 
 _EROSION = 0.98
-"""Fraction of the radius by which the free space is narrowed.
+"""Fraction of the radius by which the free space is eroded.
 
-Before GEOS moves walls, it simplifies them by up to 1 % of the distance.
+Before GEOS offsets walls, it simplifies them by up to 1 % of the offset.
 """
 
 _ROUNDING = 1e-10
-"""Allowance for each robot and site, as a fraction of the map's size: far more than all rounding errors."""
+"""Allowance per robot and site, as a fraction of the map's size, far larger than all rounding errors."""
 
 _PROGRESS_BEFORE_SEARCH = 0.2
-"""Progress when the search for prices starts."""
+"""Fraction of the work that is done when the search for prices starts."""
 
 
 @dataclass(frozen=True, eq=False)
 class LowerBound:
-    """A certified lower bound of the coverage cost (22) of a team, and the cost of one placement.
+    """A certified lower bound on the coverage cost (22) of a team, and the cost of one placement.
 
     Attributes
     ----------
     mean_distance : float, m
-        As of `CoverageResult`: no placement has a lower one.
+        Lower bound on the mean distance of any placement; see `CoverageResult`.
     value : float, m³
-        The same for the cost (22).
+        Lower bound on the cost (22) of any placement.
     placement_mean_distance : float, m
         Mean distance of the given placement.
     prices : (m,) array, m
@@ -108,27 +108,26 @@ def compute_lower_bound(
     precision: float = 0.001,
     progress: Callable[[float], None] | None = None,
 ) -> LowerBound:
-    """Compute a lower bound of the coverage cost of every placement of a team.
+    """Compute a lower bound on the coverage cost of every placement of a team.
 
     The bound holds for as many robots as there are positions, anywhere in the free space where a disc of the
-    radius fits. (A point may be where walls touch, in two rooms at once.) If the free space has several
-    components, it holds for all placements in those that contain the positions, and is of the cost of these.
-    It is not required that robots fit next to each other.
+    given radius fits. If the free space has several components, it covers only those that contain positions:
+    it bounds the cost of these components for all placements in them. Robots may overlap each other.
 
     Parameters
     ----------
     environment : Environment
     positions : (n, 2) array, m
-        A placement of low cost, as `find_optimum` returns it, which makes the interval small.
+        A placement of low cost, such as that of `find_optimum`. The lower its cost, the smaller the gap.
     radius : float, m
-        Radius of the robots, at least 1 µm.
+        Radius of the robots, at least 1 µm: a single point could be where walls touch, in two rooms at once.
     lattice : int
-        Number of cells along a side of the lattice, see `CoverageCost`.
+        Number of cells along a side of the lattice; see `CoverageCost`.
     precision : float
-        The search ends if the interval is not wider than this fraction of the cost, or the bound is about
-        that much below the best that the dual can give.
+        The search ends if the gap is at most this fraction of the cost, or if the bound is within about this
+        fraction of the best one that the dual can give.
     progress : callable, optional
-        Called now and then with the fraction that is done. It may raise an exception to stop.
+        Called regularly with the fraction that is done. It may raise an exception to stop.
 
     Returns
     -------
@@ -137,13 +136,13 @@ def compute_lower_bound(
     Raises
     ------
     ParameterError
-        If a parameter is out of range, or no such robot fits where the positions are.
+        If a parameter is out of range, or no robot of this radius fits where the positions are.
     InputError
         If a position is outside the free space; the message names it.
 
     Notes
     -----
-    All rounding errors are covered by 1e-10 of the map's size for each robot and site.
+    An allowance of 1e-10 of the map's size per robot and site covers all rounding errors.
 
     Examples
     --------
@@ -177,15 +176,15 @@ class _Proof(NamedTuple):
     """The result of a branch and bound."""
 
     bound: float
-    """Lower bound of the cost, as a weighted sum over the sites, m."""
+    """Lower bound on the cost, as a weighted sum over the sites, m."""
     prices: Array
-    """(m,) m, prices of the sites that prove it."""
-    worthy_positions: Array
-    """(p, 2) grid steps, positions that are worth more than all of the table."""
+    """(m,) m, prices of the sites that prove the bound."""
+    better_candidates: Array
+    """(p, 2) grid steps, positions that are worth more than any in the table."""
 
 
 def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float], None]) -> _Proof:
-    """Search prices on the table and prove bounds in turn; return the best proof."""
+    """Alternate between searching for prices and proving bounds; return the best proof."""
     prices = dual.first_prices
     for smoothing in _ROUGH_SMOOTHINGS:
         prices = dual.improve_prices(prices, smoothing, partial(report, _PROGRESS_BEFORE_SEARCH))
@@ -194,14 +193,14 @@ def _search_best_prices(dual: _Dual, precision: float, report: Callable[[float],
     rounds = max(1, math.ceil(math.log2(8.0 * smoothing / precision)))
     for k in range(rounds):
         fraction = _PROGRESS_BEFORE_SEARCH + (1.0 - _PROGRESS_BEFORE_SEARCH) * k / rounds
-        beat = partial(report, fraction)
-        prices = dual.improve_prices(prices, smoothing, beat)
-        proof = dual.prove(prices, _SLACK * smoothing, beat)
+        heartbeat = partial(report, fraction)
+        prices = dual.improve_prices(prices, smoothing, heartbeat)
+        proof = dual.prove(prices, _SLACK * smoothing, heartbeat)
         if best is None or proof.bound > best.bound:
             best = proof
         if best.bound >= (1.0 - precision) * dual.placement_cost:
             break
-        dual.add_positions(proof.worthy_positions)
+        dual.add_candidates(proof.better_candidates)
         smoothing /= 2.0
     assert best is not None
     return best
@@ -246,79 +245,79 @@ class _Dual:
         points = cost.points[self.sites]
         sites, _ = geodesics.snap_to_free_space(points)
         from_corners = geodesics.compute_grid_distances(geodesics.walls.corners, sites)
-        self._known = SiteDistances(
+        self._site_data = SiteData(
             walls=geodesics.walls,
             sites=sites,
             weights=self._weights,
             from_corners=np.ascontiguousarray(from_corners.T),
         )
-        room = self._build_room(cost.environment, radius)
-        self._triangles = self._triangulate(room)
+        configuration_space = self._build_configuration_space(cost.environment, radius)
+        self._triangles = self._triangulate(configuration_space)
         self._max_prices, self.first_prices = self._compute_first_prices(robots)
 
-        # The table starts with one site in each square of some cells, and the robots.
-        count = max(_MIN_POSITIONS, _POSITIONS_PER_ROBOT * len(robots))
+        # The table starts with the robots and one site in each square block of cells.
+        count = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * len(robots))
         side = max(1, int(math.sqrt(len(sites) / count)))
-        self._position_spacing = side * cost.spacing / self._unit
-        inside = sites[shapely.intersects_xy(room, points[:, 0], points[:, 1])]
+        self._candidate_spacing = side * cost.spacing / self._unit
+        inside = sites[shapely.intersects_xy(configuration_space, points[:, 0], points[:, 1])]
         self._table = PriceTable.build_empty()
-        self.add_positions(np.concatenate([robots, self._thin_out(inside)]))
+        self.add_candidates(np.concatenate([robots, self._thin_out(inside)]))
 
-    def _build_room(self, environment: Environment, radius: float) -> shapely.Geometry:
+    def _build_configuration_space(self, environment: Environment, radius: float) -> shapely.Geometry:
         """Return the area for the centres of robots, m; it may be a little too large, but never too small."""
         components = np.array(environment.free.geoms)[self.is_covered]
-        # The arcs around corners become chords, which makes the room larger.
-        room = shapely.union_all(shapely.buffer(components, -_EROSION * radius, quad_segs=2))
-        if room.is_empty:
+        # The arcs around corners become chords, which makes the area larger.
+        area = shapely.union_all(shapely.buffer(components, -_EROSION * radius, quad_segs=2))
+        if area.is_empty:
             raise ParameterError(f"radius: expected one that fits where the positions are, got {radius:g} m")
-        return room
+        return area
 
-    def _triangulate(self, room: shapely.Geometry) -> Array:
-        """Return triangles that cover the room, (t, 3, 2) grid steps."""
-        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(room))
-        assert math.isclose(shapely.area(triangles).sum(), room.area, rel_tol=1e-9)
+    def _triangulate(self, area: shapely.Geometry) -> Array:
+        """Return triangles that cover an area, (t, 3, 2) grid steps."""
+        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(area))
+        assert math.isclose(shapely.area(triangles).sum(), area.area, rel_tol=1e-9)
         rings = shapely.get_coordinates(triangles).reshape(-1, 4, 2)
         return self._geodesics.grid.snap(rings[:, :3])
 
     def _compute_first_prices(self, robots: Array) -> tuple[Array, Array]:
-        """Return the maximal prices and the first ones, (m,) m, for a placement at (n, 2) grid steps."""
-        sites = self._known.sites
+        """Return the maximum prices and the initial prices, (m,) m, for a placement at (n, 2) grid steps."""
+        sites = self._site_data.sites
         distances = self._geodesics.compute_grid_distances(robots, sites) * self._unit
-        no_robots = np.full((_SERVING_ROBOTS, len(sites)), np.inf)
+        no_robots = np.full((_MAX_PRICE_RANK, len(sites)), np.inf)
         distances = np.sort(np.concatenate([distances, no_robots]), axis=0)
         nearest = distances[0]
         second = distances[1]
-        # A price is between the distances of the nearest robot and of the next one. Without another robot it
-        # is beyond all sites.
+        # An initial price is halfway between the distances of the nearest robot and the next one. If there is
+        # only one robot, it exceeds the distances of all sites.
         beyond = nearest + nearest.max()
         first_prices = np.where(np.isinf(second), beyond, (nearest + second) / 2.0)
-        return distances[_SERVING_ROBOTS - 1], first_prices
+        return distances[_MAX_PRICE_RANK - 1], first_prices
 
-    def _thin_out(self, positions: Array) -> Array:
+    def _thin_out(self, candidates: Array) -> Array:
         """Return the first of (p, 2) positions in each square of a grid."""
-        squares = np.floor(positions * 2.0 / self._position_spacing)
+        squares = np.floor(candidates * 2.0 / self._candidate_spacing)
         _, first = np.unique(squares, axis=0, return_index=True)
-        return positions[np.sort(first)]
+        return candidates[np.sort(first)]
 
-    def add_positions(self, positions: Array) -> None:
+    def add_candidates(self, candidates: Array) -> None:
         """Add positions, (p, 2) grid steps, to the table."""
-        for first in range(0, len(positions), _POSITIONS_PER_BLOCK):
-            block = positions[first : first + _POSITIONS_PER_BLOCK]
-            distances = self._geodesics.compute_grid_distances(block, self._known.sites) * self._unit
+        for first in range(0, len(candidates), _CANDIDATES_PER_BLOCK):
+            block = candidates[first : first + _CANDIDATES_PER_BLOCK]
+            distances = self._geodesics.compute_grid_distances(block, self._site_data.sites) * self._unit
             self._table = self._table.append(distances, self._max_prices)
 
-    def improve_prices(self, prices: Array, smoothing: float, beat: Callable[[], None]) -> Array:
-        """Search prices, (m,) m, for which the dual on the table is higher.
+    def improve_prices(self, prices: Array, smoothing: float, heartbeat: Callable[[], None]) -> Array:
+        """Search for prices, (m,) m, at which the dual on the table is higher.
 
-        In place of the maximal worth, the search uses ``s log sum exp(worth / s)``; `smoothing` is s as a
-        fraction of the cost of one robot.
+        Instead of the maximum of the worths, the search uses the smooth ``s log sum exp(worth / s)``.
+        `smoothing` is s as a fraction of the cost per robot.
         """
         weights = self._weights
         scale = max(self.placement_cost, 1e-9 * self.total_weight * self._geodesics.size)
         smooth = smoothing * scale / self._robots
 
         def compute_negative_dual(prices: Array) -> tuple[float, Array]:
-            beat()
+            heartbeat()
             worths = self._table.compute_worths(prices, weights)
             max_worth = worths.max()
             shares = np.exp((worths - max_worth) / smooth)
@@ -339,7 +338,7 @@ class _Dual:
         return np.asarray(solution.x)
 
     def bound_worths(self, prices: Array, triangles: Array) -> tuple[Array, Array, Array]:
-        """Bound the worths of the points of triangles.
+        """Compute upper bounds on the worths of all points of triangles.
 
         Parameters
         ----------
@@ -353,7 +352,7 @@ class _Dual:
         worths : (t,) array, m
             Worths of these points.
         bounds : (t,) array, m
-            Upper bounds of the worths of all points of the triangles.
+            Upper bound on the worth of every point of each triangle.
         """
         middles = self._geodesics.grid.to_metres(triangles.mean(axis=1))
         centres, _ = self._geodesics.snap_to_free_space(middles)
@@ -362,16 +361,16 @@ class _Dual:
         steps = prices / self._unit
 
         def fill(index: AngularWallIndex, _numbers: IntArray, _lengths: Array) -> int:
-            return int(bound_worths(self._known, index, steps, triangles, centres, scratch, worths))
+            return int(bound_worths(self._site_data, index, steps, triangles, centres, scratch, worths))
 
         self._geodesics.run_with_index(1, SOURCE_BINS, fill)
         worths *= self._unit
         return centres, worths[0], worths[1]
 
-    def prove(self, prices: Array, tolerance: float, beat: Callable[[], None]) -> _Proof:
-        """Prove a lower bound of the cost.
+    def prove(self, prices: Array, tolerance: float, heartbeat: Callable[[], None]) -> _Proof:
+        """Prove a lower bound on the cost.
 
-        The bound is lower than the best one for these prices by at most a fraction, `tolerance`, of the cost.
+        It is below the best bound at these prices by at most the fraction `tolerance` of the cost.
         """
         slack = tolerance * self.placement_cost / self._robots
         table_worth = self._table.compute_worths(prices, self._weights).max()
@@ -380,13 +379,13 @@ class _Dual:
         count = 0
         triangles = self._triangles
         leaves = []
-        worthy = [np.empty((0, 3))]
+        better = [np.empty((0, 3))]
         while len(triangles):
-            beat()
+            heartbeat()
             centres, worths, bounds = self.bound_worths(prices, triangles)
             best_worth = max(best_worth, float(worths.max()))
             count += len(triangles)
-            worthy.append(np.column_stack([worths, centres])[worths > table_worth])
+            better.append(np.column_stack([worths, centres])[worths > table_worth])
             is_leaf = (bounds <= best_worth + slack) | (count >= _MAX_TRIANGLES)
             max_worth = max(max_worth, float(bounds[is_leaf].max(initial=0.0)))
             leaves.append(triangles[is_leaf])
@@ -395,6 +394,10 @@ class _Dual:
         self._triangles = np.concatenate(leaves)
         rounding = _ROUNDING * self._geodesics.size * self.total_weight * self._robots
         bound = float(self._weights @ prices) - self._robots * max_worth - rounding
-        candidates = np.concatenate(worthy)
+        candidates = np.concatenate(better)
         by_worth = np.argsort(-candidates[:, 0], kind="stable")
-        return _Proof(bound, prices, self._thin_out(candidates[by_worth, 1:]))
+        return _Proof(
+            bound=bound,
+            prices=prices,
+            better_candidates=self._thin_out(candidates[by_worth, 1:]),
+        )

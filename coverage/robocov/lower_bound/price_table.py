@@ -1,4 +1,4 @@
-"""A table of distances from some positions, on which prices for the sites are searched."""
+"""A table of distances from some positions, on which the search for prices of the sites is done."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 
 _MIN_SHARE = 1e-9
-"""Smallest share of a robot at a position that counts."""
+"""Smaller shares of a robot at a position are ignored."""
 
 
 class PriceTable(NamedTuple):
-    """Distances from p positions to the sites that may pay for a robot there."""
+    """Distances from p positions to the sites that may pay for a robot there, one entry per pair."""
 
     first_entry: IntArray
     """(p + 1,) The entries of position k are those from ``first_entry[k]`` up to ``first_entry[k + 1]``."""
     site: NDArray[np.int32]
-    """(e,)"""
+    """(e,) The site of each entry."""
     distance: NDArray[np.float32]
-    """(e,) m"""
+    """(e,) Distance from the position to the site, m."""
 
     @classmethod
     def build_empty(cls) -> PriceTable:
@@ -35,14 +35,14 @@ class PriceTable(NamedTuple):
         return cls(np.zeros(1, np.int64), np.empty(0, np.int32), np.empty(0, np.float32))
 
     def append(self, distances: Array, max_distance: Array) -> PriceTable:
-        """Append positions.
+        """Return the table with more positions at the end.
 
         Parameters
         ----------
         distances : (p, m) array, m
             Distances from the new positions to all sites.
         max_distance : (m,) array, m
-            Entries are made only for smaller distances.
+            Only smaller distances get an entry.
 
         Returns
         -------
@@ -88,16 +88,16 @@ def _compute_worths(table: PriceTable, prices: Array, weights: Array, worths: Ar
 
 @kernel
 def add_paid_shares(table: PriceTable, prices: Array, shares: Array, paid: Array) -> None:
-    """Add up the shares of robots, at the positions of the table, that each site pays for.
+    """Add up the shares of robots that each site pays for.
 
     Parameters
     ----------
     table : PriceTable
     prices : (m,) array, m
     shares : (p,) array
-        Share of a robot at each position.
+        The share of a robot that is at each position of the table.
     paid : (m,) array
-        Result, added to its content.
+        Result: the sums are added to its values.
     """
     for position in range(len(shares)):
         if shares[position] > _MIN_SHARE:

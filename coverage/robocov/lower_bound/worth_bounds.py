@@ -1,4 +1,4 @@
-"""Bounds of the worths of positions in a triangle, by tangents of the distances; see `lower_bound`."""
+"""Upper bounds on the worths of positions in a triangle, by tangents of distances; see `lower_bound`."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from robocov.geodesic.corner_graph import find_visible_corners
 from robocov.geodesic.walls import Walls
 
 
-class SiteDistances(NamedTuple):
-    """Weights and distances of the sites, in grid steps."""
+class SiteData(NamedTuple):
+    """The walls of a map, and the sites with their weights and distances, in grid steps."""
 
     walls: Walls
     sites: Array
     """(m, 2) Positions."""
     weights: Array
-    """(m,)"""
+    """(m,) Weights of the sites."""
     from_corners: Array
-    """(m, k) Distances of the sites from the corners."""
+    """(m, k) Distances from the corners to the sites."""
 
 
 class TriangleScratch(NamedTuple):
     """Scratch space for one triangle, in grid steps."""
 
     corners: IntArray
-    """(k,) Corners that the centre sees."""
+    """(k,) The corners that are visible from the centre."""
     corner_distances: Array
-    """(k,) Distances of these from the centre."""
+    """(k,) Distances from the centre to these corners."""
     vertices: Array
-    """(3, 2) Vertices, relative to the centre."""
+    """(3, 2) The vertices, relative to the centre."""
     min_distances: Array
-    """(3,) A lower bound of the distance of a site from each vertex."""
+    """(3,) A lower bound on the distance from each vertex to the current site."""
     max_worths: Array
-    """(3,) An upper bound of the worth of each vertex."""
+    """(3,) An upper bound on the worth of each vertex."""
 
     @classmethod
     def allocate(cls, corners: int) -> TriangleScratch:
-        """Allocate space for a number of corners.
+        """Allocate space for a given number of corners.
 
         Parameters
         ----------
@@ -62,7 +62,7 @@ class TriangleScratch(NamedTuple):
 
 @kernel
 def bound_worths(
-    known: SiteDistances,
+    site_data: SiteData,
     index: AngularWallIndex,
     prices: Array,
     triangles: Array,
@@ -70,11 +70,11 @@ def bound_worths(
     scratch: TriangleScratch,
     worths: Array,
 ) -> int:
-    """Compute the worths of the centres of triangles, and upper bounds for all their points.
+    """Compute the worths of the centres of triangles, and upper bounds on those of all their points.
 
     Parameters
     ----------
-    known : SiteDistances
+    site_data : SiteData
     index : AngularWallIndex
         Scratch space for one source.
     prices : (m,) array, grid steps
@@ -83,43 +83,43 @@ def bound_worths(
         A point in each triangle.
     scratch : TriangleScratch
     worths : (2, t) array, grid steps
-        Result: the worths of the centres, and the bounds.
+        Result: the worths of the centres in the first row, the bounds in the second.
 
     Returns
     -------
     int
-        -1 if there are too few entries in the index.
+        0, or -1 if the index has too few entries.
     """
-    corners = known.walls.corners
+    corners = site_data.walls.corners
     min_distances = scratch.min_distances
     for t in range(len(triangles)):
         x = centres[t, 0]
         y = centres[t, 1]
-        if add_walls(known.walls, index, 0, x, y, np.inf, 0) < 0:
+        if add_walls(site_data.walls, index, 0, x, y, np.inf, 0) < 0:
             return -1
         radius = _set_triangle(scratch, triangles[t], x, y)
-        count = find_visible_corners(known.walls, index, 0, 0, scratch.corners)
+        count = find_visible_corners(site_data.walls, index, 0, 0, scratch.corners)
         for k in range(count):
             corner = scratch.corners[k]
             scratch.corner_distances[k] = np.hypot(x - corners[corner, 0], y - corners[corner, 1])
         worth = 0.0
         for site in range(len(prices)):
             price = prices[site]
-            dx = x - known.sites[site, 0]
-            dy = y - known.sites[site, 1]
+            dx = x - site_data.sites[site, 0]
+            dy = y - site_data.sites[site, 1]
             straight = np.sqrt(dx * dx + dy * dy)
             if straight - radius >= price:
                 continue
             for vertex in range(3):
                 min_distances[vertex] = price
             distance = np.inf
-            if is_visible(known.walls, index, 0, known.sites[site, 0], known.sites[site, 1]):
+            if is_visible(site_data.walls, index, 0, site_data.sites[site, 0], site_data.sites[site, 1]):
                 distance = straight
                 _lower_to_tangent(scratch, straight, dx, dy, straight)
-            distance = min(distance, _lower_by_corners(known, scratch, count, site, x, y, radius))
-            worth += known.weights[site] * max(price - distance, 0.0)
+            distance = min(distance, _lower_by_corners(site_data, scratch, count, site, x, y, radius))
+            worth += site_data.weights[site] * max(price - distance, 0.0)
             for vertex in range(3):
-                scratch.max_worths[vertex] += known.weights[site] * (price - min_distances[vertex])
+                scratch.max_worths[vertex] += site_data.weights[site] * (price - min_distances[vertex])
         worths[0, t] = worth
         worths[1, t] = max(scratch.max_worths[0], scratch.max_worths[1], scratch.max_worths[2])
     return 0
@@ -127,7 +127,7 @@ def bound_worths(
 
 @kernel
 def _set_triangle(scratch: TriangleScratch, triangle: Array, x: float, y: float) -> float:
-    """Take a triangle with the centre (x, y); return the largest distance of a vertex from there."""
+    """Set the triangle and its centre (x, y); return the distance from there to the farthest vertex."""
     radius = 0.0
     for vertex in range(3):
         scratch.vertices[vertex, 0] = triangle[vertex, 0] - x
@@ -139,18 +139,18 @@ def _set_triangle(scratch: TriangleScratch, triangle: Array, x: float, y: float)
 
 @kernel
 def _lower_by_corners(
-    known: SiteDistances, scratch: TriangleScratch, count: int, site: int, x: float, y: float, radius: float
+    site_data: SiteData, scratch: TriangleScratch, count: int, site: int, x: float, y: float, radius: float
 ) -> float:
-    """Lower the bounds of the distances of a site by its paths through the first `count` visible corners.
+    """Lower the distance bounds of a site to the tangents of its paths via the first `count` visible corners.
 
     Return the length of the shortest of these paths from the centre (x, y).
     """
-    corners = known.walls.corners
+    corners = site_data.walls.corners
     min_distances = scratch.min_distances
     shortest = np.inf
     for k in range(count):
         corner = scratch.corners[k]
-        length = scratch.corner_distances[k] + known.from_corners[site, corner]
+        length = scratch.corner_distances[k] + site_data.from_corners[site, corner]
         shortest = min(shortest, length)
         if length - radius < max(min_distances[0], min_distances[1], min_distances[2]):
             dx = x - corners[corner, 0]
@@ -160,19 +160,21 @@ def _lower_by_corners(
 
 
 @kernel
-def _lower_to_tangent(scratch: TriangleScratch, length: float, dx: float, dy: float, first: float) -> None:
-    """Lower the bounds of the distances to those of a path whose first segment leads along -(dx, dy).
+def _lower_to_tangent(
+    scratch: TriangleScratch, length: float, dx: float, dy: float, first_length: float
+) -> None:
+    """Lower the distance bounds to the tangent of a path whose first segment points along -(dx, dy).
 
-    `length` is that of the whole path from the centre, `first` that of its first segment.
+    `length` is that of the whole path from the centre, `first_length` that of its first segment.
     """
     for vertex in range(3):
         rise = dx * scratch.vertices[vertex, 0] + dy * scratch.vertices[vertex, 1]
-        tangent = length + rise / max(first, 1.0)
+        tangent = length + rise / max(first_length, 1.0)
         scratch.min_distances[vertex] = min(scratch.min_distances[vertex], tangent)
 
 
 def halve_triangles(triangles: Array) -> Array:
-    """Cut triangles through the middle of their longest edge.
+    """Halve triangles by a cut from the middle of their longest edge to the opposite vertex.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The positions at which robots fit: clear of walls, and of each other."""
+"""The positions at which robots fit: clear of walls and of each other."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from robocov.environment import compute_start_clearance, compute_start_spacing, 
 from robocov.potential import compute_spread_directions
 
 _EDGES_PER_QUARTER = 32
-"""Edges of a quarter circle around corners: they cut 3e-4 of the radius off, less than the gap at starts."""
+"""Edges per quarter circle around corners. They cut off 3e-4 of the radius, less than the gap to walls."""
 
 _MAX_PUSHES = 60
-"""Maximum number of times that overlapping robots are pushed apart; then there is not enough space."""
+"""Maximum number of times that overlapping robots are pushed apart before the search gives up."""
 
 _OVERSHOOT = 1.005
-"""Factor of the distance to which robots are pushed apart; to exactly 1 they would only converge."""
+"""Robots are pushed apart to this multiple of their spacing. With a factor of 1, they would only converge."""
 
 
 class ConfigurationSpace:
     """The free configuration space of robots of the same radius.
 
-    Robots keep the gap of starts to walls and to each other.
+    Robots keep the same gaps to walls and to each other as at the start of a simulation.
 
     Parameters
     ----------
@@ -38,9 +38,9 @@ class ConfigurationSpace:
     clearance : float, m
         Minimum distance of a robot's centre from walls.
     spacing : float, m
-        Minimum distance of the centres of two robots.
+        Minimum distance between the centres of two robots.
     components : tuple of shapely geometries, m
-        For each component of the free space, where the centre of a robot can be; may be empty.
+        For each component of the free space, the area where the centre of a robot can be, which may be empty.
 
     Examples
     --------
@@ -58,7 +58,7 @@ class ConfigurationSpace:
         shapely.prepare(list(self.components))
 
     def find_nearest(self, positions: Array, component: IntArray) -> Array | None:
-        """Find positions near given ones where all robots fit.
+        """Find positions where all robots fit, near the given ones.
 
         Parameters
         ----------
@@ -83,16 +83,16 @@ class ConfigurationSpace:
         return None
 
     def _push_apart(self, positions: Array, pairs: IntArray) -> Array:
-        """Return (n, 2) positions with each of (p, 2) pairs pushed apart, both robots by the same length."""
+        """Return (n, 2) positions with the robots of (p, 2) pairs pushed apart, both by the same distance."""
         first = pairs[:, 0]
         second = pairs[:, 1]
         offset = positions[second] - positions[first]
         distance = compute_lengths(offset)
-        # Two robots at the same point have no direction apart: take a fixed one, another for each pair.
-        coincide = distance == 0.0
-        numbers = first[coincide] + second[coincide] * len(positions)
-        offset[coincide] = compute_spread_directions(numbers)
-        length = np.where(coincide, 1.0, distance)
+        # Two robots at the same point have no direction apart: use a fixed one that differs between pairs.
+        is_coincident = distance == 0.0
+        numbers = first[is_coincident] + second[is_coincident] * len(positions)
+        offset[is_coincident] = compute_spread_directions(numbers)
+        length = np.where(is_coincident, 1.0, distance)
         fraction = (_OVERSHOOT * self.spacing - distance) / 2.0 / length
         push = offset * fraction[:, None]
         pushed = positions.copy()

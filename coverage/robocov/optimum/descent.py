@@ -14,38 +14,38 @@ from robocov.cost import CoverageCost, CoverageResult
 from robocov.optimum.configuration_space import ConfigurationSpace
 
 _MAX_STEPS = 300
-"""Maximum number of steps; some tens are usual."""
+"""Maximum number of steps. A few dozen are typical."""
 
 _MEMORY = 8
-"""Number of steps from which the curvature is learnt."""
+"""Number of recent steps from which the curvature is estimated."""
 
 _SUFFICIENT_DECREASE = 1e-4
-"""Fraction of the decrease promised by the gradient that a step must achieve (Armijo's condition)."""
+"""Fraction of the decrease predicted by the gradient that a step must achieve (Armijo's condition)."""
 
 _MAX_QUASI_NEWTON_HALVINGS = 4
-"""Maximum number of trials along the quasi-Newton direction, each half as long as the one before."""
+"""Maximum number of trial steps along the quasi-Newton direction, each half as long as the previous one."""
 
 _MAX_GRADIENT_HALVINGS = 14
-"""The same along the scaled gradient."""
+"""Maximum number of trial steps along the scaled gradient."""
 
 _STALL_STEPS = 5
-"""Number of steps over which the decrease is added up."""
+"""Number of steps over which the decrease is summed to detect a stall."""
 
 _STALL_DECREASE = 1e-7
-"""The descent ends if the sum is below this fraction of the cost."""
+"""The descent ends if that sum is below this fraction of the cost."""
 
 _MIN_CURVATURE = 1e-10
-"""Minimum of the curvature along a step, relative to the change of the gradient."""
+"""Minimum curvature along a step, relative to the change of the gradient."""
 
 
 @dataclass(frozen=True, slots=True)
-class _LearntStep:
-    """A step of the descent, from which the curvature is learnt."""
+class _CurvaturePair:
+    """A step of the descent and the change of the gradient, from which the curvature is estimated."""
 
     move: Array
-    """(n, 2) m"""
+    """(n, 2) m, change of the positions."""
     gradient_change: Array
-    """(n, 2)"""
+    """(n, 2) change of the gradient."""
 
 
 def descend(
@@ -53,7 +53,7 @@ def descend(
     space: ConfigurationSpace,
     positions: Array,
     component: IntArray,
-    beat: Callable[[], None] = lambda: None,
+    heartbeat: Callable[[], None] = lambda: None,
 ) -> CoverageResult:
     """Move robots to a local minimum of the coverage cost.
 
@@ -66,26 +66,27 @@ def descend(
         Positions from which the descent starts.
     component : (n,) int array
         The component of the free space in which each robot stays.
-    beat : callable, optional
+    heartbeat : callable, optional
         Called before each step. It may raise an exception to stop.
 
     Returns
     -------
     CoverageResult
-        Its mean distance is not larger than at the start.
+        Its mean distance is never larger than at the start.
 
     Notes
     -----
-    Projected quasi-Newton steps: L-BFGS (Nocedal and Wright, *Numerical Optimization*, algorithm 7.4), scaled
-    by the curvature that Weiszfeld's iteration for the geometric median uses. A step is projected onto the
-    configuration space, and halved until the cost decreases enough. The cost is only piecewise smooth, since
-    sites change owners and paths, and a wall may stop a robot: if the quasi-Newton direction does not lead
-    down, the descent follows the scaled gradient, and learns the curvature again.
+    The descent takes projected quasi-Newton steps: L-BFGS (Nocedal and Wright, *Numerical Optimization*,
+    algorithm 7.4), scaled by the curvature that Weiszfeld's iteration for the geometric median uses. Each
+    step is projected onto the configuration space and halved until the cost decreases enough. The cost is
+    only piecewise smooth, since sites change owners and paths, and a wall may stop a robot. If the
+    quasi-Newton direction does not lead downhill, the descent follows the scaled gradient and estimates the
+    curvature anew.
     """
     descent = _Descent(cost, space, component, cost(positions))
     decreases: deque[float] = deque(maxlen=_STALL_STEPS)
     for _ in range(_MAX_STEPS):
-        beat()
+        heartbeat()
         before = descent.result.mean_distance
         if not descent.step():
             break
@@ -104,41 +105,41 @@ class _Descent:
     space: ConfigurationSpace
     component: IntArray
     result: CoverageResult
-    learnt: deque[_LearntStep] = field(default_factory=lambda: deque(maxlen=_MEMORY))
+    recent_pairs: deque[_CurvaturePair] = field(default_factory=lambda: deque(maxlen=_MEMORY))
 
     def step(self) -> bool:
         """Move the robots to a lower cost; return whether that was possible."""
         gradient = _compute_gradient(self.result)
         scale = _compute_curvature(self.result, self.cost.spacing / 2.0)[:, None]
         lower = None
-        if self.learnt:
-            direction = _compute_quasi_newton_direction(gradient, scale, self.learnt)
+        if self.recent_pairs:
+            direction = _compute_quasi_newton_direction(gradient, scale, self.recent_pairs)
             lower = self._search_line(gradient, direction, _MAX_QUASI_NEWTON_HALVINGS)
         if lower is None:
-            self.learnt.clear()
+            self.recent_pairs.clear()
             lower = self._search_line(gradient, -gradient / scale, _MAX_GRADIENT_HALVINGS)
         if lower is None:
             return False
         move = lower.positions - self.result.positions
         change = _compute_gradient(lower) - gradient
-        # The direction leads down only if the cost is convex along all learnt steps.
+        # Quasi-Newton directions lead downhill only if the cost is convex along all recorded steps.
         if (move * change).sum() > _MIN_CURVATURE * (change * change).sum():
-            self.learnt.append(_LearntStep(move, change))
+            self.recent_pairs.append(_CurvaturePair(move, change))
         self.result = lower
         return True
 
     def _search_line(self, gradient: Array, direction: Array, halvings: int) -> CoverageResult | None:
-        """Return the result of the longest step, of several, that lowers the cost enough, None for none."""
+        """Return the result of the longest trial step that lowers the cost enough, or None if none does."""
         start = self.result
         for k in range(halvings):
             positions = self.space.find_nearest(start.positions + 0.5**k * direction, self.component)
             if positions is None:
                 continue
-            promised = float((gradient * (positions - start.positions)).sum())
-            if not promised < 0.0:
+            predicted_change = float((gradient * (positions - start.positions)).sum())
+            if not predicted_change < 0.0:
                 continue
             after = self.cost(positions)
-            if after.mean_distance <= start.mean_distance + _SUFFICIENT_DECREASE * promised:
+            if after.mean_distance <= start.mean_distance + _SUFFICIENT_DECREASE * predicted_change:
                 return after
         return None
 
@@ -155,7 +156,7 @@ def _compute_curvature(result: CoverageResult, min_distance: float) -> Array:
     site = np.flatnonzero(result.owner >= 0)
     owner = result.owner[site]
     offset = result.first_waypoints[site] - result.positions[owner]
-    # Without a minimum, a site right at a robot would not let it go.
+    # Without a minimum, a site at the position of a robot would hold it in place.
     distance = np.maximum(compute_lengths(offset), min_distance)
     pull = 1.0 / distance
     total_weight = float(max(len(site), 1))
@@ -166,11 +167,11 @@ def _compute_curvature(result: CoverageResult, min_distance: float) -> Array:
     return np.where(curvature > 0.0, curvature, 1.0)
 
 
-def _compute_quasi_newton_direction(gradient: Array, scale: Array, learnt: deque[_LearntStep]) -> Array:
+def _compute_quasi_newton_direction(gradient: Array, scale: Array, pairs: deque[_CurvaturePair]) -> Array:
     """Return the L-BFGS direction, (n, 2) m, for an initial curvature of `scale`, (n, 1)."""
-    moves = np.array([step.move for step in learnt]).reshape(len(learnt), -1)
-    changes = np.array([step.gradient_change for step in learnt]).reshape(len(learnt), -1)
-    # SciPy's recursion starts with a curvature of 1: change the coordinates so that it is about that.
+    moves = np.array([pair.move for pair in pairs]).reshape(len(pairs), -1)
+    changes = np.array([pair.gradient_change for pair in pairs]).reshape(len(pairs), -1)
+    # SciPy's recursion starts with a curvature of 1: scale the coordinates so that this is about right.
     curvature = np.broadcast_to(scale, gradient.shape).ravel()
     ratio = changes[-1] @ (changes[-1] / curvature) / (moves[-1] @ changes[-1])
     root = np.sqrt(curvature * ratio)

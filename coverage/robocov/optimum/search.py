@@ -24,55 +24,55 @@ from robocov.optimum.descent import descend
 from robocov.team import DEFAULT_RADIUS
 
 MAX_ROBOTS = 500
-"""Maximum number of robots of an optimum."""
+"""Maximum number of robots."""
 
 MAX_RESTARTS = 100_000
 """Maximum number of restarts of the search."""
 
-_MIN_SOURCES = 600
-"""About the minimum number of positions for robots in the table."""
+_MIN_CANDIDATES = 600
+"""Approximate minimum number of candidate positions for robots."""
 
-_SOURCES_PER_ROBOT = 20
-"""About the minimum number of these for each robot."""
+_CANDIDATES_PER_ROBOT = 20
+"""Approximate minimum number of candidate positions per robot."""
 
 _MAX_TARGETS = 1000
-"""About the maximum number of groups of sites in the table."""
+"""Approximate maximum number of groups of sites in the distance table."""
 
-_MAX_CANDIDATES = 200_000
-"""Maximum number of grid points, in the box around a component, from which the positions are chosen."""
+_MAX_GRID_POINTS = 200_000
+"""Maximum number of grid points, in the box around a component, from which candidates are chosen."""
 
 _STEPS_PER_SPACING = 3
-"""Number of steps of that grid from one position to the next."""
+"""Number of steps of that grid from one candidate to the next."""
 
 _UNREACHABLE_SIZES = 1e4
-"""Sizes of the map that stand for the distance to a site that cannot be reached."""
+"""Distance to a site that cannot be reached, in multiples of the size of the map."""
 
 _PROGRESS_AFTER_COST = 0.3
-"""Progress when the cost has been prepared."""
+"""Fraction of the work that is done when the cost has been prepared."""
 
 _PROGRESS_AFTER_TABLE = 0.5
-"""Progress when the table has been computed."""
+"""Fraction of the work that is done when the table has been computed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """The best positions of a team that were found on one map, and the coverage cost (22) there.
+    """The best positions found for a team on one map, and their coverage cost (22).
 
     Attributes
     ----------
     positions : (n, 2) array, m
         From left to right, in the free space, clear of walls and of each other.
     mean_distance : float, m
-        As of `CoverageResult`.
+        See `CoverageResult`.
     value : float, m³
     uncovered_area : float, m²
         Area of the components of the free space without a robot.
     costs : (r,) array, m
-        Mean distance with which each restart ended.
-    undescended : (r,) array, m
-        The same before the descent of the exact cost.
+        Mean distance at the end of each restart.
+    costs_before_descent : (r,) array, m
+        Mean distance of each restart before the descent of the exact cost.
     restart : int
-        The restart that found the positions, the first of equals.
+        The restart that found the positions, the first one if several did.
     """
 
     positions: Array
@@ -80,7 +80,7 @@ class Optimum:
     value: float
     uncovered_area: float
     costs: Array
-    undescended: Array
+    costs_before_descent: Array
     restart: int
 
     def compute_agreement(self, within: float = 0.005) -> float:
@@ -98,7 +98,7 @@ class Optimum:
         return float((self.costs <= self.mean_distance * (1.0 + within)).mean())
 
     def compute_gap(self, mean_distance: float) -> float:
-        """Compute the relative excess of a mean distance over the best one, J / J_ref - 1.
+        """Compute the relative excess of a mean distance over that of the optimum, J / J_ref - 1.
 
         Parameters
         ----------
@@ -131,13 +131,13 @@ def find_optimum(
     radius : float, m
         Radius of the robots.
     lattice : int
-        Number of cells along a side of the lattice, see `CoverageCost`.
+        Number of cells along a side of the lattice; see `CoverageCost`.
     restarts : int
-        Number of restarts. Each depends only on the seed and its own number: more restarts never give a
+        Number of restarts. Each depends only on the seed and its own number, so more restarts never give a
         higher cost.
     seed : int
     progress : callable, optional
-        Called now and then with the fraction that is done. It may raise an exception to stop.
+        Called regularly with the fraction that is done. It may raise an exception to stop.
 
     Returns
     -------
@@ -151,14 +151,15 @@ def find_optimum(
     Notes
     -----
     The coverage cost (22) has many local minima. Each restart draws positions by k-median++ and improves them
-    on a table of geodesic distances between some hundreds of positions, first by Lloyd's iteration, then by
-    interchange, which leaves most of these minima. At last it descends the exact cost. The best of all
-    restarts is no proof of the global minimum, but the more restarts agree with it, the more likely it is.
+    on a table of geodesic distances from several hundred candidate positions: first by Lloyd's iteration,
+    then by interchange, which escapes most of these minima. Finally, it descends the exact cost. The best of
+    all restarts is not proven to be the global minimum, but the more restarts agree on it, the more likely
+    it is.
 
-    If the free space has several components, the robots first cover as much of its area as they can, the
-    largest components, and then minimise the cost of these. (The cost alone would be lowest with all robots
-    in the smallest room.) Components that are too small for a robot, or without a site of the lattice, are
-    left alone.
+    If the free space has several components, the robots first cover as much area as possible by occupying the
+    largest components, and then minimise the cost there. (The cost alone would be lowest with all robots in
+    the smallest room.) Components that are too small for a robot, or contain no site of the lattice, are
+    ignored.
 
     Examples
     --------
@@ -189,7 +190,7 @@ def find_optimum(
         value=best.value,
         uncovered_area=best.uncovered_area,
         costs=freeze([outcome.mean_distance for outcome in outcomes]),
-        undescended=freeze([outcome.undescended for outcome in outcomes]),
+        costs_before_descent=freeze([outcome.mean_distance_before_descent for outcome in outcomes]),
         restart=best_restart,
     )
 
@@ -197,8 +198,8 @@ def find_optimum(
 class _Outcome(NamedTuple):
     """The outcome of a restart."""
 
-    undescended: float
-    """Mean distance before the descent, m."""
+    mean_distance_before_descent: float
+    """m"""
     positions: Array
     """(n, 2) m"""
     mean_distance: float
@@ -219,7 +220,7 @@ def _check_parameters(robots: int, restarts: int, seed: int, radius: float) -> N
 
 
 def _get_rank(result: CoverageResult | _Outcome) -> tuple[float, float]:
-    """Return the two numbers that are minimised, the first before the second."""
+    """Return the sort key of results: a smaller uncovered area comes first, then a smaller mean distance."""
     return result.uncovered_area, result.mean_distance
 
 
@@ -229,12 +230,12 @@ class _Search:
     Attributes
     ----------
     space : ConfigurationSpace
-    positions : (p, 2) array, m
-        The sources of the table: positions for robots.
-    component : (p,) int array
-        Their components of the free space.
-    table : (t, p) array, m
-        Distances of groups of sites from the positions, times the weights of the groups.
+    candidates : (c, 2) array, m
+        Candidate positions for robots, which are the sources of the table.
+    component : (c,) int array
+        The component of the free space that contains each candidate.
+    table : (t, c) array, m
+        Distances from groups of sites to the candidates, times the weights of the groups.
     """
 
     def __init__(self, environment: Environment, cost: CoverageCost, robots: int, radius: float) -> None:
@@ -249,30 +250,30 @@ class _Search:
         # Components are sorted by area, the largest first.
         covered = usable[:robots]
         covered_area = sum(areas[k].area for k in covered)
-        sources = max(_MIN_SOURCES, _SOURCES_PER_ROBOT * robots)
-        spacing = max(math.sqrt(covered_area / sources), self.space.spacing)
-        positions = [_spread_points(areas[k], spacing) for k in covered]
-        self.component = np.repeat(covered, [len(points) for points in positions]).astype(np.intp)
+        count = max(_MIN_CANDIDATES, _CANDIDATES_PER_ROBOT * robots)
+        spacing = max(math.sqrt(covered_area / count), self.space.spacing)
+        candidates = [_spread_points(areas[k], spacing) for k in covered]
+        self.component = np.repeat(covered, [len(points) for points in candidates]).astype(np.intp)
         if len(self.component) < robots:
             capacity = sum(len(_spread_points(areas[k], self.space.spacing)) for k in usable)
             raise ParameterError(
                 f"robots: expected at most about {capacity}, as many as fit with radius {radius:g} m in map "
                 f"{environment.name!r}, got {robots}"
             )
-        self.positions = np.concatenate(positions)
+        self.candidates = np.concatenate(candidates)
         self.table = self._compute_table(site_component, np.isin(site_component, covered))
-        # Many restarts end with the same sources: descend from these only once.
+        # Many restarts find the same sources: descend from these only once.
         self._outcome_by_sources: dict[tuple[int, ...], _Outcome] = {}
 
-    def run_restart(self, rng: np.random.Generator, beat: Callable[[], None]) -> _Outcome:
-        """Find sources, and descend from them."""
-        sources = self._find_sources(rng, beat)
+    def run_restart(self, rng: np.random.Generator, heartbeat: Callable[[], None]) -> _Outcome:
+        """Find sources and descend from them."""
+        sources = self._find_sources(rng, heartbeat)
         key = tuple(sources.tolist())
         if key not in self._outcome_by_sources:
-            positions = self.positions[sources]
-            result = descend(self.cost, self.space, positions, self.component[sources], beat)
+            positions = self.candidates[sources]
+            result = descend(self.cost, self.space, positions, self.component[sources], heartbeat)
             self._outcome_by_sources[key] = _Outcome(
-                undescended=self.cost(positions).mean_distance,
+                mean_distance_before_descent=self.cost(positions).mean_distance,
                 positions=result.positions,
                 mean_distance=result.mean_distance,
                 value=result.value,
@@ -281,14 +282,14 @@ class _Search:
         return self._outcome_by_sources[key]
 
     def _compute_table(self, site_component: IntArray, is_covered: BoolArray) -> Array:
-        """Compute the table; its targets are one site for each component and square of some cells."""
+        """Compute the table. Its targets are one site per component and square block of cells."""
         cost = self.cost
         side = max(1, math.ceil(math.sqrt(np.count_nonzero(is_covered) / _MAX_TARGETS)))
         row, column = np.divmod(cost.cells, cost.lattice)
         square = row // side * cost.lattice + column // side
         group = square * len(self.space.components) + site_component
-        # Take the site nearest to the middle of the square, in whole numbers. Among equally near ones, such
-        # as all of two by two cells, chance decides.
+        # Take the site nearest to the middle of the square. Integer offsets make ties exact, such as between
+        # all cells of a two by two square; ties are broken at random.
         row_offset = 2 * (row % side) - side + 1
         column_offset = 2 * (column % side) - side + 1
         offset2 = row_offset**2 + column_offset**2
@@ -297,27 +298,27 @@ class _Search:
         site = site[np.lexsort((chance[site], offset2[site], group[site]))]
         _, first, count = np.unique(group[site], return_index=True, return_counts=True)
         weight = count if cost.weights is None else np.add.reduceat(cost.weights[site], first)
-        table = cost.geodesics.compute_distances(self.positions, cost.points[site[first]])
+        table = cost.geodesics.compute_distances(self.candidates, cost.points[site[first]])
         table[np.isinf(table)] = _UNREACHABLE_SIZES * cost.geodesics.size
         return np.ascontiguousarray((table * weight).T)
 
-    def _find_sources(self, rng: np.random.Generator, beat: Callable[[], None]) -> IntArray:
-        """Return the sources with which one restart ends, sorted, (n,).
+    def _find_sources(self, rng: np.random.Generator, heartbeat: Callable[[], None]) -> IntArray:
+        """Return the sources that one restart finds on the table, sorted, (n,).
 
-        The table approximates the cost: an earlier stage counts if its exact cost is lower.
+        Since the table only approximates the cost, an earlier stage is taken if its exact cost is lower.
         """
         drawn = seed_sources(self.table, self.robots, rng)
-        moved = run_lloyd(self.table, drawn, beat=beat)
-        swapped = apply_best_swaps(self.table, moved, beat)
+        moved = run_lloyd(self.table, drawn, heartbeat=heartbeat)
+        swapped = apply_best_swaps(self.table, moved, heartbeat)
         stages = [np.sort(sources) for sources in (swapped, moved, drawn)]
-        return min(stages, key=lambda sources: _get_rank(self.cost(self.positions[sources])))
+        return min(stages, key=lambda sources: _get_rank(self.cost(self.candidates[sources])))
 
 
 def _spread_points(area: BaseGeometry, spacing: float) -> Array:
-    """Return points in an area, (p, 2), at least `spacing` apart: a grid, and points in its gaps."""
+    """Return points in an area, (p, 2), at least `spacing` apart: a grid, and more points in its gaps."""
     low_x, low_y, high_x, high_y = area.bounds
     step = spacing / _STEPS_PER_SPACING
-    step = max(step, math.sqrt((high_x - low_x) * (high_y - low_y) / _MAX_CANDIDATES))
+    step = max(step, math.sqrt((high_x - low_x) * (high_y - low_y) / _MAX_GRID_POINTS))
     columns = int((high_x - low_x) / 2.0 / step)
     rows = int((high_y - low_y) / 2.0 / step)
     row_grid, column_grid = np.mgrid[-rows : rows + 1, -columns : columns + 1]

@@ -39,7 +39,7 @@ def test_results_have_a_row_for_each_robot_whether_it_counts_or_not() -> None:
     assert set(result.owner.tolist()) == {1}
     assert (
         result.mean_distance
-        == time_varying_cost.compute_figures(0.0, ROBOTS, working)[0]
+        == time_varying_cost.compute_summary(0.0, ROBOTS, working)[0]
         == cost(ROBOTS[1:2]).mean_distance
     )
     later = time_varying_cost.evaluate_all_robots(2.0, ROBOTS)
@@ -49,7 +49,7 @@ def test_results_have_a_row_for_each_robot_whether_it_counts_or_not() -> None:
 
 
 def test_only_the_latest_maps_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robocov.cost.time_varying_cost._MAX_KEPT_MAPS", 2)
+    monkeypatch.setattr("robocov.cost.time_varying_cost._MAX_CACHED_MAPS", 2)
     time_varying_cost = TimeVaryingCost(CoverageCost(CROSSED, 8))
     first, second, third = [time_varying_cost.get_cost(time) for time in (1.0, 2.0, 3.0)]
     assert time_varying_cost.get_cost(2.0) is second

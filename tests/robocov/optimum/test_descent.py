@@ -12,7 +12,7 @@ from scipy.spatial.distance import pdist
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
 from robocov.optimum import ConfigurationSpace, descend
-from robocov.optimum.descent import _compute_quasi_newton_direction, _LearntStep
+from robocov.optimum.descent import _compute_quasi_newton_direction, _CurvaturePair
 
 OFFICE = Environment(
     "office",
@@ -112,13 +112,13 @@ def test_one_robot_ends_at_the_geometric_median_whatever_the_start():
 def test_giving_up():
     steps = []
 
-    def beat():
+    def heartbeat():
         steps.append(1)
         if len(steps) == 3:
             raise InterruptedError
 
     with pytest.raises(InterruptedError):
-        descend(COST, ROOM, starts(0, 5), np.zeros(5, dtype=int), beat)
+        descend(COST, ROOM, starts(0, 5), np.zeros(5, dtype=int), heartbeat)
     assert len(steps) == 3
 
 
@@ -141,7 +141,7 @@ def test_what_was_learnt_of_a_quadratic_leads_to_its_minimum():
     learnt = deque()
     for step in steps:
         bend = (bowl @ step.ravel()).reshape(2, 2)
-        learnt.append(_LearntStep(step, bend))
+        learnt.append(_CurvaturePair(step, bend))
     slope = rng.normal(size=(2, 2))
     way = _compute_quasi_newton_direction(slope, np.ones((2, 1)), learnt)
     np.testing.assert_allclose(bowl @ way.ravel(), -slope.ravel(), atol=1e-12)

@@ -131,8 +131,8 @@ def test_it_never_ends_above_its_seeds_nor_above_lloyds_iteration_from_them(name
     ends = []
     for restart in range(restarts):
         drawn = seed_sources(search.table, 5, np.random.default_rng([3, restart]))
-        begin = search.positions[drawn]
-        assert best.costs[restart] <= best.undescended[restart] <= search.cost(begin).mean_distance
+        begin = search.candidates[drawn]
+        assert best.costs[restart] <= best.costs_before_descent[restart] <= search.cost(begin).mean_distance
         ends.append(lloyds(search.cost, begin))
     assert best.mean_distance <= min(ends)
     assert best.costs.min() == best.mean_distance == best.costs[best.restart]
@@ -204,7 +204,7 @@ def test_rooms_are_never_given_up_for_a_lower_mean(monkeypatch):
 
     monkeypatch.setattr("robocov.optimum.search.seed_sources", all_in_the_small_one)
     search = _Search(halves, CoverageCost(halves, 32), 3, 0.1)
-    drawn = search.positions[all_in_the_small_one(search.table, 3, None)]
+    drawn = search.candidates[all_in_the_small_one(search.table, 3, None)]
     best = find_optimum(halves, 3, lattice=32, restarts=1)
     assert (drawn[:, 0] > 9.2).all()
     assert search.cost(drawn).mean_distance < best.mean_distance
@@ -216,8 +216,8 @@ def test_the_table_holds_about_the_exact_sums_over_all_sites(name):
     where = load_map(name)
     search = _Search(where, CoverageCost(where, 64), 6, 0.1)
     assert 300 < len(search.table) < 1100 < len(search.cost.points)
-    some = np.random.default_rng(0).choice(len(search.positions), 40, replace=False)
-    exact = [search.cost(search.positions[k][None]).mean_distance for k in some]
+    some = np.random.default_rng(0).choice(len(search.candidates), 40, replace=False)
+    exact = [search.cost(search.candidates[k][None]).mean_distance for k in some]
     means = search.table[:, some].sum(axis=0) / len(search.cost.points)
     np.testing.assert_allclose(means, exact, rtol=0.01)
 
@@ -225,13 +225,13 @@ def test_the_table_holds_about_the_exact_sums_over_all_sites(name):
 def test_places_for_robots_fill_the_room():
     where = load_map("museum")
     search = _Search(where, CoverageCost(where, 32), 6, 0.1)
-    assert 500 < len(search.positions) < 900
+    assert 500 < len(search.candidates) < 900
     (part,) = search.space.components
-    assert shapely.covers(part, shapely.points(search.positions)).all()
-    apart = pdist(search.positions).min()
+    assert shapely.covers(part, shapely.points(search.candidates)).all()
+    apart = pdist(search.candidates).min()
     assert apart >= search.space.spacing
     # no place of the room is farther from all of them than they are from each other
-    assert part.difference(shapely.MultiPoint(search.positions).buffer(1.5 * apart)).area < 1e-6 * part.area
+    assert part.difference(shapely.MultiPoint(search.candidates).buffer(1.5 * apart)).area < 1e-6 * part.area
 
 
 def test_pockets_where_no_robot_fits_or_without_a_site_are_left_alone():

@@ -199,7 +199,7 @@ def test_robots_that_are_run_over_do_not_count() -> None:
     result = cost(0.0, positions)
     assert result is not None
     assert result.positions.tolist() == [[8.0, 4.0]]
-    mean_distance, _, uncovered_area = cost.compute_figures(0.0, positions[:1])
+    mean_distance, _, uncovered_area = cost.compute_summary(0.0, positions[:1])
     assert np.isnan(mean_distance)
     assert uncovered_area == pytest.approx(HALL.free_area)
 

@@ -28,7 +28,7 @@ def test_the_answer_is_that_of_the_library_and_its_positions_cost_as_much(
     assert row["mean_distance_m"] == best.mean_distance
     assert row["positions_m"] == best.positions.tolist() == json.loads(file.read_bytes())
     assert row["restart_mean_distances_m"] == best.costs.tolist()
-    assert row["undescended_mean_distances_m"] == best.undescended.tolist()
+    assert row["undescended_mean_distances_m"] == best.costs_before_descent.tolist()
     assert row["robots"] == row["restarts"] == 3
     assert row["runs"] == []
     assert row["lower_bound"] is None
