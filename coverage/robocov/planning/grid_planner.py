@@ -240,8 +240,8 @@ class GridPlanner(MapWindow):
         """
         if not self.is_roomy.any():
             return -1
-        square = np.where(self.is_roomy, ((self.nodes - position) ** 2).sum(axis=1), np.inf)
-        return int(square.argmin())
+        squared_distances = ((self.nodes - position) ** 2).sum(axis=1)
+        return int(np.where(self.is_roomy, squared_distances, np.inf).argmin())
 
     def find_own_node(self, position: Array) -> int:
         """Find the node of a robot: the nearest roomy one in sight, or else the nearest roomy one.

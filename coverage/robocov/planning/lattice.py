@@ -157,6 +157,7 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
                 node = row * columns + column
                 other = (row + up) * columns + column + right
                 length = moves.lengths[move] * (1.0 + _UNKNOWN_DETOUR / (stop - first) * unknown_cells)
+                # A node without room can be reached from one with room, but not the other way round.
                 is_roomy = cells.is_roomy[node]
                 is_other_roomy = cells.is_roomy[other]
                 if is_passable or (is_without_wall and is_roomy and not is_other_roomy):
@@ -229,6 +230,7 @@ def compute_distances(
         nearest = np.inf
         for k in range(front_size):
             nearest = min(nearest, distance[front[k]])
+        # Divide the front into the nodes to settle and those that remain.
         settled_count = 0
         remaining = 0
         for k in range(front_size):
@@ -241,6 +243,7 @@ def compute_distances(
                 front[remaining] = node
                 remaining += 1
         front_size = remaining
+        # Shorten the distances of the neighbours of settled nodes.
         for k in range(settled_count):
             node = settled[k]
             for edge in range(edges.first_edge[node], edges.first_edge[node + 1]):
@@ -272,20 +275,20 @@ def find_nearest_nodes(position: Array, nodes: Array, is_candidate: BoolArray, m
         At most `max_count` nodes.
     """
     nearest = np.empty(max_count, dtype=np.intp)
-    squares = np.empty(max_count)
+    squared_distances = np.empty(max_count)
     count = 0
     for node in range(len(nodes)):
-        square = (nodes[node, 0] - position[0]) ** 2 + (nodes[node, 1] - position[1]) ** 2
-        if not is_candidate[node] or (count == max_count and square >= squares[max_count - 1]):
+        squared = (nodes[node, 0] - position[0]) ** 2 + (nodes[node, 1] - position[1]) ** 2
+        if not is_candidate[node] or (count == max_count and squared >= squared_distances[max_count - 1]):
             continue
         count = min(count + 1, max_count)
         k = count - 1
-        while k > 0 and squares[k - 1] > square:
+        while k > 0 and squared_distances[k - 1] > squared:
             nearest[k] = nearest[k - 1]
-            squares[k] = squares[k - 1]
+            squared_distances[k] = squared_distances[k - 1]
             k -= 1
         nearest[k] = node
-        squares[k] = square
+        squared_distances[k] = squared
     return nearest[:count]
 
 

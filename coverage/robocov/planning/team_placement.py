@@ -96,13 +96,13 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
     the robots move, and their paths do not cross. Since robots also leave these paths to look around, they
     exchange goals only if that saves the fraction `MinSavings.swap` of the sum.
     """
-    home = planner.find_own_node(team.positions[0])
-    if home < 0:
+    own_node = planner.find_own_node(team.positions[0])
+    if own_node < 0:
         return team.former_goals
-    is_reached = np.isfinite(planner.get_distances(home))
-    is_usable = is_reached[planner.sources]
+    is_reachable = np.isfinite(planner.get_distances(own_node))
+    is_usable = is_reachable[planner.sources]
     sources = planner.sources[is_usable]
-    is_target = is_reached & (weights > 0.0)
+    is_target = is_reachable & (weights > 0.0)
     if len(sources) < len(team.positions) or not is_target.any():
         return team.former_goals
     distances = planner.source_distances[is_usable]
@@ -127,9 +127,9 @@ def _choose_former_sources(nodes: Array, team: TeamSituation) -> IntArray:
     """Return the source nearest to each former goal, all different; fixed robots choose first."""
     chosen = np.full(len(team.positions), -1, dtype=np.intp)
     for robot in np.argsort(~team.is_fixed, kind="stable").tolist():
-        square = ((nodes - team.former_goals[robot]) ** 2).sum(axis=1)
-        square[chosen[chosen >= 0]] = np.inf
-        chosen[robot] = square.argmin()
+        squared_distances = ((nodes - team.former_goals[robot]) ** 2).sum(axis=1)
+        squared_distances[chosen[chosen >= 0]] = np.inf
+        chosen[robot] = squared_distances.argmin()
     return chosen
 
 
@@ -159,12 +159,12 @@ def _assign_goals(
     """
     mobile = np.flatnonzero(~team.is_fixed)
     starts = [int(((nodes - team.positions[robot]) ** 2).sum(axis=1).argmin()) for robot in mobile]
-    square = np.minimum(distances[starts][:, mobile] ** 2, UNREACHABLE_M)
-    _, assignment = scipy.optimize.linear_sum_assignment(square)
+    squared_lengths = np.minimum(distances[starts][:, mobile] ** 2, UNREACHABLE_M)
+    _, assignment = scipy.optimize.linear_sum_assignment(squared_lengths)
     unchanged = np.arange(len(mobile))
     if min_saving:
-        assigned_sum = square[unchanged, assignment].sum()
-        unchanged_sum = square[unchanged, unchanged].sum()
+        assigned_sum = squared_lengths[unchanged, assignment].sum()
+        unchanged_sum = squared_lengths[unchanged, unchanged].sum()
         if assigned_sum > (1.0 - min_saving) * unchanged_sum:
             assignment = unchanged
     goals = team.former_goals.copy()
