@@ -148,13 +148,13 @@ class CoverageCost:
         positions = to_floats("positions", positions, "[x, y] of each robot in metres", InputError)
         if not positions.size:
             raise InputError("positions: expected at least one robot, got none")
-        grid_points, is_inside = self.geodesics.snap_to_free_space(positions)
+        grid_positions, is_inside = self.geodesics.snap_to_free_space(positions)
         is_covered: BoolArray = np.asarray(is_inside.any(axis=0))
         if speeds is None:
-            paths = self._find_paths(grid_points[None], is_covered[None])
+            paths = self._find_paths(grid_positions[None], is_covered[None])
             return self._build_result(positions, is_covered, paths, 0)
         checked_speeds = _require_speeds(speeds, len(positions))
-        paths = self._find_first_arrivals(grid_points, is_inside, checked_speeds)
+        paths = self._find_first_arrivals(grid_positions, is_inside, checked_speeds)
         return self._build_result(positions, is_covered, paths, 0, checked_speeds)
 
     def evaluate_teams(self, positions: Array) -> list[CoverageResult]:
@@ -188,28 +188,30 @@ class CoverageCost:
             raise InputError(
                 f"positions: expected an array of shape (r, n, 2) with n >= 1, got shape {teams.shape}"
             )
-        grid_points, is_inside = self.geodesics.snap_to_free_space(teams.reshape(-1, 2))
+        grid_positions, is_inside = self.geodesics.snap_to_free_space(teams.reshape(-1, 2))
         is_covered = np.asarray(is_inside.reshape(*teams.shape[:2], is_inside.shape[1]).any(axis=1))
-        paths = self._find_paths(grid_points.reshape(teams.shape), is_covered)
+        paths = self._find_paths(grid_positions.reshape(teams.shape), is_covered)
         return [self._build_result(teams[row], is_covered[row], paths, row) for row in range(len(teams))]
 
-    def _find_paths(self, grid_points: Array, is_covered: BoolArray) -> SitePaths:
+    def _find_paths(self, grid_positions: Array, is_covered: BoolArray) -> SitePaths:
         """Find the paths to the sites from teams at (r, n, 2) grid steps.
 
         `is_covered`, (r, c), says which components of the free space contain robots of each team.
         """
-        teams, robots, _ = grid_points.shape
+        teams, robots, _ = grid_positions.shape
         tiles = len(self._map.tiles.boxes)
         paths = SitePaths.allocate(teams, len(self.points))
         while True:
             entries = self._entries_per_robot * robots + 2 * SOURCE_BINS
             index = AngularWallIndex.allocate(robots, SOURCE_BINS, entries)
             search = Search.allocate(index, robots, len(self.corners), tiles)
-            if find_site_paths(self._map, search, grid_points, is_covered, self.geodesics.grid.unit, paths):
+            if find_site_paths(
+                self._map, search, grid_positions, is_covered, self.geodesics.grid.unit, paths
+            ):
                 return paths
             self._entries_per_robot *= 2
 
-    def _find_first_arrivals(self, grid_points: Array, is_inside: BoolArray, speeds: Array) -> SitePaths:
+    def _find_first_arrivals(self, grid_positions: Array, is_inside: BoolArray, speeds: Array) -> SitePaths:
         """Find the path to each site from the robot that arrives first.
 
         Among robots of the same speed, the nearest one arrives first. There is one search for each speed.
@@ -224,7 +226,7 @@ class CoverageCost:
         for speed in np.unique(speeds)[::-1]:
             rows = np.flatnonzero(speeds == speed)
             is_covered = is_inside[None, rows].any(axis=1)
-            paths = self._find_paths(grid_points[None, rows], np.asarray(is_covered))
+            paths = self._find_paths(grid_positions[None, rows], np.asarray(is_covered))
             is_sooner = paths.distance / speed < times
             times[is_sooner] = paths.distance[is_sooner] / speed
             first.distance[is_sooner] = paths.distance[is_sooner]

@@ -143,7 +143,7 @@ def _compute_centres(cells: IntArray, side: int, spacing: float, origin: Array) 
     return (column_row + 0.5) * spacing + origin
 
 
-def _build_tiles(sites: Sites, grid_points: Array, component: IntArray) -> Tiles:
+def _build_tiles(sites: Sites, grid_positions: Array, component: IntArray) -> Tiles:
     """Arrange sites at (m, 2) grid steps in tiles."""
     column = sites.cells % sites.lattice
     row = sites.cells // sites.lattice
@@ -154,8 +154,8 @@ def _build_tiles(sites: Sites, grid_points: Array, component: IntArray) -> Tiles
     slot = np.arange(SLOTS)
     is_empty = slot >= count[:, None]
     site = order[np.where(is_empty, 0, slot) + first[:, None]]
-    x = np.ascontiguousarray(grid_points[site, 0])
-    y = np.ascontiguousarray(grid_points[site, 1])
+    x = np.ascontiguousarray(grid_positions[site, 0])
+    y = np.ascontiguousarray(grid_positions[site, 1])
     low = np.column_stack([x.min(axis=1), y.min(axis=1)])
     high = np.column_stack([x.max(axis=1), y.max(axis=1)])
     group_starts = np.arange(0, len(low), TILES_PER_GROUP)

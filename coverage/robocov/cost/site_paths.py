@@ -239,7 +239,7 @@ def _list_within(
     boxes: Array, box: int, robots: Array, bound2: float, candidates: IntArray, count: int, result: IntArray
 ) -> int:
     """List those of the first `count` candidates within a squared distance of a box; return how many."""
-    found = 0
+    size = 0
     for k in range(count):
         i = candidates[k]
         if compute_squared_box_distance(boxes, box, robots[i, 0], robots[i, 1]) <= bound2:

@@ -189,7 +189,7 @@ class Geodesics:
 
         Returns
         -------
-        grid_points : (n, 2) array, grid steps
+        grid_positions : (n, 2) array, grid steps
         is_inside : (n, c) bool array
             Whether each point is in the closure of each component of the free space.
 
@@ -203,22 +203,22 @@ class Geodesics:
             raise InputError(
                 f"{name}: expected an array of shape (n, 2), [x, y] in metres each, got shape {points.shape}"
             )
-        grid_points = self.grid.snap(points)
+        grid_positions = self.grid.snap(points)
         # A point that is not finite counts as outside, like a point to the right of all walls, or above them.
-        is_inside = self.count_windings(grid_points) > 0
+        is_inside = self.count_windings(grid_positions) > 0
         for i in np.flatnonzero(~is_inside.any(axis=1)).tolist():
-            grid_points[i] = self._move_inside(points[i], f"{name}[{i}]")
-            is_inside[i] = self.count_windings(grid_points[i : i + 1])[0] > 0
-        return grid_points, is_inside
+            grid_positions[i] = self._move_inside(points[i], f"{name}[{i}]")
+            is_inside[i] = self.count_windings(grid_positions[i : i + 1])[0] > 0
+        return grid_positions, is_inside
 
     def _move_inside(self, point: Array, name: str) -> Array:
         """Return the free grid point nearest to a point in metres; raise InputError if it is too far away."""
         coordinates = f"[{point[0]:.12g}, {point[1]:.12g}]"
         if not np.isfinite(point).all():
             raise InputError(f"{name}: expected finite numbers, got {coordinates}")
-        grid_point = self.grid.snap(point)
-        nearest = self._find_nearest_free(grid_point)
-        depth = float(np.hypot(*(nearest - grid_point))) * self.grid.unit
+        grid_position = self.grid.snap(point)
+        nearest = self._find_nearest_free(grid_position)
+        depth = float(np.hypot(*(nearest - grid_position))) * self.grid.unit
         if depth > 2.0 * GRID_M + 1e-9 * self.size:
             raise InputError(
                 f"{name}: expected a point inside the boundary and outside every obstacle of map "
@@ -226,25 +226,25 @@ class Geodesics:
             )
         return nearest
 
-    def count_windings(self, grid_points: Array) -> IntArray:
+    def count_windings(self, grid_positions: Array) -> IntArray:
         """Count how often the components of the free space wind around points.
 
         Parameters
         ----------
-        grid_points : (n, 2) array, grid steps
+        grid_positions : (n, 2) array, grid steps
 
         Returns
         -------
         (n, c) int array
             1 inside a component, more on its boundary, 0 outside.
         """
-        windings = np.empty((len(grid_points), len(self.free.geoms)), dtype=np.int64)
-        count_windings(self.walls, np.ascontiguousarray(grid_points), windings)
+        windings = np.empty((len(grid_positions), len(self.free.geoms)), dtype=np.int64)
+        count_windings(self.walls, np.ascontiguousarray(grid_positions), windings)
         return windings
 
-    def _find_nearest_free(self, grid_point: Array) -> Array:
+    def _find_nearest_free(self, grid_position: Array) -> Array:
         """Return the nearest grid point of the closed free space, to within a few steps."""
-        line = shapely.shortest_line(self.free, shapely.Point(grid_point))
+        line = shapely.shortest_line(self.free, shapely.Point(grid_position))
         foot = np.rint(shapely.get_coordinates(line)[0])
         # The nearest point of a slanted wall is not a grid point: take the nearest one not behind the wall.
         steps = np.arange(-_SNAP_STEPS, _SNAP_STEPS + 1.0)
@@ -252,7 +252,7 @@ class Geodesics:
         free = around[(self.count_windings(around) > 0).any(axis=1)]
         if not len(free):
             free = self.walls.vertices
-        distance = compute_lengths(free - grid_point)
+        distance = compute_lengths(free - grid_position)
         return np.asarray(free[distance.argmin()])
 
     def compute_distances(self, sources: Array, targets: Array) -> Array:
@@ -300,20 +300,20 @@ class Geodesics:
         return distances
 
     def _compute_corner_distances(
-        self, grid_points: Array, *, must_be_straight: bool
+        self, grid_positions: Array, *, must_be_straight: bool
     ) -> tuple[AngularWallIndex, Array, CornerPaths]:
         """Return an index of grid points, their distances to corners, (n, k), and the last one's paths."""
         corners = len(self.corners)
-        distances = np.empty((len(grid_points), corners))
+        distances = np.empty((len(grid_positions), corners))
         paths = CornerPaths.allocate(corners)
 
         def fill(index: AngularWallIndex, _numbers: IntArray, _lengths: Array) -> int:
             used: int = _find_corner_distances(
-                self.walls, index, self.graph, grid_points, must_be_straight, distances, paths
+                self.walls, index, self.graph, grid_positions, must_be_straight, distances, paths
             )
             return used
 
-        index, _, _ = self.run_with_index(len(grid_points), SOURCE_BINS, fill)
+        index, _, _ = self.run_with_index(len(grid_positions), SOURCE_BINS, fill)
         return index, distances, paths
 
     def find_path(self, source: Array, target: Array) -> Array:

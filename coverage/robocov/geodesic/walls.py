@@ -183,7 +183,7 @@ def _find_corners(vertex: IntArray, incoming: Array, outgoing: Array) -> BoolArr
     is_pinch = np.bincount(vertex)[vertex] > 1
     # At a pinch, even a straight wall has a corner: otherwise the walls of the other sector would hide the
     # points ahead.
-    return np.asarray((turn < 0.0) | ((turn == 0.0) & is_pinch))
+    return np.asarray((crosses < 0.0) | ((crosses == 0.0) & is_pinch))
 
 
 def _find_following(segments: _Segments) -> IntArray:

@@ -330,16 +330,16 @@ def _spread_points(area: BaseGeometry, spacing: float) -> Array:
     is_inside = shapely.contains_xy(area, x, y)
     is_on_grid = is_inside & (row % _STEPS_PER_SPACING == 0) & (column % _STEPS_PER_SPACING == 0)
     chosen = points[is_on_grid].tolist()
-    candidates = points[is_inside & ~is_on_grid]
+    remaining = points[is_inside & ~is_on_grid]
     if not chosen:
         point = area.representative_point()
         chosen = [[point.x, point.y]]
-    if len(candidates):
-        distance = np.asarray(cKDTree(chosen).query(candidates)[0])
+    if len(remaining):
+        distance = np.asarray(cKDTree(chosen).query(remaining)[0])
         farthest = int(distance.argmax())
         while distance[farthest] >= _STEPS_PER_SPACING * step:
-            chosen.append(candidates[farthest].tolist())
-            offset = candidates - candidates[farthest]
+            chosen.append(remaining[farthest].tolist())
+            offset = remaining - remaining[farthest]
             distance = np.minimum(distance, compute_lengths(offset))
             farthest = int(distance.argmax())
     return np.array(chosen)
