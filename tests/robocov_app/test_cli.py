@@ -167,9 +167,9 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ("run square --lattice 2 --robots 1 --radius 0.2 --start nowhere", "unknown start 'nowhere'"),
         ("cost rooms --positions x.json --sites .", ".: expected a file, got a folder"),
         ("run rooms --radius 4", "no room for a robot of radius 4 m"),
-        ("run rooms --lattice 1", "--lattice: 1"),
+        ("run rooms --lattice 1", "--lattice: expected a number from 2 to 2048, got 1"),
         ("run rooms --size big", "--size: expected WIDTHxHEIGHT"),
-        ("run rooms --size 10x10", "--size: 10"),
+        ("run rooms --size 10x10", "--size: expected a number from 320 to 7680 pixels wide, got 10"),
         ("run rooms --theme blue", "--theme: expected dark or light, got 'blue'"),
         ("run rooms --dt 0", "--dt: expected a number from 0.0001 to 1 s, got 0.0"),
         ("run rooms --vidoe", "unknown option --vidoe: did you mean --video?"),
@@ -204,8 +204,8 @@ def test_wrong_input_gets_one_clear_line(
 @pytest.mark.parametrize(
     ("content", "part"),
     [
-        (b"{}", "expected but a list of [x, y] in metres"),
-        (b"[]", "expected but a list of [x, y] in metres"),
+        (b"{}", "expected a list of [x, y] in metres"),
+        (b"[]", "expected a list of [x, y] in metres"),
         (b"[[1, 2], [3]]", "[1]: expected [x, y]"),
         (b"[[1, true]]", "[0]: expected [x, y], two finite numbers in metres, got [1, True]"),
         (b"[[1, NaN]]", "[0]: expected [x, y], two finite numbers in metres, got [1, nan]"),

@@ -98,7 +98,7 @@ def _replay(options: Arguments) -> int:
         load_controller_class(controller)
         names = [each.record.controller for each in saved]
         if controller.rpartition(":")[2] not in (name.rpartition(":")[2] for name in names):
-            wanted = f"expected the controller of a run: {summarise_names(names)}"
+            wanted = f"expected the controller of a run ({summarise_names(names)})"
             raise ParameterError(f"--controller: {wanted}, got {controller}")
     try:
         session = replayed_session(saved, options.controller)

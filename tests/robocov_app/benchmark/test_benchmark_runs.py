@@ -220,10 +220,10 @@ def test_what_was_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.Mon
         (("verify",), "DIR: expected one result"),
         (("page", "--alone"), "DIR: expected results"),
         (("page", "nowhere"), "nowhere: no such file"),
-        (("page", "TORN"), "torn.json.gz: Compressed file ended"),
+        (("page", "TORN"), "torn.json.gz: cannot be unpacked: Compressed file ended"),
         (("suite", "--quick"), "--quick: robocov benchmark suite has no such option"),
         (("--controller", "rapf", "--out", "FOREIGN"), "it holds something else than a benchmark"),
-        (("verify", "OTHER"), "it is no result of robocov benchmark"),
+        (("verify", "OTHER"), "expected a result of robocov benchmark"),
     ],
 )
 def test_bad_input(

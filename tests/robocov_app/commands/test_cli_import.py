@@ -97,7 +97,7 @@ def test_the_file_that_is_read_is_never_written(tmp_path: Path, capsys: pytest.C
         ("plan.yaml", "--simplify -1", "--simplify: expected a number from 0 to 10"),
         ("plan.yaml", "--keep some", "--keep: expected largest or all, got 'some'"),
         ("plan.yaml", "--format bmp", "--format: expected one of "),
-        ("plan.yaml", "--format movingai", "line 1: 'image: expected type octile"),
+        ("plan.yaml", "--format movingai", "line 1: expected type octile, height N, width N or map"),
         ("none.yaml", "", "none.yaml: no such file"),
         ("plan.yaml", "--preview a.bmp", "a.bmp"),
     ],

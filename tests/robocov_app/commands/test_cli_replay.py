@@ -192,9 +192,12 @@ def test_without_a_display_it_says_what_else_there_is(run: Path, monkeypatch, ca
         ("--frames", "--out: expected a folder for the frames and the video"),
         ("--out film", "--out: requires --frames or --video"),
         ("--json", "--json: requires --frames or --video"),
-        ("--frames --out film --controller a.py:A", "--controller: expected neither --frames nor --video"),
-        ("--controller gone.py:Mine", "controller 'gone.py:Mine': there is no file gone.py"),
-        ("--controller lloyd", "--controller: expected the controller of a run, got lloyd: rapf"),
+        (
+            "--frames --out film --controller a.py:A",
+            "--controller: cannot be combined with --frames or --video",
+        ),
+        ("--controller gone.py:Mine", "controller 'gone.py:Mine': file not found: gone.py"),
+        ("--controller lloyd", "--controller: expected the controller of a run (rapf), got lloyd"),
         ("--size 480x320", "--size: expected a number from 900 to 7680 pixels wide, got 480"),
         ("--frames --out film --fps 0", "--fps: expected a number from 1 to 240, got 0"),
         ("--frames --out film --show cell", "--show: unknown layer 'cell'"),
@@ -260,7 +263,10 @@ def arrays(folder: Path, **changes) -> None:
             "{run}/cost.csv: line 2: expected 4 numbers, got '7'",
         ),
         (lambda run: (run / "cost.csv").write_bytes(b"\xff\xfe"), "{run}/cost.csv: cannot be read"),
-        (lambda run: edited(run / "run.json", dt_s=0.1), "{run}/record.npz: time: moments 0.1 s apart"),
+        (
+            lambda run: edited(run / "run.json", dt_s=0.1),
+            "{run}/record.npz: time: expected times 0.1 s apart",
+        ),
     ],
 )
 def test_a_spoilt_run_is_refused_in_one_line(run: Path, capsys, spoil, message: str) -> None:

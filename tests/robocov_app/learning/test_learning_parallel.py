@@ -144,9 +144,9 @@ def test_what_is_wrong_is_said(empty: Environment) -> None:
     with pytest.raises(ParameterError, match="actions: expected one for each agent, got none for robot_2"):
         env.step({"robot_1": (0, 0)})
     for bad in ((0.0, np.inf), (1.0,), "go", None):
-        with pytest.raises(ParameterError, match=r"action of robot_1: expected .* but two finite numbers"):
+        with pytest.raises(ParameterError, match=r"action of robot_1: expected two finite numbers, got"):
             env.step({"robot_1": bad})
-    with pytest.raises(ParameterError, match="max_cycles: 0"):
+    with pytest.raises(ParameterError, match="max_cycles: expected a whole number of at least 1, got 0"):
         made(empty, max_cycles=0)
     with pytest.raises(ParameterError, match="unknown part of a task 'map': did you mean 'maps'"):
         CoverageParallelEnv(map="rooms")
