@@ -77,12 +77,13 @@ class World:
     -----
     In each step the controllers' forces, the viscous term of (28) and the kinematic limits are combined into
     the net forces that pymunk integrates. Contacts are resolved by pymunk, in substeps fine enough that no
-    robot sinks into anything by more than `contacts.MAX_PENETRATION`. A step depends on nothing but
-    positions, velocities and steering, so that a copy continues identically, bit for bit.
+    robot sinks into a standing wall or another robot by more than `contacts.MAX_PENETRATION`. A step depends
+    on nothing but positions, velocities and steering, so that a copy continues identically, bit for bit.
 
-    Moving obstacles keep to their path and push robots aside. Walls are stronger
-    still: where no space is left between a moving obstacle and a wall, the robot stays in front of the wall
-    and the obstacle moves over it. Once there is space, the robot is pushed out on the nearest side.
+    Moving obstacles keep to their path and push robots aside. They may press a robot deeper into a wall, by
+    some millimetres and in very acute corners by centimetres. Walls are stronger still: where no space is
+    left between a moving obstacle and a wall, the robot stays in front of the wall and the obstacle moves
+    over it. Once there is space, the robot is pushed out on the nearest side.
     """
 
     def __init__(
