@@ -176,6 +176,7 @@ class Environment(Drawable):
         Environment
         """
         environment = replace(self, density=density)
+        # A cached property stores its value in the dictionary of the object.
         for name in _GEOMETRY_PROPERTIES:
             if name in vars(self):
                 vars(environment)[name] = vars(self)[name]

@@ -59,6 +59,7 @@ def estimate_max_points(area: BaseGeometry, spacing: float) -> int:
     Returns
     -------
     int
+        At least 1.
     """
     return max(1, int(area.area / (spacing**2 * _ROW_SPACING)))
 

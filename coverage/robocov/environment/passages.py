@@ -178,7 +178,7 @@ class _PassageSearch:
         return np.array_split(self._reflex_corners, max(groups, 1))
 
     def list_gaps(self, corners: IntArray, low: float, high: float) -> Iterator[Gap]:
-        """Yield the passages at some corners that are wider than `low` and narrower than `high`, by width."""
+        """Yield the passages at some corners whose width is between `low` and `high`, the narrowest first."""
         candidates = self._find_candidates(corners, low, high)
         batches = max(1, len(candidates.width) // _CANDIDATES_AT_ONCE)
         for rows in np.array_split(np.arange(len(candidates.width)), batches):
@@ -193,7 +193,7 @@ class _PassageSearch:
                     yield Gap(round(width, _DIGITS), (first, second))
 
     def _find_candidates(self, corners: IntArray, low: float, high: float) -> _Candidates:
-        """Return pairs of a corner and an edge whose distance is between two limits, by distance."""
+        """Return pairs of a corner and an edge whose distance is between two limits, sorted by distance."""
         box_low = self._start[corners] - high
         box_high = self._start[corners] + high
         boxes = shapely.box(box_low[:, 0], box_low[:, 1], box_high[:, 0], box_high[:, 1])
@@ -228,7 +228,7 @@ class _PassageSearch:
     def _leads_somewhere(self, corner: int, edge: int, q: Array, width: float) -> bool:
         """Return whether the gap from a corner to the point q of an edge leads to more than a pocket.
 
-        A cut between two rings separates nothing; one from a ring to itself separates the enclosed area.
+        A cut along the gap separates part of the free space only if it joins two points of the same ring.
         """
         ring = self._ring[corner]
         if ring != self._ring[edge]:

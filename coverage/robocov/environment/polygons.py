@@ -42,7 +42,7 @@ def find_overlaps(
     overlaps : dict of name to geometry, m
         Intersections of the area with the shapes that overlap it.
     excess : geometry or None, m
-        The part of the area that is outside of `inside`; None if there is no such part.
+        The part of the area that is not in `inside`; None if there is no such part.
     """
     intersections = {name: area.intersection(shape) for name, shape in others.items()}
     overlaps = {name: shape for name, shape in intersections.items() if shape.area > _MIN_OVERLAP_M2}
@@ -114,6 +114,7 @@ def find_nearest_inside(area: Any, positions: Array) -> Array:
         return positions
     areas = np.broadcast_to(area, len(points))
     lines = shapely.shortest_line(areas[outside], points[outside])
+    # Each line has two points; the first one is in the area.
     moved = positions.copy()
     moved[outside] = shapely.get_coordinates(lines)[::2]
     return moved

@@ -14,16 +14,20 @@ TREMBLE_WINDOW_S = 5.0
 MIN_TREMBLE_STEP_M = 0.05
 """Minimum mean displacement of a trembling robot per control step; a robot at rest moves less in 4 s."""
 MIN_TREMBLE_TURN = np.pi / 6.0
-"""Minimum mean turn of a trembling robot per control step, rad: it oscillates in at most 12 steps."""
+"""Minimum mean turn of a trembling robot per control step, rad: an oscillation takes at most 12 steps."""
 MIN_TREMBLE_DETOUR = 5.0
 """Minimum ratio of path length to net displacement of a trembling robot."""
 
 MAX_ZIGZAG_PERIOD_S = 3.0
 """Maximum time between contacts with opposite walls that count as one zigzag."""
 MAX_OPPOSITE_COSINE = -0.5
-"""Walls are opposite if the cosine of the angle between the directions away from them is below this."""
+"""Walls are opposite if the cosine of the angle between the directions away from them is below this: the
+angle is more than 120 degrees."""
 MIN_ZIGZAGS = 5
 """Minimum number of zigzags of a robot that are reported."""
+
+_MIN_DISTANCE_M = 1e-12
+"""Lower limit of distances in divisions."""
 
 
 def advise(record: Record, clearances: Array) -> list[str]:
@@ -33,7 +37,7 @@ def advise(record: Record, clearances: Array) -> list[str]:
     ----------
     record : Record
     clearances : (T, n) array, m
-        Gap between each robot and the nearest wall, as `clearance.compute_clearances` returns it.
+        Gap between each robot and the nearest wall, from `clearance.compute_clearances`.
 
     Returns
     -------
@@ -91,15 +95,15 @@ def find_trembling(record: Record) -> IntArray:
         return np.zeros(0, dtype=np.intp)
     positions = record.positions[-steps - 1 :]
     displacements = np.diff(positions, axis=0)
-    length = compute_point_distances(positions[1:], positions[:-1])
+    step_lengths = compute_point_distances(positions[1:], positions[:-1])
     net_displacement = compute_point_distances(positions[-1], positions[0])
     before = displacements[:-1]
     after = displacements[1:]
     cross = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
-    turning_angle = np.abs(np.arctan2(cross, (before * after).sum(axis=-1)))
-    trembles = length.mean(axis=0) >= MIN_TREMBLE_STEP_M
-    trembles &= turning_angle.mean(axis=0) >= MIN_TREMBLE_TURN
-    trembles &= length.sum(axis=0) >= MIN_TREMBLE_DETOUR * net_displacement
+    turning_angles = np.abs(np.arctan2(cross, (before * after).sum(axis=-1)))
+    trembles = step_lengths.mean(axis=0) >= MIN_TREMBLE_STEP_M
+    trembles &= turning_angles.mean(axis=0) >= MIN_TREMBLE_TURN
+    trembles &= step_lengths.sum(axis=0) >= MIN_TREMBLE_DETOUR * net_displacement
     trembles &= record.travelled[-steps:].all(axis=0) & record.working[-steps:].all(axis=0)
     return np.flatnonzero(trembles)
 
@@ -111,7 +115,7 @@ def count_zigzags(record: Record, clearances: Array) -> IntArray:
     ----------
     record : Record
     clearances : (T, n) array, m
-        As `clearance.compute_clearances` returns them.
+        Returned by `clearance.compute_clearances`.
 
     Returns
     -------
@@ -124,8 +128,8 @@ def count_zigzags(record: Record, clearances: Array) -> IntArray:
     for robot in np.flatnonzero(begins_to_touch.any(axis=0)).tolist():
         moments = np.flatnonzero(begins_to_touch[:, robot])
         away = record.positions[moments, robot] - record.obstacle_points[moments, robot]
-        away /= np.maximum(compute_point_distances(away, np.zeros(2)), 1e-12)[:, None]
-        # The cosine is below -1/2 for directions more than 120 degrees apart, and nan if nothing was sensed.
+        away /= np.maximum(compute_point_distances(away, np.zeros(2)), _MIN_DISTANCE_M)[:, None]
+        # The cosine is nan, and the walls are not opposite, if a robot sensed nothing.
         is_opposite = (away[:-1] * away[1:]).sum(axis=1) < MAX_OPPOSITE_COSINE
         is_soon = np.diff(record.time[moments]) <= MAX_ZIGZAG_PERIOD_S
         counts[robot] = int((is_opposite & is_soon).sum())

@@ -82,7 +82,7 @@ def compute_cost_history(
     >>> history.time
     array([0., 1., 2.])
     """
-    require_type("record", record, Record, 'a Record, as Simulation.run and Record.load("run") return')
+    require_type("record", record, Record, 'a Record, as in Record.load("run")')
     require_type("cost", cost, CoverageCost, "a CoverageCost")
     moments = select_sampled_moments(record, rate)
     samples = len(moments)

@@ -197,11 +197,13 @@ class Results:
     def _find_run_folder(self, run: str | int | Mapping[str, Any]) -> Path:
         name = self._find_run_name(run)
         folder = self.folder / "runs" / name
-        if not name or Path(name).name != name or not folder.is_dir():
+        # A name with a separator could lead out of the folder of the sweep.
+        is_plain_name = name != "" and Path(name).name == name
+        if not is_plain_name or not folder.is_dir():
             raise InputError(f"{self.folder}: there is no run {quote(name)}")
-        error = folder / "error.json"
-        if error.is_file():
-            raise InputError(f"{folder}: the run failed: {_read_error(error)}")
+        error_file = folder / "error.json"
+        if error_file.is_file():
+            raise InputError(f"{folder}: the run failed: {_read_error(error_file)}")
         return folder
 
     def _find_run_name(self, run: str | int | Mapping[str, Any]) -> str:

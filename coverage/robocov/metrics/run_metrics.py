@@ -188,9 +188,9 @@ def find_time_near_final(history: CostHistory, tolerance: float = NEAR_FINAL_TOL
     float, s
     """
     cost = history.mean_distance
-    is_near = np.abs(cost - cost[-1]) <= tolerance * cost[-1]
-    last_away = int(np.flatnonzero(~is_near).max(initial=-1))
-    return float(history.time[min(last_away + 1, len(cost) - 1)])
+    is_near_final = np.abs(cost - cost[-1]) <= tolerance * cost[-1]
+    first_near = int(np.flatnonzero(~is_near_final).max(initial=-1)) + 1
+    return float(history.time[min(first_near, len(cost) - 1)])
 
 
 def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, float | None]:

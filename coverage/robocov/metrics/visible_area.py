@@ -138,6 +138,7 @@ def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterato
             entries = add_walls(walls, index, 0, x, y, np.inf, 0)
             if entries >= 0:
                 break
+            # The index is full.
             index = AngularWallIndex.allocate(1, _BINS, 2 * len(index.entry_wall))
         sectors = _find_sectors(walls, index, entries, position)
         walls_from_robot = walls.ends[sectors.wall] - np.tile(position, 2)

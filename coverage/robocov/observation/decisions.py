@@ -102,7 +102,7 @@ def copy_decision(decision: Decision, controller: str, source: str = "") -> Deci
         terms[name] = rows.copy()
     if decision.cells is not None and not isinstance(decision.cells, Cells):
         got = f"{quote(decision.cells)}{source}"
-        raise ParameterError(f"{where} cells {got}, expected what robocov.partition returns, or None")
+        raise ParameterError(f"{where} cells {got}, expected the result of robocov.partition, or None")
     goals = None if decision.goals is None else decision.goals.copy()
     return replace(decision, forces=decision.forces.copy(), goals=goals, terms=terms)
 

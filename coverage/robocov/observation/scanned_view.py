@@ -100,15 +100,14 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
     across = []
     corners = []
     for side in (1, -1):
-        nearer = np.roll(view.distances, side, axis=1)
-        is_window = np.roll(view.hit, side, axis=1) & (
-            view.distances > _predict_depth(view, reach, side) + jump
-        )
-        robot, ray = np.nonzero(is_window)
+        previous_depth = np.roll(view.distances, side, axis=1)
+        previous_hit = np.roll(view.hit, side, axis=1)
+        is_deeper = view.distances > _predict_depth(view, reach, side) + jump
+        robot, ray = np.nonzero(previous_hit & is_deeper)
         robots.append(robot)
         rays.append(ray)
         across.append(side * directions[ray][:, ::-1] * [-1.0, 1.0])
-        corners.append(nearer[robot, ray])
+        corners.append(previous_depth[robot, ray])
     robot = np.concatenate(robots)
     order = np.argsort(robot, kind="stable")
     return Windows(
@@ -122,12 +121,13 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
 def _predict_depth(view: View, reach: Array, side: int) -> Array:
     """Predict the depth of each ray, (n, rays) m, on the line through the end points of the two before it."""
     inverse = 1.0 / np.maximum(view.distances, _MIN_DISTANCE_M)
+    # A sinusoid f satisfies f(a + b) = 2 cos(b) f(a) - f(a - b); here b is the angle between two rays.
     factor = 2.0 * np.cos(2.0 * np.pi / view.distances.shape[1])
     predicted = factor * np.roll(inverse, side, axis=1) - np.roll(inverse, 2 * side, axis=1)
-    wall = 1.0 / np.maximum(predicted, 1.0 / reach[:, None])
-    nearer = np.roll(view.distances, side, axis=1)
-    is_wall = np.roll(view.hit, 2 * side, axis=1)
-    return np.where(is_wall, np.maximum(wall, nearer), nearer)
+    wall_depth = 1.0 / np.maximum(predicted, 1.0 / reach[:, None])
+    previous_depth = np.roll(view.distances, side, axis=1)
+    has_second_hit = np.roll(view.hit, 2 * side, axis=1)
+    return np.where(has_second_hit, np.maximum(wall_depth, previous_depth), previous_depth)
 
 
 def evaluate_density(density: Density | None, points: Array) -> Array:

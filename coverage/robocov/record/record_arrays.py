@@ -77,10 +77,10 @@ def read_record_arrays(path: Path, team: Team) -> dict[str, Array]:
     return {name: saved[name] for name in names}
 
 
-def _check_shape(path: Path, name: str, array: Array, moments: tuple[int, ...], robots: int) -> None:
+def _check_shape(path: Path, name: str, array: Array, time_shape: tuple[int, ...], robots: int) -> None:
     is_time = name == "time"
-    shape = moments if is_time else (*moments, robots, 2)
-    has_moments = len(moments) == 1 and moments != (0,)
+    shape = time_shape if is_time else (*time_shape, robots, 2)
+    has_moments = len(time_shape) == 1 and time_shape != (0,)
     if array.dtype != np.float64 or array.shape != shape or not has_moments:
         expected = "(T,)" if is_time else str(shape)
         raise InputError(

@@ -40,6 +40,6 @@ def select_nearest_moments(time: Array, rate: float) -> IntArray:
     nearest_multiple = np.rint(periods)
     deviation = np.round(np.abs(periods - nearest_multiple), _TIE_DECIMALS)
     order = np.lexsort([deviation, nearest_multiple])
-    is_first_of_multiple = np.diff(nearest_multiple[order], prepend=-1.0)
+    is_first_of_multiple = np.diff(nearest_multiple[order], prepend=-1.0) > 0.0
     nearest = order[np.flatnonzero(is_first_of_multiple)]
     return np.union1d(nearest, [0, last])
