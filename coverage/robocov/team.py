@@ -103,7 +103,7 @@ class Team:
     radius, mass : m, kg
         Robots are discs. Their mass is the virtual mass of the paper, where it is 1.
     max_speed, max_acceleration : m/s, m/s²
-        The kinematic limits, the same for every controller.
+        Kinematic limits, which every controller is subject to.
     viscosity : N s/m
         nu of equation (28), with the sign that dissipates energy.
     sensing_range : m

@@ -86,7 +86,7 @@ def build_team(groups: object, path: JsonPath, defaults: TeamDefaults | None = N
     groups : object
         Expected to be a list of tables.
     path : tuple of str and int
-        Keys and indices that lead to the groups in their file, with which messages begin.
+        Path of the groups in their file; messages begin with it.
     defaults : mapping or None
         See `read_team`.
 

@@ -22,13 +22,13 @@ _MAX_FEW_POINTS = 300
 _LATTICE_TRIALS = 20
 """Number of random positions and orientations in which a lattice is tried."""
 _MAX_LATTICE_STEPS = 2000
-"""Larger lattices are not tried: darts fill such areas well enough."""
+"""Larger lattices are not tried, because darts fill large areas well enough."""
 _MIN_DARTS = 64
 """Minimum number of darts that are thrown at a time."""
 _DARTS_PER_POINT = 4
 """Expected number of darts inside the area that are thrown for each missing point."""
 _MAX_DARTS_PER_HIT = 100
-"""Throwing ends when fewer than one in so many darts inside the area finds room."""
+"""Throwing ends when more darts inside the area than this are needed for one of them to find room."""
 _MIN_AREA_FRACTION = 1e-3
 """Lower limit of the fraction of its bounding box that an area is assumed to fill."""
 

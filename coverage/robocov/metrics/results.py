@@ -105,7 +105,7 @@ class Results:
         Raises
         ------
         InputError
-            If there is no such column; the message suggests the nearest name.
+            If there is no such column; the message suggests the most similar name.
         """
         for name in columns or ():
             if name not in self.columns:
@@ -129,7 +129,7 @@ class Results:
         Raises
         ------
         InputError
-            If there is no such column; the message suggests the nearest name.
+            If there is no such column; the message suggests the most similar name.
         """
         pandas = import_optional("pandas", "pandas")
         names = list(columns or self.columns)

@@ -16,7 +16,9 @@ class Snapshot:
     """The state of a simulation at one time, with the observations and the decision."""
 
     seen: Observations
+    """What the robots observe."""
     decision: Decision
+    """What the controller decides from it."""
     truth: Array | None = None
     """(n, 2) m, the true positions, if they differ from those that the robots observe."""
     working: BoolArray | None = None
