@@ -156,8 +156,7 @@ def _describe_zigzags(record: Record, zigzags: IntArray) -> str:
 
 
 def _format_robots(record: Record, robots: IntArray) -> str:
-    numbers = record.session.get("robots") or range(1, len(record.team) + 1)
     if len(robots) == len(record.team) > 1:
         return f"all {format_count(len(robots), 'robot')}"
-    names = [str(numbers[robot]) for robot in robots.tolist()]
+    names = [str(record.robot_numbers[robot]) for robot in robots.tolist()]
     return f"robot{'s' if len(names) > 1 else ''} {summarise_names(names)}"

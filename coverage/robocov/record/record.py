@@ -114,14 +114,19 @@ class Record(Drawable):
         another position in between.
         """
         mask = self.present[:-1].copy()
-        numbers = self.session.get("robots") or range(1, len(self.team) + 1)
-        row_of_number = {number: row for row, number in enumerate(numbers)}
+        row_of_number = {number: row for row, number in enumerate(self.robot_numbers)}
         for placement in self.session.get("placed", ()):
             moment = int(np.searchsorted(self.time, placement["time_s"] - TIME_ROUNDING_S))
             rows = [row_of_number[number] for number in placement["robots"] if number in row_of_number]
             if 0 < moment < len(self.time):
                 mask[moment - 1, rows] = False
         return _protect(mask)
+
+    @property
+    def robot_numbers(self) -> tuple[int, ...]:
+        """Numbers of the robots, from 1; in a session, robots keep their numbers when others leave."""
+        numbers = self.session.get("robots") or range(1, len(self.team) + 1)
+        return tuple(numbers)
 
     @property
     def arrays(self) -> tuple[str, ...]:
