@@ -89,19 +89,19 @@ def skip_subtree(node: int) -> int:
 
 @kernel
 def compute_squared_box_distance(boxes: Array, node: int, x: float, y: float) -> float:
-    """Compute the squared distance of a point from a box.
+    """Compute the squared distance from a point to a box.
 
     Parameters
     ----------
-    boxes : (nodes, 4) array, m
+    boxes : (nodes, 4) array, grid steps
     node : int
         The node of the box.
-    x, y : float, m
+    x, y : float, grid steps
         The point.
 
     Returns
     -------
-    float, m²
+    float, grid steps²
         0 inside the box.
     """
     dx: float = max(boxes[node, 0] - x, x - boxes[node, 2], 0.0)

@@ -37,7 +37,7 @@ _TARGETS_PER_BLOCK = 1024
 _MIN_ENTRIES_PER_SOURCE = {SOURCE_BINS: 256, _CORNER_BINS: 1 << 14}
 """Initial number of index entries per source, by number of bins. It is doubled whenever it is too small."""
 _SNAP_STEPS = 2
-"""Number of grid steps around the nearest point of a slanted wall within which a free point is searched."""
+"""Number of grid steps around the nearest point of a slanted wall where a free point is searched for."""
 
 
 class IndexComputation(Protocol):
@@ -243,7 +243,7 @@ class Geodesics:
         return windings
 
     def _find_nearest_free(self, grid_position: Array) -> Array:
-        """Return the nearest grid point of the closed free space, to within a few steps."""
+        """Return the nearest grid point of the closed free space, accurate to a few steps."""
         line = shapely.shortest_line(self.free, shapely.Point(grid_position))
         foot = np.rint(shapely.get_coordinates(line)[0])
         # The nearest point of a slanted wall is not a grid point: take the nearest one not behind the wall.

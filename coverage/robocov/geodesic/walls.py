@@ -125,14 +125,15 @@ def _list_segments(free: MultiPolygon) -> _Segments:
     """List the walls in the order of the rings."""
     rings, ring_component = shapely.get_rings(free.geoms, return_index=True)
     points, ring = shapely.get_coordinates(rings, return_index=True)
-    followed = np.flatnonzero(ring[1:] == ring[:-1])
-    vertices, number = np.unique(points, axis=0, return_inverse=True)
-    number = number.reshape(-1)
-    start = number[followed]
-    end = number[followed + 1]
+    # A wall starts at each point of a ring except the last one, which repeats the first.
+    start_rows = np.flatnonzero(ring[1:] == ring[:-1])
+    vertices, vertex = np.unique(points, axis=0, return_inverse=True)
+    vertex = vertex.reshape(-1)
+    start = vertex[start_rows]
+    end = vertex[start_rows + 1]
     # Snapping may have merged two vertices.
     has_length = start != end
-    component = ring_component[ring[followed]]
+    component = ring_component[ring[start_rows]]
     return _Segments(vertices, start[has_length], end[has_length], component[has_length])
 
 
@@ -213,14 +214,14 @@ def get_relative_ends(ends: Array, wall: int, x: float, y: float) -> tuple[float
 
     Parameters
     ----------
-    ends : (w, 4) array, m
+    ends : (w, 4) array, grid steps
     wall : int
-    x, y : float, m
+    x, y : float, grid steps
         The point.
 
     Returns
     -------
-    start_x, start_y, end_x, end_y : float, m
+    start_x, start_y, end_x, end_y : float, grid steps
     """
     return ends[wall, 0] - x, ends[wall, 1] - y, ends[wall, 2] - x, ends[wall, 3] - y
 
@@ -234,11 +235,11 @@ def can_bend_at_corner(corners: Array, corner_walls: Array, corner: int, x: floa
 
     Parameters
     ----------
-    corners : (c, 2) array, m
-    corner_walls : (c, 4) array, m
-        The walls that meet at each corner; see `Walls`.
+    corners : (c, 2) array, grid steps
+    corner_walls : (c, 4) array, grid steps
+        Directions of the walls that meet at each corner; see `Walls`.
     corner : int
-    x, y : float, m
+    x, y : float, grid steps
         The point.
 
     Returns
@@ -260,9 +261,9 @@ def find_vertex(vertices: Array, x: float, y: float) -> int:
 
     Parameters
     ----------
-    vertices : (v, 2) array, m
+    vertices : (v, 2) array, grid steps
         Sorted by x, then y.
-    x, y : float, m
+    x, y : float, grid steps
         The point.
 
     Returns

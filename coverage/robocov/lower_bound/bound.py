@@ -93,7 +93,7 @@ class LowerBound:
 
     @property
     def gap(self) -> float:
-        """Largest possible excess of the placement over the best one, as a fraction of its own cost."""
+        """Largest possible excess of the placement over the best one, as a fraction of its cost."""
         if self.placement_mean_distance == 0.0:
             return 0.0
         return 1.0 - self.mean_distance / self.placement_mean_distance
@@ -358,10 +358,10 @@ class _Dual:
         centres, _ = self._geodesics.snap_to_free_space(middles)
         scratch = TriangleScratch.allocate(len(self._geodesics.corners))
         worths = np.empty((2, len(triangles)))
-        steps = prices / self._unit
+        grid_prices = prices / self._unit
 
         def fill(index: AngularWallIndex, _numbers: IntArray, _lengths: Array) -> int:
-            return int(bound_worths(self._site_data, index, steps, triangles, centres, scratch, worths))
+            return int(bound_worths(self._site_data, index, grid_prices, triangles, centres, scratch, worths))
 
         self._geodesics.run_with_index(1, SOURCE_BINS, fill)
         worths *= self._unit
@@ -374,7 +374,7 @@ class _Dual:
         """
         slack = tolerance * self.placement_cost / self._robots
         table_worth = self._table.compute_worths(prices, self._weights).max()
-        max_worth = 0.0
+        worth_bound = 0.0
         best_worth = 0.0
         count = 0
         triangles = self._triangles
@@ -387,13 +387,13 @@ class _Dual:
             count += len(triangles)
             better.append(np.column_stack([worths, centres])[worths > table_worth])
             is_leaf = (bounds <= best_worth + slack) | (count >= _MAX_TRIANGLES)
-            max_worth = max(max_worth, float(bounds[is_leaf].max(initial=0.0)))
+            worth_bound = max(worth_bound, float(bounds[is_leaf].max(initial=0.0)))
             leaves.append(triangles[is_leaf])
             triangles = halve_triangles(triangles[~is_leaf])
         # The next proof starts with these triangles.
         self._triangles = np.concatenate(leaves)
         rounding = _ROUNDING * self._geodesics.size * self.total_weight * self._robots
-        bound = float(self._weights @ prices) - self._robots * max_worth - rounding
+        bound = float(self._weights @ prices) - self._robots * worth_bound - rounding
         candidates = np.concatenate(better)
         by_worth = np.argsort(-candidates[:, 0], kind="stable")
         return _Proof(

@@ -1,4 +1,4 @@
-"""A table of distances from some positions, on which the search for prices of the sites is done."""
+"""A table of distances from some positions, used to search for prices of the sites."""
 
 from __future__ import annotations
 

@@ -152,7 +152,7 @@ def _compute_gradient(result: CoverageResult) -> Array:
 
 
 def _compute_curvature(result: CoverageResult, min_distance: float) -> Array:
-    """Return the weighted mean over all sites of the inverse distance of the first waypoint, (n,) 1/m."""
+    """Return the curvature of the cost by robot, (n,) 1/m: the mean inverse distance to first waypoints."""
     site = np.flatnonzero(result.owner >= 0)
     owner = result.owner[site]
     offset = result.first_waypoints[site] - result.positions[owner]

@@ -220,7 +220,7 @@ def _check_parameters(robots: int, restarts: int, seed: int, radius: float) -> N
 
 
 def _get_rank(result: CoverageResult | _Outcome) -> tuple[float, float]:
-    """Return the sort key of results: a smaller uncovered area comes first, then a smaller mean distance."""
+    """Return the sort key of a result: the uncovered area, then the mean distance."""
     return result.uncovered_area, result.mean_distance
 
 
@@ -293,9 +293,9 @@ class _Search:
         row_offset = 2 * (row % side) - side + 1
         column_offset = 2 * (column % side) - side + 1
         offset2 = row_offset**2 + column_offset**2
-        chance = np.random.default_rng(0).random(len(group))
+        tie_breaker = np.random.default_rng(0).random(len(group))
         site = np.flatnonzero(is_covered)
-        site = site[np.lexsort((chance[site], offset2[site], group[site]))]
+        site = site[np.lexsort((tie_breaker[site], offset2[site], group[site]))]
         _, first, count = np.unique(group[site], return_index=True, return_counts=True)
         weight = count if cost.weights is None else np.add.reduceat(cost.weights[site], first)
         table = cost.geodesics.compute_distances(self.candidates, cost.points[site[first]])
