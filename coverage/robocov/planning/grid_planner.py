@@ -56,7 +56,7 @@ class GridPlanner(MapWindow):
 
     @classmethod
     def get_shared(cls, known_map: DiscoveredMap, window: Window, clearance: float) -> GridPlanner:
-        """Return the planner that is in use for this very map and window, or build one.
+        """Return the planner in use for exactly this map and window, or build one.
 
         Parameters
         ----------

@@ -34,7 +34,7 @@ class LatticeCells(NamedTuple):
     is_unknown: BoolArray
     """(h, w) Whether each cell has not been seen."""
     is_roomy: BoolArray
-    """(m,) Whether each node keeps the clearance."""
+    """(m,) Whether each node has the required clearance."""
 
 
 class Edges(NamedTuple):

@@ -105,7 +105,7 @@ class MapWindow:
 
     @cached_property
     def is_roomy(self) -> BoolArray:
-        """Whether each node keeps the clearance, (m,)."""
+        """Whether each node has the required clearance, (m,)."""
         stride = self.window.stride
         return np.asarray(~self.is_tight[stride // 2 :: stride, stride // 2 :: stride].ravel())
 
