@@ -21,21 +21,26 @@ MAX_RATE_WITH_MOVING_OBSTACLES_HZ = 1.0
 
 @dataclass(frozen=True, eq=False)
 class CostHistory(Drawable):
-    """The coverage cost of equation (22) along a run, at K of its moments."""
+    """The coverage cost of equation (22) along a run, at K of its moments.
+
+    Attributes
+    ----------
+    time : (K,) array, s
+    mean_distance : (K,) array, m
+    cost : (K,) array, m³
+    uncovered_area : (K,) array, m²
+    mean_time : (K,) array or None, s
+        Mean over the area of the time that the first robot needs to arrive, each at its own maximum speed.
+        None if all robots have the same maximum speed.
+    """
 
     _drawing_name = "history"
 
     time: Array
-    """(K,) s"""
     mean_distance: Array
-    """(K,) m"""
     cost: Array
-    """(K,) m³"""
     uncovered_area: Array
-    """(K,) m²"""
     mean_time: Array | None = None
-    """(K,) s, mean over the area of the time that the first robot needs to arrive, each at its own maximum
-    speed. None if all robots have the same maximum speed."""
 
     def __repr__(self) -> str:
         first = float(self.mean_distance[0])

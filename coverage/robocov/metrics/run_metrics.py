@@ -39,10 +39,10 @@ COLUMNS = {
 
 @dataclass(frozen=True, eq=False)
 class RunMetrics:
-    """Metrics along a run, at K of its moments. Only working robots count."""
+    """Metrics along a run, at K of its moments. Only working robots count. All arrays have shape (K,)."""
 
     time: Array
-    """Simulation time, s. All arrays have shape (K,)."""
+    """Simulation time, s."""
     sensed_area: Array
     """Free area within the sensing range of a robot and in its line of sight, m²."""
     range_area: Array

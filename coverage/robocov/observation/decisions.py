@@ -16,18 +16,27 @@ from robocov.observation.cells import Cells
 
 @dataclass(slots=True, eq=False)
 class Decision:
-    """The forces that a controller commands, and the quantities that explain them."""
+    """The forces that a controller commands, and the quantities that explain them.
+
+    Attributes
+    ----------
+    forces : (n, 2) array, N
+        The driving force of each robot before any limit; viscosity is added by the world.
+    goals : (n, 2) array or None, m
+        The goal of each robot; nan if it has none. None if the controller does not use goals.
+    terms : mapping of str to (n, 2) array, N
+        The forces by cause (``attraction``, ``repulsion_robots``, ``repulsion_obstacle``, ...).
+    cells : Cells or None
+        The cells that the controller used.
+    memory : object
+        Memory of the robots, which the controller receives again at its next decision.
+    """
 
     forces: Array
-    """(n, 2) N, the driving force of each robot before any limit; viscosity is added by the world."""
     goals: Array | None = None
-    """(n, 2) m, the goal of each robot; nan if it has none. None if the controller does not use goals."""
     terms: Mapping[str, Array] = field(default_factory=dict)
-    """The forces by cause (``attraction``, ``repulsion_robots``, ``repulsion_obstacle``, ...), (n, 2) N."""
     cells: Cells | None = None
-    """The cells that the controller used."""
     memory: Any = None
-    """Memory of the robots, which the controller receives again at its next decision."""
 
 
 def check_decision(returned: Any, count: int, controller: str, time: float, source: str = "") -> Decision:

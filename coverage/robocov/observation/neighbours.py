@@ -17,17 +17,25 @@ _NO_POSITIONS: Array = np.empty((0, 2))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Neighbours:
-    """A communication graph in compressed sparse rows; a complete graph is stored without its n² entries."""
+    """A communication graph in compressed sparse rows; a complete graph is stored without its n² entries.
+
+    Attributes
+    ----------
+    count : int
+        Number of robots n.
+    ranges : (n,) array or None, m
+        Communication ranges; None if all robots communicate at any distance.
+    indptr : (n + 1,) int array or None
+        ``indices[indptr[i]:indptr[i + 1]]``, ascending, are the neighbours of robot i. None if the graph is
+        complete.
+    indices : (m,) int array or None
+        See `indptr`.
+    """
 
     count: int
-    """Number of robots n."""
     ranges: Array | None = None
-    """(n,) m, communication ranges; None if all robots communicate at any distance."""
     indptr: IntArray | None = None
-    """(n + 1,) ``indices[indptr[i]:indptr[i + 1]]``, ascending, are the neighbours of robot i. None if the
-    graph is complete."""
     indices: IntArray | None = None
-    """(m,) See `indptr`."""
 
     @classmethod
     def from_ranges(cls, positions: Array, ranges: Array) -> Neighbours:

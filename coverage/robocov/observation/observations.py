@@ -30,36 +30,52 @@ class NearNeighbours(NamedTuple):
 class Observations:
     """Everything that the robots know, as a structure of arrays. Only robot i knows row i.
 
+    Attributes
+    ----------
+    positions : (n, 2) array, m
+    velocities : (n, 2) array, m/s
+        A robot knows its own velocity, not those of others.
+    neighbours : Neighbours
+        The robots within communication range: their positions are known, nothing else.
+    obstacle_points : (n, 2) array, m
+        The nearest obstacle or boundary point within sensing range; nan if there is none.
+    region : Region
+        The known convex outer boundary.
+    time : float, s
+        Simulation time.
+    max_speeds : (n,) array or None, m/s
+        The maximum speed of each robot, which its neighbours know as well. None if unknown.
+    reported_positions : (m, 2) array or None, m
+        The positions of the neighbours in the newest messages that robots received, in the order of
+        ``neighbours.indices``. None: robots know the current positions of their neighbours.
+    report_ages : (m,) array or None, s
+        The ages of these messages.
+    density : Density or None
+        φ, the importance of each point: part of the task, known to all. None: 1 everywhere.
+    scans : Scans or None
+        A range scan of each robot, in the steps in which the controller requests one.
+    steering : (n, 2) array or None, rad and rad/s
+        Heading of each unicycle, from +x, and its turning rate; a robot knows its own. None in a team of
+        points.
+
+    Notes
+    -----
     Treat observations as immutable. The class is not frozen because creating a frozen object takes three
     times as long; for six robots, that is a tenth of a step.
     """
 
     positions: Array
-    """(n, 2) m"""
     velocities: Array
-    """(n, 2) m/s. A robot knows its own, not those of others."""
     neighbours: Neighbours
-    """The robots within communication range: their positions are known, nothing else."""
     obstacle_points: Array
-    """(n, 2) m, the nearest obstacle or boundary point within sensing range; nan if there is none."""
     region: Region
-    """The known convex outer boundary."""
     time: float = 0.0
-    """Simulation time, s."""
     max_speeds: Array | None = None
-    """(n,) m/s, the maximum speed of each robot, which its neighbours know as well. None if unknown."""
     reported_positions: Array | None = None
-    """(m, 2) m, the positions of the neighbours in the newest messages that robots received, in the order of
-    ``neighbours.indices``. None: robots know the current positions of their neighbours."""
     report_ages: Array | None = None
-    """(m,) s, the ages of these messages."""
     density: Density | None = None
-    """φ, the importance of each point: part of the task, known to all. None: 1 everywhere."""
     scans: Scans | None = None
-    """A range scan of each robot, in the steps in which the controller requests one."""
     steering: Array | None = None
-    """(n, 2) Heading of each unicycle, rad from +x, and its turning rate, rad/s; a robot knows its own. None
-    in a team of points."""
 
     def get_neighbour_positions(self, robot: int) -> Array:
         """Return the known positions of a robot's neighbours.

@@ -61,12 +61,18 @@ class Scanning:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scans:
-    """One scan of each robot by its own range sensor. Only robot i knows row i."""
+    """One scan of each robot by its own range sensor. Only robot i knows row i.
+
+    Attributes
+    ----------
+    distances : (n, rays) array, m
+        Distance to the first obstacle along each ray; the robot's sensing range if there is none.
+    hit : (n, rays) bool array
+        Whether there is an obstacle within the sensing range.
+    """
 
     distances: Array
-    """(n, rays) m, to the first obstacle along each ray; the robot's sensing range if there is none."""
     hit: BoolArray
-    """(n, rays) Whether there is an obstacle within the sensing range."""
 
     @property
     def rays(self) -> int:

@@ -13,18 +13,27 @@ from robocov.observation.observations import Observations
 
 @dataclass(slots=True, eq=False)
 class Snapshot:
-    """The state of a simulation at one time, with the observations and the decision."""
+    """The state of a simulation at one time, with the observations and the decision.
+
+    Attributes
+    ----------
+    seen : Observations
+        What the robots observe.
+    decision : Decision
+        What the controller decides from it.
+    truth : (n, 2) array or None, m
+        The true positions, if they differ from those that the robots observe.
+    working : (n,) bool array or None
+        Mask of the robots that have joined and have not failed. None: all.
+    inbox : object
+        The messages that the robots have received so far; None if communication is ideal.
+    """
 
     seen: Observations
-    """What the robots observe."""
     decision: Decision
-    """What the controller decides from it."""
     truth: Array | None = None
-    """(n, 2) m, the true positions, if they differ from those that the robots observe."""
     working: BoolArray | None = None
-    """(n,) Mask of the robots that have joined and have not failed. None: all."""
     inbox: Any = None
-    """The messages that the robots have received so far; None if communication is ideal."""
 
     def __repr__(self) -> str:
         return f"<Snapshot at {self.time:.2f} s, {format_count(len(self.positions), 'robot')}>"
