@@ -52,9 +52,9 @@ class Frame(NamedTuple):
     """Position of the cells of a window."""
 
     low_x: float
-    """Lower left corner of the raster, m."""
+    """x coordinate of the lower left corner of the raster, m."""
     low_y: float
-    """m"""
+    """y coordinate of that corner, m."""
     cell_size: float
     """m"""
     first_row: int

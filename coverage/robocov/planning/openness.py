@@ -22,7 +22,7 @@ _RELAXATION_FACTOR = 1.9  # the best factor for walks of that length
 _MAX_ITERATIONS = 1000
 _TOLERANCE = 1e-5
 _OUTSIDE = 255
-"""State of cells outside the region."""
+"""State that marks cells outside the region."""
 
 
 class _BlockGrid(NamedTuple):
@@ -35,9 +35,9 @@ class _BlockGrid(NamedTuple):
     wall_sides: Array
     """(rows, columns) Number of sides between unknown cells of each block and walls."""
     links_up: Array
-    """(rows + 1, columns + 1) Number of sides between its unknown cells and those of the block above."""
+    """(rows + 1, columns + 1) Number of sides between unknown cells of each block and of the one above."""
     links_right: Array
-    """(rows + 1, columns + 1) Number of sides between its unknown cells and those of the right block."""
+    """(rows + 1, columns + 1) Number of sides between unknown cells of each block and of its right one."""
 
 
 def compute_openness(state: NDArray[np.uint8], is_outside: BoolArray, max_blocks: int = MAX_BLOCKS) -> Array:

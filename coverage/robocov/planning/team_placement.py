@@ -56,7 +56,7 @@ def compute_node_weights(
     ----------
     planner : GridPlanner
     density : Density or None
-        Density at each node; None is 1 everywhere.
+        It is evaluated at each node; None means 1 everywhere.
     only_known : bool
         If true, unknown cells do not count. Otherwise, they count by their openness.
 
