@@ -23,6 +23,21 @@ class Region:
     vertices : (k, 2) array, m
         Points whose convex hull is the region, in any order.
 
+    Attributes
+    ----------
+    vertices : (k, 2) array, m
+        Counter-clockwise; no three are collinear, and the first is not repeated at the end.
+    edges : (k, 2) array, m
+        ``vertices[e + 1] - vertices[e]``.
+    normals : (k, 2) array
+        Outward unit normals of the edges.
+    offsets : (k,) array, m
+        ``normals[e] @ vertices[e]``: a point q is inside iff ``normals @ q <= offsets``.
+    sides : (k, 5) array
+        The vertex, the normal and the offset of each edge in one row, for kernels.
+    area : float, m²
+    centroid : (2,) array, m
+
     Raises
     ------
     InputError
@@ -36,19 +51,12 @@ class Region:
     """
 
     vertices: Array
-    """(k, 2) m, counter-clockwise; no three are collinear, and the first is not repeated at the end."""
     edges: Array = field(init=False)
-    """(k, 2) m, ``vertices[e + 1] - vertices[e]``."""
     normals: Array = field(init=False)
-    """(k, 2) Outward unit normals of the edges."""
     offsets: Array = field(init=False)
-    """(k,) m, ``normals[e] @ vertices[e]``: a point q is inside iff ``normals @ q <= offsets``."""
     sides: Array = field(init=False)
-    """(k, 5) The vertex, the normal and the offset of each edge in one row, for kernels."""
     area: float = field(init=False)
-    """m²"""
     centroid: Array = field(init=False)
-    """(2,) m"""
 
     def __post_init__(self) -> None:
         hull = shapely.convex_hull(shapely.MultiPoint(np.asarray(self.vertices, dtype=float)))
