@@ -65,7 +65,7 @@ class RandomStream:
         self._key = (int(first), int(second))
 
     def draw_uniform(self, step: int, first_index: IntArray, second_index: IntArray | int = 0) -> Array:
-        """Draw numbers between 0 and 1, both excluded.
+        """Draw uniformly distributed numbers between 0 and 1, both excluded.
 
         Parameters
         ----------

@@ -135,6 +135,7 @@ class Results:
         names = list(columns or self.columns)
         frame: DataFrame = pandas.DataFrame(list(self.rows(names)), columns=names)
         kinds = self._read_kinds()
+        # Otherwise, columns without any value would have the type object.
         empty_columns = [name for name in names if kinds.get(name) != "string" and frame[name].isna().all()]
         return frame.astype(dict.fromkeys(empty_columns, float))
 

@@ -99,6 +99,7 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
     rays = []
     across = []
     corners = []
+    # Compare each ray with the one before it, counter-clockwise and clockwise.
     for side in (1, -1):
         previous_depth = np.roll(view.distances, side, axis=1)
         previous_hit = np.roll(view.hit, side, axis=1)
@@ -106,6 +107,7 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
         robot, ray = np.nonzero(previous_hit & is_deeper)
         robots.append(robot)
         rays.append(ray)
+        # The direction of the ray, turned by a right angle.
         across.append(side * directions[ray][:, ::-1] * [-1.0, 1.0])
         corners.append(previous_depth[robot, ray])
     robot = np.concatenate(robots)
