@@ -177,7 +177,7 @@ def test_the_nearest_declared_colour_counts(tmp_path: Path) -> None:
         ({"free_colour": ("nocolour",)}, "free_colour: expected a colour name or #rrggbb"),
         ({"solid_colour": ("transparent",)}, "solid_colour: expected a colour name"),
         ({"free_colour": ("red",), "ignore_colour": ("#f00",)}, "ignore_colour: '#f00' is a colour of free"),
-        ({"colour_tolerance": 256.0}, "colour_tolerance: 256"),
+        ({"colour_tolerance": 256.0}, "colour_tolerance: expected a number from 0 to 255, got 256"),
         ({"free_colour": tuple(f"#0000{k:02x}" for k in range(33))}, "expected at most 32 colours, got 33"),
     ],
 )
