@@ -5,11 +5,11 @@
 - `gains`: gains as dataclass fields, with units and ranges
 - `registry`: controllers by name
 - `user_modules`: controllers in files of users
-- `repulsion`, `lloyd`, `barrier`, `tangentbug`, `visibility`, `boosting`, `adaptive`: controllers that go by
-  what the robots sense now
+- `repulsion`, `lloyd`, `barrier`, `tangentbug`, `visibility`, `boosting`, `adaptive`: controllers that
+  use only what the robots sense and hear now
 - `geodesic_lloyd`, `diffeomorphism`: controllers that know the whole map
 - `atlas`, `frontier_median`, `greedy_submodular`, `voronoi_graph`: controllers that discover the map
-- `shared_map`, `teammates`, `localization`: what the latter have in common
+- `shared_map`, `teammates`, `localization`: common parts of the controllers that discover the map
 - `known_cells`, `driving`, `route_following`: cells, velocities and forces, for several controllers
 """
 

@@ -64,7 +64,7 @@ class Adaptive(BaseController):
 
     The first term fits all measurements of the robot. The second one makes the paper's Lyapunov function
     fall, with P_i = ∫ K (q - p_i)^T dq over V_i. The third one is the consensus with the neighbours. Where no
-    robot has been, the estimate stays about as it was at first: robots move to where the cost is low, not to
+    robot has been, the estimate stays close to the initial one: robots move to where the cost is low, not to
     where there is much to learn.
 
     With ``estimate="gp"`` robots exchange their measurements instead, one for each of 20 by 20 squares, as if
@@ -74,8 +74,8 @@ class Adaptive(BaseController):
     compute, robots are drawn to where no robot has been.
 
     The controller reads the density of the map at the positions of the robots, and nowhere else. Neighbours
-    exchange their estimates, therefore its information is a shared map. A robot without neighbours
-    learns alone, and takes the whole region for its cell. Obstacles are not known; the robot slides along
+    exchange their estimates, so ``information`` is "shared map". A robot without neighbours
+    learns alone, and treats the whole region as its cell. Obstacles are not known; the robot slides along
     them, as with `lloyd`.
 
     The implementation follows summaries of the papers, not their texts. Decisions made here: parameters are
@@ -225,7 +225,7 @@ class Adaptive(BaseController):
 
 @kernel
 def _multiply(first: Array, second: Array) -> Array:
-    """Return the product of two matrices, with the same bits on all processors, unlike a library's."""
+    """Return the product of two matrices, bit-identical on all processors, unlike that of BLAS."""
     result = np.zeros((len(first), second.shape[1]))
     for i in range(len(first)):
         for k in range(len(second)):
@@ -256,7 +256,7 @@ def _solve(matrices: Array, right: Array) -> Array:
 
 
 def _measure(seen: Observations) -> Array:
-    """Return φ at the positions of the robots, (n,): all that they may know of it."""
+    """Return φ at the positions of the robots, (n,), the only values of φ that they may use."""
     if seen.density is None:
         return np.ones(len(seen.positions))
     return seen.density.evaluate(seen.positions)

@@ -53,7 +53,7 @@ _GROUP_NODES = 500
 _OWN_NODES = 2500
 """Number of nodes of the lattice on which a robot finds its own goal."""
 _GROUP_REACH = 2.0
-"""Size of the window for a group, in distances of its farthest robot."""
+"""Size of the window for a group, relative to the distance of its farthest robot."""
 _MIN_GROUP_REACH_M = 1.0
 """Minimum size of that window."""
 _MAX_IDLE_MOVE = 0.1
@@ -77,7 +77,7 @@ _MAX_EVASION_S = 8.0
 _SWAP_SAVING = 0.1
 """Fraction of the squared path lengths that an exchange of goals must save."""
 _JOINT_PLANNING_CROSSINGS = 3.0
-"""Time for which a robot plans for others, in times that it takes to cross the region."""
+"""Time for which a robot plans for others, in multiples of the time it needs to cross the region."""
 _STAGGERING = 0.5
 """Fraction of the period in which all robots make their first plans."""
 _MAX_DOUBLINGS = 60.0
@@ -95,7 +95,7 @@ class PlannerState:
     """s"""
     teammates: Teammates
     met: frozenset[int] = frozenset()
-    """Robots that it has ever heard or heard of, except for failed ones."""
+    """Robots that it has heard, or that others have reported to it, except for failed ones."""
     gone: Mapping[int, float] = field(default_factory=dict)
     """Times at which it considered robots failed or missing, s. Never changed in place."""
     start_time: float = 0.0
@@ -129,7 +129,7 @@ class PlannerState:
     is_idle: bool = False
     """Whether the next plan may be skipped if nothing has changed."""
     stuck_plans: int = 0
-    """Number of the latest plans since which it has been stuck."""
+    """Number of consecutive plans for which it has been stuck."""
     evasion_end: float = 0.0
     """Time until which it moves out of a jam, s."""
 
@@ -519,7 +519,7 @@ class Atlas(BaseController):
     def _find_evasion_goal(
         self, state: PlannerState, step_length: float, time: float, robot: int
     ) -> tuple[PlannerState, Array | None]:
-        """Return the state, and a goal outside the jam of robots; None if the robot is in none."""
+        """Return the state, and a goal outside the jam of robots; None if it is not in a jam."""
         assert state.positions is not None and state.own_goal is not None
         positions = state.positions
         position = positions[0]
@@ -622,7 +622,7 @@ def _place_agreed_team(
 
 
 def _list_others(teammates: Teammates, position: Array, time: float, *, is_agreed: bool) -> _Others:
-    """Return the others, sorted such that those come first for which a robot at (2,) m plans."""
+    """Return the other robots, first those that a robot at `position`, (2,) m, plans for."""
     is_fixed = (time - teammates.rest_times >= MIN_REST_S) | (teammates.heard_times < time)
     is_quiet = bool(is_fixed.all())
     is_beyond = np.full(len(teammates.robots), not is_agreed)

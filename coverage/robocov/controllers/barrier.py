@@ -23,9 +23,9 @@ from robocov.team import Team
 _ROUNDING_M = 1e-3
 """Length over which the square root in h, which is vertical at the safe distance, is rounded."""
 _MIN_DISTANCE_M = 1e-9
-"""Distance that robots at the same position are treated as having."""
+"""Lower bound of distances between robots, to avoid division by zero."""
 _MIN_PASSING_CLEARANCE_M = 1e-3
-"""Length that is added to the safe gap where the distance to a passing robot divides."""
+"""Margin added to the safe gap, for the lower bound of the distance to a passing robot."""
 _MIN_NORM = 1e-300
 
 
@@ -69,7 +69,7 @@ class Barrier(BaseController):
     acceleration, here Lloyd's, is changed as little as these half planes require: one quadratic programme for
     each robot, solved exactly. If no acceleration is allowed, the robot brakes. An obstacle point does not
     move and does not contribute: alpha_j = 0. The closest point of a wall moves on as the robot passes;
-    therefore the term by which a single point would be passed is left out.
+    therefore the term for moving sideways past a single point is left out.
 
     Robots do not know the velocities of others: each derives them from two reported positions. Obstacle
     points are the closest one and those of the last scan. The bodies and limits of the others are assumed to
@@ -152,13 +152,15 @@ class Barrier(BaseController):
     def _find_near_neighbours(self, seen: Observations, team: Team) -> NearNeighbours:
         """Find the neighbours that constrain a robot now."""
         # Two robots at full speed can stop from farther away. Twice that, because gamma h³ is then not small.
-        stopping_distance = 2.0 * float(team.max_speed.max()) ** 2 / float(self._count_on(team).min())
+        stopping_distance = (
+            2.0 * float(team.max_speed.max()) ** 2 / float(self._compute_braking_limits(team).min())
+        )
         return seen.find_near_neighbours(
             2.0 * float(team.radius.max()) + self.safe_gap + 2.0 * stopping_distance
         )
 
-    def _count_on(self, team: Team) -> Array:
-        """Return alpha, the acceleration of each robot that is counted on for braking, (n,) m/s²."""
+    def _compute_braking_limits(self, team: Team) -> Array:
+        """Return alpha, the deceleration that each robot is assumed to be capable of, (n,) m/s²."""
         return np.asarray(self.braking * team.max_acceleration)
 
     def _constrain_to_robots(
@@ -167,7 +169,7 @@ class Barrier(BaseController):
         """Return the half planes that keep robots apart."""
         n = len(seen.positions)
         robot, neighbour, offset, distance = near
-        alpha = self._count_on(team)
+        alpha = self._compute_braking_limits(team)
         relative_velocities = seen.velocities[robot] - neighbour_velocities
         is_together = distance < _MIN_DISTANCE_M
         normal = offset / np.maximum(distance, _MIN_DISTANCE_M)[:, None]
@@ -192,7 +194,7 @@ class Barrier(BaseController):
         normal = offset / np.where(distance > 0.0, distance, np.nan)[..., None]
         along = (normal * seen.velocities[:, None]).sum(axis=2)
         gap = distance - (team.radius + self.safe_gap)[:, None]
-        alpha = self._count_on(team)[:, None]
+        alpha = self._compute_braking_limits(team)[:, None]
         limit = self._limit_approach(np.nan_to_num(gap), np.nan_to_num(along), alpha)
         return HalfPlanes(normals=-normal, limits=np.where(np.isnan(along), np.inf, limit))
 
@@ -206,7 +208,7 @@ class Barrier(BaseController):
         along : array, m/s
             Speed away from each other.
         alpha : array, m/s²
-            Sum of both accelerations that are counted on.
+            Sum of the braking limits of both.
 
         Returns
         -------
@@ -232,7 +234,7 @@ def _derive_velocities(heard: HeardNeighbours, previous: HeardNeighbours | None,
     ----------
     heard : HeardNeighbours
     previous : HeardNeighbours or None
-        Those of the last step.
+        The neighbours heard at the last step.
     max_speed : (m,) array, m/s
         Maximum speeds of the neighbours. The position jumps when a message was late.
 

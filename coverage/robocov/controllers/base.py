@@ -79,7 +79,7 @@ def get_information(controller: Any) -> Information:
     Raises
     ------
     ParameterError
-        If its attribute ``information`` is none of `Information`.
+        If its attribute ``information`` is not one of `Information`.
 
     Examples
     --------

@@ -38,17 +38,17 @@ _SAMPLES_PER_RAY = 10
 _SAMPLE_FRACTIONS = (np.arange(_SAMPLES_PER_RAY) + 0.5) / _SAMPLES_PER_RAY
 """Points of each ray, as fractions of its length: samples of the integrals."""
 _SETTLE_TIME_S = 2.0
-"""A robot is at an optimum if for this time"""
+"""Time at rest after which a robot is considered to be at an optimum."""
 _REST_RADIUS_M = 0.1
-"""it has stayed within this distance."""
+"""A robot is at rest while it stays within this distance of one point."""
 _TRAIL_SPACING_M = 0.2
 """Distance between the points of the trail on which a robot returns."""
 _RETURN_GAIN = 2.0
 """Speed per metre of distance to the next point of the trail, 1/s."""
 _MIN_DISTANCE_M = 1e-3
-"""Distance that is used instead of a smaller one, by which is divided."""
+"""Lower bound of distances, to avoid division by zero."""
 _MIN_DETECTION = 1e-3
-"""Probability of detection that is used instead of a smaller one, by which is divided."""
+"""Lower bound of the probability of detection, to avoid division by zero."""
 
 
 class Mode(Enum):

@@ -16,7 +16,7 @@ from robocov.environment import Environment, find_nearest_inside
 from robocov.observation.region import Region
 
 _MAX_REFINEMENTS = 12
-"""Number of times that pieces of walls are halved that are not edges of the mesh yet."""
+"""Maximum number of times that wall segments are halved until they are edges of the mesh."""
 _ROUNDING_M = 1e-6
 """Length to which vertices of the mesh are rounded."""
 
@@ -147,7 +147,7 @@ class _PiecewiseAffineMap(NamedTuple):
 
 @kernel
 def _find_triangles(points: Array, inverses: Array, origins: Array) -> IntArray:
-    """Return the triangle of each of (n, 2) points, (n,): for a point outside of all, the nearest one.
+    """Return the triangle that contains each of (n, 2) points, (n,), or else the nearest one.
 
     The nearest triangle is the one whose smallest barycentric coordinate is the largest.
     """

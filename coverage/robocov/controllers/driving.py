@@ -17,9 +17,9 @@ from robocov.observation import Observations
 from robocov.team import Team
 
 _DEFAULT_APPROACH_RATE = 4.0
-"""Rate in 1/s at which the rest of a distance may fall."""
+"""Rate in 1/s at which the remaining distance may decrease."""
 _DEFAULT_BRAKING_FRACTION = 0.5
-"""Fraction of the maximum acceleration that is counted on for braking."""
+"""Fraction of the maximum acceleration that is assumed to be available for braking."""
 
 
 class Margins(NamedTuple):
@@ -30,9 +30,9 @@ class Margins(NamedTuple):
     separation: Array
     """(n,) m, between the centres of robots."""
     rate: float
-    """1/s, at which the rest of a distance may fall exponentially."""
+    """1/s, rate of the exponential decrease of the remaining distance."""
     braking: float
-    """Fraction of the maximum acceleration that is counted on for braking."""
+    """Fraction of the maximum acceleration that is assumed to be available for braking."""
 
     @classmethod
     def build_with_gap(cls, team: Team, gap: float) -> Margins:
@@ -310,7 +310,7 @@ def arrange_in_rows(robot: IntArray, n: int, values: Array, fill: float) -> Arra
 
 
 def sum_by_robot(robot: IntArray, vectors: Array, n: int) -> Array:
-    """Sum (m, 2) vectors by the robot, (m,), that each belongs to, (n, 2)."""
+    """Sum the (m, 2) vectors that belong to each robot, (m,); return (n, 2)."""
     x = np.bincount(robot, vectors[:, 0], minlength=n)
     y = np.bincount(robot, vectors[:, 1], minlength=n)
     # The counts of no vectors at all are integers.

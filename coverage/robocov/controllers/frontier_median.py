@@ -104,7 +104,7 @@ class FrontierMedian(SharedMapController):
         return np.asarray(targets[square > _INSPECTED_RADIUS_M**2])
 
     def _assign_targets(self, situation: Situation, targets: Array) -> Array:
-        """Return the target of each robot, (k, 2) m; its position if it has none."""
+        """Return the target of each robot, (k, 2) m, or its position if it has none."""
         planner = situation.planner
         goals = situation.positions.copy()
         roomy = np.flatnonzero(planner.is_roomy)

@@ -16,7 +16,7 @@ from robocov.team import Team
 _AVERAGING_S = 2.0
 """Time over which position fixes are averaged."""
 _OUTLIER_SIGMAS = 6.0
-"""Number of standard deviations of a fix beyond which the robot has been carried away."""
+"""Number of standard deviations from a fix beyond which the robot must have been moved externally."""
 _MIN_FIXES = 10
 """Number of fixes after which their noise is known."""
 _MIN_DISTANCE_M = 1e-9
@@ -33,7 +33,7 @@ _MAX_DOUBT_FRACTION = 0.75
 
 
 class Tracks(NamedTuple):
-    """Filter states of each robot, by rows, for each other one, by columns, from messages."""
+    """Tracks of the other robots from their messages: row i, column j is robot i's track of robot j."""
 
     sent: Array
     """(n, n) s, when the newest message was sent, nan for none."""
@@ -176,7 +176,7 @@ def assume_closer_neighbours(seen: Observations, estimates: Estimates) -> Observ
     seen : Observations
         As `estimate_positions` returns them.
     estimates : Estimates
-        The same.
+        The estimates that it returned with them.
     """
     assert seen.reported_positions is not None
     robot, other = seen.neighbours.list_pairs()

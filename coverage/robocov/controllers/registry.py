@@ -91,7 +91,7 @@ def get_controller_label(name: str) -> str:
 
 
 def list_controller_classes() -> dict[str, type[Any]]:
-    """List all controller classes by name: those of installed packages, and the built-in ones.
+    """List all controller classes by name: those of installed packages and the built-in ones.
 
     Returns
     -------

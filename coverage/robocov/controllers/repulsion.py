@@ -33,17 +33,17 @@ from robocov.team import Team
 from robocov.voronoi.delaunay import Mesh
 
 _MIN_DISTANCE_M = 1e-9
-"""Distance that robots at the same position are treated as having."""
+"""Lower bound of distances between robots, to avoid division by zero."""
 _MIN_CHARGE_DISTANCE_M = 0.05
 """Distance below which Howard's forces no longer grow; robots in contact are farther apart."""
 _WALL_FACTOR = 2.0 / (3.0 * math.pi)
 """Force of all rays that meet a straight wall, relative to that of a point charge at the same distance."""
 _MAX_LINK_STRETCH = 0.999
-"""Fraction of the range of a link beyond which the force that keeps it no longer grows."""
+"""Fraction of the range of a link beyond which the force that maintains it no longer grows."""
 _MIN_EXPLORING_SPEED = 0.01
-"""Speed in m/s below which a robot has no direction of motion that it could keep."""
+"""Speed in m/s below which a robot has no well-defined direction of motion."""
 _BRAKING_FRACTION = 0.5
-"""Fraction of the maximum acceleration that is counted on to avoid collisions."""
+"""Fraction of the maximum acceleration that is assumed to be available to avoid collisions."""
 
 
 def _compute_potential_forces(
@@ -58,7 +58,7 @@ def _compute_potential_forces(
 
 
 def _find_separated_neighbours(seen: Observations, reach: float) -> NearNeighbours:
-    """Return near neighbours; robots at the same position get a direction, too."""
+    """Return near neighbours; robots at the same position get a direction as well."""
     pairs = seen.find_near_neighbours(reach)
     is_same = pairs.distance < _MIN_DISTANCE_M
     directions = compute_separations(pairs.robot[is_same], pairs.neighbour[is_same])
@@ -320,7 +320,7 @@ class Poduri(BaseController):
     def _is_critical_for_neighbour(
         self, seen: Observations, links: NearNeighbours, is_near: BoolArray, selected: IntArray
     ) -> BoolArray:
-        """Return whether links are critical for the neighbour, by the robots that the robot hears."""
+        """Return whether links are critical for the neighbour, from the robots that the robot hears."""
         n = len(is_near)
         hears = np.eye(n, dtype=bool)
         first, second = seen.neighbours.list_pairs()
@@ -340,7 +340,7 @@ class Poduri(BaseController):
     def _is_critical_by_reports(
         self, seen: Observations, links: NearNeighbours, link_ranges: Array, selected: IntArray
     ) -> BoolArray:
-        """Return whether links are critical for the neighbour, by the positions that the robot was sent."""
+        """Return whether links are critical for the neighbour, from the positions that the robot received."""
         is_critical = np.zeros(len(selected), dtype=bool)
         for k, link in enumerate(selected.tolist()):
             robot = links.robot[link]

@@ -21,7 +21,7 @@ from robocov.team import Team
 _WAYPOINT_RADIUS_M = 0.2
 """Distance from a waypoint at which it counts as reached."""
 _BRAKING_FRACTION = 0.4
-"""Fraction of the maximum acceleration that is for braking: less than half, because the drive lags."""
+"""Fraction of the maximum acceleration reserved for braking: less than half, because the drive lags."""
 _STEERING_FRACTION = 0.7
 """Fraction of the maximum acceleration that is used to follow the route; the rest avoids collisions."""
 _WALL_GAP_M = 0.02
@@ -29,7 +29,7 @@ _WALL_GAP_M = 0.02
 _ROBOT_GAP_M = 0.04
 """Gap between two robots."""
 _APPROACH_RATE = 10.0
-"""Rate in 1/s at which a distance may fall to its gap."""
+"""Rate in 1/s at which a distance may decrease towards its gap."""
 _MIN_SPEED_LIMIT = 0.15
 """Speed in m/s that a robot may reach even close to a wall."""
 _MAX_EVASION_SPEED = 0.3

@@ -95,8 +95,8 @@ class Situation(NamedTuple):
     def compute_weights(self, cells: BoolArray) -> Array:
         """Compute the weights of the nodes, (m,), for cells of the map, (rows, columns).
 
-        A weight is the number of these cells that the node stands for, times the density; 0 if no path leads
-        there.
+        A weight is the number of these cells that the node represents, times the density. It is 0 for a node
+        that no robot can reach.
         """
         weights = self.planner.sum_by_node(self.planner.window.crop(cells, False))
         weights = weights * np.isfinite(self.planner.compute_distances_from(self.positions))
@@ -115,7 +115,7 @@ class Candidates(NamedTuple):
 
     @classmethod
     def build_at_nodes(cls, situation: Situation, weights: Array, nodes: IntArray) -> Candidates:
-        """Build the candidates at those of some nodes that a path leads to, by the weights of all nodes."""
+        """Build the candidates at the reachable ones of some nodes, from the weights of all nodes."""
         targets = np.flatnonzero(weights > 0.0)
         nodes = nodes[weights[nodes] > 0.0]
         distances = situation.planner.compute_distance_table(nodes)[:, targets]
@@ -387,7 +387,7 @@ def update_maps(
 
 
 def _build_group(seen: Observations, team: Team, former_plan: Plan | None, robot: int) -> Group:
-    """Return the group of a robot: itself, those that it hears, and those that it assumes at their goals."""
+    """Return the group of a robot: itself, those that it hears, and those assumed to be at their goals."""
     position = seen.positions[robot : robot + 1]
     robots = np.append(seen.neighbours.list_neighbours(robot), robot)
     positions = np.vstack([seen.get_neighbour_positions(robot), position])

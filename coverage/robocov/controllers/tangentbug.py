@@ -28,17 +28,17 @@ from robocov.team import Team
 _SQUARE_SIDE_M = 0.1
 """Side of the squares in which a robot remembers that it has met an obstacle."""
 _MIN_IMPROVEMENT_M = 0.2
-"""A point counts as nearer to the goal if it is nearer by this; with less, modes would alternate."""
+"""Minimum difference for a point to count as nearer to the goal; smaller values let modes alternate."""
 _RETURN_RADIUS_M = 0.3
-"""Distance from a point at which a robot is back at it."""
+"""Distance from a point at which a robot has returned to it."""
 _ARRIVAL_RADIUS_M = 0.05
 """Distance from a point at which a robot has arrived."""
 _MIN_BOUNDARY_LENGTH_M = 1.0
-"""Length of a boundary that is worth following."""
+"""Minimum length of a boundary that is worth following."""
 _PATIENCE_DECAY = 0.9
 """Factor of the length for which boundaries are followed, with each attempt to reach a goal."""
 _CONTACT_FRACTION = 0.95
-"""Fraction of its distance to which a point may be approached that is nearer than the clearance."""
+"""Fraction of the distance to a point within the clearance down to which a robot may approach it."""
 
 
 class Mode(Enum):
@@ -265,7 +265,7 @@ class ContourEnd(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Navigator:
-    """Decisions of one robot by its last scan. Points and distances are relative to it, in m."""
+    """Decisions of one robot from its last scan. Points and distances are relative to it, in m."""
 
     jump: float
     """Minimum step of the depth in view at the end of an obstacle."""
@@ -422,7 +422,7 @@ class Navigator:
         return bug
 
     def _is_around(self, bug: BugState) -> bool:
-        """Return whether a robot has followed the whole boundary, and is back where it met it."""
+        """Return whether a robot has followed the whole boundary, back to where it met it."""
         assert bug.entry_point is not None
         if bug.followed_length <= 2.0 * math.pi * _RETURN_RADIUS_M:
             return False
@@ -439,7 +439,7 @@ class Navigator:
         return np.asarray(self.position + depths[ray] * self.directions[ray])
 
     def _find_best_point(self, bug: BugState, ends: dict[int, ContourEnd]) -> Array:
-        """Return the point nearest to the goal of the boundaries followed so far and in view, (2,) m."""
+        """Return the boundary point, followed so far or now in view, that is nearest to the goal, (2,) m."""
         rays = np.arange(len(self.free_distances))
         if len(ends) == 2:
             # The contour extends counter-clockwise from one end to the other.

@@ -1,4 +1,4 @@
-"""Knowledge of one robot about the others: positions, when they were heard, and since when they rest."""
+"""Knowledge of one robot about the others: positions, last contacts, and times at rest."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Teammates(NamedTuple):
     heard_distances: Array
     """(k,) m, their distances then."""
     rest_times: Array
-    """(k,) s, the time since when they have been within `REST_RADIUS_M` of `rest_positions`."""
+    """(k,) s, the time since which they have been within `REST_RADIUS_M` of `rest_positions`."""
     rest_positions: Array
     """(k, 2) m"""
 

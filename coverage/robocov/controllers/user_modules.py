@@ -102,7 +102,7 @@ def format_location(function: object) -> str:
 
 
 def _format_place(error: BaseException) -> str:
-    """Return file and line of the last call outside robocov, as " (mine.py, line 12)", or an empty text."""
+    """Return file and line of the last call outside robocov, as " (mine.py, line 12)", or an empty string."""
     calls = _list_calls(error)
     places = [call for call in calls if _is_in_user_file(call)]
     if not places:
@@ -232,7 +232,7 @@ class _ModuleCollector:
     def __init__(self) -> None:
         self.modules: dict[str, ModuleText] = {}
         self._locations: dict[str, list[str]] = {}
-        """Folders of the submodules of each module that was looked up; empty if there are none."""
+        """Folders that contain the submodules of each module that was looked up; empty if there are none."""
 
     def add(self, name: str) -> list[str]:
         """Add a module, and the packages that contain it; return the names that they import."""
@@ -295,7 +295,7 @@ def _is_own(spec: ModuleSpec) -> bool:
 
 
 class _TextLoader(importlib.abc.ExecutionLoader):
-    """Loads a module from the text of its file, which need not exist any more."""
+    """Loads a module from the text of its file, which may no longer exist."""
 
     def __init__(self, path: str, text: str) -> None:
         self._path = path
@@ -312,7 +312,7 @@ class _TextLoader(importlib.abc.ExecutionLoader):
 
 
 class _TextFinder(importlib.abc.MetaPathFinder):
-    """Finds modules by name among texts."""
+    """Finds modules by name in a collection of source texts."""
 
     def __init__(self, modules: Mapping[str, ModuleText]) -> None:
         self.modules = modules

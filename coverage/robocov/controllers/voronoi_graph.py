@@ -16,7 +16,7 @@ from robocov.planning.voronoi_roadmap import VoronoiRoadmap
 from robocov.planning.window import Window
 
 MAX_CELLS = 150_000
-"""Number of blocks of cells that the map is thinned on."""
+"""Number of blocks of cells on which the map is thinned."""
 MAX_VERTICES = 300
 """Approximate number of vertices of the graph."""
 _MIN_SPACING_M = 0.25
