@@ -5,8 +5,8 @@
 - `gains`: gains as dataclass fields, with units and ranges
 - `registry`: controllers by name
 - `user_modules`: controllers in files of users
-- `repulsion`, `lloyd`, `barrier`, `tangentbug`, `visibility`, `boosting`, `adaptive`: controllers that
-  use only what the robots sense and hear now
+- `repulsion`, `lloyd`, `barrier`, `tangentbug`, `visibility`, `boosting`, `adaptive`: controllers
+  without a map of the region
 - `geodesic_lloyd`, `diffeomorphism`: controllers that know the whole map
 - `atlas`, `frontier_median`, `greedy_submodular`, `voronoi_graph`: controllers that discover the map
 - `shared_map`, `teammates`, `localization`: common parts of the controllers that discover the map
