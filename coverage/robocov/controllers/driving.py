@@ -310,7 +310,7 @@ def arrange_in_rows(robot: IntArray, n: int, values: Array, fill: float) -> Arra
 
 
 def sum_by_robot(robot: IntArray, vectors: Array, n: int) -> Array:
-    """Sum the (m, 2) vectors that belong to each robot, (m,); return (n, 2)."""
+    """Return the sum of the vectors, (m, 2), of each robot, (n, 2); `robot`, (m,), holds their robots."""
     x = np.bincount(robot, vectors[:, 0], minlength=n)
     y = np.bincount(robot, vectors[:, 1], minlength=n)
     # The counts of no vectors at all are integers.

@@ -16,7 +16,7 @@ from robocov.team import Team
 _AVERAGING_S = 2.0
 """Time over which position fixes are averaged."""
 _OUTLIER_SIGMAS = 6.0
-"""Number of standard deviations from a fix beyond which the robot must have been moved externally."""
+"""Number of standard deviations of a fix, off the prediction, at which a robot was carried away."""
 _MIN_FIXES = 10
 """Number of fixes after which their noise is known."""
 _MIN_DISTANCE_M = 1e-9
