@@ -97,7 +97,10 @@ class Adaptive(BaseController):
     consensus: float = gain(1.0, "1/s", "ζ, rate at which neighbours agree")
     coupling: float = gain(1e-3, "1/(m⁴ s)", "k, effect of the offset to the centroid")
     correlation: float = gain(
-        0.12, "sides", "correlation length of the process, in longer sides of the region", low=0.01
+        0.12,
+        "sides",
+        "correlation length of the process, relative to the longer side of the region",
+        low=0.01,
     )
     explore: float = gain(0.0, "σ", "number of standard deviations that are added", high=100.0)
     period: float = gain(0.2, "s", "time from one estimate to the next", low=0.01, high=60.0)

@@ -302,12 +302,15 @@ class _TextLoader(importlib.abc.ExecutionLoader):
         self._text = text
 
     def get_filename(self, fullname: str) -> str:
+        """Return the path of the file, for tracebacks."""
         return self._path
 
     def get_source(self, fullname: str) -> str:
+        """Return the text of the module."""
         return self._text
 
     def is_package(self, fullname: str) -> bool:
+        """Return whether the module is a package."""
         return Path(self._path).name == "__init__.py"
 
 
@@ -318,6 +321,7 @@ class _TextFinder(importlib.abc.MetaPathFinder):
         self.modules = modules
 
     def find_spec(self, fullname: str, path: object, target: object = None) -> ModuleSpec | None:
+        """Find a module among the texts; None if it is not one of them."""
         module = self.modules.get(fullname)
         if module is None:
             return None
