@@ -138,14 +138,14 @@ class _Reader:
         """Count characters: entities and default attributes make more of them than the file has."""
         self.room -= count
         if self.room < 0:
-            self._refuse("its entities stand for too much")
+            self._refuse("entities that stand for too much")
 
     def _entity(self, name: str, parameter: bool, value: str | None, *rest: object) -> None:
         """Check an entity: it may stand for a few words, which expat puts in where it is used."""
         self._declared()
-        stands = f"entity {quote(name)} stands"
+        stands = f"an entity {quote(name)} that stands"
         if value is None:
-            self._refuse(f"{stands} for another file ({quote(rest[1])}), which is not read")
+            self._refuse(f"{stands} for another file ({quote(rest[1])})")
         if parameter or "&" in value or "%" in value:
             self._refuse(f"{stands} for other entities")
         if len(value) * self.references > _EXPANDED:

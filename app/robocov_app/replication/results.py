@@ -163,7 +163,7 @@ def open_folder(folder: Path, plan: Plan) -> None:
         if content["format"] == _HEAD["format"]:
             if content["plan"] == plan.name:
                 return
-            words = f"holds the {content['plan']} study, but the {plan.name} one was asked for"
+            words = f"expected the {plan.name} study, got the {content['plan']} one"
     raise InputError(f"{folder}: {words}; choose another --out")
 
 

@@ -98,7 +98,7 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes] | None, str, str]] = {
     "pixels of a bomb": ("a.png", lambda: raw_png(20_000, 20_000, 8, 6, b"\0" * 10**7), "cell", TOO_MANY),
     "GBs of pixels": ("a.png", lambda: raw_png(8000, 8000, 16, 6, b"\0" * 10**7), "cell", "truncated"),
     "more than it says": ("a.png", lambda: raw_png(10, 10, 8, 0, b"\0" * 4 * 10**7), "cell", "no cell is"),
-    "text": ("a.png", text_bomb, "cell", "whole PNG"),
+    "text": ("a.png", text_bomb, "cell", "expected a complete PNG"),
     "10^9 cells": ("a.pgm", lambda: b"P5 31623 31623 255\n" + b"\xff" * 1000, "cell", TOO_MANY),
     "10^9 plain cells": ("a.pgm", lambda: b"P2 1 999999999 255\n" + b"1 " * 1000, "cell", TOO_MANY),
     "cut off": ("a.pgm", lambda: b"P5 8000 8000 65535\n" + b"\xff" * 1000, "cell", "cut off after 500"),

@@ -99,7 +99,9 @@ def test_declarations() -> None:
 
 @pytest.mark.slow
 def test_sheets_that_take_for_ever_are_refused() -> None:
-    with pytest.raises(MapError, match=rf"plan\.svg: style sheets of over {MOST_TEXT} characters"):
+    with pytest.raises(
+        MapError, match=rf"plan\.svg: expected style sheets of at most {MOST_TEXT} characters"
+    ):
         sheet("*" * (MOST_TEXT + 1))
     rules = sheet("*{fill:red} " * 9000)
     with pytest.raises(MapError, match=r"plan\.svg: too many rules for too many elements"):

@@ -323,7 +323,7 @@ class TestStopping:
         process.kill()
         process.communicate(timeout=300)
 
-        process = begun("--out", str(out), "--workers", "1", "--json")
+        process = begun("--out", str(out), "--workers", "2", "--json")
         said, told = process.communicate(timeout=500)
         assert process.returncode == 0, told
         answer = json.loads(said)
@@ -649,5 +649,5 @@ def test_other_folders_are_left_alone(tmp_path):
 def test_quick_and_full_do_not_mix(tmp_path):
     open_folder(tmp_path / "out", TINY)
     open_folder(tmp_path / "out", TINY)
-    with pytest.raises(InputError, match="expected the full one, got holds the quick study asked for"):
+    with pytest.raises(InputError, match="expected the full study, got the quick one; choose another --out"):
         open_folder(tmp_path / "out", replace(TINY, name="full"))

@@ -56,8 +56,9 @@ class Crossings:
                     break
         self.count += estimate
         if self.count > MAX_CROSSINGS:
-            found = f"its lines cross each other some {self.count:.1g} times"
-            raise MapError(f"{self.where}: expected at most {MAX_CROSSINGS} times, got {found}")
+            raise MapError(
+                f"{self.where}: expected at most {MAX_CROSSINGS} crossings of lines, got about {self.count:.1g}"
+            )
 
 
 def edges_of(lines: Iterable[BaseGeometry]) -> Array:
