@@ -61,7 +61,7 @@ def content(path: Path, most: int = MAX_BYTES) -> bytes:
     """Return the content of a file; a MapError where it is larger than `most` bytes, or as `head`."""
     head(path, 0)
     if path.stat().st_size > most or len(data := head(path, most + 1)) > most:
-        raise MapError(f"{to_one_line(path)}: expected at most {most / 1e6:g} MB, got more")
+        raise MapError(f"{to_one_line(path)}: expected at most {most / 1e6:.3g} MB, got more")
     return data
 
 

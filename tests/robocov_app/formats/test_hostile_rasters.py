@@ -106,24 +106,24 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes] | None, str, str]] = {
     "a grid cut off": ("a.map", lambda: GRID % (8000, 8000) + b"." * 9000, "", "9000 letters"),
     "noise": ("a.pgm", lambda: pgm(255 * (np.indices((2500, 2500)).sum(axis=0) % 2)), "cell", "vertices"),
     "10^9 of a JPEG": ("a.jpg", lambda: sized(large("JPEG", 997), 997, 31_623), "cell", TOO_MANY),
-    "a JPEG cut off": ("a.jpg", lambda: sized(large("JPEG", 997), 997, 8000), "cell", "whole JPEG"),
-    "a BMP cut off": ("a.bmp", lambda: sized(large("BMP", 997), 997, 8000), "cell", "whole BMP"),
+    "a JPEG cut off": ("a.jpg", lambda: sized(large("JPEG", 997), 997, 8000), "cell", "complete JPEG"),
+    "a BMP cut off": ("a.bmp", lambda: sized(large("BMP", 997), 997, 8000), "cell", "complete BMP"),
     "a TIFF cut off": (
-        "a.tif", lambda: large("TIFF", 4000, 9000, compression="packbits"), "cell", "whole TIFF"
+        "a.tif", lambda: large("TIFF", 4000, 9000, compression="packbits"), "cell", "complete TIFF"
     ),
     "10^9 of a TIFF": ("a.tif", lambda: sized(large("TIFF", 997), 997, 31_623), "cell", TOO_MANY),
     "a TIFF of nothing": (
-        "a.tif", lambda: sized(large("TIFF", 997, compression="tiff_lzw"), 997, 8000), "cell", "whole TIFF"
+        "a.tif", lambda: sized(large("TIFF", 997, compression="tiff_lzw"), 997, 8000), "cell", "complete TIFF"
     ),
     "a wide TIFF": (
-        "a.tif", lambda: sized(large("TIFF", 997, compression="group4"), 997, 8000), "cell", "whole TIFF"
+        "a.tif", lambda: sized(large("TIFF", 997, compression="group4"), 997, 8000), "cell", "complete TIFF"
     ),
     "a PPM cut off": ("a.ppm", lambda: b"P6 8000 8000 255\n" + b"\xff" * 1000, "cell", "cut off after 333"),
-    "a PBM cut off": ("a.pbm", lambda: b"P1 8000 8000\n" + b"1 " * 1000, "cell", "whole PPM"),
+    "a PBM cut off": ("a.pbm", lambda: b"P1 8000 8000\n" + b"1 " * 1000, "cell", "complete PPM"),
     "laughs": ("a.yaml", laughs, "", "more than 50000 values, aliases followed"),
     "depth": ("a.yaml", deep_yaml, "", "nested too deeply"),
-    "a large yaml": ("a.yaml", lambda: b"image: a\nresolution: 1\n" + b"# " * 10**7, "", "larger than"),
-    "a terabyte": ("a.pgm", None, "cell", "larger than 256 MB"),
+    "a large yaml": ("a.yaml", lambda: b"image: a\nresolution: 1\n" + b"# " * 10**7, "", "most 0.262 MB"),
+    "a terabyte": ("a.pgm", None, "cell", "expected at most 256 MB"),
 }  # fmt: skip
 
 

@@ -56,9 +56,8 @@ class Crossings:
                     break
         self.count += estimate
         if self.count > MAX_CROSSINGS:
-            raise MapError(
-                f"{self.where}: expected at most {MAX_CROSSINGS} crossings of lines, got about {self.count:.1g}"
-            )
+            got = f"about {self.count:.1g}"
+            raise MapError(f"{self.where}: expected at most {MAX_CROSSINGS} crossings of lines, got {got}")
 
 
 def edges_of(lines: Iterable[BaseGeometry]) -> Array:
