@@ -228,7 +228,7 @@ def test_too_many_vertices_are_refused() -> None:
 
 def test_a_tangle_of_lines_is_refused() -> None:
     ends = np.random.default_rng(0).random((3000, 2, 2)) * 10
-    with pytest.raises(MapError, match="cross each other"):
+    with pytest.raises(MapError, match="crossings of lines"):
         taken(shapes(lines=ends.tolist()))
 
 

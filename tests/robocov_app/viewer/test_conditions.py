@@ -113,7 +113,7 @@ def test_who_stays_keeps_the_messages_when_another_is_taken_out() -> None:
     assert after is not None
     kept = [0, 2, 3]
     assert (after.sent == before.sent[np.ix_(kept, kept)]).all()
-    assert (after.places == before.places[np.ix_(kept, kept)]).all()
+    assert (after.positions == before.positions[np.ix_(kept, kept)]).all()
     session.add_robot((3.0, 1.0))
     inbox = session.panes[0].simulation.inbox
     assert inbox is not None

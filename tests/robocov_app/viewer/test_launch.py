@@ -123,7 +123,7 @@ def test_a_folder_that_has_frames_already_is_not_written_over(
         (("square", "--start", "nowhere"), "nowhere"),
         (("square", "--seed", "-1"), "--seed"),
         (("square", "--controllers", "nobody"), "nobody"),
-        (("square", "--controllers", *("rapf",) * 5), "--controllers: 5"),
+        (("square", "--controllers", *("rapf",) * 5), "--controllers: expected 1 to 4, got 5"),
         (("square", "--controllers", "mine.py:Mine"), "mine.py"),
         (("square", "--set", "k_rep=much"), "k_rep"),
         (("square", "--set", "k_none=1"), "k_none"),
