@@ -1,6 +1,7 @@
 """The pymunk bodies of a world: obstacles and robots, and their states as arrays.
 
-Only public pymunk is used. `pymunk.batch` reads and writes the states of all bodies of a space in one call.
+Only pymunk's public interface is used. `pymunk.batch` reads and writes the states of all bodies of a space
+in one call.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ from robocov.arrays import Array, IntArray
 from robocov.world.obstacle_pieces import Mover, Obstacles
 
 WALL_CATEGORY = 0b1
-"""Filter category of what robots never enter: walls and failed robots, but not moving obstacles."""
+"""Filter category of shapes that robots never enter: walls and failed robots, but not moving obstacles."""
 WALLS_ONLY = pymunk.ShapeFilter(mask=WALL_CATEGORY)
-"""Filter of queries that find nothing but walls and failed robots."""
+"""Filter of queries that find only walls and failed robots."""
 MAX_TEAMS_PER_SPACE = 31
-"""Teams that one space can keep apart: one filter category each, in addition to that of the walls."""
+"""Number of teams that one space can keep apart: each needs a filter category, and so do the walls."""
 
 _ALL_BUT_WALLS = pymunk.ShapeFilter.ALL_CATEGORIES() & ~WALL_CATEGORY
 _FORCE_FIELD = batch.BodyFields.FORCE
@@ -112,7 +113,7 @@ class BodyArrays:
 
     def __init__(self, space: pymunk.Space, capacity: int) -> None:
         self._space = space
-        # One spare row: pymunk would reallocate a buffer as soon as reading has filled it.
+        # One spare row, because pymunk reallocates a buffer as soon as it is full.
         self.forces = np.zeros((capacity + 1, 2))
         self.states = np.zeros((capacity + 1, 4))
         self._force_buffer = _wrap_array(self.forces)
@@ -129,8 +130,8 @@ class BodyArrays:
         Returns
         -------
         slice or int array
-            In the order of the list. A slice if they are consecutive, which is usual and quicker to index
-            with.
+            In the order of the list. A slice if they are consecutive, which is the usual case and makes
+            indexing faster.
         """
         self._id_buffer.clear()
         batch.get_space_bodies(self._space, batch.BodyFields.BODY_ID, self._id_buffer)
@@ -190,7 +191,7 @@ def compute_mover_states(movers: tuple[Mover, ...], time: float, dt: float) -> A
     time : float, s
         Simulation time.
     dt : float, s
-        Period over which the velocity is the mean one, so that a step of `dt` ends exactly on the path.
+        Period over which the velocity is averaged, so that a step of `dt` ends exactly on the path.
 
     Returns
     -------

@@ -22,9 +22,9 @@ from robocov.world.world import World
 class ChangingWorld:
     """A world with a row for every robot that is ever part of the team.
 
-    A robot that has failed is an obstacle from then on. One that has not joined yet is nowhere; its position
-    is the one at which it would start, or is to join. Nothing changes for the others: whenever the team
-    changes, a new `World` of the robots that work takes over.
+    A robot that has failed is an obstacle from then on. A robot that has not joined yet is not in the world;
+    its row contains the position at which it will join. Whenever the team changes, the robots that work
+    continue in a new `World`.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class ChangingWorld:
     Attributes
     ----------
     positions, velocities, steering
-        As those of `World`; read-only.
+        See `World`. Read-only.
     working : (n,) bool array
         Mask of the robots that are present and have not failed. Read-only.
     """
@@ -96,7 +96,7 @@ class ChangingWorld:
     def step(
         self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
     ) -> None:
-        """Move as `World.step` does; then robots fail and join.
+        """Move the robots as `World.step` does, then let robots fail and join.
 
         Parameters
         ----------
@@ -132,7 +132,7 @@ class ChangingWorld:
             self.steering[rows] = self._world.steering
 
     def _change_team(self, time: float) -> None:
-        """Let robots fail and join that do so until `time`."""
+        """Apply the failures and arrivals that are due by `time`."""
         working = self._conditions.find_working(time, len(self.team))
         failed = self._conditions.find_failed(time, len(self.team))
         if (working == self.working).all() and (failed == self._failed).all():
@@ -150,7 +150,7 @@ class ChangingWorld:
         self._build_world()
 
     def _find_joining_position(self, robot: int, is_present: BoolArray, time: float) -> tuple[float, float]:
-        """Return the free position at which a robot joins, the nearest to the one where it should."""
+        """Return the free position nearest to the one at which a robot should join."""
         x, y = self.positions[robot].tolist()
         try:
             return find_free_position(
@@ -167,7 +167,7 @@ class ChangingWorld:
             ) from None
 
     def _build_world(self) -> None:
-        """Build the world of the robots that work; there is none while no robot does."""
+        """Build the world of the robots that work; without such robots it is None."""
         self._protect_state()
         self._working_rows = np.flatnonzero(self.working)
         self._world: World | None = None

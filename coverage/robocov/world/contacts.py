@@ -1,10 +1,10 @@
 """Contacts: finding the robots that touch something, and moving them again in fine substeps.
 
-pymunk remembers more of a contact than positions and velocities: cached impulses, pushes out of an overlap
-that are still to be made, the shape of its search tree. A step must depend on nothing but positions and
+Besides positions and velocities, pymunk stores cached impulses, overlap corrections that it has yet to
+apply, and a search tree whose shape depends on the past. A step must depend on nothing but positions and
 velocities, so that a copy of a world continues identically, bit for bit. Therefore all robots are first moved
 as if nothing touched (`FreeSpace`), and those that pymunk reports in contact are moved again, from the same
-state, by a `ContactSolver` that remembers nothing.
+state, by a `ContactSolver`, which stores nothing between steps.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from robocov.world.dynamics import compute_clip_factor
 from robocov.world.obstacle_pieces import Obstacles
 
 MAX_PENETRATION = 1e-3
-"""Depth in metres to which robots may sink into walls or each other; in contact no substep is longer."""
+"""Maximum depth, in metres, to which robots may sink into walls or each other. A robot in contact moves no
+farther than this in one substep."""
 
 _MAX_SUBSTEPS = 64
 _COLLISION_SLOP_M = 1e-4
@@ -57,7 +58,7 @@ class FreeSpace:
         robots = []
         for row, (mass, radius) in enumerate(zip(team.mass.tolist(), team.radius.tolist(), strict=True)):
             body, disc = build_robot(mass=mass, radius=radius, team=row // team_size)
-            # Placed first: pymunk would remember a pair for any two discs that are added at one position.
+            # Set the position first: pymunk would register a contact between discs added at one place.
             body.position = tuple(positions[row].tolist())
             space.add(body, disc)
             robots.append(body)
@@ -125,7 +126,7 @@ class FreeSpace:
 class ContactSolver:
     """Moves robots that touch something, in a space that contains only them and the obstacles.
 
-    It remembers nothing between calls: pymunk forgets a contact when the discs leave the space.
+    It stores nothing between calls: pymunk drops a contact when the discs leave the space.
 
     Parameters
     ----------
@@ -138,13 +139,12 @@ class ContactSolver:
         self._team = team
         self._max_mover_speed = obstacles.max_speed
         space, self._movers = build_obstacle_space(obstacles)
-        # Sequential impulses: a light robot between a heavy one and a wall needs as many as the ratio of
-        # masses.
+        # A light robot between a heavy one and a wall needs about as many iterations as the ratio of masses.
         mass_ratio = float(team.mass.max() / team.mass.min())
         space.iterations = _MIN_ITERATIONS + math.ceil(2.0 * mass_ratio)
         space.collision_slop = _COLLISION_SLOP_M
-        # The fraction of an overlap that remains after a second. Nothing remains after a substep, unless a
-        # moving obstacle has run over a robot, which then comes out gradually.
+        # The fraction of an overlap that remains after one second. With 0, each substep removes all overlap.
+        # With moving obstacles, a robot that one of them has run over is pushed out gradually.
         space.collision_bias = 1e-9 if self._movers else 0.0
         self._space = space
         self._arrays = BodyArrays(space, capacity=len(self._movers) + len(team) + 1)
@@ -176,7 +176,7 @@ class ContactSolver:
         mover_states : (m, 4) array, m and m/s
             As `bodies.compute_mover_states` returns them.
         max_speed : (k,) array, m/s
-            Speed to which each robot is limited afterwards: a contact can give it more than it can do itself.
+            Speed to which each robot is limited afterwards: a contact can make it faster than its drive can.
         dt : float, s
 
         Returns
@@ -197,17 +197,17 @@ class ContactSolver:
             self._space.add(*discs)
             self._arrays.forces[rows] = net_forces
             substeps = self._count_substeps(robots, states, net_forces, dt)
-            self._make_substeps(members, substeps, dt / substeps)
+            self._run_substeps(members, substeps, dt / substeps)
             self._space.remove(*discs)
             self._arrays.read_states()
             final = self._arrays.states[rows].copy()
             for robot, (vx, vy) in enumerate(final[:, 2:].tolist()):
                 final[robot, 2:] *= compute_clip_factor(vx, vy, float(max_speed[robot]))
-            self._finish_pushes(members, dt / substeps)
+            self._finish_corrections(members, dt / substeps)
             final[:, :2] = self._arrays.states[rows, :2]
             return final
         finally:
-            # Also after an interruption the space contains no robots.
+            # Leave no robots in the space, even after an interruption.
             self._arrays.forces[:] = 0.0
             self._space.remove(*[disc for disc in discs if disc.space is not None])
             self._space.remove(*bodies)
@@ -223,10 +223,10 @@ class ContactSolver:
         speed = math.sqrt(max_square) + self._max_mover_speed
         return min(_MAX_SUBSTEPS, max(1, math.ceil(speed * dt / self._max_travel)))
 
-    def _make_substeps(
+    def _run_substeps(
         self, members: list[tuple[pymunk.Body, pymunk.Circle]], substeps: int, dt: float
     ) -> None:
-        """Make substeps of `dt` seconds each, all under the same forces."""
+        """Run substeps of `dt` seconds each, all under the same forces."""
         for _ in range(substeps):
             positions = self._list_positions(members)
             self._arrays.write_forces()
@@ -234,8 +234,8 @@ class ContactSolver:
             if self._movers:
                 self._keep_out_of_walls(members, positions)
 
-    def _finish_pushes(self, members: list[tuple[pymunk.Body, pymunk.Circle]], dt: float) -> None:
-        """Apply the push out of an overlap that pymunk has decided on but not yet made; read the states."""
+    def _finish_corrections(self, members: list[tuple[pymunk.Body, pymunk.Circle]], dt: float) -> None:
+        """Apply the overlap corrections that pymunk has computed but not yet applied, and read the states."""
         self._arrays.states[:, 2:] = 0.0
         self._arrays.write_states()
         positions = self._list_positions(members)
@@ -245,7 +245,7 @@ class ContactSolver:
         self._arrays.read_states()
 
     def _list_positions(self, members: list[tuple[pymunk.Body, pymunk.Circle]]) -> list[pymunk.Vec2d]:
-        """Return the positions of robots; none if nothing can push them into a wall."""
+        """Return the positions of robots, or an empty list if nothing can push them into a wall."""
         if not self._movers:
             return []
         return [body.position for body, _ in members]
@@ -253,15 +253,15 @@ class ContactSolver:
     def _keep_out_of_walls(
         self, members: list[tuple[pymunk.Body, pymunk.Circle]], old_positions: list[pymunk.Vec2d]
     ) -> None:
-        """Leave robots that a moving obstacle has pushed into a wall in front of that wall.
+        """Move robots that a moving obstacle has pushed into a wall back in front of that wall.
 
-        Walls are stronger than moving obstacles, which then go over the robot.
+        Walls take precedence over moving obstacles, which then pass over the robot.
         """
         for (body, disc), old_position in zip(members, old_positions, strict=True):
             crossed = self._space.segment_query_first(old_position, body.position, 0.0, WALLS_ONLY)
             if crossed is not None:
                 body.position = old_position
-            for _ in range(_MAX_CORNER_WALLS):  # Out of one wall may be into another one.
+            for _ in range(_MAX_CORNER_WALLS):  # Leaving one wall may mean entering another.
                 wall = self._space.point_query_nearest(body.position, disc.radius, WALLS_ONLY)
                 if wall is None or wall.distance >= disc.radius - _COLLISION_SLOP_M or wall.distance <= 0.0:
                     break

@@ -1,9 +1,9 @@
 """Free motion of robots: viscosity and kinematic limits, combined into one net force per robot.
 
 A controller returns a force. Equation (28) with the physical sign, m q'' = F - nu q', is solved exactly over
-a substep, so that viscosity is stable at any period; then the change of velocity and the speed are limited.
-The net force is the one that takes a point mass from its velocity to the resulting one within the substep,
-and it is what pymunk integrates.
+a substep, so that viscosity is stable for any time step; then the change of velocity and the speed are
+limited. The net force takes a point mass from its velocity to the resulting one within the substep. It is
+what pymunk integrates.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class MotionResponse(NamedTuple):
     velocity_loss: Array
     """Fraction of the velocity that viscosity removes, 1 - exp(-nu dt / m)."""
     velocity_per_force: Array
-    """Velocity gained per controller's force, m/s/N."""
+    """Velocity gained per unit of the controller's force, m/s/N."""
     force_per_velocity: Array
     """Net force per change of velocity, m / dt, N/(m/s)."""
     max_velocity_change: Array
@@ -55,7 +55,7 @@ def compute_response(team: Team, dt: float) -> MotionResponse:
         velocity_per_force=effective_time / team.mass,
         force_per_velocity=team.mass / dt,
         max_velocity_change=team.max_acceleration * dt,
-        # A copy: read-only arrays, such as those of a team, are another type to the compiler.
+        # A copy, because read-only arrays, such as those of a team, are a different type to the compiler.
         max_speed=team.max_speed.copy(),
     )
 
@@ -86,8 +86,8 @@ def compute_clip_factor(x: float, y: float, limit: float) -> float:
 def compute_net_forces(forces: Array, velocities: Array, response: MotionResponse, external: Array) -> Array:
     """Compute the net forces that pymunk integrates.
 
-    The change of velocity is limited first, then the speed: projecting onto the disc of speeds brings a
-    velocity no farther from the old one, which lies inside it.
+    The change of velocity is limited first, then the speed. Limiting the speed does not make the change
+    larger again, because the old velocity is within the limit as well.
 
     Parameters
     ----------

@@ -12,9 +12,9 @@ from robocov.potential import compute_spread_directions
 from robocov.team import Team
 
 _CLEARANCE_M = 1e-3
-"""Clearance of a robot from walls and robots after it was moved away from them."""
+"""Clearance that a robot keeps from walls and robots when it is moved away from them."""
 _MAX_ROUNDS = 300
-"""Robots that still overlap after this number of rounds have no room next to each other."""
+"""Maximum number of rounds; robots that still overlap then do not fit next to each other."""
 _QUADRANT_SEGMENTS = 16
 """Edges per quadrant of the polygons that represent the discs of other robots."""
 
@@ -84,7 +84,7 @@ def _compute_directions(positions: Array, first: IntArray, second: IntArray, dis
     is_same_point = distance == 0.0
     divisor = np.where(is_same_point, 1.0, distance)
     directions: Array = (positions[second] - positions[first]) / divisor[:, None]
-    # Robots at the same point have no direction apart. Each pair gets one of its own.
+    # Between robots at the same point there is no direction. Each such pair is assigned one.
     directions[is_same_point] = compute_spread_directions((first + second)[is_same_point])
     return directions
 
@@ -103,7 +103,7 @@ def find_free_position(
         Positions of the other robots.
     point : (x, y), m
     radii : (n,) array or None, m
-        Radii of the other robots; by default they have the same one.
+        Radii of the other robots; by default the same as `radius`.
 
     Returns
     -------
@@ -122,10 +122,11 @@ def find_free_position(
         return float(point[0]), float(point[1])
     area = _compute_center_area(environment, radius)
     if len(others) > 0:
-        # The polygon of a buffer is inscribed into it: a larger one keeps the clearance all around.
-        enlargement = np.cos(np.pi / (4 * _QUADRANT_SEGMENTS))
-        reach = (radius + radii + _CLEARANCE_M) / enlargement
-        discs = shapely.buffer(shapely.points(others), reach, quad_segs=_QUADRANT_SEGMENTS)
+        # shapely replaces a disc by a polygon inscribed in it. The disc is enlarged, so that the edges of the
+        # polygon keep the clearance as well.
+        inradius_ratio = np.cos(np.pi / (4 * _QUADRANT_SEGMENTS))
+        circumradii = (radius + radii + _CLEARANCE_M) / inradius_ratio
+        discs = shapely.buffer(shapely.points(others), circumradii, quad_segs=_QUADRANT_SEGMENTS)
         area = area.difference(shapely.union_all(discs))
     if area.is_empty:
         raise StartError("there is no room for a robot there")
@@ -187,7 +188,7 @@ def _compute_center_area(environment: Environment, radius: float) -> BaseGeometr
 
 
 def _compute_wall_distances(environment: Environment, positions: Array) -> Array:
-    """Return the distances of positions from the nearest wall, (n,) m; -inf inside of one."""
+    """Return the distances of positions from the nearest wall, (n,) m; -inf inside a wall."""
     points = shapely.points(positions)
     shapely.prepare(environment.free)
     is_free = shapely.contains_properly(environment.free, points)

@@ -1,8 +1,8 @@
-"""Everything that is solid as convex pieces, because the physics engine represents nothing else.
+"""Walls and obstacles as convex pieces, the only polygons that the physics engine supports.
 
-pymunk silently replaces a concave polygon by its hull. Therefore everything that is not free is triangulated,
-and the triangles are merged to larger convex pieces as long as they stay convex (Hertel and Mehlhorn 1983: at
-most four times as many pieces as in an optimal decomposition).
+pymunk silently replaces a concave polygon by its convex hull. Therefore everything that is not free is
+triangulated, and the triangles are merged into larger pieces as long as these stay convex (Hertel and
+Mehlhorn 1983: at most four times as many pieces as in an optimal decomposition).
 """
 
 import weakref
@@ -81,7 +81,7 @@ def build_obstacles(environment: Environment) -> Obstacles:
 def build_solid_pieces(environment: Environment) -> tuple[Array, ...]:
     """Build convex polygons that tile everything that is not free and does not move.
 
-    These are obstacles at rest, the outside of the boundary, and a frame around the region.
+    They cover the obstacles at rest, the area outside the boundary, and a frame around the region.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def build_solid_pieces(environment: Environment) -> tuple[Array, ...]:
     Returns
     -------
     tuple of (k, 2) arrays, m
-        Counter-clockwise. They are computed once for each environment.
+        Counter-clockwise. They are computed only once for each environment.
     """
     static = environment.static
     pieces = _pieces_by_environment.get(id(static))
@@ -160,7 +160,7 @@ def _triangulate(polygon: BaseGeometry) -> list[Loop]:
 
 
 def _merge_loops(loops: list[Loop]) -> list[Loop]:
-    """Remove the diagonals between convex loops as long as what remains is convex."""
+    """Merge triangles across their common edges as long as the result is convex."""
     pieces = dict(enumerate(loops))
     piece_of_edge: dict[tuple[Point, Point], int] = {}
     for number, (a, b, c) in pieces.items():

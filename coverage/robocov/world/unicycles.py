@@ -1,4 +1,4 @@
-"""Unicycles: the speeds of two wheels that follow the force on a point.
+"""Unicycles: wheel speeds that make a two-wheeled robot follow the force that acts on a point robot.
 
 A controller's force gives the acceleration a of a point robot, within its limits and with viscosity.
 A unicycle (a differential drive with its centre between its wheels) has a speed v >= 0 along its heading h
@@ -20,7 +20,7 @@ Guarantees:
 
 - Neither the wheels nor the turning rate exceed their limits; a unicycle gains no more speed in a substep
   than the point would along its heading.
-- If the point would brake along the heading, the unicycle brakes as hard, at once and without a turn.
+- If the point would brake along the heading, the unicycle brakes just as hard, at once and without turning.
 - There is no sideways slip, except in contact and under external forces: those carry a robot, which then
   moves as a point and keeps its heading. When it is released, its wheels stop the sideways part of its
   velocity.
@@ -42,9 +42,10 @@ from robocov.team import Team
 from robocov.world.dynamics import MotionResponse, compute_clip_factor
 
 RESPONSE_TIME_S = 0.2
-"""τ, the time within which a unicycle faces the direction that it should take."""
-_FAINT_FRACTION = 0.005
-"""Fraction of the maximum acceleration below which a robot at rest turns ever more slowly, as under noise."""
+"""τ, the time within which a unicycle turns to the direction in which it should move."""
+_DAMPING_FRACTION = 0.005
+"""Fraction of the maximum acceleration below which turning is damped, so that noise does not turn a robot at
+rest."""
 
 
 class Wheels(NamedTuple):
@@ -61,8 +62,8 @@ class Wheels(NamedTuple):
 class DriveCommand(NamedTuple):
     """Motion of the wheels in one substep.
 
-    The forces give a unicycle its new velocity exactly, if it responds to them as `response` says: without
-    viscosity and limits, which the wheels have already respected. Other robots are unchanged.
+    With `response`, the forces give a unicycle exactly its new velocity: viscosity and limits are left out of
+    it, as the wheels have already respected them. The rows of other robots are unchanged.
     """
 
     forces: Array
@@ -143,7 +144,7 @@ def compute_drive_command(
     wheels: Wheels,
     dt: float,
 ) -> DriveCommand:
-    """Turn the controllers' forces into the motion of wheels, as the module's docstring explains.
+    """Convert the controllers' forces into wheel motion, as explained at the top of this module.
 
     Parameters
     ----------
@@ -154,7 +155,7 @@ def compute_drive_command(
     response : MotionResponse
         Response of points to forces.
     wheels : Wheels
-        Robots that do not roll keep their rows.
+        The rows of robots that are not rolling are copied unchanged.
     dt : float, s
 
     Returns
@@ -175,7 +176,7 @@ def compute_drive_command(
         heading = steering[i, 0]
         hx = math.cos(heading)
         hy = math.sin(heading)
-        # The wheels grip: nothing sideways remains.
+        # The wheels grip, so that no sideways velocity remains.
         motion = _Motion(max(vx * hx + vy * hy, 0.0), steering[i, 1])
         limits = _WheelLimits(
             0.5 * wheels.track_width[i],
@@ -215,11 +216,11 @@ def compute_drive_command(
 def _choose_motion(motion: _Motion, along: float, across: float, limits: _WheelLimits, dt: float) -> _Motion:
     """Return the motion that follows a point whose velocity changes along the heading and across it, m/s."""
     # The turning rate towards the velocity that the point would have after the response time.
-    ahead = motion.speed + along * (RESPONSE_TIME_S / dt)
-    aside = across * (RESPONSE_TIME_S / dt)
-    error = math.atan2(aside, ahead)
-    faint_speed = _FAINT_FRACTION * limits.max_change * (RESPONSE_TIME_S / dt)
-    damping = min(1.0, math.hypot(ahead, aside) / faint_speed)
+    future_along = motion.speed + along * (RESPONSE_TIME_S / dt)
+    future_across = across * (RESPONSE_TIME_S / dt)
+    error = math.atan2(future_across, future_along)
+    undamped_speed = _DAMPING_FRACTION * limits.max_change * (RESPONSE_TIME_S / dt)
+    damping = min(1.0, math.hypot(future_along, future_across) / undamped_speed)
     rate = min(
         limits.max_turning_rate,
         limits.max_speed / limits.half_track,
@@ -259,7 +260,7 @@ def _approach_motion(motion: _Motion, target: _Motion, limits: _WheelLimits) -> 
 def remove_sideways_velocity(
     velocities: Array, steering: Array, max_speed: Array, is_rolling: BoolArray
 ) -> Array:
-    """Remove the part of the velocities of unicycles after a contact that their wheels do not allow.
+    """Remove the velocity that a contact gave to unicycles and that their wheels do not allow.
 
     Parameters
     ----------
@@ -273,7 +274,7 @@ def remove_sideways_velocity(
     Returns
     -------
     (n, 2) array, m/s
-        Forward, and up to the limit.
+        Forward and at most `max_speed` for unicycles on their wheels.
     """
     remaining = velocities.copy()
     for i in range(len(velocities)):

@@ -18,6 +18,7 @@ from robocov.world.contacts import ContactSolver, FreeSpace
 from robocov.world.dynamics import MotionResponse, compute_net_forces, compute_response
 from robocov.world.obstacle_pieces import Obstacles
 from robocov.world.unicycles import (
+    DriveCommand,
     Wheels,
     compute_drive_command,
     initialize_steering,
@@ -27,7 +28,7 @@ from robocov.world.unicycles import (
 MAX_SUBSTEP_S = 0.02
 """Longest period over which motion is integrated at once."""
 MAX_MASS_RATIO = 1000.0
-"""Mass of the heaviest robot over that of the lightest; beyond it contacts cannot be resolved."""
+"""Largest ratio of the masses of two robots; beyond it contacts cannot be resolved."""
 
 _NO_FORCES = np.zeros((0, 2))
 
@@ -37,9 +38,9 @@ class _SpeedLimits:
     """Speeds that robots may reach in a substep, each (n,) m/s."""
 
     driving: Array
-    """By their own force. A robot that is faster than its limit brakes as hard as it can."""
+    """Under their own force. A robot that is faster than its limit brakes as hard as it can."""
     pushed: Array
-    """By external forces as well."""
+    """Under external forces as well."""
 
 
 class World:
@@ -81,9 +82,9 @@ class World:
     on nothing but positions, velocities and steering, so that a copy continues identically, bit for bit.
 
     Moving obstacles keep to their path and push robots aside. They may press a robot deeper into a wall, by
-    some millimetres and in very acute corners by centimetres. Walls are stronger still: where no space is
-    left between a moving obstacle and a wall, the robot stays in front of the wall and the obstacle moves
-    over it. Once there is space, the robot is pushed out on the nearest side.
+    some millimetres and in very acute corners by centimetres. Walls take precedence: where no space is left
+    between a moving obstacle and a wall, the robot stays in front of the wall and the obstacle passes over
+    it. Once there is space, the robot is pushed out on the nearest side.
     """
 
     def __init__(
@@ -122,7 +123,7 @@ class World:
         self._mover_states = compute_mover_states(obstacles.movers, time=0.0, dt=1.0)
         self._response: MotionResponse | None = None
         self._response_dt = math.nan
-        # Both are built when they are needed, and are the only objects that a step changes in place.
+        # Both are built on demand, and are the only objects that a step changes in place.
         self._spaces: list[tuple[slice, FreeSpace]] | None = None
         self._contact_solver: ContactSolver | None = None
 
@@ -157,7 +158,7 @@ class World:
         return copy(self)
 
     def __getstate__(self) -> dict[str, Any]:
-        # Spaces are built when they are needed: nothing that matters is in them alone.
+        # Both are rebuilt on demand: they contain nothing that is not in the other attributes.
         return {**vars(self), "_spaces": None, "_contact_solver": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -196,7 +197,8 @@ class World:
         """Return the number of substeps in which no robot can cross a thin wall."""
         speed = self._max_team_speed
         if self._may_exceed_max_speed or len(external) > 0:
-            speed = max(speed, float((self._compute_speeds() + self._compute_push(external) * dt).max()))
+            possible_speeds = self._compute_speeds() + self._compute_external_acceleration(external) * dt
+            speed = max(speed, float(possible_speeds.max()))
         crossed_radii = (speed + self._obstacles.max_speed) * dt / self._min_radius
         return max(math.ceil(dt / MAX_SUBSTEP_S - 1e-9), math.ceil(crossed_radii))
 
@@ -204,22 +206,15 @@ class World:
         """Move all robots by `dt` seconds: freely at first, then again where they touch something."""
         response = self._get_response(dt)
         max_speed_after_contact = self.team.max_speed
-        if self._may_exceed_max_speed or len(external) > 0:
+        may_exceed_max_speed = self._may_exceed_max_speed or len(external) > 0
+        if may_exceed_max_speed:
             limits = self._compute_speed_limits(external, dt)
             response = response._replace(max_speed=limits.driving)
             max_speed_after_contact = limits.pushed
         steering = self.steering
         if steering is not None:
             is_rolling = self._find_rolling(external)
-            command = compute_drive_command(
-                forces=forces,
-                velocities=self.velocities,
-                # Robots that are carried keep their heading, and do not turn.
-                steering=steering * np.column_stack([np.ones(len(is_rolling)), is_rolling]),
-                response=response,
-                wheels=Wheels(self.team.track_width, self.team.turning_rate, is_rolling),
-                dt=dt,
-            )
+            command = self._drive_wheels(forces, steering, is_rolling, response, dt)
             forces = command.forces
             steering = command.steering
             response = command.response
@@ -230,21 +225,34 @@ class World:
         velocities = np.ascontiguousarray(states[:, 2:])
         if steering is not None:
             if has_contacts:
-                wheel_speed = 0.5 * self.team.track_width * np.abs(steering[:, 1])
+                turning_speed = 0.5 * self.team.track_width * np.abs(steering[:, 1])
                 velocities = remove_sideways_velocity(
                     velocities=velocities,
                     steering=steering,
-                    max_speed=max_speed_after_contact - wheel_speed,
+                    max_speed=max_speed_after_contact - turning_speed,
                     is_rolling=is_rolling,
                 )
             steering.setflags(write=False)
             self.steering = steering
-        if self._may_exceed_max_speed or len(external) > 0:
+        if may_exceed_max_speed:
             speeds = compute_lengths(velocities)
             self._may_exceed_max_speed = bool((speeds > self.team.max_speed).any())
         self._set_state(positions, velocities)
         if has_contacts:
             self._update_spaces()
+
+    def _drive_wheels(
+        self, forces: Array, steering: Array, is_rolling: BoolArray, response: MotionResponse, dt: float
+    ) -> DriveCommand:
+        """Return the wheel motion for a substep, in which robots that are carried do not turn."""
+        return compute_drive_command(
+            forces=forces,
+            velocities=self.velocities,
+            steering=steering * np.column_stack([np.ones(len(is_rolling)), is_rolling]),
+            response=response,
+            wheels=Wheels(self.team.track_width, self.team.turning_rate, is_rolling),
+            dt=dt,
+        )
 
     def _get_response(self, dt: float) -> MotionResponse:
         """Return the response of the team for substeps of `dt`, which is the same in nearly all substeps."""
@@ -258,17 +266,17 @@ class World:
         driving = np.maximum(self.team.max_speed, speeds - self.team.max_acceleration * dt)
         pushed = driving
         if len(external) > 0:
-            pushed = np.maximum(driving, speeds + self._compute_push(external) * dt)
+            pushed = np.maximum(driving, speeds + self._compute_external_acceleration(external) * dt)
         return _SpeedLimits(driving, pushed)
 
     def _find_rolling(self, external: Array) -> BoolArray:
-        """Return which robots are unicycles on their own wheels: those that no external force carries."""
+        """Return a mask of the unicycles on their own wheels, which no external force carries."""
         if len(external) > 0:
             return self._is_unicycle & ~external.any(axis=1)
         return self._is_unicycle
 
-    def _compute_push(self, external: Array) -> Array:
-        """Return the acceleration by external forces, (n,) m/s², or (1,) zero without such forces."""
+    def _compute_external_acceleration(self, external: Array) -> Array:
+        """Return the accelerations due to external forces, (n,) m/s², or (1,) zero without such forces."""
         if len(external) == 0:
             return np.zeros(1)
         return compute_lengths(external) / self.team.mass
@@ -308,7 +316,7 @@ class World:
         return self._spaces
 
     def _update_spaces(self) -> None:
-        """Set the bodies to the state of the robots, which is no longer the one that pymunk has computed."""
+        """Copy the state of the robots to the pymunk bodies, after it was changed outside pymunk."""
         if self._spaces is not None:
             for rows, space in self._spaces:
                 space.set_robots(self.positions[rows], self.velocities[rows])
@@ -319,7 +327,7 @@ class World:
             space.set_movers(self._mover_states)
 
     def _move_freely(self, net_forces: Array, dt: float) -> Array:
-        """Return the states after a substep in which nothing is pushed, (n, 4): x, y, vx, vy."""
+        """Return the states after a substep without contacts, (n, 4): x, y, vx, vy."""
         states = [space.step(net_forces[rows], dt) for rows, space in self._get_spaces()]
         return states[0] if len(states) == 1 else np.concatenate(states)
 
@@ -331,7 +339,7 @@ class World:
         return touching
 
     def _resolve_contacts(self, states: Array, net_forces: Array, max_speed: Array, dt: float) -> bool:
-        """Correct free states in place where robots touch something; return whether any do."""
+        """Correct, in place, the states of robots that touch something; return whether any do."""
         touching_in_run: dict[int, list[int]] = {}
         for robot in self._list_touching():
             touching_in_run.setdefault(robot // self._team_size, []).append(robot)
@@ -344,7 +352,7 @@ class World:
     def _resolve_contacts_of_run(
         self, run: int, touching: list[int], states: Array, net_forces: Array, max_speed: Array, dt: float
     ) -> None:
-        """Move the robots in contact again, and with them all that they are moved against."""
+        """Move the robots in contact again, together with all robots that they are pushed into."""
         if self._contact_solver is None:
             self._contact_solver = ContactSolver(self.team, self._obstacles)
         rows = self._rows_of_run(run)
