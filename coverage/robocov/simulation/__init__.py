@@ -3,9 +3,9 @@
 - `simulation`: one run of one team
 - `batch`: many runs of equal teams, advanced together
 - `team_state`: the state from which a run starts or continues
-- `controller_caller`: calls of controllers, checked, with faults in one line
+- `controller_caller`: calls to controllers, with checks of what they return
 - `sensing`: observations of robots with exact sensors
-- `checks`: checks of control periods and joining robots
+- `checks`: checks of the arguments of simulations
 """
 
 from robocov.simulation.batch import SimulationBatch

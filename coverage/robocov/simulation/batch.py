@@ -28,8 +28,8 @@ from robocov.world.free_positions import require_free_starts
 from robocov.world.obstacle_pieces import build_obstacles
 
 MAX_JOINT_TEAM_SIZE = 15
-"""Largest teams whose controller is called once for all runs. Cells of larger teams come from a
-triangulation, with which one call for each run is as fast."""
+"""Size of the largest teams whose controller is called once for all runs. The cells of larger teams come from
+a triangulation, for which one call per run is just as fast."""
 
 
 class _BatchDecision(NamedTuple):
@@ -38,7 +38,7 @@ class _BatchDecision(NamedTuple):
     forces: Array
     """(runs * n, 2) N"""
     goals: Array | None
-    """(runs * n, 2) m; None if the controller knows no goals."""
+    """(runs * n, 2) m; None if the controller has no goals."""
     memories: list[Any]
 
 
@@ -51,7 +51,7 @@ class SimulationBatch:
     Parameters
     ----------
     environment : Environment
-        All obstacles stand still.
+        Without moving obstacles.
     controller : Controller or IndividualController
     starts : (runs, n, 2) array, m
         Positions of the robots of each run, which are at rest.
@@ -68,7 +68,7 @@ class SimulationBatch:
     Raises
     ------
     StartError
-        If the starts are no array of this shape, or a robot would start in a wall or in another robot.
+        If the starts are not an array of this shape, or a robot would start in a wall or in another robot.
     ParameterError
         If an obstacle moves, the control period is out of range, or team and starts differ in size.
 
@@ -78,8 +78,8 @@ class SimulationBatch:
 
     Notes
     -----
-    Robots of different runs neither see nor touch each other. Each run of points is the same, bit for bit,
-    as ``Simulation(environment, controller, starts[k], team, dt)``; unicycles agree within rounding.
+    Robots of different runs neither see nor touch each other. A run of point robots is identical, bit for
+    bit, to ``Simulation(environment, controller, starts[k], team, dt)``; unicycles agree to within rounding.
 
     Examples
     --------
@@ -206,7 +206,7 @@ class SimulationBatch:
         self._start_step()
 
     def observe(self) -> Observations:
-        """Return the present observations of the robots of all runs.
+        """Return the current observations of the robots of all runs.
 
         Returns
         -------
@@ -227,7 +227,7 @@ class SimulationBatch:
         return self._observations
 
     def observe_run(self, run: int) -> Observations:
-        """Return the present observations of the robots of one run, as `Simulation.observe` does.
+        """Return the current observations of the robots of one run, as `Simulation.observe` does.
 
         Parameters
         ----------
@@ -254,7 +254,7 @@ class SimulationBatch:
         )
 
     def _check_forces(self, forces: Any) -> Array:
-        """Return forces from outside as an array with a row for each robot of all runs."""
+        """Check forces passed to `step`, and return them with one row for each robot of all runs."""
         shape = (len(self), len(self.team), 2)
         if np.shape(forces) != shape:
             raise ParameterError(f"forces: expected an array of shape {shape}, got {np.shape(forces)}")
@@ -286,8 +286,8 @@ class SimulationBatch:
             else:
                 observations = [self.observe_run(run) for run in range(len(self))]
             decisions = [
-                self._caller.decide(known, memory)
-                for known, memory in zip(observations, self._memories, strict=True)
+                self._caller.decide(observed, memory)
+                for observed, memory in zip(observations, self._memories, strict=True)
             ]
             self._decision = _BatchDecision(
                 forces=np.concatenate([decision.forces for decision in decisions]),
@@ -320,7 +320,7 @@ class SimulationBatch:
     def run(
         self, duration: float, *, start: str | None = None, seeds: Sequence[int] | None = None
     ) -> list[Record]:
-        """Simulate all runs for some time, and record each.
+        """Simulate all runs for some time and record each.
 
         Parameters
         ----------
@@ -355,7 +355,7 @@ class SimulationBatch:
         ]
 
     def _to_snapshot(self) -> Snapshot:
-        """Return the present step of all runs, as far as a record needs it."""
+        """Return what a record needs of the current step of all runs."""
         decision = self._observe_and_decide()
         return Snapshot(self.observe(), Decision(forces=decision.forces, goals=decision.goals))
 
@@ -369,7 +369,7 @@ class SimulationBatch:
         return replace(joint_record, team=self.team, seed=seed, **arrays)
 
     def __getstate__(self) -> dict[str, Any]:
-        # Observations and decision of this step are computed again.
+        # Observations and decision of this step are computed again on demand.
         return {**vars(self), "_graphs": None, "_observations": None, "_decision": None}
 
 

@@ -74,7 +74,7 @@ def check_team(team: Any, robots: int) -> Team:
     Raises
     ------
     ParameterError
-        If it is no team, or has another number of robots.
+        If it is not a team, or has another number of robots.
     """
     if team is None:
         return Team.homogeneous(robots)
@@ -86,7 +86,7 @@ def check_team(team: Any, robots: int) -> Team:
 
 
 def check_conditions(conditions: Any, robots: int) -> Conditions | None:
-    """Return conditions that a team can have, or None if they are ideal.
+    """Check conditions, and return them, or None if they are ideal.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def check_conditions(conditions: Any, robots: int) -> Conditions | None:
     Raises
     ------
     ParameterError
-        If they are no conditions, or name robots that the team does not have.
+        If they are not conditions, or refer to robots that the team does not have.
     """
     if conditions is None:
         return None
@@ -116,14 +116,14 @@ def check_joins(environment: Environment, conditions: Conditions | None) -> None
     Parameters
     ----------
     environment : Environment
-        Its boundary has to enclose the positions.
+        Its boundary must enclose the positions.
     conditions : Conditions or None
-        None: no robot joins.
+        None if no robot joins.
 
     Raises
     ------
     ParameterError
-        If a robot is to join outside of the boundary, or has a position of its own and joins at time zero.
+        If a robot is to join outside the boundary, or has a position of its own but joins at time zero.
     """
     if conditions is None:
         return

@@ -1,4 +1,4 @@
-"""Calls of controllers, with checked answers, and faults of users' code in one line."""
+"""Calls to controllers: checks of what they return, and errors in users' code reported in one line."""
 
 from __future__ import annotations
 
@@ -23,31 +23,31 @@ from robocov.team import Team
 
 
 class ControllerCaller:
-    """Calls a controller and checks its answers.
+    """Calls a controller and checks its decisions.
 
-    A built-in controller is trusted. A controller of a user may change its arguments, return arrays that it
-    changes later, or raise anything: it gets copies, its answers are copied, and its faults become one line
-    with the file and line of its code.
+    A built-in controller is trusted. A user's controller may change its arguments, return arrays that it
+    changes later, or raise anything. Therefore it receives copies, its decisions are copied, and its errors
+    are reported in one line with the file and line of its code.
 
     Parameters
     ----------
     controller : Controller or IndividualController
     environment : Environment
-        The map that a controller with the information "whole map" gets to know.
+        The map, for a controller with the information "whole map".
     time : float, s
         Simulation time, for messages.
 
     Attributes
     ----------
     controller : Controller
-        The controller of the whole team, before it was informed of the map.
+        The controller of the whole team, before it was given the map.
     scanning : Scanning or None
-        The range scans that it needs.
+        The range scans that it needs, if any.
 
     Raises
     ------
     ParameterError
-        If it is no controller, or fails.
+        If it is not a controller, or fails.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class ControllerCaller:
         ----------
         observations : Observations
         memory : object
-            The memory that the previous decision returned, or `begin`.
+            The memory that the previous decision returned; for the first one, that from `begin`.
 
         Returns
         -------
@@ -110,17 +110,15 @@ class ControllerCaller:
         decide = self._informed_controller.decide
         if self._is_built_in:
             return check_decision(decide(observations, memory), robots, name, observations.time)
-        answer = self._call(observations.time, decide, replace(observations), _copy_memory(memory))
-        source = (
-            ""
-            if isinstance(self._informed_controller, IndividualControllerAdapter)
-            else format_location(decide)
-        )
-        decision = check_decision(answer, robots, name, observations.time, source)
+        returned = self._call(observations.time, decide, replace(observations), _copy_memory(memory))
+        source = ""
+        if not isinstance(self._informed_controller, IndividualControllerAdapter):
+            source = format_location(decide)
+        decision = check_decision(returned, robots, name, observations.time, source)
         return copy_decision(decision, name, source)
 
     def _call(self, time: float, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a function of the controller; a fault in a user's code is explained in one line."""
+        """Call a function of the controller; an error in a user's code is explained in one line."""
         try:
             return function(*arguments)
         except (RobocovError, KeyboardInterrupt):

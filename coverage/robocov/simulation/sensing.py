@@ -31,7 +31,7 @@ def build_observations(
         The communication graph.
     time : float, s
     scanning : Scanning or None
-        The scans to take in this step; None: no scan.
+        The scans to take in this step; None if none is due.
 
     Returns
     -------
@@ -61,9 +61,9 @@ def is_scan_due(scanning: Scanning | None, step: int, dt: float) -> bool:
     Parameters
     ----------
     scanning : Scanning or None
-        None: they never scan.
+        None if they never scan.
     step : int
-        Number of the step, from 0.
+        Number of the step, starting from 0.
     dt : float, s
         Control period.
 

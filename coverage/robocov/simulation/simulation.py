@@ -39,7 +39,7 @@ from robocov.world.free_positions import require_free_starts
 from robocov.world.obstacle_pieces import build_movers, build_obstacles, build_solid_pieces
 
 MAX_START_OVERLAP_M = 1e-6
-"""Overlap of robots at rest, with walls or with each other, that is taken for rounding."""
+"""Overlap of robots at rest, with walls or with each other, that is attributed to rounding."""
 
 
 class _Knowledge(NamedTuple):
@@ -71,7 +71,7 @@ class Simulation:
     memory : object
         Memory of the robots, which the controller returned with its last decision.
     inbox : Inbox or None
-        Messages that the robots have received; None if robots know the positions of others at once.
+        Messages that the robots have received; None if robots know the positions of others without delay.
     joined : tuple of JoinedRobot
         Robots that have joined since the simulation was built.
     decision_time : float
@@ -129,8 +129,8 @@ class Simulation:
         self._caller = ControllerCaller(controller, environment.static, self.time)
         self._world = self._build_world(state)
         self.sensor = RangeSensor(build_solid_pieces(environment), build_movers(environment))
-        team_changes = self.conditions is not None and self.conditions.has_team_changes
-        self._obstacles_change = environment.has_moving_obstacles or team_changes
+        has_team_changes = self.conditions is not None and self.conditions.has_team_changes
+        self._obstacles_change = environment.has_moving_obstacles or has_team_changes
         self._perception: Perception | None = None
         self.inbox: Inbox | None = None
         if self.conditions is not None:
@@ -221,7 +221,7 @@ class Simulation:
         ParameterError
             If forces are not finite or not of shape (n, 2), or the controller fails.
         StartError
-            If there is no space for a robot that joins.
+            If there is no room for a robot that joins.
         """
         robots = len(self.team)
         if external_forces is not None:
@@ -243,7 +243,7 @@ class Simulation:
         self._start_step()
 
     def observe(self) -> Observations:
-        """Return the present observations of the robots; the controller is not called.
+        """Return the current observations of the robots, without calling the controller.
 
         Returns
         -------
@@ -259,7 +259,7 @@ class Simulation:
         Returns
         -------
         Snapshot
-            The present state, the observations of the robots and the decision of the controller.
+            The current state, the observations of the robots and the decision of the controller.
 
         Raises
         ------
@@ -312,7 +312,7 @@ class Simulation:
     def _find_new_robots(self, positions_before: Array) -> tuple[JoinedRobot, ...]:
         """Return the robots that joined at the end of the last step.
 
-        The position of a robot before it joins is the one at which it should.
+        Before a robot joins, its position is the one at which it should join.
         """
         if self.conditions is None or not self.conditions.joins:
             return ()
@@ -330,7 +330,7 @@ class Simulation:
         )
 
     def snapshots(self, duration: float) -> Iterator[Snapshot]:
-        """Yield the present snapshot, and one after every step.
+        """Yield the current snapshot, and one after every step.
 
         Parameters
         ----------
@@ -353,7 +353,7 @@ class Simulation:
             yield self.observe_and_decide()
 
     def run(self, duration: float, *, start: str | None = None, seed: int | None = None) -> Record:
-        """Simulate for some time, and record it.
+        """Simulate for some time and record the run.
 
         Parameters
         ----------
@@ -395,7 +395,7 @@ class Simulation:
     def show(self, *, height: int = 620) -> Any:
         """Show the simulation in an interactive window, or in a cell of a notebook.
 
-        The window starts with the present positions at 0 s. It does not change this simulation.
+        The window starts from the current positions, at 0 s. It does not change this simulation.
 
         Parameters
         ----------
@@ -405,7 +405,7 @@ class Simulation:
         Returns
         -------
         object
-            As `robocov.show`.
+            See `robocov.show`.
         """
         return show(self, height=height)
 
@@ -426,7 +426,7 @@ class Simulation:
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
-        # Observations and decision of this step are computed again.
+        # Observations and decision of this step are computed again on demand.
         return {**vars(self), "_knowledge": None, "_snapshot": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -439,7 +439,7 @@ class Simulation:
         Parameters
         ----------
         environment : Environment
-            The present one, apart from its density. A controller that knows the map is informed again.
+            The current one, with another density. A controller that knows the map is given this one.
 
         Returns
         -------
@@ -451,13 +451,14 @@ class Simulation:
         return twin
 
     def with_memory(self, memory: Any, inbox: Inbox | None = None) -> Simulation:
-        """Return a simulation in the same state, but with another memory of the robots.
+        """Return a simulation in the same state, but with another memory.
 
         Parameters
         ----------
         memory : object
+            Memory of the robots.
         inbox : Inbox or None
-            Messages that the robots have received; None: the present ones.
+            Messages that the robots have received; by default the current ones.
 
         Returns
         -------
@@ -480,7 +481,7 @@ class Simulation:
         steering: Array | None = None,
         conditions: Conditions | None = None,
     ) -> Simulation:
-        """Return a simulation that continues from here with changes; this one remains as it is.
+        """Return a simulation that continues from here with changes; this one is not affected.
 
         The memory of the robots is kept unless the controller or the number of robots changes, and their
         messages unless the conditions or the number of robots change.
@@ -488,9 +489,9 @@ class Simulation:
         Parameters
         ----------
         environment, controller, team, conditions
-            As those of `Simulation`; None: no change.
+            See `Simulation`. By default they do not change.
         positions, velocities, steering : (n, 2) arrays or None
-            As those of `TeamState`; None: no change.
+            See `TeamState`. By default they do not change.
 
         Returns
         -------
@@ -535,7 +536,7 @@ def _check_robots_fit(
     """Check that no working robot is in a wall or in another robot."""
     max_overlap = MAX_START_OVERLAP_M
     if state.velocities is not None:
-        # A robot that moves may lean on something, and then overlaps with it a little.
+        # A moving robot may lean on something, and then overlaps with it a little.
         max_overlap = 2.0 * MAX_PENETRATION
     working = None if conditions is None else conditions.find_working(time, len(state))
     require_free_starts(environment.at(time), state.positions, team, max_overlap, working)

@@ -39,10 +39,10 @@ class TeamState:
     """(n, 2) rad and rad/s, heading from +x and turning rate of unicycles. By default they face the direction
     in which they move."""
     steps: int = 0
-    """Number of control steps that were taken before."""
+    """Number of control steps taken before this state."""
     is_computed: bool = False
-    """Whether a simulation computed this state, so that robots need not be checked to fit: a robot that leans
-    on something overlaps with it a little."""
+    """Whether a simulation computed this state, so that it need not be checked for overlaps: a robot that
+    leans on something overlaps with it a little."""
 
     def __post_init__(self) -> None:
         positions = to_floats("starts", self.positions, "[x, y] of each robot in metres", StartError)
