@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
-"""Floating point data, whose shape and unit are documented where it is used."""
+"""Floating-point data; shape and unit are documented where it is used."""
 
 IntArray: TypeAlias = NDArray[np.intp]
 """Indices."""
@@ -21,7 +21,7 @@ Point: TypeAlias = tuple[float, float]
 """x and y, m."""
 
 Ring: TypeAlias = tuple[Point, ...]
-"""Points of a poly-line, or of a closed ring, whose first point is not repeated."""
+"""Points of a polyline, or of a closed ring, whose first point is not repeated."""
 
 
 def freeze(values: object) -> Array:
@@ -63,7 +63,7 @@ def compute_lengths(vectors: Array) -> Array:
 def compute_point_distances(first: Array, second: Array) -> Array:
     """Compute the Euclidean distances between points, sqrt(dx² + dy²).
 
-    Unlike `compute_lengths`, it uses the square root, as kernels do, so that both give the same bits.
+    Unlike `compute_lengths`, it uses the square root, so that the result has the same bits as in kernels.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The k-median problem on a table of distances: choose k sources so that each target is near to one.
+"""The k-median problem on a table of distances: choose k sources so that each target is close to one.
 
 A table is an array of shape (m, c), C-contiguous and finite: distances, weighted or not, from m targets to c
 possible sources. *Sources* are columns of the table, and their *cost* is the sum over the targets of the
@@ -23,7 +23,7 @@ Heartbeat: TypeAlias = Callable[[], None]
 _MIN_SAVING = 1e-9
 """Fraction of the cost that an iteration must save: far more than rounding, so that none undoes another."""
 _MAX_ROUNDS = 60
-"""Maximum number of rounds of `improve_sources`; a few are usual."""
+"""Maximum number of rounds of `improve_sources`; usually a few are enough."""
 _MIN_SAVING_OF_ROUND = 1e-4
 """Fraction of the cost that a round of `improve_sources` must save."""
 _REMOVAL_SIZES = (2, 3)
@@ -35,7 +35,7 @@ _MAX_REBUILT = 4
 class _NearestSources(NamedTuple):
     """The sources nearest to each target, (m,) each.
 
-    `owner` is the number of the nearest source among the sources, not its column.
+    `owner` is the index of the nearest source among the sources, not its column.
     """
 
     owner: IntArray
@@ -66,7 +66,7 @@ def seed_sources(table: Array, count: int, rng: np.random.Generator) -> IntArray
     is_chosen = np.zeros(table.shape[1], dtype=bool)
     for _ in range(count):
         cumulative = np.cumsum(distance)
-        # If all targets are at distance zero, the last one is chosen, which is as good as any.
+        # If all targets are at distance zero, the last one is chosen, which is as good as any other.
         target = int(np.searchsorted(cumulative, rng.random() * cumulative[-1], side="right"))
         target = min(target, len(distance) - 1)
         source = int(np.where(is_chosen, np.inf, table[target]).argmin())
@@ -77,7 +77,7 @@ def seed_sources(table: Array, count: int, rng: np.random.Generator) -> IntArray
 
 
 def choose_greedily(table: Array, count: int) -> IntArray:
-    """Choose sources one after another, each such that the cost is lowest.
+    """Choose sources one after another, each so that the cost becomes as low as possible.
 
     Parameters
     ----------
@@ -91,8 +91,8 @@ def choose_greedily(table: Array, count: int) -> IntArray:
 
     Notes
     -----
-    The sources save at least 1 - 1/e of the saving by the best k sources, in comparison with one source that
-    is far from everything (Nemhauser, Wolsey and Fisher 1978).
+    Compared with a single source far from everything, these sources save at least 1 - 1/e of what the best k
+    sources save (Nemhauser, Wolsey and Fisher 1978).
     """
     sources = np.zeros(count, dtype=np.intp)
     return _replace_sources(table, sources, np.arange(count), 0)[1]
@@ -131,7 +131,7 @@ def run_lloyd(
 
 
 def apply_best_swap(table: Array, sources: IntArray, fixed: BoolArray, threshold: float) -> IntArray:
-    """Replace one source by another column, such that the cost is lowest.
+    """Replace one source by another column, so that the cost becomes as low as possible.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def apply_best_swaps(table: Array, sources: IntArray, heartbeat: Heartbeat = lam
 def improve_sources(
     table: Array, sources: IntArray, fixed: BoolArray, threshold: float, *, removals: bool = True
 ) -> IntArray:
-    """Improve sources by Lloyd's iteration in turn with swaps, and with removals where no swap helps.
+    """Improve sources by swaps, or removals where no swap helps, alternating with Lloyd's iteration.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def improve_sources(
 
 
 def move_first_source(table: Array, sources: IntArray, is_allowed: BoolArray, threshold: float) -> IntArray:
-    """Replace the first source by the best allowed column, while the others do not change.
+    """Replace the first source by the best allowed column; the others do not change.
 
     Unlike Lloyd's iteration, this takes into account that targets change their nearest source.
 
@@ -248,7 +248,7 @@ def rebuild_sources(table: Array, sources: IntArray, fixed: BoolArray, threshold
     fixed : (k,) bool array
         Sources that do not change.
     threshold : float
-        Fraction of the cost that must be saved.
+        Fraction of the cost that the change must save.
 
     Returns
     -------
@@ -337,8 +337,8 @@ def _find_smallest(sums: Array, is_taken: BoolArray) -> int:
 def _find_best_swap(table: Array, sources: IntArray, fixed: BoolArray) -> tuple[float, float, IntArray]:
     """Return the cost of the sources, the cost after the best swap, and the sources after it."""
     nearest = _find_nearest_sources(table, sources)
-    # The cost after a swap is that with the new column in addition to all sources, and the increase of the
-    # targets of the removed source: they go to the new column, or to their second nearest source.
+    # The cost after a swap is the cost with the new column added to all sources, plus the increase for the
+    # targets of the removed source: they go to the new column or to their second nearest source.
     cost_with_column = np.zeros(table.shape[1])
     increase = np.zeros((len(sources), table.shape[1]))
     cost = 0.0
@@ -377,7 +377,7 @@ def _replace_sources(
 ) -> tuple[float, IntArray]:
     """Keep the first `unchanged` sources of an order, and replace the others greedily one by one.
 
-    Returns the cost, and the sources.
+    Return the cost and the sources.
     """
     replaced = sources.copy()
     distance = np.full(len(table), np.inf)

@@ -2,11 +2,11 @@
 
 Three cases that the paper leaves open are decided as follows:
 
-- *Contact*. (24) is singular at distance zero. Below `CONTACT_DISTANCE` its magnitude is constant and the
+- *Contact*: (24) is singular at distance zero. Below `CONTACT_DISTANCE` its magnitude is constant and the
   potential continues linearly, so that F = -grad U holds everywhere.
-- *Robots at the same position* have no direction from one to the other. They are pushed apart along a fixed
-  direction that depends on their two numbers alone, and is opposite for the two.
-- *Saturation*. (27) grows with the third power of the distance, without bound, and would push robots
+- *Robots at the same position*: there is no direction from one to the other. They are pushed apart in
+  opposite directions that depend only on their two numbers.
+- *Saturation*: (27) grows with the third power of the distance, without bound, and would push robots
   through the repulsion of walls. A limit caps its magnitude; the potential continues linearly there.
 """
 
@@ -25,7 +25,7 @@ GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 """The golden angle, rad: its multiples are spread evenly over all directions."""
 
 _MIN_DISTANCE = 1e-12
-"""Distance that robots at the same position are treated as having, m."""
+"""Distance that is assumed between robots at the same position, m."""
 
 
 class PotentialGains(NamedTuple):
@@ -132,7 +132,7 @@ def compute_separations(robots: IntArray, neighbours: IntArray) -> Array:
     Returns
     -------
     (m, 2) array
-        Unit vectors in which the first robot of each pair is pushed; for the second one they are opposite.
+        Unit vectors in which the first robot of each pair is pushed. The second one is pushed the other way.
     """
     directions = np.empty((len(robots), 2))
     for k in range(len(robots)):

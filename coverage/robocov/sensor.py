@@ -1,4 +1,4 @@
-"""The range sensor: the nearest obstacle point and ray scans, both by pymunk queries.
+"""The range sensor: nearest obstacle points and ray scans, by pymunk queries.
 
 A sensor has a space of its own, which contains the obstacles and robots that have failed. Working robots are
 not in it: they neither hide obstacles nor are mistaken for any.
@@ -20,12 +20,12 @@ from robocov.world.bodies import build_obstacle_space
 from robocov.world.obstacle_pieces import Mover, Obstacles
 
 _MAX_RANGE_M = 1e6
-"""Stands for an unlimited range: pymunk's bounding boxes cannot hold an infinite one."""
+"""Range that replaces an unlimited one, because pymunk's bounding boxes must be finite."""
 _EVERYTHING = pymunk.ShapeFilter()
 
 
 class RangeSensor:
-    """Measures what robots would measure among static and moving obstacles.
+    """Simulates the range sensors of robots among static and moving obstacles.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class RangeSensor:
         time : float, s
             Simulation time.
         failed_robots : (w, 3) array or None, m
-            x, y and radius of the robots that have failed by then, and are obstacles.
+            x, y and radius of the robots that have failed by then, which are obstacles.
         """
         for body, mover in zip(self._mover_bodies, self._movers, strict=True):
             body.position = tuple(mover.path.compute_displacement(time).tolist())
@@ -178,13 +178,13 @@ class RangeSensor:
 
 
 def _get_compiled_queries() -> ModuleType | None:
-    """Return `robocov.compiled_queries` if it can be used now; otherwise pymunk's public queries are."""
+    """Return `robocov.compiled_queries`, or None if pymunk's public queries are to be used now."""
     return None if is_interpreting() else _load_compiled_queries()
 
 
 @functools.cache
 def _load_compiled_queries() -> ModuleType | None:
-    """Return `robocov.compiled_queries` if it works here."""
+    """Return `robocov.compiled_queries`, or None if it does not work on this machine."""
     if not IS_COMPILER_ENABLED:
         return None
     try:

@@ -5,7 +5,7 @@
 - `cell_edges`: cells as edges, over which densities are integrated
 - `polygon_masses`: integrals over other polygons
 
-Each density is integrated over all Voronoi cells at once, in closed form or by a quadrature that is exact. By
+Each density is integrated over all Voronoi cells at once, in closed form or by an exact quadrature. By
 the divergence theorem an integral over a cell is a sum over its edges, so that no cell is ever clipped.
 """
 

@@ -79,8 +79,8 @@ class Density(ABC):
             See `compute_moments`.
         area : (n,) array, m²
         centroid : (n, 2) array, m
-            Centroids for density 1. They are also the centroids of cells without area, or without mass: a
-            cell whose mean density is below 1e-9 of the largest density is filled up to that.
+            Centroids for density 1. They are also the centroids of cells without area, or without mass: for
+            a mean density below 1e-9 of the largest density, mass is added up to that, spread evenly.
 
         Returns
         -------
@@ -89,9 +89,9 @@ class Density(ABC):
         """
         moments = self.compute_moments(edges, origins)
         mass = np.maximum(moments[:, 0], 0.0)
-        filling = np.maximum(_MIN_MEAN_DENSITY * self.max_value * area - mass, 0.0)
-        weight = mass + filling
-        first_moments = moments[:, 1:3] + filling[:, None] * (centroid - origins)
+        added_mass = np.maximum(_MIN_MEAN_DENSITY * self.max_value * area - mass, 0.0)
+        weight = mass + added_mass
+        first_moments = moments[:, 1:3] + added_mass[:, None] * (centroid - origins)
         has_weight = weight > 0.0
         offset = first_moments / np.where(has_weight, weight, 1.0)[:, None]
         return mass, np.where(has_weight[:, None], origins + offset, centroid)
@@ -121,7 +121,7 @@ def require_weight(name: str, value: float, *, above_zero: bool = False) -> None
 
 @dataclass(frozen=True)
 class Uniform(Density):
-    """The same weight everywhere, as without a density except for the unit of the cost.
+    """The same weight everywhere. It differs from no density only in the unit of the cost.
 
     Parameters
     ----------

@@ -14,13 +14,13 @@ REGION = -1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellEdges:
-    """All edges of all cells, grouped by cell, and counter-clockwise round each cell.
+    """All edges of all cells, grouped by cell, counter-clockwise around each cell.
 
     Attributes
     ----------
     start, end : (s, 2) arrays, m
         Ends of the edges **relative to the generator** of their cell, so that a tiny cell far from the origin
-        keeps all its digits.
+        keeps its full precision.
     cell : (s,) int array
         Cell of each edge, ascending.
     beyond : (s,) int array
@@ -83,7 +83,7 @@ class CellEdges:
         return np.column_stack(np.divmod(numbers, count)).astype(np.intp, copy=False)
 
     def _has_length(self) -> BoolArray:
-        """Return which edges are longer than rounding makes a point at their distance from the generator."""
+        """Return a mask of the edges whose length exceeds the rounding error of their coordinates."""
         length = compute_lengths(self.end - self.start)
         distance = compute_lengths(self.start) + compute_lengths(self.end)
         return np.asarray(length > 1e-12 * distance)

@@ -1,13 +1,13 @@
 """Sums of Gaussians, and their integrals over polygons in closed form.
 
 Let g = exp(-|q|²/2), and let an edge lie at the signed distance d from the centre along its outward
-normal n, between s₁ and s₂ along its direction t. With div[(1 - g) q / |q|²] = g, an edge adds to the mass
+normal n, between s₁ and s₂ along its direction t. As div[(1 - g) q / |q|²] = g, an edge adds to the mass
 
     ∫ d (1 - g) / (d² + s²) ds = [atan(s/d) - 2π T(d, s/d)] from s₁ to s₂
 
-where T is Owen's function (Owen 1956). With q g = -grad g, it adds -n E₀ to the first moment, where
-E₀ = ∫ g ds. With ∂(qᵢ g)/∂qⱼ = (δᵢⱼ - qᵢ qⱼ) g, it adds -(d n + s t) nᵀ g, integrated along the edge, to the
-second moments minus the mass. Any other Gaussian is this one after an affine map.
+where T is Owen's function (Owen 1956). From q g = -grad g, it adds -n E₀ to the first moment, where
+E₀ = ∫ g ds. From ∂(qᵢ g)/∂qⱼ = (δᵢⱼ - qᵢ qⱼ) g, it adds -(d n + s t) nᵀ g, integrated along the edge, to the
+second moments minus the mass. Any other Gaussian is an affine map of this one.
 """
 
 import math
@@ -58,16 +58,16 @@ class Gaussian:
     ----------
     center : (x, y), m
     weight : float
-        Value at the centre, from 0.
+        Value at the centre, at least 0.
     sigma : float or None, m
         Standard deviation, above 0.
     covariance : 2 x 2 nested tuples or None, m²
-        S, symmetric and positive definite. Either this or `sigma` is given.
+        S, symmetric and positive definite; an alternative to `sigma`.
 
     Raises
     ------
     ParameterError
-        If a value is out of range, or not exactly one of `sigma` and `covariance` is given.
+        If a value is out of range, or both or neither of `sigma` and `covariance` are given.
     """
 
     center: Point
@@ -125,10 +125,10 @@ class Gaussian:
         (n, 4) array, m², m³, m³ and m⁴
         """
         factor = self._factorize()
-        lever = origins - np.array(self.center)
-        edge_lever = lever[edges.cell]
-        start = self._standardize(edges.start + edge_lever)
-        end = self._standardize(edges.end + edge_lever)
+        offset = origins - np.array(self.center)
+        edge_offset = offset[edges.cell]
+        start = self._standardize(edges.start + edge_offset)
+        end = self._standardize(edges.end + edge_offset)
         scale = self.weight * factor.xx * factor.yy
         sums: list[Array] = [
             np.asarray(np.bincount(edges.cell, integral, minlength=len(origins)) * scale)
@@ -145,11 +145,11 @@ class Gaussian:
             + factor.yy * factor.yy * (mass - cells.missing_yy)
         )
         # From there to moments about the origins.
-        lever_x = lever[:, 0]
-        lever_y = lever[:, 1]
-        squared_lever = (lever * lever).sum(axis=1)
-        polar = polar - 2.0 * (lever_x * x + lever_y * y) + squared_lever * mass
-        return np.column_stack([mass, x - lever_x * mass, y - lever_y * mass, polar])
+        offset_x = offset[:, 0]
+        offset_y = offset[:, 1]
+        squared_offset = (offset * offset).sum(axis=1)
+        polar = polar - 2.0 * (offset_x * x + offset_y * y) + squared_offset * mass
+        return np.column_stack([mass, x - offset_x * mass, y - offset_y * mass, polar])
 
     def _factorize(self) -> _Factor:
         """Return the Cholesky factor of the covariance."""
@@ -173,7 +173,7 @@ class Gaussians(Density):
     ----------
     peaks : tuple of Gaussian
     floor : float
-        The constant, from 0.
+        The constant, at least 0.
 
     Raises
     ------
@@ -199,12 +199,12 @@ class Gaussians(Density):
 
     @property
     def min_value(self) -> float:
-        """The constant, which no point falls below."""
+        """The constant, which is a lower bound everywhere."""
         return self.floor
 
     @property
     def max_value(self) -> float:
-        """The sum of the constant and all peaks, as if their centres coincided."""
+        """The sum of the constant and all peaks, an upper bound that is reached if their centres coincide."""
         return self.floor + sum(peak.weight for peak in self.peaks)
 
     def evaluate(self, points: Array) -> Array:
@@ -244,7 +244,7 @@ class Gaussians(Density):
 
 def _integrate_along_edges(start: Array, end: Array) -> _EdgeIntegrals:
     """Integrate the standard Gaussian along edges, whose ends are (s, 2)."""
-    # SciPy is imported late, because loading a map does not need it.
+    # SciPy is imported only here, because loading a map does not need it.
     from scipy.special import erf, owens_t
 
     along = end - start
@@ -283,7 +283,7 @@ def _integrate_along_edges(start: Array, end: Array) -> _EdgeIntegrals:
 
 
 def _is_positive_definite(matrix: Matrix) -> bool:
-    """Return whether a matrix is a covariance; one that is nearly singular is not."""
+    """Return whether a matrix is symmetric, positive definite, and not nearly singular."""
     (a, b), (c, d) = matrix
     is_symmetric = b == c
     has_positive_diagonal = a > 0.0 and d > 0.0 and a + d < math.inf

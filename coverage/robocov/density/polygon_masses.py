@@ -10,7 +10,7 @@ from robocov.density.base import Density
 from robocov.density.cell_edges import REGION, CellEdges
 
 _SQUARES_PER_BATCH = 1 << 16
-"""Number of squares that are integrated at once, which limits the memory."""
+"""Number of squares that are integrated at once, to limit memory use."""
 
 
 def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]) -> Array:
@@ -20,7 +20,7 @@ def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]
     ----------
     density : Density
     polygons : sequence of k shapely polygons, m
-        Valid ones. Their holes are left out.
+        Valid polygons. Their holes do not count.
 
     Returns
     -------
@@ -38,7 +38,7 @@ def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]
     points, ring = shapely.get_coordinates(rings, return_index=True)
     owners = ring_owners[ring]
     points -= origins[owners]
-    # From the last point of a ring no edge leads to the first point of the next one.
+    # No edge leads from the last point of a ring to the first point of the next one.
     is_edge = ring[1:] == ring[:-1]
     edges = _build_edges(points[:-1][is_edge], points[1:][is_edge], owners[:-1][is_edge])
     return np.maximum(density.compute_moments(edges, origins)[:, 0], 0.0)
@@ -67,7 +67,7 @@ def compute_square_means(density: Density, centers: Array, side: float) -> Array
         end = np.tile(next_corners, (len(batch), 1))
         edges = _build_edges(start, end, np.repeat(np.arange(len(batch)), 4))
         masses[first : first + len(batch)] = density.compute_moments(edges, batch)[:, 0]
-    # Rounding must not make a density that the map does not have, such as a negative one.
+    # Rounding must not lead to a density that the map does not have, such as a negative one.
     return np.clip(masses / (side * side), density.min_value, density.max_value)
 
 

@@ -1,15 +1,15 @@
 """Areas of constant weight, and their exact integrals over polygons, without clipping.
 
 A polygon is a signed sum of strips, one for each edge: the area to the left of a rising edge counts
-positive, that to the left of a falling edge negative. The integral over the intersection of two polygons is
-therefore a signed sum over the pairs of their edges e and f. Each term is the integral of a polynomial over
-the area between f and e,
+as positive, that to the left of a falling edge as negative. The integral over the intersection of two
+polygons is therefore a signed sum over the pairs of their edges e and f. Each term is the integral of a
+polynomial over the area between f and e,
 
     ∫ max(0, x_e(y) - x_f(y)) dy          (the area; over the heights y that both edges have)
 
 and the same with other powers of x and y in it. Both edges are straight, so that this is an integral of
-a polynomial in y over one interval. Nothing is decided by rounding: each pair adds a term that depends
-continuously on all ends, however edges meet, touch or coincide.
+a polynomial in y over one interval. Rounding decides nothing: each pair adds a term that depends
+continuously on all end points, however edges meet, touch or coincide.
 """
 
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ class WeightedArea:
     vertices : tuple of (x, y), m
         Outer ring, in either direction. The first vertex is not repeated.
     weight : float
-        From 0.
+        At least 0.
     holes : tuple of rings
         Rings like `vertices`.
     name : str or None
@@ -65,14 +65,14 @@ class WeightedArea:
 
 @dataclass(frozen=True)
 class WeightedPolygons(Density):
-    """A density that is constant in polygons, and outside of them all. Its integrals are exact.
+    """A density that is constant in each of several polygons and outside them. Its integrals are exact.
 
     Parameters
     ----------
     areas : tuple of WeightedArea
-        If areas overlap, the last of them counts.
+        Where areas overlap, the last one counts.
     background : float
-        Density outside of all areas, from 0.
+        Density outside all areas, at least 0.
 
     Raises
     ------
@@ -114,7 +114,7 @@ class WeightedPolygons(Density):
         """Edges across which φ jumps, (e, 5): lower end and upper end, m, and φ on the right minus left."""
         jumps = [np.empty((0, 5))]
         covered = shapely.MultiPolygon()
-        # The last areas are on top.
+        # The last area is on top.
         for area in reversed(self.areas):
             visible = area.polygon if covered.is_empty else shapely.difference(area.polygon, covered)
             covered = shapely.union(covered, area.polygon)
@@ -179,7 +179,7 @@ def _add_jumps(
     """Add to the moments of cells the integrals between each edge and each jump to its left."""
     for e in range(len(cell)):
         c = cell[e]
-        # Edges run upwards from here on; the sign says in which direction they ran.
+        # From here on the edge runs upwards; the sign is negative if it ran downwards.
         sign = 1.0
         x = start[e, 0]
         y = start[e, 1]
@@ -194,7 +194,7 @@ def _add_jumps(
             u = start[e, 0]
             v = start[e, 1]
         for f in range(len(jumps)):
-            # Relative to the origin, where the edges of the cell are small.
+            # Relative to the origin of the cell, as its edges are.
             low_x = jumps[f, 0] - origins[c, 0]
             low_y = jumps[f, 1] - origins[c, 1]
             high_x = jumps[f, 2] - origins[c, 0]

@@ -35,9 +35,9 @@ class Raster(Density):
     Parameters
     ----------
     values : (rows, columns) array
-        From 0, **the lowest row first**. The attribute is read-only.
+        At least 0, **the lowest row first**. The attribute is read-only.
     extent : (x_min, y_min, x_max, y_max), m
-        Extent of the image. Outside, the nearest pixel of its border counts.
+        Extent of the image. Points outside have the value of the nearest border pixel.
     interpolation : {"bilinear", "cells"}
 
     Raises
@@ -111,7 +111,7 @@ class Raster(Density):
         return float(self.values.max())
 
     def evaluate(self, points: Array) -> Array:
-        """Evaluate the image; outside, the nearest pixel of its border counts.
+        """Evaluate the image; points outside have the value of the nearest border pixel.
 
         Parameters
         ----------
@@ -171,12 +171,12 @@ class Raster(Density):
 
 
 def sample_density(density: Density | None, extent: Iterable[float], columns: int, rows: int) -> Raster:
-    """Build a bilinear raster of the values of a density at the centres of its pixels.
+    """Sample a density at the centres of pixels, and return it as a bilinear raster.
 
     Parameters
     ----------
     density : Density or None
-        None is 1 everywhere.
+        None stands for 1 everywhere.
     extent : (x_min, y_min, x_max, y_max), m
     columns, rows : int
 
@@ -215,15 +215,15 @@ class _Grid(NamedTuple):
     left: Array
 
 
-# A grid takes ten times the memory of its image. While an image is painted there are many, but only the last
-# few are still in use.
+# A grid takes ten times the memory of its image. While a user paints a raster, a new one is built for each
+# change, but only the last few are still in use.
 @lru_cache(maxsize=4)
 def _build_grid(raster: Raster) -> _Grid:
     values = raster.values
     origin = np.array(raster.extent[:2])
     step = (np.array(raster.extent[2:]) - origin) / values.shape[::-1]
     if raster.interpolation == "bilinear":
-        # Squares reach from one centre of pixels to the next; the border is repeated outside.
+        # Squares reach from one pixel centre to the next; the border is repeated outside.
         padded = np.pad(values, 1, mode="edge")
         lower_left = padded[:-1, :-1]
         right = padded[:-1, 1:]
@@ -262,8 +262,8 @@ def _integrate_cells(
     """Return the integrals of φ times 1, u, v, u² and v² over cells, (n, 5), from their edges.
 
     With P(x, y) the integral of φ along the row from the left side of the image to x, the integral of φ
-    over a polygon is that of P dy along its edges. P is a prefix sum over the squares and a polynomial within
-    one: divided where it leaves a square, an edge is integrated by Gauss's rule without error.
+    over a polygon is that of P dy along its edges. P is a prefix sum over squares and a polynomial within a
+    square. Therefore each edge is divided where it leaves a square, and Gauss's rule is exact on the parts.
     """
     rows = coefficients.shape[1]
     columns = coefficients.shape[2]
@@ -276,7 +276,7 @@ def _integrate_cells(
         dv = end[e, 1] - v0
         line_u = _find_first_line(u0, du, columns)
         line_v = _find_first_line(v0, dv, rows)
-        # Level edges enclose nothing with the left side.
+        # Horizontal edges contribute nothing.
         t = 0.0 if dv != 0.0 else 1.0
         while t < 1.0:
             next_u = _find_crossing(line_u, u0, du, columns)
@@ -316,7 +316,7 @@ def _integrate_cells(
 
 @kernel
 def _find_first_line(start: float, step: float, lines: int) -> int:
-    """Return the first inner line of a grid that a motion from a coordinate along an axis crosses."""
+    """Return the first inner grid line that is crossed from coordinate `start` in the direction of `step`."""
     if step > 0.0:
         return int(max(np.floor(start) + 1.0, 1.0))
     return int(min(np.ceil(start), lines + 0.0) - 1.0)
@@ -324,7 +324,7 @@ def _find_first_line(start: float, step: float, lines: int) -> int:
 
 @kernel
 def _find_crossing(line: int, start: float, step: float, lines: int) -> float:
-    """Return the fraction of an edge at which it crosses a line of a grid; infinity for no inner line."""
+    """Return the fraction of an edge at which it crosses a grid line; infinite if the line is not inside."""
     if 0 < line < lines and step != 0.0:
         return (line - start) / step
     return np.inf

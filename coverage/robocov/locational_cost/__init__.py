@@ -1,9 +1,9 @@
-"""The locational cost (4) of cells, its derivatives, and the points where it is best.
+"""The locational cost (4) of cells, its derivatives, and its optima.
 
 - `performance`: the functions f of the distance that the cost integrates
 - `integrals`: the cost, its gradient (11) and its Hessian, for density 1
 - `weighted_derivatives`: gradient and Hessian for any density, by quadrature
-- `best_points`: the best point of each cell, which is a robot's target
+- `best_points`: the best point of each cell, which is the target of its robot
 """
 
 from robocov.locational_cost.integrals import (

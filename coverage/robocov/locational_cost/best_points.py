@@ -1,11 +1,11 @@
-"""The point of a cell with the best locational cost (4): a robot's target.
+"""The point of a cell with the best locational cost (4), which is the target of its robot.
 
 It is found by Newton's method, in all cells at once. For f = r the cost of a convex cell is strictly convex.
 For f = 1/(r²+h²) it need not be, but it has no second optimum: f is (-1/2)-concave, and in the plane the
 integral of such a function over a convex set that moves is quasi-concave (Borell; Brascamp and Lieb). Along
-any line the cost therefore first falls and then rises. If it still falls at the end of a step, the step has
-not gone too far. This, and that it stays in the cell, is all that a step must satisfy; no difference of two
-costs is ever computed, which would suffer from cancellation.
+any line the cost therefore first falls and then rises. If it still falls at the end of a step, the step was
+not too long. A step must satisfy this condition and stay in the cell, and nothing else. No difference of two
+costs is ever computed: it would suffer from cancellation.
 """
 
 from typing import NamedTuple
@@ -22,24 +22,24 @@ from robocov.locational_cost.weighted_derivatives import compute_weighted_deriva
 from robocov.observation import Cells
 
 TARGETS = ("centroid", "sensing", "median")
-"""The optima for f = r², (12); f = 1/(r²+h²), (14); and f = r, which the coverage cost (22) counts."""
+"""The optima for f = r², (12); f = 1/(r²+h²), (14); and f = r, as in the coverage cost (22)."""
 TARGET_HELP = "the goal of a robot in its cell: the optimum for r², for 1/(r²+h²), or for r"
-"""Description of the gain of controllers that selects a target."""
+"""Description of the controllers' parameter `target`."""
 HEIGHT_HELP = "height h of the sensor in (14), for the target sensing; points much farther away count little"
-"""Description of the gain of controllers for the height."""
+"""Description of the controllers' parameter `height`."""
 
 _MAX_ITERATIONS = 80
-"""Most cells need 4; a cell as thin as a hair below a low sensor needs some dozens."""
+"""Most cells need 4; a very thin cell below a low sensor needs a few dozen."""
 _MAX_WEIGHTED_ITERATIONS = 30
 _LAST_STEP = 1e-7
-"""Length of a step, relative to the size of the cell, after which the search ends."""
+"""Length of a step, relative to the size of the cell, at which the search ends."""
 _LAST_WEIGHTED_STEP = 1e-6
 _NO_STEP = 1e-15
 """Length of a step, relative to the size of the cell, that changes nothing."""
 _MIN_CURVATURE = 1e-14
-"""Smallest curvature, relative to the largest one, that is not a rounding error."""
+"""Curvature, relative to the largest one, up to which it may be a rounding error."""
 _MIN_AREA = 1e-9
-"""Area of a cell, relative to the square of its size, that is not a rounding error."""
+"""Area of a cell, relative to the square of its size, up to which it may be a rounding error."""
 _MIN_WEIGHTED_CLEARANCE = 1e-9
 """Clearance of a centroid, relative to the size of the cell, in a cell that counts as convex."""
 _MIN_MEAN_DENSITY = 1e-12
@@ -59,11 +59,11 @@ class _Search(NamedTuple):
     points : (n, 2) array, m
         Best points so far, relative to the generators.
     trials : (n, 2) array, m
-        Points that are examined next.
+        Points to evaluate next.
     is_active : (n,) bool array
         Cells whose search continues.
     clearance : (n,) array, m
-        That of `points`; infinite in cells that do not confine the search.
+        Clearance of `points`; infinite in cells that do not confine the search.
     step_x, step_y : (n,) arrays, m
         Full step from `points`.
     slope : (n,) array
@@ -83,7 +83,7 @@ class _Search(NamedTuple):
 
 
 def find_targets(cells: Cells, density: Density | None, target: str, height: float) -> Array:
-    """Find the point that each robot heads for: within its cell, if that is convex.
+    """Find the target of each robot, which lies in its cell if that is convex.
 
     Parameters
     ----------
@@ -105,10 +105,10 @@ def find_targets(cells: Cells, density: Density | None, target: str, height: flo
 
     Notes
     -----
-    Centroid and median take the distances of all points of the cell into account. 1/(r²+h²) rewards points
-    within a few h: in a cell that is large in comparison, the far ends are given up; if h is much larger
-    than the cells, the target is the centroid. Without obstacles that hardly changes the coverage cost
-    (22). Walls magnify it: whether a robot gets round one depends on centimetres of its goal, usually to the
+    Centroid and median take all points of the cell into account. 1/(r²+h²) rewards points within a few h, so
+    that the far ends of a much larger cell hardly count; if h is much larger than the cell, the target is the
+    centroid. Without obstacles, the choice hardly affects the coverage cost (22). With walls it matters more:
+    a few centimetres in the goal can decide whether a robot gets around a wall, which is usually a
     disadvantage of "sensing" with a low h.
     """
     if target == "centroid":
@@ -227,9 +227,9 @@ def _advance(search: _Search, derivatives: CellDerivatives, sign: float, last_st
             search.slope[i] = gradient_x * step_x + gradient_y * step_y
             search.fraction[i] = 1.0
         elif clearance >= 0.0:
-            # To where the slope would be zero if it changed linearly, but neither too near nor too far.
-            level = search.slope[i] / min(search.slope[i] - slope, -1e-300)
-            search.fraction[i] *= min(max(level, _MIN_SHORTENING), _MAX_SHORTENING)
+            # To where the slope would be zero if it changed linearly, within limits.
+            zero_slope = search.slope[i] / min(search.slope[i] - slope, -1e-300)
+            search.fraction[i] *= min(max(zero_slope, _MIN_SHORTENING), _MAX_SHORTENING)
         else:
             search.fraction[i] *= _MAX_SHORTENING
         x = search.fraction[i] * search.step_x[i]
@@ -249,7 +249,7 @@ def _advance(search: _Search, derivatives: CellDerivatives, sign: float, last_st
 def _compute_newton_step(
     gradient_x: float, gradient_y: float, xx: float, xy: float, yy: float, size: float
 ) -> tuple[float, float]:
-    """Return Newton's step, or a descent step if the Hessian is not positive; at most as long as `size`."""
+    """Return Newton's step, or a descent step if the Hessian is not positive definite, clipped to `size`."""
     trace = xx + yy
     determinant = xx * yy - xy * xy
     if trace > 0.0 and determinant > _MIN_CURVATURE * trace * trace:
@@ -265,7 +265,7 @@ def _compute_newton_step(
 def _compute_descent_step(
     gradient_x: float, gradient_y: float, xx: float, xy: float, yy: float
 ) -> tuple[float, float]:
-    """Return Newton's step with the absolute values of the Hessian's eigenvalues: it always descends."""
+    """Return Newton's step for the absolute values of the Hessian's eigenvalues, which always descends."""
     mean = 0.5 * (xx + yy)
     half_difference = 0.5 * (xx - yy)
     radius = np.sqrt(half_difference * half_difference + xy * xy)

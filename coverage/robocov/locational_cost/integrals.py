@@ -6,12 +6,12 @@ All are integrals over the boundary of a cell. By the divergence theorem
 
 so that an edge adds -n ∫ f(√(s²+d²)) ds: d is the distance from p to the edge's line, and s runs from the
 foot of the perpendicular along the edge. For f = 1/(r²+h²) that is Δ/w with w² = d²+h² and Δ the angle
-atan(s₂/w) - atan(s₁/w): equations (15)-(20) of the paper, without its case of upright edges, and without the
-second integral of (18), which is printed with the wrong sign but sums to zero round a cell. The cost itself
-is a sum over the triangles that p spans with the edges. p may lie anywhere.
+atan(s₂/w) - atan(s₁/w): equations (15)-(20) of the paper, without its special case for vertical edges, and
+without the second integral of (18), which is printed with the wrong sign but sums to zero around a cell. The
+cost itself is a sum over the triangles that p spans with the edges. p may lie anywhere.
 
-Sums over a cell's edges are formed in the order of the edges: the results for a cell do not depend on the
-other cells, to the last bit.
+Sums are formed in the order of a cell's edges, so that the results for a cell do not depend on other cells,
+to the last bit.
 """
 
 from typing import NamedTuple
@@ -29,7 +29,7 @@ _PANEL_LENGTH = 2.0
 """Length of a panel of the quadrature in τ, where s = w sinh τ. The integrand is analytic for |Im τ| < π/2,
 and 16 nodes per panel leave less than a rounding error."""
 _MIN_LENGTH = 1e-12
-"""Length, relative to the size of the cell, of an edge that is longer than rounding."""
+"""Length of an edge, relative to the size of its cell, up to which it may be a rounding error."""
 
 
 class CellDerivatives(NamedTuple):
@@ -40,7 +40,7 @@ class CellDerivatives(NamedTuple):
     x, y : gradient
     xx, xy, yy : Hessian
     clearance : m
-        Distance of the point from the boundary of its cell: negative outside of the cell, 0 if the cell is
+        Distance of the point from the boundary of its cell: negative outside the cell, 0 if the cell is
         empty. In a cell that is not convex, it is the distance from the boundary of the part from which
         all of the cell is visible.
     size : m
@@ -58,10 +58,10 @@ class CellDerivatives(NamedTuple):
     area: Array
 
 
-class _SeenEdge(NamedTuple):
-    """An edge as seen from a point.
+class _RelativeEdge(NamedTuple):
+    """An edge relative to a point.
 
-    `distance` is that of its line, negative if the point lies outside of it; the edge begins at `foot`,
+    `distance` is that of its line, negative if the point lies outside it. The edge starts at `start`,
     measured along the line from the foot of the perpendicular.
     """
 
@@ -69,11 +69,11 @@ class _SeenEdge(NamedTuple):
     normal_y: float
     length: float
     distance: float
-    foot: float
+    start: float
 
 
 class _EdgeIntegral(NamedTuple):
-    """∫ f ds over an edge, and its changes as the point moves: ∫ f'(r)/r s ds and ∫ f'(r)/r d ds."""
+    """∫ f ds over an edge, and its derivatives by the point: ∫ f'(r)/r s ds and ∫ f'(r)/r d ds."""
 
     total: float
     along: float
@@ -124,8 +124,7 @@ def compute_gradients(edges: CellEdges, points: Array, f: Performance) -> Array:
     Notes
     -----
     At the generators this is equation (11). As the cells move with their generators, it is also the gradient
-    of the whole cost: the boundary between two cells adds to one the same that it subtracts from the other,
-    (8)-(10).
+    of the whole cost: what a moving boundary adds to one cell, it takes from the other, (8)-(10).
     """
     derivatives = compute_derivatives(edges, points, f)
     return np.column_stack([derivatives.x, derivatives.y])
@@ -153,7 +152,7 @@ def compute_derivatives(edges: CellEdges, points: Array, f: Performance) -> Cell
 def _sum_derivatives(
     start: Array, end: Array, cell: IntArray, points: Array, kind: int, height: float
 ) -> CellDerivatives:
-    """Return the sums over the edges of each cell."""
+    """Return the derivatives as sums over the edges of each cell."""
     n = len(points)
     sums = CellDerivatives(
         np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
@@ -165,25 +164,25 @@ def _sum_derivatives(
         first = stop
         size = 0.0
         while stop < len(cell) and cell[stop] == i:
-            size += 0.5 * _see_edge(start, end, stop, x, y).length
+            size += 0.5 * _compute_relative_edge(start, end, stop, x, y).length
             stop += 1
         clearance = np.inf
         for k in range(first, stop):
-            edge = _see_edge(start, end, k, x, y)
+            edge = _compute_relative_edge(start, end, k, x, y)
             nx = edge.normal_x
             ny = edge.normal_y
-            foot = edge.foot
-            integral = _integrate_edge(kind, height, edge.distance, foot, foot + edge.length, size)
+            edge_end = edge.start + edge.length
+            integral = _integrate_edge(kind, height, edge.distance, edge.start, edge_end, size)
             mixed = integral.along * nx * ny
             difference = 0.5 * (nx - ny) * (nx + ny)
             sums.x[i] -= nx * integral.total
             sums.y[i] -= ny * integral.total
             sums.xx[i] += integral.across * nx * nx - mixed
-            # The mean of two expressions, whose sums round the cell are equal.
+            # The mean of two expressions, whose sums around the cell are equal.
             sums.xy[i] += integral.across * nx * ny + integral.along * difference
             sums.yy[i] += integral.across * ny * ny + mixed
             sums.area[i] += 0.5 * edge.length * (edge.distance + x * nx + y * ny)
-            # An edge that is nothing but rounding has no direction.
+            # The direction of an edge that may be a rounding error is meaningless.
             if edge.length > _MIN_LENGTH * size:
                 clearance = min(clearance, edge.distance)
         sums.clearance[i] = clearance if first < stop else 0.0
@@ -192,8 +191,8 @@ def _sum_derivatives(
 
 
 @kernel
-def _see_edge(start: Array, end: Array, k: int, x: float, y: float) -> _SeenEdge:
-    """Return edge k as seen from a point (x, y)."""
+def _compute_relative_edge(start: Array, end: Array, k: int, x: float, y: float) -> _RelativeEdge:
+    """Return edge k relative to a point (x, y)."""
     along_x = end[k, 0] - start[k, 0]
     along_y = end[k, 1] - start[k, 1]
     length = np.sqrt(along_x * along_x + along_y * along_y)
@@ -201,8 +200,8 @@ def _see_edge(start: Array, end: Array, k: int, x: float, y: float) -> _SeenEdge
     normal_x = along_y * inverse
     normal_y = -along_x * inverse
     distance = start[k, 0] * normal_x + start[k, 1] * normal_y - (x * normal_x + y * normal_y)
-    foot = start[k, 1] * normal_x - start[k, 0] * normal_y - (y * normal_x - x * normal_y)
-    return _SeenEdge(normal_x, normal_y, length, distance, foot)
+    along = start[k, 1] * normal_x - start[k, 0] * normal_y - (y * normal_x - x * normal_y)
+    return _RelativeEdge(normal_x, normal_y, length, distance, along)
 
 
 @kernel
@@ -211,7 +210,7 @@ def _integrate_edge(
 ) -> _EdgeIntegral:
     """Return the integrals over an edge at distance d from a point, from `first` to `last` along its line.
 
-    A constant that is the same for all edges of a cell may be omitted from f: round the cell it adds 0.
+    A constant that is the same for all edges of a cell may be omitted from f: around the cell it adds 0.
     """
     length = last - first
     first_r = np.sqrt(d * d + first * first)
@@ -228,7 +227,7 @@ def _integrate_edge(
     angle = np.arctan2(w * length, w * w + first * last)
     total = angle / w
     if size < height:
-        # Seen from far above, f is nearly constant. Integrating f - 1/h² avoids that its variation is lost.
+        # From far above, f is nearly constant. Integrating f - 1/h² keeps the digits of its variation.
         remainder = _subtract_arctan(last / w) - _subtract_arctan(first / w)
         total = -length * (d / w) ** 2 / squared_height - remainder / w
     first_square = first_r * first_r + squared_height
@@ -265,9 +264,9 @@ def _sum_costs(
     sums = np.zeros(len(points))
     for k in range(len(cell)):
         i = cell[k]
-        edge = _see_edge(start, end, k, points[i, 0], points[i, 1])
+        edge = _compute_relative_edge(start, end, k, points[i, 0], points[i, 1])
         d = edge.distance
-        first = edge.foot
+        first = edge.start
         last = first + edge.length
         if kind == SQUARED_DISTANCE:
             square = 3.0 * d * d + first * first + first * last + last * last
@@ -278,8 +277,8 @@ def _sum_costs(
             inverse = _integrate_inverse(d, first, last)
             sums[i] += d * (last * last_r - first * first_r + d * d * inverse) / 6.0
         else:
-            # By quadrature, exact to rounding. The closed form has dilogarithms, which cancel if a triangle
-            # is flat or seen from far above.
+            # By quadrature, exact up to rounding. The closed form has dilogarithms, which cancel if a
+            # triangle is flat or the height is large.
             w = np.sqrt(d * d + height * height)
             first_tau = np.arcsinh(first / w)
             last_tau = np.arcsinh(last / w)

@@ -8,7 +8,7 @@ import numpy as np
 from robocov.errors import ParameterError, quote
 
 SQUARED_DISTANCE, DISTANCE, SENSING = range(3)
-"""Numbers of the functions, by which kernels distinguish them."""
+"""Numbers by which kernels distinguish the functions."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class SquaredDistance:
 
 @dataclass(frozen=True)
 class Distance:
-    """f = r, in m: the coverage cost (22) within a convex cell. Its optimum is the median."""
+    """f = r, in m, as in the coverage cost (22) of a convex cell. Its optimum is the median."""
 
     kind: ClassVar[int] = DISTANCE
     sign: ClassVar[float] = 1.0
@@ -47,8 +47,8 @@ class Sensing:
 
     Notes
     -----
-    In contrast to the remark of the paper after (14), the optimum depends on the height: it is the centroid
-    only for h → ∞.
+    Contrary to the remark after (14) in the paper, the optimum depends on the height: it is the centroid only
+    for h → ∞.
     """
 
     kind: ClassVar[int] = SENSING

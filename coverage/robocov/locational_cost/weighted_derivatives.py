@@ -1,6 +1,6 @@
 """Gradient and Hessian of the locational cost for any density, by quadrature.
 
-A cell is divided into the triangles that the point itself spans with the edges. In the coordinates
+A cell is divided into the triangles that the point spans with the edges. In the coordinates
 q = p + u (e(t) - p), where e(t) runs along an edge, distance and direction from p are smooth, so that Gauss's
 rule converges quickly where φ is smooth. If φ jumps within a cell, the error is of the order of the
 distance between the nodes.
@@ -22,7 +22,7 @@ _NODES_OUTWARD = 12
 
 
 class WeightedDerivatives(NamedTuple):
-    """Derivatives of the cost that is to be minimized with respect to the points, (n,) each."""
+    """Derivatives, with respect to the points, of the cost that is to be minimized, (n,) each."""
 
     x: Array
     y: Array
@@ -42,7 +42,7 @@ def compute_weighted_derivatives(
         n cells.
     density : Density
     f : Performance
-        `Distance` or `Sensing`, whose sign is reversed: the cost is to be minimized.
+        `Distance`, or `Sensing` with its sign reversed, so that the cost is to be minimized.
     size : (n,) array, m
         Upper bounds of the diameters of the cells.
     points : (n, 2) array, m
@@ -103,7 +103,7 @@ def _build_outward_rule(f: Performance, size: Array, cell: IntArray) -> tuple[Ar
     nodes = np.tile(plain_nodes, (len(size), 1))
     weights = np.tile(plain_weights, (len(size), 1))
     if isinstance(f, Sensing):
-        # The nodes are as close to the point as f is steep there.
+        # The steeper f is near the point, the more nodes are there.
         bend = np.arcsinh(np.maximum(size / f.height, 1e-3))[:, None]
         weights = weights * bend * np.cosh(bend * nodes) / np.sinh(bend)
         nodes = np.sinh(bend * nodes) / np.sinh(bend)

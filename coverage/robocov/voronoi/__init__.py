@@ -1,11 +1,11 @@
 """Voronoi cells of robots within a convex region.
 
-- `bounded_partition`: the cells of equation (1), and what equation (2) needs of them
+- `bounded_partition`: the cells of equation (1), with their masses and centroids (2)
 - `weighted_cells`: cells by travel time, of robots of different speeds
 - `disc_limited_cells`: the parts of cells within a distance of their generators
 - `sampled_cells`: cells as sets of sample points
-- `clipped_cells`, `clipping`: cells that are cut out of the region, one after the other
-- `triangulated_cells`, `delaunay`: cells from a Delaunay triangulation that is kept from step to step
+- `clipped_cells`, `clipping`: cells that are cut out of the region one after another
+- `triangulated_cells`, `delaunay`: cells from a Delaunay triangulation that is reused from step to step
 - `boundary_curves`, `arcs`: boundaries that consist of segments and circular arcs
 """
 

@@ -1,9 +1,9 @@
 """Boundaries that consist of segments and circular arcs: moments, chords and closed rings.
 
-A piece of a boundary is a row of an array, whose columns are named below. An arc spans from -pi/2 to pi/2 in
-half angle, positive if it turns left; a half angle of zero is a segment. An arc that is almost a segment
-keeps all its digits, however large its radius is. Green's theorem needs the triangle that the chord spans
-with the origin, and the circular segment between chord and arc.
+A piece of a boundary is a row of an array, whose columns are named below. The half angle of an arc is from
+-pi/2 to pi/2, positive if the arc turns left; a half angle of zero is a segment. An arc that is almost a
+segment keeps its full precision, however large its radius is. Green's theorem needs the triangle that the
+chord spans with the origin, and the circular segment between chord and arc.
 """
 
 from math import comb
@@ -29,13 +29,13 @@ BEYOND = 6
 """Column of a piece: the robot on the other side, or `robocov.density.cell_edges.REGION`."""
 
 _MAX_SERIES_SQUARE = 0.04
-"""sin² of the half angle up to which the series is used: the closed form divides rounding errors by it."""
+"""sin² of the half angle up to which the series is used: for small angles rounding spoils the closed form."""
 
 _SERIES = np.array([2.0 * comb(2 * m, m) / 4.0**m / (2 * m + 3) for m in range(13, 0, -1)])
 """Coefficients of (x - sin x cos x - 2/3 sin³ x) / sin⁵ x by powers of sin² x, the highest first."""
 
 _MIN_LENGTH_M = 1e-300
-"""Length by which is divided if there is none."""
+"""Smallest length by which anything is divided."""
 _MIN_CHORD_HALF_ANGLE = 1e-3
 """Half angle of the shortest chords that replace an arc, rad."""
 
@@ -156,7 +156,7 @@ def _count_chords(length: float, half_angle: float, max_deviation: float) -> int
 
 
 def link_rings(pieces: Array, max_deviation: float) -> list[Array]:
-    """Link pieces to closed rings.
+    """Link pieces into closed rings.
 
     Parameters
     ----------

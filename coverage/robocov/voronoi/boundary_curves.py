@@ -1,9 +1,9 @@
-"""Lines and circles that bound the cells of robots of different speeds, and the pieces of them that do.
+"""Boundaries of the cells of robots of different speeds: pieces of lines and circles.
 
-About its generator, every curve that may bound a cell is a |q|² + b q = c, and the cell lies where
+Relative to the generator, every curve that may bound a cell is a |q|² + b q = c, and the cell lies where
 a |q|² + b q <= c. It is a line (a = 0), a circle around the cell (a > 0), or a circle around what does not
 belong to the cell (a < 0). With b² + 4 a c = 1 the curves behave like unit vectors: their product
-g = b b' + 2 (a c' + a' c) says how they meet. They intersect in two points if |g| < 1.
+g = b b' + 2 (a c' + a' c) determines how they meet. They intersect in two points if |g| < 1.
 
 With r n the point of a curve that is nearest to the generator, and its curvature k = 2 a, the parameter t of
 
@@ -38,7 +38,7 @@ PAIR_ROBOT = 0
 PAIR_NEIGHBOUR = 1
 """Column of a pair: its neighbour."""
 PAIR_DX = 2
-"""Column of a pair: offset in x to where the robot knows the neighbour to be, m."""
+"""Column of a pair: offset in x to the neighbour's position as known to the robot, m."""
 PAIR_DY = 3
 """Column of a pair: offset in y, m."""
 PAIR_OWN_SPEED = 4
@@ -54,7 +54,7 @@ _SECOND_IS_OUTSIDE = 2
 
 _MIN_SQUARE_SINE = 1e-29
 """sin² of the angle at which two curves meet, below which rounding alone decides whether and where they do.
-One of them is then taken to be within the other, which moves no boundary by more than rounding does."""
+One of them then counts as within the other, which moves no boundary by more than rounding does."""
 
 
 @kernel
@@ -98,7 +98,8 @@ def trace_boundaries(
         lines = edge - first_edge
         curves = np.empty((lines + pair - first_pair, _CURVE_COLUMNS))
         count = _write_circles(curves, own_pairs, own_edges)
-        is_straight[i] = count == lines or (lines == 0 and count > 0)
+        # Without circles, the cell is the one among robots of equal speeds.
+        is_straight[i] = count == lines
         if is_straight[i]:
             pieces = _make_room(pieces, used, lines)
             used = _add_edges(own_edges, pieces, used)
@@ -124,7 +125,7 @@ def _make_room(pieces: Array, used: int, room: int) -> Array:
 
 @kernel
 def _add_edges(edges: Array, pieces: Array, used: int) -> int:
-    """Add straight edges to the pieces; return the number of pieces."""
+    """Add straight edges to the pieces; return the updated `used`."""
     for e in range(len(edges)):
         for column in range(HALF_ANGLE):
             pieces[used, column] = edges[e, column]
@@ -137,7 +138,7 @@ def _add_edges(edges: Array, pieces: Array, used: int) -> int:
 
 @kernel
 def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
-    """Write the circles that may bound a cell behind its lines.
+    """Write the circles that may bound a cell to the rows after those of its lines.
 
     Return the number of curves, or -1 if the cell is empty because a faster robot is at the same position.
     """
@@ -166,7 +167,7 @@ def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
 
 @kernel
 def _compute_reach(pairs: Array, edges: Array) -> float:
-    """Return a distance from the generator that no point of the cell exceeds, m; -1 for an empty cell."""
+    """Return an upper bound of the distances of a cell's points from its generator, m; -1 if it is empty."""
     reach = 0.0
     for e in range(len(edges)):
         reach = max(reach, np.sqrt(edges[e, 0] ** 2 + edges[e, 1] ** 2))
@@ -203,7 +204,7 @@ def _write_lines(curves: Array, pairs: Array, edges: Array, sides: Array, point:
 def _write_bisector(curve: Array, pairs: Array, neighbour: float) -> None:
     """Write the direction and distance of the bisector to a neighbour.
 
-    They are not taken from the edge: it may be so short that rounding decides on its direction.
+    They are not taken from the edge: it may be so short that rounding decides its direction.
     """
     for k in range(len(pairs)):
         if pairs[k, PAIR_NEIGHBOUR] == neighbour:
@@ -215,7 +216,7 @@ def _write_bisector(curve: Array, pairs: Array, neighbour: float) -> None:
 
 @kernel
 def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
-    """Write the direction of the region's side that an edge lies on, and its distance from the generator."""
+    """Write the direction and distance from the generator of the side of the region that an edge lies on."""
     middle_x = 0.5 * (edge[0] + edge[2])
     middle_y = 0.5 * (edge[1] + edge[3])
     min_offset = np.inf
@@ -305,7 +306,7 @@ def _intersect(one: Array, other: Array) -> tuple[float, float, int]:
         if leftward >= 0.0:
             return large / quadratic, constant / large, 0
         return constant / large, large / quadratic, 0
-    # One curve is within the other (g >= 1), or none is, or each is outside of the other.
+    # One curve is within the other (g >= 1), or none is, or each is outside the other.
     is_outside = quadratic + constant > 0.0
     g = b1x * b2x + b1y * b2y + 2.0 * (a1 * c2 + a2 * c1)
     outside = _FIRST_IS_OUTSIDE if is_outside else 0
@@ -316,7 +317,7 @@ def _intersect(one: Array, other: Array) -> tuple[float, float, int]:
 
 @kernel
 def _add_parts(curve: Array, crossings: Array, pieces: Array, used: int) -> int:
-    """Add the parts of a curve that are on the cell's side of all others; return the number of pieces.
+    """Add the parts of a curve that are on the cell's side of all others; return the updated `used`.
 
     The crossings with the other curves, (k, 2), are overwritten.
     """
@@ -364,7 +365,7 @@ def _add_pieces(curve: Array, start: float, end: float, pieces: Array, used: int
 
 @kernel
 def _evaluate(curve: Array, t: float) -> tuple[float, float]:
-    """Return q(t), m; two formulas, so that nothing overflows for large t."""
+    """Return q(t), m, by one of two formulas, so that nothing overflows for large t."""
     k = 2.0 * curve[_COEFFICIENT]
     if abs(k * t) <= 1.0:
         divisor = 1.0 + (k * t) ** 2
@@ -382,7 +383,7 @@ def _evaluate(curve: Array, t: float) -> tuple[float, float]:
 
 @kernel
 def _find_parameter(curve: Array, x: float, y: float) -> float:
-    """Return the t of the point q(t) nearest to a point next to the curve."""
+    """Return the t of the point q(t) nearest to a point that is close to the curve."""
     k = 2.0 * curve[_COEFFICIENT]
     outward = x * curve[_NORMAL_X] + y * curve[_NORMAL_Y] - curve[_DISTANCE]
     leftward = y * curve[_NORMAL_X] - x * curve[_NORMAL_Y]

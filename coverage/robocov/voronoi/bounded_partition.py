@@ -1,4 +1,4 @@
-"""The bounded Voronoi partition of all robots at once: equation (1), and what equation (2) needs of it."""
+"""The bounded Voronoi partition (1) of all robots, with the masses and centroids (2) of its cells."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class VoronoiPartition(Cells):
 
     @cached_property
     def edges(self) -> CellEdges:
-        """The edges of all cells, which are computed when they are first used."""
+        """The edges of all cells, computed when they are first used."""
         return self._find_edges()
 
     @cached_property
@@ -58,27 +58,27 @@ def partition(
     reported_positions: Array | None = None,
     density: Density | None = None,
 ) -> VoronoiPartition:
-    """Compute the Voronoi cells of robots within a convex region; obstacles play no part.
+    """Compute the Voronoi cells of robots within a convex region, without regard to obstacles.
 
     Parameters
     ----------
     generators : (n, 2) array, m
-        They may lie on the region's boundary or outside. Generators at one position do not cut each other's
-        cells: they get the same cell.
+        They may lie on the region's boundary or outside. Generators at the same position
+        do not cut each other's cells.
     region : Region
     neighbours : Neighbours or None
         Communication graph. Cell i is cut only by the bisectors to the neighbours of robot i, and depends, to
-        the last bit, on nothing else. None: each robot is a neighbour of all others.
+        the last bit, on nothing else. By default each robot is a neighbour of all others.
     triangulation : (2, 8 n + 4) int32 array or None
         `Cells.triangulation` of the previous partition. If the generators have moved little since, this one
         takes a fraction of the time. Its cells are the same, to the last bit unless four generators lie on a
         circle up to rounding.
     reported_positions : (m, 2) array or None, m
         Known positions of the neighbours, in the order of ``neighbours.indices``. The cells of two
-        robots may then overlap or leave a gap, as each is based on the knowledge of its own robot. None: the
-        neighbours are where they are.
+        robots may then overlap or leave a gap, as each is based on what its own robot knows. By default the
+        true positions are known.
     density : Density or None
-        φ of mass, centroid and moments; the cells do not depend on it. None: 1 everywhere.
+        φ of mass, centroid and moments; the cells do not depend on it. By default 1 everywhere.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def partition(
     ------
     InputError
         If the generators are not finite numbers of shape (n, 2), or neighbours or reported positions do not
-        fit to them.
+        match them.
 
     Examples
     --------
@@ -135,7 +135,7 @@ def to_generators(values: object) -> Array:
     Raises
     ------
     InputError
-        If they are no numbers of this shape.
+        If they are not numbers of this shape.
     """
     try:
         points = np.array(values, dtype=np.float64, order="C")
@@ -147,7 +147,7 @@ def to_generators(values: object) -> Array:
 
 
 def check_neighbours(neighbours: Neighbours, reported_positions: Array | None, robots: int) -> None:
-    """Check that neighbours and reported positions fit to the number of robots.
+    """Check that neighbours and reported positions match the number of robots.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def check_neighbours(neighbours: Neighbours, reported_positions: Array | None, r
     Raises
     ------
     InputError
-        If they do not fit.
+        If they do not match.
     """
     if neighbours.count != robots:
         raise InputError(f"neighbours: expected a graph of {robots} robots, got {neighbours.count}")
@@ -181,7 +181,7 @@ def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
         New cells that are not yet in use, computed for a density of 1. They are changed in place, and their
         arrays become read-only.
     density : Density or None
-        None: 1 everywhere.
+        None stands for 1 everywhere.
 
     Returns
     -------
@@ -201,7 +201,7 @@ def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
 
 
 def _create_mesh(robots: int, previous: Mesh | None, *, is_complete: bool) -> Mesh:
-    """Create the mesh from which the triangulation starts; it has no columns if there is to be none."""
+    """Create the mesh from which the triangulation starts, without columns if cells are to be clipped."""
     if not is_complete or robots < _MIN_TRIANGULATED_ROBOTS:
         return np.empty((2, 0), dtype=np.int32)
     size = 8 * robots + 4
@@ -214,7 +214,7 @@ def _find_edges(points: Array, sides: Array, known: NeighbourPositions, mesh: Me
     """Compute all cells once more, now with their edges, whose number is known."""
     edges = np.empty((count, 6))
     cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=edges)
-    # Copies, because read-only arrays are another type to the compiler.
+    # Copies, because read-only arrays are a different type to the compiler.
     _compute_cells(points.copy(), sides, known, mesh.copy(), cells)
     return CellEdges(
         start=edges[:, :2].copy(),
@@ -230,7 +230,7 @@ def _compute_cells(
 ) -> int:
     """Compute all cells; return the number of edges, or -1 - i if generator i is not finite.
 
-    A mesh with columns stands for a complete graph. If the triangulation fails, its first entry is -1.
+    A mesh with columns requires a complete graph. If the triangulation fails, its first entry becomes -1.
     """
     for i in range(len(points)):
         if not (abs(points[i, 0]) < np.inf and abs(points[i, 1]) < np.inf):

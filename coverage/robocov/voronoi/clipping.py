@@ -1,7 +1,7 @@
 """Clipping of one cell: the region is cut by the bisectors between a robot and its neighbours.
 
 The polygon of a cell is stored in one of two rings, and each cut writes the other one. All coordinates are
-relative to the generator of the cell, so that a tiny cell far from the origin keeps all its digits.
+relative to the generator of the cell, so that a tiny cell far from the origin keeps its full precision.
 """
 
 from typing import NamedTuple
@@ -19,7 +19,8 @@ Y = 1
 BEYOND = 2
 """Column of a vertex: the robot on the other side of the edge that begins there, or `REGION`."""
 _EXCESS = 3
-"""Column of a vertex: its excess over the present bisector, m²; positive beyond it."""
+"""Column of a vertex: its excess q · d - |d|²/2 over the current bisector, with d the offset of the
+neighbour, m²; positive beyond the bisector."""
 
 DX = 0
 """Column of a neighbour: its offset from the generator in x, m."""
@@ -32,11 +33,11 @@ ROBOT = 3
 _NEIGHBOUR_COLUMNS = 4
 
 _SORTED_NEIGHBOURS = 6
-"""Number of neighbours that cut a cell in order of distance; it is then so small that few others count."""
+"""Number of neighbours that cut a cell in order of distance; few others can then still cut it."""
 
 
 class Workspace(NamedTuple):
-    """Working memory for the computation of one cell after the other."""
+    """Working memory for the computation of one cell after another."""
 
     rings: Array
     """(2, k, 4) Vertices of two polygons; the columns are `X`, `Y`, `BEYOND` and one for cuts."""
@@ -84,7 +85,7 @@ def create_workspace(robots: int, sides: int) -> Workspace:
 def add_neighbour(neighbours: Array, count: int, dx: float, dy: float, robot: int) -> int:
     """Add a neighbour that may bound a cell to those of a workspace.
 
-    Neighbours at the same position are left out: two robots at one position do not cut each other's cells.
+    A neighbour at the position of the generator is left out: the two do not cut each other's cells.
 
     Parameters
     ----------
@@ -167,14 +168,14 @@ def _compute_max_square(rings: Array, ring: int, count: int) -> float:
 
 @inlined_kernel
 def _move_nearest(neighbour_rows: Array, row: int, count: int) -> None:
-    """Swap the nearest of the neighbours from a row on into this row."""
-    best = row
+    """Swap the nearest of the neighbours from `row` onwards into that row."""
+    nearest = row
     for k in range(row + 1, count):
-        if neighbour_rows[k, SQUARE] < neighbour_rows[best, SQUARE]:
-            best = k
+        if neighbour_rows[k, SQUARE] < neighbour_rows[nearest, SQUARE]:
+            nearest = k
     for column in range(_NEIGHBOUR_COLUMNS):
-        neighbour_rows[row, column], neighbour_rows[best, column] = (
-            neighbour_rows[best, column],
+        neighbour_rows[row, column], neighbour_rows[nearest, column] = (
+            neighbour_rows[nearest, column],
             neighbour_rows[row, column],
         )
 
@@ -185,12 +186,12 @@ def _cut(rings: Array, old: int, count: int, neighbour_rows: Array, row: int) ->
 
     Return its number of vertices, or -1 if the bisector does not cut the polygon; nothing is written then.
     """
-    worst = _compute_excess(rings, old, count, neighbour_rows, row)
-    if worst < 0:
+    farthest = _compute_excess(rings, old, count, neighbour_rows, row)
+    if farthest < 0:
         return -1
-    # The vertices beyond the line follow each other, up to rounding, because the polygon is convex.
-    last = worst
-    after = worst
+    # The vertices beyond the bisector are consecutive, up to rounding, because the polygon is convex.
+    last = farthest
+    after = farthest
     for _ in range(count):
         after = last + 1 if last + 1 < count else 0
         if rings[old, after, _EXCESS] <= 0.0:
@@ -198,7 +199,7 @@ def _cut(rings: Array, old: int, count: int, neighbour_rows: Array, row: int) ->
         last = after
     else:
         return 0
-    first = worst
+    first = farthest
     while rings[old, first - 1 if first else count - 1, _EXCESS] > 0.0:
         first = first - 1 if first else count - 1
     size = 0
@@ -228,15 +229,15 @@ def _compute_excess(rings: Array, ring: int, count: int, neighbour_rows: Array, 
     dx = neighbour_rows[row, DX]
     dy = neighbour_rows[row, DY]
     level = 0.5 * neighbour_rows[row, SQUARE]
-    worst = -1
+    farthest = -1
     max_excess = 0.0
     for k in range(count):
         excess = rings[ring, k, X] * dx + rings[ring, k, Y] * dy - level
         rings[ring, k, _EXCESS] = excess
         if excess > max_excess:
-            worst = k
+            farthest = k
             max_excess = excess
-    return worst
+    return farthest
 
 
 @inlined_kernel
@@ -265,9 +266,9 @@ def write_cell(
     i : int
         Number of the robot.
     cells : CellArrays
-        Changed in place. Edges for which there is no row are not written.
+        Changed in place. Edges beyond the last row of its array are not written.
     total : int
-        Number of edges of the cells before.
+        Number of edges of the previous cells.
 
     Returns
     -------

@@ -1,14 +1,14 @@
-"""The Delaunay triangulation of moving points, kept from step to step and repaired by flips.
+"""The Delaunay triangulation of moving points, reused from step to step and repaired by flips.
 
 A mesh stores three half-edges for each triangle, counter-clockwise. Half-edge h begins at the point
 ``mesh[CORNER, h]``, and ``mesh[TWIN, h]`` is the half-edge of the neighbouring triangle along the same
-edge, or -1. One entry behind each triangle is unused, so that ``h & 3`` is the position of h within its
-triangle and ``h & -4`` the first half-edge of that triangle. Three sentinels, far away, enclose all points
-and follow them.
+edge, or -1. One entry after each triangle is unused, so that ``h & 3`` is the position of h within its
+triangle and ``h & -4`` the first half-edge of that triangle. Three distant sentinels enclose all points; they
+are the last three.
 
 An edge is Delaunay if the two angles opposite to it add up to at most half a turn, that is, if their
-cotangents add up to at least 0. The cotangents also say where on the edge's bisector the Voronoi vertices
-are.
+cotangents add up to at least 0. The cotangents also give the positions of the Voronoi vertices on the edge's
+bisector.
 """
 
 from typing import TypeAlias
@@ -28,7 +28,7 @@ TWIN = 1
 """Row of a mesh: the half-edge of the neighbouring triangle along the same edge; -1 where there is none."""
 
 _TOLERANCE = 1e-14
-"""Sum of two cotangents, relative to their size, that may be rounding; such an edge is not flipped."""
+"""Sum of two cotangents, relative to their size, that counts as rounding; such an edge is not flipped."""
 _MAX_FLIPS_PER_POINT = 16
 """Number of flips, on average, after which triangulating has failed: rounding may cause endless flips."""
 _MIN_CROSS = 1e-300
@@ -37,7 +37,7 @@ _MIN_CROSS = 1e-300
 
 @kernel
 def update_triangulation(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bool:
-    """Make a mesh Delaunay: repair it if it is a triangulation still, and otherwise build it from scratch.
+    """Make a mesh Delaunay: repair it if it is still a triangulation, and otherwise build it from scratch.
 
     Parameters
     ----------
@@ -92,17 +92,17 @@ def get_previous(h: int) -> int:
 
 @kernel
 def _repair(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bool:
-    """Flip all edges that are no longer Delaunay; return whether the mesh is a triangulation then."""
+    """Flip all edges that are no longer Delaunay; return whether the result is a triangulation."""
     flips = 0
-    is_upright = _compute_all_cotangents(mesh, points, cotangents)
+    is_ccw = _compute_all_cotangents(mesh, points, cotangents)
     for h in range(mesh.shape[1]):
         if h & 3 < 3 and h < mesh[TWIN, h] and _must_flip(mesh, cotangents, h):
-            flips, are_new_upright = _flip_from(mesh, points, cotangents, stack, h, flips)
-            is_upright &= are_new_upright
+            flips, are_new_ccw = _flip_from(mesh, points, cotangents, stack, h, flips)
+            is_ccw &= are_new_ccw
             if flips < 0:
                 return False
-    # Flips may have turned triangles upright that were upside down before.
-    return is_upright or _compute_all_cotangents(mesh, points, cotangents)
+    # Flips may have removed triangles that were clockwise before.
+    return is_ccw or _compute_all_cotangents(mesh, points, cotangents)
 
 
 @kernel
@@ -147,7 +147,7 @@ def _split_triangle(mesh: Mesh, triangle: int, new: int, i: int) -> None:
 
 @inlined_kernel
 def _link(mesh: Mesh, h: int, twin: int) -> None:
-    """Make two half-edges each other's twins; -1 is none."""
+    """Make two half-edges each other's twins; a twin of -1 is none."""
     mesh[TWIN, h] = twin
     if twin >= 0:
         mesh[TWIN, twin] = h
@@ -155,21 +155,21 @@ def _link(mesh: Mesh, h: int, twin: int) -> None:
 
 @inlined_kernel
 def _compute_all_cotangents(mesh: Mesh, points: Array, cotangents: Array) -> bool:
-    """Compute the cotangents in all triangles; return whether all are upright."""
-    is_upright = True
+    """Compute the cotangents in all triangles; return whether all triangles are counter-clockwise."""
+    is_ccw = True
     for h in range(0, mesh.shape[1], 4):
-        is_upright &= _compute_cotangents(mesh, points, cotangents, h)
-    return is_upright
+        is_ccw &= _compute_cotangents(mesh, points, cotangents, h)
+    return is_ccw
 
 
 @inlined_kernel
 def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, h: int) -> bool:
-    """Compute the cotangents in the triangle whose first half-edge is h; return whether it is upright.
+    """Compute the cotangents in a triangle with first half-edge h; return whether it is counter-clockwise.
 
     Each is computed from its own corner, so that its last bit does not depend on how the triangle is stored.
-    In a triangle that is upside down they are those of a flat one, so that flips turn it upright.
+    In a clockwise triangle the sign of the cross product is ignored, so that flips turn it round.
     """
-    is_upright = True
+    is_ccw = True
     for k in range(3):
         i = mesh[CORNER, h + k]
         j = mesh[CORNER, h + (k + 1) % 3]
@@ -180,8 +180,8 @@ def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, h: int) ->
         by = points[j, 1] - points[apex, 1]
         cross = ax * by - ay * bx
         cotangents[h + k] = (ax * bx + ay * by) / max(abs(cross), _MIN_CROSS)
-        is_upright &= cross > 0.0
-    return is_upright
+        is_ccw &= cross > 0.0
+    return is_ccw
 
 
 @inlined_kernel
@@ -194,7 +194,7 @@ def _must_flip(mesh: Mesh, cotangents: Array, h: int) -> bool:
 
 @kernel
 def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, triangles: int) -> int:
-    """Walk from a triangle to the one that contains (x, y); return its first half-edge, or -1 if lost."""
+    """Walk from a triangle to the one that contains (x, y); return its first half-edge, or -1 on failure."""
     triangle = start
     for _ in range(3 * triangles + 3):
         for h in range(triangle, triangle + 3):
@@ -218,11 +218,11 @@ def _flip_from(
 ) -> tuple[int, bool]:
     """Flip the edge of h, and those that are no longer Delaunay because of it, until all are.
 
-    Return the number of flips so far, -1 on failure, and whether all triangles made by it are upright.
+    Return the number of flips so far, -1 on failure, and whether all new triangles are counter-clockwise.
     """
     stack[0] = h
     size = 1
-    is_upright = True
+    is_ccw = True
     while size and flips >= 0:
         size -= 1
         a = stack[size]
@@ -236,8 +236,8 @@ def _flip_from(
         _link(mesh, a, mesh[TWIN, before_b])
         _link(mesh, b, mesh[TWIN, before_a])
         _link(mesh, before_a, before_b)
-        is_upright &= _compute_cotangents(mesh, points, cotangents, a & -4)
-        is_upright &= _compute_cotangents(mesh, points, cotangents, b & -4)
+        is_ccw &= _compute_cotangents(mesh, points, cotangents, a & -4)
+        is_ccw &= _compute_cotangents(mesh, points, cotangents, b & -4)
         flips += 1
         if flips > _MAX_FLIPS_PER_POINT * len(points) or size + 4 > len(stack):
             return -1, False
@@ -246,4 +246,4 @@ def _flip_from(
         stack[size + 2] = b
         stack[size + 3] = get_next(b)
         size += 4
-    return flips, is_upright
+    return flips, is_ccw

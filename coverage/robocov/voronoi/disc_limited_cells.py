@@ -24,14 +24,14 @@ class _Arcs(NamedTuple):
 
 
 class _CutEdges(NamedTuple):
-    """Edges cut by discs; the path from start to end of an edge is an arc, the part in the disc, an arc."""
+    """Edges cut by discs: each is replaced by an arc, the part of the edge in the disc, and another arc."""
 
     first: Array
     """(e, 2) m, where the part in the disc begins, relative to the generator."""
     last: Array
     """(e, 2) m, where it ends; the same point if the edge is outside the disc."""
     arc_before: _Arcs
-    arc_behind: _Arcs
+    arc_after: _Arcs
 
 
 def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array, Array]:
@@ -64,7 +64,7 @@ def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array,
     cross = cut.first[:, 0] * cut.last[:, 1] - cut.first[:, 1] * cut.last[:, 0]
     doubled_area = cross.copy()
     doubled_moment = cross[:, None] * (cut.first + cut.last) / 3.0
-    for angle, turn in (cut.arc_before, cut.arc_behind):
+    for angle, turn in (cut.arc_before, cut.arc_after):
         doubled_area += radius * radius * turn
         factor = 2.0 / 3.0 * radius**3
         doubled_moment[:, 0] += factor * (np.sin(angle + turn) - np.sin(angle))
@@ -81,8 +81,8 @@ def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array,
 def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
     """Build polygons of the parts of cells within a distance of their generators.
 
-    Chords replace the arcs of the discs. A chord spans at most a 128th of a turn: of a whole disc, 0.04 % of
-    the area are missing.
+    Chords replace the arcs of the discs. A chord spans at most 1/128 of a turn, so that a whole disc loses
+    0.04 % of its area.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
     Returns
     -------
     CellEdges
-        Some edges have no length.
+        Some edges have length zero.
     """
     max_coordinate = float(np.abs(edges.start).max(initial=0.0))
     radius = np.minimum(radii[edges.cell], 4.0 * max_coordinate + 1.0)
@@ -102,7 +102,7 @@ def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
     ends = [cut.last]
     cells = [edges.cell]
     fraction = np.linspace(0.0, 1.0, _CHORDS_PER_ARC + 1)
-    for start_angle, turn in (cut.arc_before, cut.arc_behind):
+    for start_angle, turn in (cut.arc_before, cut.arc_after):
         angle = start_angle[:, None] + turn[:, None] * fraction
         points = radius[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         curved = np.flatnonzero(turn != 0.0)
@@ -134,12 +134,12 @@ def _cut_by_discs(edges: CellEdges, radius: Array) -> _CutEdges:
         first=first,
         last=last,
         arc_before=_build_arcs(edges.start, first),
-        arc_behind=_build_arcs(last, edges.end),
+        arc_after=_build_arcs(last, edges.end),
     )
 
 
 def _build_arcs(start: Array, end: Array) -> _Arcs:
-    """Return the arcs about the origin from the directions of some points, (e, 2), to those of others."""
+    """Return the arcs about the origin between the directions of start and end points, (e, 2) each."""
     x, y = start.T
     u, v = end.T
     return _Arcs(angle=np.arctan2(y, x), turn=np.arctan2(x * v - y * u, x * u + y * v))

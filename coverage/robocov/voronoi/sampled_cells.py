@@ -1,4 +1,4 @@
-"""Voronoi cells as sets of sample points, for functions without closed integrals: maps and estimates."""
+"""Voronoi cells as sets of sample points, for functions without closed-form integrals, such as estimates."""
 
 import numpy as np
 
@@ -18,9 +18,9 @@ def find_own_samples(
     positions : (n, 2) array, m
         Positions of the robots.
     robot : (m,) int array
-        A robot for each of its neighbours.
+        The robot in each pair of a robot and one of its neighbours.
     neighbour_positions : (m, 2) array, m
-        Position of that neighbour, as that robot knows it.
+        Position of the neighbour in each pair, as known to the robot.
 
     Returns
     -------
@@ -49,9 +49,9 @@ def compute_sample_centroids(is_own: BoolArray, samples: Array, mass: Array, pos
         Whether each sample belongs to each cell.
     samples : (k, 2) array, m
     mass : (k,) or (n, k) array
-        Mass of each sample, or of each sample as each robot knows it.
+        Mass of each sample, the same for all robots or as known to each robot.
     positions : (n, 2) array, m
-        Positions of the robots; the centroids of cells without mass.
+        Positions of the robots, which replace the centroids of cells without mass.
 
     Returns
     -------

@@ -24,7 +24,8 @@ from robocov.voronoi.clipping import (
 from robocov.voronoi.delaunay import CORNER, TWIN, Mesh, get_next, get_previous, update_triangulation
 
 _MASS_TOLERANCE = 1e-12
-"""Difference of the sum of masses from the region's area, relative to the latter, that may be rounding."""
+"""Difference between the sum of masses and the area of the region, relative to the latter, that counts as
+rounding."""
 
 
 class Triangulation(NamedTuple):
@@ -46,7 +47,7 @@ class _Fan(NamedTuple):
     first: int
     """Half-edge to the neighbour with the lowest number."""
     start: int
-    """Position of that neighbour among the others."""
+    """Position of that neighbour among the neighbours."""
     max_square: float
     """Squared distance of the farthest Voronoi vertex, m²; infinite if the cell is not bounded by robots."""
 
@@ -55,8 +56,8 @@ class _Fan(NamedTuple):
 def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: CellArrays) -> int:
     """Compute all cells from a Delaunay triangulation.
 
-    A cell that was clipped by too few robots would be too large. Therefore the cells are right if their
-    masses add up to the area of the region.
+    A cell that is clipped by too few robots is too large. Therefore the cells are correct if their masses add
+    up to the area of the region.
 
     Parameters
     ----------
@@ -98,7 +99,7 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
     for i in range(n):
         corners[i, 0] = points[i, 0]
         corners[i, 1] = points[i, 1]
-        # Then all robots lie within the triangle of the sentinels, and no sentinel cuts a cell.
+        # Within this distance, robots lie in the triangle of the sentinels, and no sentinel cuts a cell.
         if max(abs(points[i, 0] - x), abs(points[i, 1] - y)) > 2.0 * size:
             return False
     corners[n, 0] = x - 8.0 * size
@@ -108,7 +109,7 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
     corners[n + 2, 0] = x
     corners[n + 2, 1] = y + 9.0 * size
     mesh = triangulation.mesh
-    # The array is working memory first, and has its own content only afterwards.
+    # The array first serves as working memory; its actual content is written below.
     half_edges = triangulation.half_edges
     if not update_triangulation(mesh, corners, triangulation.cotangents, half_edges):
         return False
@@ -135,7 +136,7 @@ def _compute_bounds(sides: Array) -> tuple[float, float, float]:
 
 @kernel
 def _compute_area(sides: Array) -> float:
-    """Return the area of the region, m², from coordinates about its centre."""
+    """Return the area of the region, m², from coordinates relative to its centre."""
     x, y, _ = _compute_bounds(sides)
     area = 0.0
     for k in range(len(sides)):
@@ -155,7 +156,8 @@ def _find_cell(
         clearance = min(clearance, sides[k, 4] - (sides[k, 2] * points[i, 0] + sides[k, 3] * points[i, 1]))
     if clearance > 0.0 and fan.max_square < clearance * clearance:
         return CellPolygon(0, fan.neighbours, fan.start)
-    # From the lowest neighbour on, so that the result does not depend on the order of the triangles.
+    # Start at the neighbour with the lowest number, so that the result does not depend on the order of the
+    # triangles.
     fan = _walk_around(workspace, triangulation, points, i, fan.first)
     return clip_cell(workspace, fan.neighbours, points, sides, i)
 

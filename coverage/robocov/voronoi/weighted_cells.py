@@ -1,6 +1,6 @@
 """Cells by travel time: the multiplicatively weighted Voronoi partition of robots of different speeds.
 
-Cell i contains the points that robot i reaches before all others, |q - p_i| / v_i <= |q - p_j| / v_j, on a
+Cell i contains the points that robot i reaches before any other, |q - p_i| / v_i <= |q - p_j| / v_j, on a
 straight line. The border between robots of the same speed is their bisector; between robots of different
 speeds it is a circle of Apollonius around the slower one. Cells are bounded by segments and arcs, and may be
 neither convex nor connected: the cell of a slow robot is a hole in that of a fast one, or divides it. The
@@ -9,7 +9,7 @@ cell of another robot.
 
 Source: F. Aurenhammer and H. Edelsbrunner, *An optimal algorithm for constructing the weighted Voronoi
 diagram in the plane*, Pattern Recognition 17 (1984). Here the pieces of all boundaries are found
-independently, and are not linked: Green's theorem needs no order.
+independently and not linked, because Green's theorem needs no order.
 """
 
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ _MIN_AREA = 1e-14
 class WeightedCells(Cells):
     """The cells of robots of different speeds within a convex region.
 
-    The centroid of a cell that is not convex may lie outside of it. There is no triangulation.
+    The centroid of a cell that is not convex may lie outside it. There is no triangulation.
     """
 
     speeds: Array
@@ -113,15 +113,15 @@ def partition_by_travel_time(
     Parameters
     ----------
     generators : (n, 2) array, m
-        Generators at one position do not cut each other's cells if they are equally fast. Otherwise the
-        fastest has the cell, and the others have none.
+        Generators at the same position do not cut each other's cells if they are equally fast. Otherwise the
+        fastest gets the cell, and the others get none.
     speeds : (n,) array, m/s
         Positive. If all are equal, the cells are those of `partition`, bit for bit.
     region, neighbours, triangulation, reported_positions
-        As for `partition`.
+        See `partition`.
     density : Density or None
         φ is integrated over cells whose arcs are replaced by chords, which deviate from them by at most 2e-5
-        of the region's diameter. None: 1 everywhere; moments are then exact.
+        of the region's diameter. By default it is 1 everywhere, and moments are exact.
 
     Returns
     -------
@@ -131,11 +131,11 @@ def partition_by_travel_time(
     Raises
     ------
     InputError
-        As `partition`, and if the speeds are not n positive, finite numbers.
+        See `partition`; also if the speeds are not n positive, finite numbers.
 
     Examples
     --------
-    A robot of twice the speed leaves a slow one a disc of 2/3 of the distance between them.
+    The cell of a robot is a disc if the other one is twice as fast. Its radius is 2/3 of their distance.
 
     >>> square = Region(np.array([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]))
     >>> cells = partition_by_travel_time(np.array([[0.0, 0.0], [3.0, 0.0]]), np.array([1.0, 2.0]), square)
@@ -176,7 +176,7 @@ def _compute_weighted_cells(
     edges = equal_cells.edges
     offsets = other_positions - points[robot]
     is_straight = np.empty(len(points), dtype=bool)
-    # Without the compiler, NumPy would warn of infinite and undefined numbers.
+    # When the kernel runs as Python, NumPy would warn of infinite and undefined numbers.
     with np.errstate(all="ignore"):
         pieces = trace_boundaries(
             points=points,
