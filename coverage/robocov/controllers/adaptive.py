@@ -86,7 +86,7 @@ class Adaptive(BaseController):
 
     name = "adaptive"
     label = "Adaptive"
-    summary = "Lloyd's algorithm, learning the density on the way (Schwager, Rus and Slotine 2009)"
+    summary = "Lloyd's algorithm, learning the density while moving (Schwager, Rus and Slotine 2009)"
     information = "shared map"
 
     estimate: str = choice("basis", ("basis", "gp"), "how the density is learned")

@@ -282,7 +282,7 @@ class Navigator:
     directions: Array
     """(k, 2) Unit vectors of the rays."""
     free_distances: Array
-    """(k,) How far the robot can move straight along each ray."""
+    """(k,) Distance that the robot can move straight along each ray, m."""
     clearance: float
     """Distance that its centre keeps from obstacles."""
     reach: float
@@ -323,7 +323,7 @@ class Navigator:
         return distance < _ARRIVAL_RADIUS_M or self._compute_free_distance(offset) >= distance - 1e-9
 
     def _compute_free_distance(self, offset: Array) -> float:
-        """Return how far the robot can move straight towards a point, m."""
+        """Return the distance that the robot can move straight towards a point, m."""
         direction = offset / max(math.hypot(*offset), 1e-300)
         return float(compute_free_distances(self.points, direction[None], self.clearance, self.reach)[0])
 
@@ -473,7 +473,7 @@ class Navigator:
 
 @kernel
 def compute_free_distances(points: Array, directions: Array, clearance: float, reach: float) -> Array:
-    """Compute how far a disc can move straight in each direction.
+    """Compute the distance that a disc can move straight in each direction.
 
     Parameters
     ----------
@@ -526,7 +526,7 @@ def find_contour_end(
     Parameters
     ----------
     free_distances : (k,) array, m
-        How far the robot can move along each ray.
+        Distance that the robot can move along each ray.
     directions : (k, 2) array
         Unit vectors of the rays.
     first_ray : int

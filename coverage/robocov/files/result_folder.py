@@ -2,7 +2,7 @@
 
 A result is written to a hidden staging folder inside its folder. To commit it, a journal is written that
 lists the files of the new result, and those of the old one that are to be removed. As soon as the journal has
-its name, the new result counts: the next process that opens the folder completes what is left to be done
+its name, the new result counts: the next process that opens the folder completes the remaining steps
 (`complete_commit`). At the end the journal becomes the manifest, the list of the files of the result. Files
 that are not in the manifest belong to somebody else, and are neither replaced nor removed. Links inside the
 folder are not followed.
@@ -300,7 +300,7 @@ def _require_result_file(name: str) -> None:
 
 
 def _carry_out_journal(folder: Path) -> None:
-    """Do what is left to be done according to the journal of a folder, which then becomes the manifest."""
+    """Complete the steps in the journal of a folder, which then becomes the manifest."""
     journal = _read_file_lists(folder / _JOURNAL_FILE)
     if journal is None:
         return
@@ -326,7 +326,7 @@ def _carry_out_journal(folder: Path) -> None:
 
 @contextmanager
 def _open_folder(folder: Path) -> Iterator[None]:
-    """Lock a folder and complete its last commit; at the end, discard what has not been committed."""
+    """Lock a folder and complete its last commit; at the end, discard uncommitted files."""
     with lock_folder(folder, _LOCK_FILE, remove=True):
         with report_folder_errors(folder):
             _carry_out_journal(folder)

@@ -14,7 +14,7 @@ from robocov.errors import OutputError, describe_error, quote
 _SPECIAL_FILES = {"d": "a folder", "p": "a named pipe", "s": "a socket", "c": "a device", "b": "a device"}
 """Kinds of files that are not regular, by the first character of the mode."""
 _MAX_SUFFIX_LENGTH = 16
-"""Characters; what is longer is no suffix by which a writer chooses a format."""
+"""Characters; longer endings are not suffixes by which a writer chooses a format."""
 _FLUSH_THREADS = 8
 
 

@@ -1,7 +1,7 @@
 """Maps of the kind `blocks`: a town, divided by streets into blocks.
 
 The map is divided into convex cells by one cut after another. Each cut is the middle line of a street, and
-the block of a cell is what the streets along its edges leave of it.
+the block is the part of a cell that the streets along its edges leave.
 """
 
 import math
@@ -26,7 +26,7 @@ _MIN_WIDENING_SHARE = 0.4
 _CHAMFER_PROBABILITY = 0.25
 _YARD_PROBABILITY = 0.2
 _MAX_CORNERS = 12
-"""The corner to be cut is drawn from so many, and counted round the block as often as necessary."""
+"""The number of the corner to cut is drawn below this, and counted round the block as often as necessary."""
 _MAX_UNEVENNESS = 0.25
 """Largest offset of a cut from the even division, in the share of one block."""
 _MIN_THICKNESS = 0.3

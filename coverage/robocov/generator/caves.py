@@ -31,10 +31,10 @@ _RIM_SIDES = 0.012
 """Smallest thickness of the rock along the boundary."""
 _SHORE_UNITS = 0.35
 _SHORE_RISE = 3.0
-"""Width of the belt along the boundary where the field is raised, and by how much."""
+"""Width of the belt along the boundary where the field is raised, and the rise."""
 _HALL_UNITS = 0.35
 _HALL_DEPTH = 1.5
-"""Radius around the start within which the field is lowered, and by how much."""
+"""Radius around the start within which the field is lowered, and the depth."""
 _MAX_TOLERANCE_UNITS = 0.008
 _MAX_TOLERANCE_SIDES = 0.0027
 """Tolerance with which walls are simplified."""
@@ -101,7 +101,7 @@ def build_cave(request: Request, corner: DiscStart, rng: np.random.Generator) ->
 
 @dataclass(frozen=True)
 class _Site:
-    """What the request says about a cave before anything is drawn.
+    """The quantities that the request determines before anything is drawn.
 
     Attributes
     ----------

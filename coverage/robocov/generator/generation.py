@@ -72,7 +72,7 @@ class MapKind:
         Builds the obstacles.
     description : str
     counted : str
-        What the number of obstacles counts, in the plural.
+        Plural name of the objects that the number of obstacles counts.
     obstacles : int
         Default number of them.
     area : float

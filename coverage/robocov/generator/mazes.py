@@ -317,7 +317,7 @@ def trace_trails(walls: BoolArray) -> Iterator[list[Post]]:
 
 
 def _find_next_post(neighbours: Mapping[Post, set[Post]], previous: Post, post: Post) -> Post | None:
-    """Return the post to which a poly-line goes on from a post; None if it ends there."""
+    """Return the post to which a polyline continues from a post; None if it ends there."""
     others = neighbours[post] - {previous}
     straight = _step_straight(previous, post)
     if straight in others:

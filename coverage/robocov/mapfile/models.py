@@ -201,7 +201,7 @@ KEYS = {
 
 
 def _build_model(described_class: Any, kind: str | None = None) -> type[Model]:
-    """Build the model of a class from its fields, of which those with a default are optional."""
+    """Build the model of a class from its fields; those with a default are optional."""
     defaults = {field.name: field.default for field in fields(described_class)}
     members: dict[str, Any] = {}
     if kind is not None:

@@ -153,7 +153,7 @@ def _find_polygon_mistakes(path: JsonPath, shape: PolygonObstacle | WeightedArea
 
 
 def _find_space_mistakes(environment: Environment) -> Iterator[Mistake]:
-    """Yield the mistakes of a map as a whole, each part of which is valid."""
+    """Yield the mistakes of a map as a whole whose parts are all valid."""
     if len(environment.region.vertices) < 3:
         yield Mistake.at_path(("boundary",), "expected a region with an area, got a line as its convex hull")
         return

@@ -22,7 +22,7 @@ _STEP_INCREASE = 1.2
 
 
 class View(NamedTuple):
-    """How far each robot sees along the rays of its last scan."""
+    """Visible distances along the rays of the last scan of each robot."""
 
     distances: Array
     """(n, rays) m, at most the sensing range."""

@@ -18,9 +18,9 @@ class Snapshot:
     Attributes
     ----------
     seen : Observations
-        What the robots observe.
+        Observations of the robots.
     decision : Decision
-        What the controller decides from it.
+        Decision of the controller for these observations.
     truth : (n, 2) array or None, m
         The true positions, if they differ from those that the robots observe.
     working : (n,) bool array or None

@@ -81,7 +81,7 @@ def descend(
     step is projected onto the configuration space and halved until the cost decreases enough. The cost is
     only piecewise smooth, since sites change owners and paths, and a wall may stop a robot. If the
     quasi-Newton direction does not lead downhill, the descent follows the scaled gradient and estimates the
-    curvature anew.
+    curvature again.
     """
     descent = _Descent(cost, space, component, cost(positions))
     decreases: deque[float] = deque(maxlen=_STALL_STEPS)

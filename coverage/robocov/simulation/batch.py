@@ -355,7 +355,7 @@ class SimulationBatch:
         ]
 
     def _to_snapshot(self) -> Snapshot:
-        """Return what a record needs of the current step of all runs."""
+        """Return the current step of all runs, as far as a record needs it."""
         decision = self._observe_and_decide()
         return Snapshot(self.observe(), Decision(forces=decision.forces, goals=decision.goals))
 
