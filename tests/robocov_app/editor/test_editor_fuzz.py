@@ -176,7 +176,7 @@ class Monkey:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [1])
 @pytest.mark.parametrize("name", SHEETS)
 def test_random_events_do_no_harm(name: str, seed: int, tmp_path: Path) -> None:
     play(name, seed, tmp_path, EVENTS)

@@ -19,7 +19,7 @@ from robocov_app.toolkit.faults import FaultLog
 from robocov_app.toolkit.window import BaseWindow
 from robocov_app.viewer.costs import Costs
 
-EVENTS = 4_000
+EVENTS = 3_000
 FEW_EVENTS = 150
 SEED = 1
 

@@ -243,7 +243,7 @@ def check(driver: Driver) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [1])
 def test_it_bears_whatever_is_pressed(seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     laws = (RAPF, RPF) if seed % 2 else (RAPF,)
     with limited(monkeypatch), opened(tmp_path, *laws, robots=2, lattice=4) as driver:
