@@ -1,9 +1,9 @@
 """Kernels: plain loops over arrays, which numba compiles when they are first called.
 
-Numba is imported only then. Machine code is kept in the user's cache folder by numba's own cache, in a folder
-named after the sources of robocov, so that no code of another version is ever used. The environment variable
-``NUMBA_CACHE_DIR`` names another folder, ``ROBOCOV_CACHE`` one for all of robocov's caches; if the latter is
-empty, nothing is kept. With ``NUMBA_DISABLE_JIT=1`` kernels run as Python.
+Numba is imported only then. Its own cache keeps the machine code in the user's cache folder, in a folder
+named after a digest of robocov's sources, so that code of another version is never used. The environment
+variable ``NUMBA_CACHE_DIR`` selects another folder, and ``ROBOCOV_CACHE`` one for all of robocov's caches; if
+the latter is empty, nothing is cached. With ``NUMBA_DISABLE_JIT=1`` kernels run as Python.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 IS_COMPILER_ENABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 """Whether kernels are compiled; the environment variable ``NUMBA_DISABLE_JIT`` prevents it."""
 _MAX_KEPT_VERSIONS = 4
-"""Number of versions whose machine code is kept, the most recently used ones."""
+"""Number of most recently used versions whose machine code is kept."""
 _MIN_UNUSED_DAYS = 1.0
 """Machine code that was used more recently is kept in any case: a program may still be running with it."""
 
@@ -52,12 +52,12 @@ def kernel(function: _Function) -> _Function:
     """Compile a function of numbers, arrays and named tuples of these when it is first called.
 
     A kernel may call other kernels, from any module, and read global numbers. Arithmetic is that of
-    Python, without fused or reordered operations, so that all processors give the same bits.
+    Python, without fused or reordered operations, so that the results have the same bits on all processors.
 
     Parameters
     ----------
     function : callable
-        Plain Python that numba can compile without objects.
+        Plain Python that numba can compile in its "nopython" mode.
 
     Returns
     -------
@@ -82,13 +82,13 @@ def kernel(function: _Function) -> _Function:
 def inlined_kernel(function: _Function) -> _Function:
     """Compile a function as a part of each kernel that calls it.
 
-    For short functions in inner loops: a call counts the references to all arrays that it passes, which takes
-    longer than some arithmetic. Longer kernels take longer to compile.
+    Use it for short functions in inner loops: a call updates the reference counts of all arrays that it
+    passes, which can take longer than the arithmetic. Inlining makes the calling kernels slower to compile.
 
     Parameters
     ----------
     function : callable
-        As `kernel` takes it.
+        See `kernel`.
 
     Returns
     -------
@@ -131,14 +131,14 @@ class Kernel:
         try:
             return dispatcher(*args, **kwargs)
         except SystemError as error:
-            # numba turns a Ctrl-C that comes while it looks at the arguments into a SystemError.
+            # numba turns a Ctrl-C that arrives while it inspects the arguments into a SystemError.
             if isinstance(error.__cause__, KeyboardInterrupt):
                 raise KeyboardInterrupt from None
             raise
         except _CACHE_ERRORS:
             if not _is_cache_usable:
                 raise
-            # A cache is never an obstacle: continue without it if it is damaged, or the disk is full.
+            # Continue without the cache if it is damaged or the disk is full.
             _disable_cache()
             return self.get_dispatcher()(*args, **kwargs)
 
@@ -148,7 +148,7 @@ class Kernel:
         return self._dispatcher is not None and len(self._dispatcher.signatures) > 0
 
     def get_dispatcher(self) -> Any:
-        """Return numba's dispatcher for the function; import numba if this is the first kernel of all.
+        """Return numba's dispatcher for the function; import numba if this is the first kernel.
 
         Returns
         -------
@@ -163,12 +163,12 @@ class Kernel:
     def _build_dispatcher(self) -> Any:
         numba = import_numba()
         options = {"error_model": "numpy", "forceinline": self.is_inlined}
-        # A cache finds its folder when the dispatcher is built; the setting is numba's own again afterwards.
+        # A dispatcher looks up the cache folder when it is built. The setting is restored afterwards.
         previous = numba.config.CACHE_DIR
         try:
             if self._is_cached:
                 numba.config.CACHE_DIR = str(cache_folder())
-                with suppress(RuntimeError):  # for functions that are in no file, such as those of an example
+                with suppress(RuntimeError):  # functions without a file, as in a doctest, cannot be cached
                     return numba.njit(self.py_func, cache=True, **options)
             return numba.njit(self.py_func, **options)
         finally:
@@ -176,12 +176,13 @@ class Kernel:
 
 
 def interpret_kernels(must_interpret: Callable[[str], bool] | None) -> None:
-    """Run some kernels as Python, which gives the same results, only later.
+    """Run some kernels as Python, which gives the same results, only more slowly.
 
     Parameters
     ----------
     must_interpret : callable or None
-        Returns whether the kernel of a name, `Kernel.name`, is to be run as Python. None: no kernel is.
+        Takes the `Kernel.name` of a kernel, and returns whether to run it as Python. None runs none as
+        Python.
     """
     global _must_interpret
     _must_interpret = must_interpret
@@ -215,9 +216,9 @@ def _disable_cache() -> None:
 
 
 def import_numba() -> ModuleType:
-    """Import numba, in spite of a folder `coverage` on the path, and let its kernels call ours.
+    """Import numba despite a folder `coverage` on the path, and let kernels call other kernels.
 
-    Numba takes any module `coverage` for coverage.py, also our source root of that name.
+    Numba takes any module `coverage` for coverage.py, including our source root of that name.
 
     Returns
     -------
@@ -271,12 +272,12 @@ def cache_folder() -> Path | None:
     """Return the folder that keeps the machine code of this version.
 
     A folder that belongs to somebody else, or that others may write to, is ignored, because code from it
-    would run as this user. So is one that cannot be written to.
+    would run as this user. A folder that cannot be written to is ignored as well.
 
     Returns
     -------
     Path or None
-        None if nothing is kept.
+        None if nothing is cached.
     """
     named = os.environ.get("NUMBA_CACHE_DIR")
     root = Path(named) if named else find_cache_root()
@@ -303,7 +304,7 @@ def _compute_source_digest() -> str:
 
 
 def _remove_unused_versions(parent: Path) -> None:
-    """Remove the machine code of versions of the library that have not been used for long."""
+    """Remove the machine code of versions of the library that have not been used for some time."""
     newest_removed = time.time() - _MIN_UNUSED_DAYS * 24 * 3600
     last_used: list[tuple[float, Path]] = []
     for folder in parent.glob("robocov-*"):

@@ -2,7 +2,7 @@
 
 Calling `pymunk.Space.point_query_nearest` and `pymunk.Space.segment_query_first` from Python costs
 microseconds each, mostly for building their result objects. The functions here call the same C functions of
-the pymunk library from a compiled loop. This is the only module that uses anything but public pymunk.
+the pymunk library from a compiled loop. This is the only module that uses a private interface of pymunk.
 `is_usable` compares its results with those of the public queries, and `robocov.sensor` uses the latter where
 they differ. With the environment variable ``ROBOCOV_PUBLIC_QUERIES=1`` this module is never used.
 
@@ -27,7 +27,7 @@ from robocov.compiled import import_numba, kernel
 numba = import_numba()
 
 PUBLIC_QUERIES_VARIABLE = "ROBOCOV_PUBLIC_QUERIES"
-"""Environment variable that switches to pymunk's public queries."""
+"""Environment variable that selects pymunk's public queries."""
 
 _PASSES_STRUCTS_IN_REGISTERS = sys.platform != "win32" and platform.machine() in (
     "x86_64",
@@ -47,13 +47,13 @@ _ALL_CATEGORIES = -1
 def call_c_function(typing_context: Any, address: Any, arguments: Any) -> Any:
     """Call a C function at an address with floats and integers.
 
-    This is an intrinsic of numba: it is called with the types of the arguments, when a kernel is compiled.
+    This is a numba intrinsic: numba calls it with the types of the arguments when it compiles a kernel.
 
     Parameters
     ----------
     typing_context : numba typing context
     address : numba type
-        Integer: where the function is.
+        Integer, the address of the function.
     arguments : numba type
         Tuple of floats and integers.
 
@@ -75,7 +75,7 @@ def call_c_function(typing_context: Any, address: Any, arguments: Any) -> Any:
 
 
 def is_usable() -> bool:
-    """Return whether the compiled queries give the same results as the public ones here.
+    """Return whether the compiled queries give the same results as the public ones on this machine.
 
     Returns
     -------

@@ -1,8 +1,9 @@
 """Compilation of kernels in advance: before a long computation, or in the background of a window.
 
 Numba compiles a kernel for the types of the arguments with which it is called. Each *example* below calls a
-group of kernels as robocov itself does. Once an example has been called, the machine code of its kernels is
-in the cache folder, and a file there says so. No two processes call the same example at the same time.
+group of kernels in the same way as robocov does. Once an example has been called, the machine code of its
+kernels is in the cache folder, where a file marks it as ready. No two processes call the same example at the
+same time.
 
 ``python -m robocov.kernel_compilation`` calls all examples.
 """
@@ -37,14 +38,14 @@ from robocov.simulation import Simulation
 from robocov.team import Team
 
 Example: TypeAlias = Callable[[], None]
-"""A function that calls kernels, so that they are compiled."""
+"""A function that calls kernels in order to compile them."""
 
 _COMPILED_LIST = "compiled.json"
 """File in the cache folder with the names of the kernels whose machine code is there."""
-_LOOK_PERIOD_S = 0.25
+_POLL_PERIOD_S = 0.25
 """Time between two checks whether more kernels have been compiled."""
 _UNTIL_STDIN_CLOSES = "--until-stdin-closes"
-"""Option with which the module ends when the process that started it ends, in any manner."""
+"""Option that ends the module when the process that started it ends, for whatever reason."""
 _SQUARE = ((0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0))
 _TRIANGLE = PolygonObstacle(((3.0, 3.0), (4.0, 3.0), (4.0, 4.0)))
 _MAP = Environment("example", _SQUARE, (_TRIANGLE,))
@@ -67,7 +68,7 @@ def call_step_kernels() -> None:
 
 
 def call_summary_kernels() -> None:
-    """Call the kernels of a run's metrics."""
+    """Call the kernels of the metrics of a run."""
     record = Simulation(_MAP, Rapf(), _place_robots(2)).run(0.1)
     summarise(record, compute_cost_history(record, CoverageCost(_MAP, 2)))
 
@@ -138,7 +139,7 @@ def _place_robots(count: int) -> Array:
 
 
 def compile_kernels(examples: Sequence[Example] = COMMON_EXAMPLES) -> None:
-    """Compile the kernels of examples, unless their machine code is in the cache already.
+    """Compile the kernels of examples, unless their machine code is already in the cache.
 
     Without a cache folder the kernels are compiled for this process. If another process is compiling the same
     kernels, this function waits for it.
@@ -180,8 +181,8 @@ def compile_in_background() -> Iterator[None]:
     """Compile all kernels in another process, and run those that are not ready as Python.
 
     The results are the same. A step of six robots in Python takes less than a millisecond, so that a window
-    shows them in real time from the beginning. When the context ends, so does the other process; the next one
-    compiles the rest.
+    shows it in real time from the start. The other process ends with the context. Kernels that it has not
+    compiled by then are compiled the next time.
 
     Returns
     -------
@@ -206,15 +207,15 @@ class _BackgroundCompilation:
     def __init__(self, folder: Path) -> None:
         self._list = folder / _COMPILED_LIST
         self._compiled: set[str] = set()
-        self._time_of_next_look = 0.0
-        # Importing numba takes a while, too.
+        self._next_poll_time = 0.0
+        # Importing numba takes a while, too, so it happens in a thread.
         self._import = threading.Thread(target=import_numba, daemon=True)
         self._import.start()
         self._process: subprocess.Popen[bytes] | None = None
         search_path = os.pathsep.join(filter(None, sys.path))
         with suppress(OSError):
             self._process = subprocess.Popen(
-                # -P: modules in the working folder are not meant.
+                # -P prevents the import of modules from the working folder.
                 [sys.executable, "-P", "-m", __name__, _UNTIL_STDIN_CLOSES],
                 env={**os.environ, "PYTHONPATH": search_path},
                 stdin=subprocess.PIPE,
@@ -223,18 +224,18 @@ class _BackgroundCompilation:
             )
 
     def must_interpret(self, kernel: str) -> bool:
-        """Return whether there is no machine code of a kernel yet, and the other process is making it."""
+        """Return whether a kernel must run as Python, because its machine code is not ready yet."""
         if self._import.is_alive():
             return True
         if kernel in self._compiled:
             return False
-        if time.monotonic() >= self._time_of_next_look:
-            self._time_of_next_look = time.monotonic() + _LOOK_PERIOD_S
-            self._look()
+        if time.monotonic() >= self._next_poll_time:
+            self._next_poll_time = time.monotonic() + _POLL_PERIOD_S
+            self._poll()
         return kernel not in self._compiled
 
-    def _look(self) -> None:
-        """Read which kernels are compiled; if the process has ended, all others are compiled here."""
+    def _poll(self) -> None:
+        """Read which kernels are compiled. If the process has ended, the others are compiled in this one."""
         has_ended = self._process is None or self._process.poll() is not None
         with suppress(OSError, ValueError):
             self._compiled = set(json.loads(self._list.read_text(encoding="utf-8")))
@@ -249,7 +250,7 @@ class _BackgroundCompilation:
 
 
 def _get_marker(folder: Path, example: Example) -> Path:
-    """Return the file whose existence says that an example has been called."""
+    """Return the file that exists once an example has been called."""
     return folder / f"{example.__name__}.ready"
 
 
@@ -265,7 +266,7 @@ def _save_compiled_list(folder: Path) -> None:
 
 
 def main() -> None:
-    """Compile all kernels, at a low priority."""
+    """Compile all kernels at low priority."""
     if _UNTIL_STDIN_CLOSES in sys.argv[1:]:
         threading.Thread(target=_exit_when_stdin_closes, daemon=True).start()
     if hasattr(os, "nice"):

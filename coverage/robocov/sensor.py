@@ -116,7 +116,7 @@ class RangeSensor:
         return points
 
     def scan(self, positions: Array, rays: int, ranges: Array) -> tuple[Array, BoolArray]:
-        """Cast rays evenly round a full turn from each position; the first points along +x.
+        """Cast rays at even angles over a full turn from each position; the first points along +x.
 
         Parameters
         ----------
@@ -146,7 +146,7 @@ class RangeSensor:
         return distances, is_hit
 
     def scan_from(self, position: Array, rays: int, sensing_range: float) -> tuple[Array, Array]:
-        """Cast rays evenly round a full turn from one position; the first points along +x.
+        """Cast rays at even angles over a full turn from one position; the first points along +x.
 
         Parameters
         ----------

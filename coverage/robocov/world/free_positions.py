@@ -84,7 +84,7 @@ def _compute_directions(positions: Array, first: IntArray, second: IntArray, dis
     is_same_point = distance == 0.0
     divisor = np.where(is_same_point, 1.0, distance)
     directions: Array = (positions[second] - positions[first]) / divisor[:, None]
-    # Between robots at the same point there is no direction. Each such pair is assigned one.
+    # The direction between robots at the same point is undefined: each such pair is assigned one.
     directions[is_same_point] = compute_spread_directions((first + second)[is_same_point])
     return directions
 
