@@ -98,8 +98,8 @@ def trace_boundaries(
         lines = edge - first_edge
         curves = np.empty((lines + pair - first_pair, _CURVE_COLUMNS))
         count = _write_circles(curves, own_pairs, own_edges)
-        # Without circles, the cell is the one among robots of equal speeds; if that is empty, so is this one.
-        is_straight[i] = count == lines or (lines == 0 and count > 0)
+        # Without circles, the cell is the one among robots of equal speeds.
+        is_straight[i] = count == lines
         if is_straight[i]:
             pieces = _make_room(pieces, used, lines)
             used = _add_edges(own_edges, pieces, used)
