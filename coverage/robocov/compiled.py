@@ -1,15 +1,16 @@
 """Kernels: plain loops over arrays, which numba compiles when they are first called.
 
 Numba is imported only then. Its own cache keeps the machine code in the user's cache folder, in a folder
-named after a digest of robocov's sources, so that code of another version is never used. The environment
-variable ``NUMBA_CACHE_DIR`` selects another folder, and ``ROBOCOV_CACHE`` one for all of robocov's caches; if
-the latter is empty, nothing is cached. With ``NUMBA_DISABLE_JIT=1`` kernels run as Python.
+named after a digest of this installation of robocov, so that code of another version is never used. The
+environment variable ``NUMBA_CACHE_DIR`` selects another folder, and ``ROBOCOV_CACHE`` one for all of robocov's
+caches; if the latter is empty, nothing is cached. With ``NUMBA_DISABLE_JIT=1`` kernels run as Python.
 """
 
 from __future__ import annotations
 
 import functools
 import hashlib
+import importlib.metadata
 import importlib.util
 import os
 import pickle
@@ -284,7 +285,7 @@ def cache_folder() -> Path | None:
     if root is None:
         return None
     parent = root if named else root / "kernels"
-    folder = open_private_folder(parent / _compute_source_digest())
+    folder = open_private_folder(parent / _compute_installation_digest())
     if folder is not None:
         with suppress(OSError):
             os.utime(folder)
@@ -292,10 +293,15 @@ def cache_folder() -> Path | None:
     return folder
 
 
-def _compute_source_digest() -> str:
-    """Return a digest of all sources of the library: machine code is valid for exactly these."""
+def _compute_installation_digest(package: Path = Path(__file__).parent) -> str:
+    """Return a digest of an installation of the library: its sources, and how numba names their machine code.
+
+    Numba looks for machine code by the folder of the sources and the versions of Python and numba. Each
+    combination has its own cache folder, so that a kernel counts as ready only where numba will find it.
+    """
+    numba_version = importlib.metadata.version("numba")
     digest = hashlib.blake2b(digest_size=10)
-    package = Path(__file__).parent
+    digest.update(f"{package.resolve()}\n{sys.implementation.cache_tag} {numba_version}\n".encode())
     for path in sorted(package.rglob("*.py")):
         source = path.read_bytes()
         digest.update(f"{path.relative_to(package).as_posix()} {len(source)}\n".encode())

@@ -99,13 +99,25 @@ def test_machine_code_that_others_may_write_is_never_loaded(tmp_path: Path, kern
     assert run_script(KERNEL_SCRIPT, kernel_folder, cache) == ["double", "1.0"]
 
 
-def test_changed_source_changes_cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changed_source_changes_cache_folder(tmp_path: Path) -> None:
     (tmp_path / "one.py").write_text("x = 1")
-    monkeypatch.setattr(compiled, "__file__", str(tmp_path / "compiled.py"))
-    before = compiled._compute_source_digest()
-    assert compiled._compute_source_digest() == before
+    before = compiled._compute_installation_digest(tmp_path)
+    assert compiled._compute_installation_digest(tmp_path) == before
     (tmp_path / "one.py").write_text("x = 2")
-    assert compiled._compute_source_digest() != before
+    assert compiled._compute_installation_digest(tmp_path) != before
+
+
+def test_installations_of_one_version_have_cache_folders_of_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Numba does not find the machine code of the other one: it must not count as ready."""
+    for name in ("first", "second"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "one.py").write_text("x = 1")
+    first = compiled._compute_installation_digest(tmp_path / "first")
+    assert compiled._compute_installation_digest(tmp_path / "second") != first
+    monkeypatch.setattr("sys.implementation.cache_tag", "cpython-399")
+    assert compiled._compute_installation_digest(tmp_path / "first") != first
 
 
 def test_versions_unused_for_long_are_removed(tmp_path: Path) -> None:
