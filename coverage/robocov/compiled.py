@@ -2,8 +2,8 @@
 
 Numba is imported only then. Its own cache keeps the machine code in the user's cache folder, in a folder
 named after a digest of this installation of robocov, so that code of another version is never used. The
-environment variable ``NUMBA_CACHE_DIR`` selects another folder, and ``ROBOCOV_CACHE`` one for all of robocov's
-caches; if the latter is empty, nothing is cached. With ``NUMBA_DISABLE_JIT=1`` kernels run as Python.
+environment variable ``NUMBA_CACHE_DIR`` selects another folder, and ``ROBOCOV_CACHE`` one for all caches of
+robocov; if the latter is empty, nothing is cached. With ``NUMBA_DISABLE_JIT=1`` kernels run as Python.
 """
 
 from __future__ import annotations
