@@ -18,12 +18,13 @@ html_css_files = ["handbook.css"]
 html_copy_source = False
 html_show_sphinx = False
 default_role = "code"
-napoleon_use_ivar = True  # attributes of a dataclass are listed once
+# A plain list: entries of their own would describe the attributes of a dataclass twice.
+napoleon_custom_sections = [("Attributes", "params_style")]
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
 python_maximum_signature_line_length = 90
 toc_object_entries_show_parents = "hide"
-# a terminal's characters, and a map with comments, are no language that the highlighter knows
-# and words like "path" or "positions" name attributes of several classes
+# The highlighter knows no language for terminal output and maps with comments; and words such as "path" in
+# the types of parameters are also names of attributes, of several classes.
 suppress_warnings = ["misc.highlighting_failure", "ref.python"]
