@@ -9,17 +9,19 @@ robot knows exactly where it is, the range sensor is exact, and all robots work 
 """
 
 from robocov.conditions.conditions import (
-    FAILURE_STREAM,
-    LOSS_STREAM,
     PARAMETERS,
-    POSITION_STREAM,
-    SCANNING_STREAM,
-    SENSING_STREAM,
     TIME_TOLERANCE_S,
     UNITS,
     Conditions,
 )
 from robocov.conditions.events import Failure, Join, JoinedRobot, parse_event
+from robocov.conditions.random_streams import (
+    FAILURE_STREAM,
+    LOSS_STREAM,
+    POSITION_STREAM,
+    SCANNING_STREAM,
+    SENSING_STREAM,
+)
 
 __all__ = [
     "FAILURE_STREAM",

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
-from robocov.conditions.conditions import LOSS_STREAM, TIME_TOLERANCE_S, Conditions
-from robocov.conditions.random_streams import RandomStream
+from robocov.conditions.conditions import TIME_TOLERANCE_S, Conditions
+from robocov.conditions.random_streams import LOSS_STREAM, create_generator
 from robocov.observation.neighbours import Neighbours
 
 NEVER = -1
@@ -126,7 +126,6 @@ class Radio:
         self._ranges = ranges
         self._dt = dt
         self._latency_steps = math.ceil(conditions.delay / dt - TIME_TOLERANCE_S)
-        self._loss_stream = RandomStream(conditions.seed, LOSS_STREAM)
 
     def exchange_messages(
         self, inbox: Inbox, step: int, reported_positions: Array, true_positions: Array, working: BoolArray
@@ -216,6 +215,6 @@ class Radio:
         is_received = np.zeros((len(positions), len(positions)), dtype=bool)
         is_received[receiver, sender] = True
         if self._conditions.loss:
-            uniform = self._loss_stream.draw_uniform(step, receiver, sender)
-            is_received[receiver, sender] = uniform >= self._conditions.loss
+            rng = create_generator(self._conditions.seed, LOSS_STREAM, step)
+            is_received &= rng.random(is_received.shape) >= self._conditions.loss
         return is_received

@@ -12,19 +12,9 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.conditions.events import MAX_TIME_S, Failure, Join, build_events
-from robocov.conditions.random_streams import RandomStream
+from robocov.conditions.random_streams import FAILURE_STREAM, create_generator
 from robocov.errors import ParameterError, is_number, quote, require_number
 
-LOSS_STREAM = 0
-"""Number of the random stream for the loss of messages."""
-POSITION_STREAM = 1
-"""Number of the random stream for localization noise."""
-SENSING_STREAM = 2
-"""Number of the random stream for the noise of obstacle points."""
-SCANNING_STREAM = 3
-"""Number of the random stream for the noise of scans."""
-FAILURE_STREAM = 4
-"""Number of the random stream for lifetimes."""
 TIME_TOLERANCE_S = 1e-9
 """Difference up to which two times count as equal, because sums of steps have rounding errors."""
 
@@ -225,8 +215,8 @@ class Conditions:
         for join in self.joins:
             starts[join.robot - 1] = join.time
         if self.failure_rate:
-            uniform = RandomStream(self.seed, FAILURE_STREAM).draw_uniform(0, np.arange(count))
-            stops = np.maximum(starts, 0.0) - np.log(uniform) / self.failure_rate
+            rng = create_generator(self.seed, FAILURE_STREAM)
+            stops = np.maximum(starts, 0.0) + rng.exponential(1.0 / self.failure_rate, size=count)
         for failure in self.failures:
             stops[failure.robot - 1] = min(stops[failure.robot - 1], failure.time)
         return starts, stops

@@ -8,8 +8,13 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, compute_point_distances
 from robocov.conditions.communication import Inbox, Radio
-from robocov.conditions.conditions import POSITION_STREAM, SCANNING_STREAM, SENSING_STREAM, Conditions
-from robocov.conditions.random_streams import RandomStream
+from robocov.conditions.conditions import Conditions
+from robocov.conditions.random_streams import (
+    POSITION_STREAM,
+    SCANNING_STREAM,
+    SENSING_STREAM,
+    create_generator,
+)
 from robocov.observation import Decision, Observations, Scans
 from robocov.team import Team
 
@@ -32,11 +37,8 @@ class Perception:
     def __init__(self, conditions: Conditions, team: Team, dt: float) -> None:
         self._conditions = conditions
         self._dt = dt
-        self._robots = np.arange(len(team))
+        self._count = len(team)
         self._radio = Radio(conditions, team.communication_range, dt)
-        self._position_stream = RandomStream(conditions.seed, POSITION_STREAM)
-        self._sensing_stream = RandomStream(conditions.seed, SENSING_STREAM)
-        self._scanning_stream = RandomStream(conditions.seed, SCANNING_STREAM)
 
     def create_inbox(self) -> Inbox | None:
         """Create the inbox before the first step.
@@ -46,7 +48,7 @@ class Perception:
         Inbox or None
             None if communication is ideal.
         """
-        return Inbox.create_empty(len(self._robots)) if self._conditions.uses_messages else None
+        return Inbox.create_empty(self._count) if self._conditions.uses_messages else None
 
     def perceive(
         self, truth: Observations, inbox: Inbox | None, working: BoolArray
@@ -98,7 +100,8 @@ class Perception:
         sigma = self._conditions.position_noise
         if not sigma:
             return positions
-        noisy = positions + sigma * self._position_stream.draw_normal(step, self._robots)
+        rng = create_generator(self._conditions.seed, POSITION_STREAM, step)
+        noisy = positions + rng.normal(scale=sigma, size=positions.shape)
         noisy.setflags(write=False)
         return np.asarray(noisy)
 
@@ -110,7 +113,8 @@ class Perception:
         offset = truth.obstacle_points - truth.positions
         if sigma:
             distance = compute_point_distances(truth.obstacle_points, truth.positions)
-            noise = sigma * self._sensing_stream.draw_normal(step, self._robots)[:, 0]
+            rng = create_generator(self._conditions.seed, SENSING_STREAM, step)
+            noise = rng.normal(scale=sigma, size=self._count)
             measured = np.maximum(distance + noise, MIN_MEASURED_DISTANCE_M)
             # A point at distance zero has no direction in which it could be moved.
             has_direction = distance > 0.0
@@ -123,8 +127,8 @@ class Perception:
         sigma = self._conditions.sensing_noise
         if scans is None or not sigma:
             return scans
-        rays = np.arange(scans.rays)
-        noise = sigma * self._scanning_stream.draw_normal(step, self._robots[:, None], rays)[..., 0]
+        rng = create_generator(self._conditions.seed, SCANNING_STREAM, step)
+        noise = rng.normal(scale=sigma, size=scans.distances.shape)
         measured = np.maximum(scans.distances + noise, MIN_MEASURED_DISTANCE_M)
         distances = np.where(scans.hit, measured, scans.distances)
         distances.setflags(write=False)

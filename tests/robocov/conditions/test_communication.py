@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from robocov.conditions import LOSS_STREAM, Conditions
 from robocov.conditions.communication import NEVER, Inbox, Radio
-from robocov.conditions.random_streams import RandomStream
+from robocov.conditions.random_streams import create_generator
 from robocov.controllers import CONTROLLERS, Controller, atlas, inform_controller
 from robocov.environment import Environment
 from robocov.errors import InputError
@@ -49,7 +49,6 @@ def simulate_messages(
     conditions: Conditions, ranges: np.ndarray, walks: np.ndarray, working: np.ndarray
 ) -> list[dict[tuple[int, int], Message]]:
     """Return the message that each robot knows of each other one in each step, from a list of all."""
-    loss_stream = RandomStream(conditions.seed, LOSS_STREAM)
     rate = conditions.message_rate
     messages = []
     known_messages = []
@@ -58,13 +57,13 @@ def simulate_messages(
         is_working = working[step]
         if rate is None or step * DT + 1e-9 >= broadcasts / rate:
             broadcasts += 1
+            uniform = create_generator(conditions.seed, LOSS_STREAM, step).random(2 * (len(positions),))
             for receiver, sender in np.ndindex(len(positions), len(positions)):
                 distance = np.hypot(*(positions[receiver] - positions[sender]))
                 is_in_range = distance <= min(ranges[receiver], ranges[sender])
                 if receiver == sender or not (is_in_range and is_working[receiver] and is_working[sender]):
                     continue
-                uniform = loss_stream.draw_uniform(step, np.array([receiver]), np.array([sender]))[0]
-                if uniform >= conditions.loss:
+                if uniform[receiver, sender] >= conditions.loss:
                     arrives = step * DT + conditions.delay
                     messages.append(Message(arrives, step, receiver, sender, positions[sender].copy()))
         known = {}
