@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 
 from robocov.controllers.gains import get_gain_values
 from robocov.controllers.individual import unwrap_controller
-from robocov.cost import DEFAULT_LATTICE, CoverageResult
+from robocov.cost import CoverageResult
+from robocov.defaults import DEFAULT_LATTICE
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, format_count, quote
 from robocov.mapfile import load_map, save_map

@@ -10,6 +10,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray, freeze
+from robocov.defaults import (
+    DEFAULT_COMMUNICATION_RANGE_M,
+    DEFAULT_MASS_KG,
+    DEFAULT_MAX_ACCELERATION_M_S2,
+    DEFAULT_MAX_SPEED_M_S,
+    DEFAULT_RADIUS_M,
+    DEFAULT_SENSING_RANGE_M,
+    DEFAULT_TRACK_WIDTH_M,
+    DEFAULT_TURNING_RATE_RAD_S,
+    DEFAULT_VISCOSITY_N_S_M,
+)
 from robocov.errors import (
     ParameterError,
     describe_unknown_name,
@@ -22,10 +33,6 @@ from robocov.errors import (
 
 MAX_ROBOTS = 10_000
 """Maximum number of robots in a team file or a record."""
-DEFAULT_RADIUS = 0.1
-"""Default radius of a robot, m."""
-DEFAULT_TURNING_RATE = 4.0
-"""Default maximum turning rate of a unicycle, rad/s."""
 DEFAULT_TRACK_PER_RADIUS = 1.6
 """Default track width of a unicycle divided by its radius; the wheels are within the disc."""
 KINEMATICS = ("point", "unicycle")
@@ -83,7 +90,7 @@ PARAMETERS: dict[str, TeamParameter] = {
 UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
 """Units of the parameters."""
 
-_POINT_ROBOT_VALUES = {"track_width": 0.0, "turning_rate": DEFAULT_TURNING_RATE}
+_POINT_ROBOT_VALUES = {"track_width": DEFAULT_TRACK_WIDTH_M, "turning_rate": DEFAULT_TURNING_RATE_RAD_S}
 """Parameters that matter only for unicycles, with their values in a team of points."""
 
 
@@ -161,15 +168,15 @@ class Team:
         cls,
         n: int,
         *,
-        radius: float = DEFAULT_RADIUS,
-        mass: float = 1.0,
-        max_speed: float = 1.0,
-        max_acceleration: float = 2.0,
-        viscosity: float = 2.0,
-        sensing_range: float = 3.0,
-        communication_range: float = np.inf,
-        track_width: float = 0.0,
-        turning_rate: float = DEFAULT_TURNING_RATE,
+        radius: float = DEFAULT_RADIUS_M,
+        mass: float = DEFAULT_MASS_KG,
+        max_speed: float = DEFAULT_MAX_SPEED_M_S,
+        max_acceleration: float = DEFAULT_MAX_ACCELERATION_M_S2,
+        viscosity: float = DEFAULT_VISCOSITY_N_S_M,
+        sensing_range: float = DEFAULT_SENSING_RANGE_M,
+        communication_range: float = DEFAULT_COMMUNICATION_RANGE_M,
+        track_width: float = DEFAULT_TRACK_WIDTH_M,
+        turning_rate: float = DEFAULT_TURNING_RATE_RAD_S,
         kinematics: str | None = None,
     ) -> Team:
         """Build a team of equal robots, by default those of the paper.

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from hypothesis import strategies as st
 
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import (
     CircleObstacle,
     DiscStart,
@@ -13,7 +14,6 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
-from robocov.team import DEFAULT_RADIUS
 from robocov_app.editor.edits import boolean, clipboard, create, properties, transform, vertices
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.selection import Change, Edge, Selection, points_of
@@ -23,7 +23,7 @@ from robocov_app.editor.model.validation import Problem, examined
 HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 
 
-def problems(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> tuple[Problem, ...]:
+def problems(sketch: Sketch, radius: float = DEFAULT_RADIUS_M) -> tuple[Problem, ...]:
     return examined(sketch, radius)[0]
 
 

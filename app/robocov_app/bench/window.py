@@ -8,7 +8,7 @@ from time import perf_counter
 
 import pygame
 
-from robocov.cost import DEFAULT_LATTICE
+from robocov.defaults import DEFAULT_LATTICE
 from robocov.mapfile import load_map
 from robocov_app.bench.measure import Call, Case, Row, in_turn
 from robocov_app.bench.render import SIZE, cleared

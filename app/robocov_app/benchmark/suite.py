@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from robocov.defaults import DEFAULT_DURATION_S
 from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, describe_unknown_name
 from robocov.generator import GENERATORS, generate_map
@@ -62,7 +63,7 @@ class Track:
     maps: tuple[str, ...] = _CORE
     seeds: tuple[int, ...] = (0,)
     robots: int = TEAM
-    duration: float = 60.0  # s
+    duration: float = DEFAULT_DURATION_S
     changes: Mapping[str, Any] = field(default_factory=dict)  # of the study
     failures: tuple[tuple[int, float], ...] = ()  # robot, and when it fails, s
 

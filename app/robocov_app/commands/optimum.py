@@ -9,12 +9,12 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.errors import InputError, ParameterError, format_count, require_number
 from robocov.files.writing import replace_file
 from robocov.lower_bound import MIN_PRECISION, LowerBound, compute_lower_bound
 from robocov.mapfile import load_map
 from robocov.optimum import MAX_RESTARTS, MAX_ROBOTS, find_optimum
-from robocov.team import DEFAULT_RADIUS
 from robocov_app.render.density import density_kind, density_lines, mean_label
 from robocov_app.runs.cost import PICTURE_LATTICE, built_cost, draw_distances
 from robocov_app.runs.options import PlotOptions
@@ -87,7 +87,7 @@ def command(options: Arguments) -> None:
         assert options.map is not None
         environment = load_map(options.map)
         robots = _ROBOTS if options.robots is None else options.robots
-        radius = DEFAULT_RADIUS if options.radius is None else options.radius
+        radius = DEFAULT_RADIUS_M if options.radius is None else options.radius
     lattice, began = options.lattice, time.perf_counter()
     search: dict[str, Any] = {"lattice": lattice, "restarts": options.restarts, "seed": options.seed}
     with late_progress("searching", quiet=options.json) as update:

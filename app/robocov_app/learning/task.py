@@ -15,6 +15,7 @@ from robocov.compiled import kernel
 from robocov.conditions import Conditions
 from robocov.controllers.known_cells import compute_known_cells
 from robocov.cost import CoverageCost, CoverageResult
+from robocov.defaults import DEFAULT_DT_S, DEFAULT_DURATION_S, DEFAULT_ROBOTS
 from robocov.environment import Environment
 from robocov.errors import (
     ParameterError,
@@ -27,7 +28,7 @@ from robocov.errors import (
 from robocov.mapfile import load_map
 from robocov.observation import MAX_RAYS, Observations, Scans
 from robocov.observation.region import Region
-from robocov.simulation import DEFAULT_DT, check_dt
+from robocov.simulation import check_dt
 from robocov.team import Team
 
 Action: TypeAlias = Literal["force", "velocity"]
@@ -330,10 +331,10 @@ class CoverageTask:
 
     maps: MapSource | Sequence[MapSource] = "rooms"
     start: str | None = None  # None: each map's first; "*": any of its starts
-    robots: int = 6
+    robots: int = DEFAULT_ROBOTS
     team: Team | None = None  # None: equal robots; its size goes before `robots`
-    duration: float = 60.0  # s, after which an episode is truncated
-    dt: float = DEFAULT_DT  # control period of the physics, s
+    duration: float = DEFAULT_DURATION_S  # after which an episode is truncated
+    dt: float = DEFAULT_DT_S  # control period of the physics, s
     repeat: int = 6  # so many control periods long an action is held
     action: Action = "force"  # N, or "velocity", m/s
     reward: Reward = "shared"  # see `shares`; in units of `reference_distance` of the whole team

@@ -4,11 +4,12 @@ from pathlib import Path
 
 from robocov.arrays import Array
 from robocov.cost import CoverageCost
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
 from robocov.errors import format_count
 from robocov.geodesic import Geodesics
 from robocov.mapfile.check import MANY_VERTICES, count_vertices
-from robocov.team import DEFAULT_RADIUS, Team
+from robocov.team import Team
 from robocov_app.terminal.progress import late_progress
 
 PICTURE_LATTICE = 256  # coarsest lattice for maps of distances: its cells are to be narrower than walls
@@ -40,7 +41,7 @@ def draw_distances(
     title: str,
     theme: str,
     speeds: Array | None = None,
-    radius: float = DEFAULT_RADIUS,
+    radius: float = DEFAULT_RADIUS_M,
 ) -> None:
     """Draw a map of the distances to the nearest robot, under words on their mean."""
     from robocov_app.figures.coverage import Moment, plot_coverage

@@ -9,6 +9,19 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from robocov.defaults import (
+    DEFAULT_DT_S,
+    DEFAULT_DURATION_S,
+    DEFAULT_LATTICE,
+    DEFAULT_MAX_ACCELERATION_M_S2,
+    DEFAULT_MAX_SPEED_M_S,
+    DEFAULT_RADIUS_M,
+    DEFAULT_ROBOTS,
+    DEFAULT_SENSING_RANGE_M,
+    DEFAULT_TRACK_WIDTH_M,
+    DEFAULT_TURNING_RATE_RAD_S,
+    DEFAULT_VISCOSITY_N_S_M,
+)
 from robocov.errors import ParameterError, require_number
 from robocov_app.terminal.arguments import parsed_size, window_size
 
@@ -197,19 +210,19 @@ class ScenarioOptions:
 
     map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="[MAP]")] = "rooms"
     """Path to a map JSON, or the name of a bundled map (see `robocov maps`)."""
-    robots: int = 6
+    robots: int = DEFAULT_ROBOTS
     """Number of robots."""
     start: str | None = None
     """Named start of the map; the map's first by default."""
     seed: int = 0
     """Seed of the starting positions; every controller gets the same."""
-    dt: float = 1 / 60
+    dt: float = DEFAULT_DT_S
     """Control period in seconds."""
-    radius: float = 0.1
+    radius: float = DEFAULT_RADIUS_M
     """Radius of a robot in metres."""
     team: Annotated[Path | None, tyro.conf.arg(metavar="TEAM.toml")] = None
     """TOML or JSON file of a mixed team: [[group]] with count, max_speed, ...; options give the rest."""
-    lattice: int = 128
+    lattice: int = DEFAULT_LATTICE
     """The coverage cost is evaluated on a lattice of N x N sites over the map."""
     conditions: tyro.conf.OmitArgPrefixes[ConditionOptions] = field(default_factory=ConditionOptions)
 
@@ -220,25 +233,25 @@ class RunOptions(ScenarioOptions, JsonOption):
 
     gains: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="GAIN=VALUE ...")] = ()
     """Gains, as in --set k_rep=0.3 target=median attraction_limit=null (see `robocov controllers`)."""
-    duration: float = 60.0
+    duration: float = DEFAULT_DURATION_S
     """Simulated seconds."""
     record_hz: float | None = None
     """Moments a second that the record keeps, about; by default all, of large teams what makes 320 MB."""
-    max_speed: float = 1.0
+    max_speed: float = DEFAULT_MAX_SPEED_M_S
     """Largest speed in m/s."""
-    max_acceleration: float = 2.0
+    max_acceleration: float = DEFAULT_MAX_ACCELERATION_M_S2
     """Largest acceleration in m/s²."""
-    viscosity: float = 2.0
+    viscosity: float = DEFAULT_VISCOSITY_N_S_M
     """Viscosity nu of (28) in N s/m; a robot has 1 kg."""
-    sensing_range: float = 3.0
+    sensing_range: float = DEFAULT_SENSING_RANGE_M
     """How far the range sensor reaches, in metres from the robot's centre."""
     communication_range: float | None = None
     """How far robots hear each other, in metres; without limit by default."""
     kinematics: Literal["point", "unicycle"] = "point"
     """What robots can do: move in any direction, or drive on two wheels and turn (differential drive)."""
-    track_width: float = 0.0
+    track_width: float = DEFAULT_TRACK_WIDTH_M
     """Distance between a unicycle's wheels in metres; 1.6 radii where it is 0."""
-    turning_rate: float = 4.0
+    turning_rate: float = DEFAULT_TURNING_RATE_RAD_S
     """Largest turning rate of a unicycle in rad/s."""
     out: Path | None = None
     """Folder for the results."""

@@ -10,9 +10,10 @@ from robocov.conditions import Conditions
 from robocov.controllers import Controller, make_controller
 from robocov.controllers.gains import Value
 from robocov.controllers.user_modules import ControllerSource, provide_modules
+from robocov.defaults import DEFAULT_DT_S
 from robocov.environment import Environment
 from robocov.record import Record, Recorder
-from robocov.simulation import DEFAULT_DT, Simulation, TeamState, check_joins
+from robocov.simulation import Simulation, TeamState, check_joins
 from robocov.team import Team
 
 MOST_ROWS = 2e7  # largest record, in moments times robots: about 2 GB
@@ -39,7 +40,7 @@ class RunSpec:
     velocities: Array | None = None
     steering: Array | None = None
     duration: float = 60.0
-    dt: float = DEFAULT_DT
+    dt: float = DEFAULT_DT_S
     conditions: Conditions | None = None
 
     @cached_property

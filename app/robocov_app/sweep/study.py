@@ -21,6 +21,18 @@ from robocov.conditions import UNITS as CONDITION_UNITS
 from robocov.controllers import get_gain_values, get_gains, load_controller_class
 from robocov.controllers.gains import Gain, Option, Value, instantiate_controller
 from robocov.controllers.user_modules import ControllerSource, find_own_modules
+from robocov.defaults import (
+    DEFAULT_DT_S,
+    DEFAULT_DURATION_S,
+    DEFAULT_MAX_ACCELERATION_M_S2,
+    DEFAULT_MAX_SPEED_M_S,
+    DEFAULT_RADIUS_M,
+    DEFAULT_ROBOTS,
+    DEFAULT_SENSING_RANGE_M,
+    DEFAULT_TRACK_WIDTH_M,
+    DEFAULT_TURNING_RATE_RAD_S,
+    DEFAULT_VISCOSITY_N_S_M,
+)
 from robocov.environment import Environment
 from robocov.errors import (
     InputError,
@@ -32,8 +44,8 @@ from robocov.errors import (
     require_type,
 )
 from robocov.mapfile import to_json
-from robocov.simulation import DEFAULT_DT, check_dt, check_joins
-from robocov.team import DEFAULT_RADIUS, DEFAULT_TURNING_RATE, KINEMATICS, Team
+from robocov.simulation import check_dt, check_joins
+from robocov.team import KINEMATICS, Team
 from robocov.team import UNITS as TEAM_UNITS
 from robocov.team_files import build_team
 from robocov_app.runs.spec import MOST_ROWS
@@ -292,7 +304,7 @@ MAX_MAX_RUNS = 10_000_000
 ALL = "*"  # stands for all starts of a map
 TEAM = ("radius", "max_speed", "max_acceleration", "viscosity", "sensing_range", "communication_range")
 """Parameters of a team that a study may sweep."""
-UNICYCLES = {"kinematics": "point", "track_width": 0.0, "turning_rate": DEFAULT_TURNING_RATE}
+UNICYCLES = {"kinematics": "point", "track_width": 0.0, "turning_rate": DEFAULT_TURNING_RATE_RAD_S}
 """More of them, with defaults: what is as by default a study does not tell."""
 _UNLIMITED: dict[str, tuple[object, ...]] = {"message_rate": (None, NO_LIMIT)}  # words for no limit
 _UNLIMITED |= dict.fromkeys(("sensing_range", "communication_range"), (None, NO_LIMIT, math.inf))
@@ -320,20 +332,20 @@ class Study:
     maps: tuple[StudyMap, ...]
     controllers: tuple[str, ...]
     gains: Mapping[str, Wanted] = field(default_factory=dict)  # what is tried of each controller
-    robots: Sequence[int] = (6,)
+    robots: Sequence[int] = (DEFAULT_ROBOTS,)
     starts: Sequence[str] = ()  # none: the first of each map; ("*",): all of each map
     seeds: Sequence[int] = (0,)
-    duration: float = 60.0  # s
-    dt: float = DEFAULT_DT  # control period, s
-    radius: Swept = DEFAULT_RADIUS
-    max_speed: Swept = 1.0
-    max_acceleration: Swept = 2.0
-    viscosity: Swept = 2.0
-    sensing_range: Swept = 3.0
+    duration: float = DEFAULT_DURATION_S
+    dt: float = DEFAULT_DT_S  # control period, s
+    radius: Swept = DEFAULT_RADIUS_M
+    max_speed: Swept = DEFAULT_MAX_SPEED_M_S
+    max_acceleration: Swept = DEFAULT_MAX_ACCELERATION_M_S2
+    viscosity: Swept = DEFAULT_VISCOSITY_N_S_M
+    sensing_range: Swept = DEFAULT_SENSING_RANGE_M
     communication_range: Swept = None  # without limit
     kinematics: str | Sequence[str] = "point"
-    track_width: Swept = 0.0
-    turning_rate: Swept = DEFAULT_TURNING_RATE
+    track_width: Swept = DEFAULT_TRACK_WIDTH_M
+    turning_rate: Swept = DEFAULT_TURNING_RATE_RAD_S
     conditions: Mapping[str, Any] = field(default_factory=dict)  # of lists each is tried
     group: Sequence[Mapping[str, Any]] = ()  # robots that differ, as in a team file
     lattice: int = 64

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.cost import DEFAULT_LATTICE, CoverageCost, CoverageResult, Sites, TimeVaryingCost
+from robocov.cost import CoverageCost, CoverageResult, Sites, TimeVaryingCost
+from robocov.defaults import DEFAULT_LATTICE
 from robocov.environment import Environment
 from robocov.errors import InputError, RobocovError
 from robocov.kernel_compilation import call_cost_kernels, compile_kernels

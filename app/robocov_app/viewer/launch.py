@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from robocov.cost import DEFAULT_LATTICE
+from robocov.defaults import DEFAULT_LATTICE
 from robocov_app.render.picture import standard_layers
 from robocov_app.terminal.output import echo
 from robocov_app.toolkit.autosave import autosave_folder

@@ -6,12 +6,11 @@ maps with moving obstacles. The cost is a mean over the `Sites` of a lattice (`l
 """
 
 from robocov.cost.coverage_cost import CoverageCost
-from robocov.cost.lattice import DEFAULT_LATTICE, MAX_LATTICE, Sites
+from robocov.cost.lattice import MAX_LATTICE, Sites
 from robocov.cost.result import CoverageResult
 from robocov.cost.time_varying_cost import TimeVaryingCost
 
 __all__ = [
-    "DEFAULT_LATTICE",
     "MAX_LATTICE",
     "CoverageCost",
     "CoverageResult",

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray, compute_weighted_mean, freeze
 from robocov.cost.corner_views import build_corner_views, find_corner_views
-from robocov.cost.lattice import DEFAULT_LATTICE, MAX_LATTICE, build_lattice
+from robocov.cost.lattice import MAX_LATTICE, build_lattice
 from robocov.cost.result import CoverageResult
 from robocov.cost.site_paths import CostMap, Search, SitePaths, find_site_paths
+from robocov.defaults import DEFAULT_LATTICE
 from robocov.density.polygon_masses import compute_square_means
 from robocov.environment import Environment, require_environment
 from robocov.errors import InputError, quote, require_number, to_floats

@@ -13,9 +13,6 @@ from robocov.errors import ParameterError
 from robocov.geodesic import Geodesics
 from robocov.geodesic.box_tree import build_box_tree, compute_z_order
 
-DEFAULT_LATTICE = 128
-"""Default number of cells along a side."""
-
 MAX_LATTICE = 4096
 """Maximum number of cells along a side."""
 

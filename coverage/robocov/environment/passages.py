@@ -11,11 +11,11 @@ import shapely
 from shapely import MultiPolygon
 
 from robocov.arrays import Array, BoolArray, IntArray, Point, compute_lengths
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment.obstacles import MAX_SAGITTA_M
 from robocov.environment.polygons import GRID_M
-from robocov.team import DEFAULT_RADIUS
 
-MIN_POCKET_AREA_M2 = math.pi * DEFAULT_RADIUS**2
+MIN_POCKET_AREA_M2 = math.pi * DEFAULT_RADIUS_M**2
 """A gap that leads only to a smaller pocket is not a passage: no robot would go there."""
 _MAX_CRACK_M = 2 * MAX_SAGITTA_M
 """Walls closer than this count as touching, because the polygon of a touching circle may leave a crack."""

@@ -12,6 +12,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, Point, Ring, compute_lengths
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment.packing import (
     choose_points,
     compute_max_points,
@@ -21,7 +22,6 @@ from robocov.environment.packing import (
     throw_darts,
 )
 from robocov.errors import StartError, format_count, is_number, quote
-from robocov.team import DEFAULT_RADIUS
 
 MIN_START_GAP_RADII = 0.02
 """Minimum gap between two robots, and between robots and walls, at the start, in radii of a robot."""
@@ -85,7 +85,7 @@ class Start:
     spec: StartSpec
     free: BaseGeometry
 
-    def sample(self, n: int, seed: int = 0, radius: float = DEFAULT_RADIUS) -> Array:
+    def sample(self, n: int, seed: int = 0, radius: float = DEFAULT_RADIUS_M) -> Array:
         """Sample positions at which the robots touch neither walls nor each other.
 
         Parameters
@@ -126,7 +126,7 @@ class Start:
             raise self._build_error(self._describe_lack_of_space(n, radius))
         return points
 
-    def estimate_capacity(self, radius: float = DEFAULT_RADIUS) -> int:
+    def estimate_capacity(self, radius: float = DEFAULT_RADIUS_M) -> int:
         """Estimate how many robots of a radius fit.
 
         The result depends only on the start and the radius: it is the number of robots in the densest packing

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from robocov.arrays import Array
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import MIN_START_GAP_RADII, Ring
 from robocov.errors import require_number
-from robocov.team import DEFAULT_RADIUS
 
 MIN_GAP_M = 0.21
 """Robots of the default size fit through."""
-assert MIN_GAP_M > 2.0 * DEFAULT_RADIUS * (1.0 + MIN_START_GAP_RADII)
+assert MIN_GAP_M > 2.0 * DEFAULT_RADIUS_M * (1.0 + MIN_START_GAP_RADII)
 AREA_TOLERANCE = 0.005
 """Largest difference between the blocked fraction of a map's area and the requested one."""
 MAX_OBSTACLES = 100_000

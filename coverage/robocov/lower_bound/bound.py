@@ -14,6 +14,7 @@ from scipy.optimize import Bounds, minimize
 
 from robocov.arrays import Array, BoolArray, IntArray, freeze
 from robocov.cost import CoverageCost
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import GRID_M, Environment
 from robocov.errors import ParameterError, require_number
 from robocov.geodesic.angular_index import AngularWallIndex
@@ -25,7 +26,6 @@ from robocov.lower_bound.worth_bounds import (
     bound_worths,
     halve_triangles,
 )
-from robocov.team import DEFAULT_RADIUS
 
 MIN_PRECISION = 1e-5
 """The smallest precision that may be requested."""
@@ -103,7 +103,7 @@ def compute_lower_bound(
     environment: Environment,
     positions: Array,
     *,
-    radius: float = DEFAULT_RADIUS,
+    radius: float = DEFAULT_RADIUS_M,
     lattice: int = 64,
     precision: float = 0.001,
     progress: Callable[[float], None] | None = None,

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from robocov.arrays import Array, compute_lengths
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.density import Density, Gaussians
 from robocov.environment import (
     DiscStart,
@@ -23,7 +24,6 @@ from robocov.environment import (
     find_overlaps,
 )
 from robocov.errors import StartError, format_count, format_path, summarise_names
-from robocov.team import DEFAULT_RADIUS
 
 MANY_VERTICES = 5000
 """Maps with more vertices get a warning about computing time."""
@@ -122,7 +122,7 @@ class MapReport:
         }
 
 
-def check_map(environment: Environment, radius: float = DEFAULT_RADIUS) -> MapReport:
+def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> MapReport:
     """Measure a map, and look for likely mistakes.
 
     Parameters

@@ -9,6 +9,7 @@ import shapely
 from shapely import Polygon
 
 from robocov.arrays import Array, compute_lengths
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.density import WeightedArea, WeightedPolygons
 from robocov.environment import (
     MIN_START_GAP_RADII,
@@ -23,7 +24,6 @@ from robocov.environment import (
 from robocov.errors import JsonPath, MapError, Mistake, StartError, format_path
 from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov.mapfile.structure import NO_WEIGHT
-from robocov.team import DEFAULT_RADIUS
 
 _MAX_FLATNESS = 1e-9
 """A ring whose hull has a smaller area, relative to the square of its extent, is a line."""
@@ -191,13 +191,13 @@ def _find_room_mistakes(
     if _certainly_has_room(environment, start):
         return
     try:
-        environment.start(name).sample(1, radius=DEFAULT_RADIUS)
+        environment.start(name).sample(1, radius=DEFAULT_RADIUS_M)
     except StartError:
         place = "the free space"
         if isinstance(start, DiscStart):
             x, y = start.center
             place = f"the disc of radius {start.radius:g} m at [{x:g}, {y:g}]"
-        message = f"{place} has no room for a robot of radius {DEFAULT_RADIUS:g} m"
+        message = f"{place} has no room for a robot of radius {DEFAULT_RADIUS_M:g} m"
         yield Mistake.at_path(("starts", name), message)
 
 
@@ -208,5 +208,5 @@ def _certainly_has_room(environment: Environment, start: DiscStart | UniformStar
     points = shapely.points(np.reshape(centers, (-1, 2)))
     is_free = shapely.contains_properly(environment.free, points)
     clearances = shapely.distance(environment.free.boundary, points)
-    min_clearance = DEFAULT_RADIUS * (1 + MIN_START_GAP_RADII) + _START_MARGIN_M
+    min_clearance = DEFAULT_RADIUS_M * (1 + MIN_START_GAP_RADII) + _START_MARGIN_M
     return bool((is_free & (clearances > min_clearance)).any())

@@ -16,12 +16,12 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, BoolArray, IntArray, compute_lengths, freeze
 from robocov.cost import CoverageCost, CoverageResult
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
 from robocov.errors import ParameterError, is_number, quote, require_number
 from robocov.k_median import apply_best_swaps, run_lloyd, seed_sources
 from robocov.optimum.configuration_space import ConfigurationSpace
 from robocov.optimum.descent import descend
-from robocov.team import DEFAULT_RADIUS
 
 MAX_ROBOTS = 500
 """Maximum number of robots."""
@@ -115,7 +115,7 @@ def find_optimum(
     environment: Environment,
     robots: int,
     *,
-    radius: float = DEFAULT_RADIUS,
+    radius: float = DEFAULT_RADIUS_M,
     lattice: int = 64,
     restarts: int = 24,
     seed: int = 0,

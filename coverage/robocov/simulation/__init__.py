@@ -9,8 +9,8 @@
 """
 
 from robocov.simulation.batch import SimulationBatch
-from robocov.simulation.checks import DEFAULT_DT, check_dt, check_joins
+from robocov.simulation.checks import check_dt, check_joins
 from robocov.simulation.simulation import Simulation
 from robocov.simulation.team_state import TeamState
 
-__all__ = ["DEFAULT_DT", "Simulation", "SimulationBatch", "TeamState", "check_dt", "check_joins"]
+__all__ = ["Simulation", "SimulationBatch", "TeamState", "check_dt", "check_joins"]

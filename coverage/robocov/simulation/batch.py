@@ -12,13 +12,14 @@ from robocov.arrays import Array, BoolArray
 from robocov.controllers import has_memory
 from robocov.controllers.base import Controller
 from robocov.controllers.individual import IndividualController
+from robocov.defaults import DEFAULT_DT_S
 from robocov.environment import Environment, require_environment
 from robocov.errors import ParameterError, StartError, format_count, to_floats
 from robocov.observation import Decision, Observations, Scans, Snapshot, check_forces
 from robocov.observation.neighbours import Neighbours
 from robocov.record import Record, Recorder
 from robocov.sensor import RangeSensor
-from robocov.simulation.checks import DEFAULT_DT, check_dt, check_team, count_steps
+from robocov.simulation.checks import check_dt, check_team, count_steps
 from robocov.simulation.controller_caller import ControllerCaller
 from robocov.simulation.sensing import build_observations, is_scan_due
 from robocov.simulation.simulation import MAX_START_OVERLAP_M
@@ -98,7 +99,7 @@ class SimulationBatch:
         controller: Controller | IndividualController,
         starts: Array | Sequence[Array],
         team: Team | None = None,
-        dt: float = DEFAULT_DT,
+        dt: float = DEFAULT_DT_S,
     ) -> None:
         require_environment(environment)
         check_dt(dt)

@@ -12,8 +12,6 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, is_number, quote
 from robocov.team import Team
 
-DEFAULT_DT = 1 / 60
-"""Default control period, s."""
 MIN_DT_S = 1e-4
 """Shortest control period."""
 MAX_DT_S = 1.0

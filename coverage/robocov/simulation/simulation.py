@@ -15,6 +15,7 @@ from robocov.conditions.communication import Inbox
 from robocov.conditions.perception import Perception, ignore_idle_robots
 from robocov.controllers.base import Controller
 from robocov.controllers.individual import IndividualController
+from robocov.defaults import DEFAULT_DT_S
 from robocov.drawing import show
 from robocov.environment import Environment, require_environment
 from robocov.errors import format_count
@@ -23,7 +24,6 @@ from robocov.observation.neighbours import Neighbours
 from robocov.record import Record, Recorder
 from robocov.sensor import RangeSensor
 from robocov.simulation.checks import (
-    DEFAULT_DT,
     check_conditions,
     check_dt,
     check_joins,
@@ -109,7 +109,7 @@ class Simulation:
         controller: Controller | IndividualController,
         starts: Array | list[list[float]] | TeamState,
         team: Team | None = None,
-        dt: float = DEFAULT_DT,
+        dt: float = DEFAULT_DT_S,
         *,
         conditions: Conditions | None = None,
     ) -> None:

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon
 
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, ParameterError
 from robocov.generator import generate_map
 from robocov.mapfile import list_bundled_maps, load_map
-from robocov.team import DEFAULT_RADIUS
 from robocov_app.formats import (
     EXPORTERS,
     ReadOptions,
@@ -169,7 +169,7 @@ def test_maps_go_out_and_in(tmp_path: Path, name: str, way: str) -> None:
     back, _, _ = import_map(path, options=read)
     assert back.free.is_valid
     assert back.free_area == pytest.approx(environment.free_area, rel=0.005)
-    assert len(rooms(back.free, DEFAULT_RADIUS)) == len(rooms(environment.free, DEFAULT_RADIUS))
+    assert len(rooms(back.free, DEFAULT_RADIUS_M)) == len(rooms(environment.free, DEFAULT_RADIUS_M))
     drawn = [back.boundary_polygon, *(shape.polygon for shape in back.obstacles), *back.free.geoms]
     for ring in shapely.get_rings(drawn):
         assert np.hypot(*np.diff(shapely.get_coordinates(ring), axis=0).T).min() >= 1e-3

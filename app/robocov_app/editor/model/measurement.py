@@ -8,8 +8,8 @@ import shapely
 from shapely import LineString, MultiPolygon, Polygon
 
 from robocov.arrays import Array, IntArray
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import MAX_SAGITTA_M, Gap, Point, find_narrow_gaps, find_narrowest_gap
-from robocov.team import DEFAULT_RADIUS
 from robocov_app.editor.model.geometry import middle_of
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.model.validation import Problem, examined, place_words
@@ -36,7 +36,7 @@ class Measurement:
     radius: float  # m; of the robots that were asked about
 
 
-def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:
+def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS_M) -> Measurement:
     """Measure a sketch for robots of a radius, m; a broken one as far as its free space can be made out."""
     found, free = examined(sketch, radius)
     narrow = find_narrow_gaps(free, 2.0 * radius - _EXACTLY)

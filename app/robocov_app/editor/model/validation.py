@@ -13,12 +13,12 @@ from shapely import LineString, MultiPoint, MultiPolygon, Polygon
 
 from robocov import environment as env
 from robocov.arrays import Array
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError, StartError, format_count, summarise_names
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_LABEL_CHARACTERS, MAX_SIZE_M, MIN_SIZE_M
 from robocov.mapfile.rules import check_rules
 from robocov.mapfile.structure import validate_document
-from robocov.team import DEFAULT_RADIUS
 from robocov_app.editor.model.geometry import as_array
 from robocov_app.editor.model.selection import numbered_name
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch, draft_document
@@ -258,7 +258,7 @@ def _space_faults(sketch: Sketch, free: MultiPolygon, faulty: set[Owner | None])
     for name, spec in sketch.starts:
         if not isinstance(spec, env.PointsStart):
             if name not in faulty:
-                yield from _no_room(name, spec, free, DEFAULT_RADIUS, grave=True)
+                yield from _no_room(name, spec, free, DEFAULT_RADIUS_M, grave=True)
             continue
         points = shapely.points(as_array(spec.positions))
         for k in np.flatnonzero(~shapely.contains_properly(free, points)).tolist():
@@ -329,7 +329,7 @@ def _warnings(sketch: Sketch, free: MultiPolygon, radius: float, bad: set[Owner 
     for name, spec in sketch.starts:
         if name not in bad and isinstance(spec, env.PointsStart):
             yield from _tight_places(name, spec, free, radius)
-        elif name not in bad and radius > DEFAULT_RADIUS:
+        elif name not in bad and radius > DEFAULT_RADIUS_M:
             yield from _no_room(name, spec, free, radius, grave=False)
 
 

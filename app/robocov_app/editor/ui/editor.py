@@ -9,10 +9,10 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Point
 from robocov.errors import MapError, RobocovError
 from robocov.mapfile.models import MIN_SIZE_M
-from robocov.team import DEFAULT_RADIUS
 from robocov_app.editor.model import require
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.measurement import Measurement
@@ -53,7 +53,7 @@ class EditorSettings(BaseModel):
     angle: float = Field(default=15.0, gt=0.0, le=90.0)
     snaps: tuple[str, ...] = tuple(SNAPS)
     shown: tuple[str, ...] = tuple(name for name in SHOWN if name != "robots")
-    radius: float = Field(default=DEFAULT_RADIUS, ge=0.001, le=10.0)
+    radius: float = Field(default=DEFAULT_RADIUS_M, ge=0.001, le=10.0)
     robots: int = Field(default=6, ge=1, le=1000)
     wall: float = Field(default=0.1, ge=0.001, le=100.0)
     recent: tuple[str, ...] = ()

@@ -6,7 +6,7 @@ from pathlib import Path
 import pygame
 
 from robocov.controllers import list_controller_classes
-from robocov.cost import DEFAULT_LATTICE
+from robocov.defaults import DEFAULT_LATTICE
 from robocov.environment import Environment
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Item, Sketch

@@ -15,12 +15,12 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov import environment as env
 from robocov.arrays import Array
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment, Ring
 from robocov.errors import MapError, ParameterError, format_count, quote, to_one_line
 from robocov.mapfile import from_json, to_json
 from robocov.mapfile.check import MANY_VERTICES, count_vertices, describe_vertex_count
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M, MIN_SIZE_M
-from robocov.team import DEFAULT_RADIUS
 from robocov_app.formats.base import ForeignMap, ImportReport, Options, Primitive, square_metres
 from robocov_app.formats.geometry.cleaning import Cleaned, Deviation, measure_deviation, remove_hairs
 from robocov_app.formats.geometry.polygons import (
@@ -84,7 +84,7 @@ class Shaping(Options):
     """The boundary is the convex hull of the free space, not its outline."""
     margin: float = 0.0
     """So many metres around the free space are solid."""
-    radius: float = DEFAULT_RADIUS
+    radius: float = DEFAULT_RADIUS_M
     """Radius of a robot in metres: where it passes in the file, it passes in the map."""
     default_start: Literal["room", "uniform"] = "room"
     """The map's default start: a disc at the roomiest place, or anywhere."""
@@ -134,7 +134,7 @@ class _Shaper:
         self.others: list[tuple[float, float]] = []
         self.specks = foreign.specks if shaping.specks is None else shaping.specks
         # how far from walls a robot starts, m: the rules of maps want room for the usual one
-        self.clearance = max(DEFAULT_RADIUS, self.radius) * (1 + env.MIN_START_GAP_RADII)
+        self.clearance = max(DEFAULT_RADIUS_M, self.radius) * (1 + env.MIN_START_GAP_RADII)
         grid = _GRID if foreign.cell is None else min(_GRID, foreign.cell / 100)
         self.digits = -math.floor(math.log10(grid) + 1e-9)
 

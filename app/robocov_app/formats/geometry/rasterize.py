@@ -12,15 +12,15 @@ from scipy import ndimage
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges
+from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
 from robocov.errors import ParameterError, format_count
-from robocov.team import DEFAULT_RADIUS
 from robocov_app.formats.base import ExportReport
 from robocov_app.formats.files import MAX_CELLS
 from robocov_app.formats.geometry.polygons import sides_of
 
 CELL = 0.05  # side of a cell in metres where none is given: what maps of robots mostly have
-_LEAST = math.pi * DEFAULT_RADIUS**2  # parts of the free space with no room for a robot, in m², do not count
+_LEAST = math.pi * DEFAULT_RADIUS_M**2  # parts of the free space without room for a robot do not count, m²
 _MOST_TRIED = 16_000_000  # cells of grids that are tried for whether they keep what others lose
 _DIGITS = 6  # decimals of a grid's corner: a micrometre
 

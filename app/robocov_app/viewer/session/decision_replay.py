@@ -10,18 +10,18 @@ import numpy as np
 from robocov.conditions.perception import Perception
 from robocov.controllers import inform_controller
 from robocov.controllers.base import Controller
+from robocov.defaults import DEFAULT_DT_S
 from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
 from robocov.sensor import RangeSensor
-from robocov.simulation import DEFAULT_DT
 from robocov.voronoi import partition_by_travel_time
 from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
 from robocov_app.viewer.session.moments import PaneSetup, State
 
 
-def replayed_snapshot(state: State, time: float, dt: float = DEFAULT_DT) -> Snapshot:
+def replayed_snapshot(state: State, time: float, dt: float = DEFAULT_DT_S) -> Snapshot:
     """Return a moment as it was at a time, s; a controller that fails on it decided nothing."""
     setup, team, positions = state.setup, state.setup.team, state.positions
     region, density, sensor = setup.solid.region, setup.solid.density, sensor_in(setup.solid)

@@ -14,10 +14,22 @@ from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, get_gains, load_controller_class, make_controller
 from robocov.controllers.base import Controller
 from robocov.controllers.gains import Gain, Option, Value, format_value
+from robocov.defaults import (
+    DEFAULT_COMMUNICATION_RANGE_M,
+    DEFAULT_DT_S,
+    DEFAULT_MASS_KG,
+    DEFAULT_MAX_ACCELERATION_M_S2,
+    DEFAULT_MAX_SPEED_M_S,
+    DEFAULT_RADIUS_M,
+    DEFAULT_ROBOTS,
+    DEFAULT_SENSING_RANGE_M,
+    DEFAULT_TRACK_WIDTH_M,
+    DEFAULT_TURNING_RATE_RAD_S,
+    DEFAULT_VISCOSITY_N_S_M,
+)
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, quote
-from robocov.simulation import DEFAULT_DT
-from robocov.team import DEFAULT_TURNING_RATE, UNITS, Team
+from robocov.team import UNITS, Team
 
 MOST_ROBOTS = 1000  # so many robots can be asked for in the window
 MOST_THAT_TALK = 100  # so many robots can be asked for where each has messages of its own of every other
@@ -143,15 +155,15 @@ class TeamSpec:
 
     __pydantic_config__ = ConfigDict(extra="forbid")
 
-    radius: Limit = 0.1
-    mass: Limit = 1.0
-    max_speed: Limit = 1.0
-    max_acceleration: Limit = 2.0
-    viscosity: Limit = 2.0
-    sensing_range: Limit = 3.0
-    communication_range: Limit = np.inf
-    track_width: Limit = 0.0
-    turning_rate: Limit = DEFAULT_TURNING_RATE
+    radius: Limit = DEFAULT_RADIUS_M
+    mass: Limit = DEFAULT_MASS_KG
+    max_speed: Limit = DEFAULT_MAX_SPEED_M_S
+    max_acceleration: Limit = DEFAULT_MAX_ACCELERATION_M_S2
+    viscosity: Limit = DEFAULT_VISCOSITY_N_S_M
+    sensing_range: Limit = DEFAULT_SENSING_RANGE_M
+    communication_range: Limit = DEFAULT_COMMUNICATION_RANGE_M
+    track_width: Limit = DEFAULT_TRACK_WIDTH_M
+    turning_rate: Limit = DEFAULT_TURNING_RATE_RAD_S
     different: Mapping[str, Mapping[int, Limit]] = field(default_factory=dict)
 
     def team(self, robots: int | Sequence[int]) -> Team:
@@ -180,7 +192,12 @@ Limits: TypeAlias = Annotated[TeamSpec, WrapSerializer(lambda team, plain: _fill
 
 
 def _filled(plain: dict[str, Any]) -> dict[str, Any]:
-    usual = {"different": {}, "track_width": 0.0, "turning_rate": DEFAULT_TURNING_RATE}  # as in older files
+    # Older files do not have these.
+    usual = {
+        "different": {},
+        "track_width": DEFAULT_TRACK_WIDTH_M,
+        "turning_rate": DEFAULT_TURNING_RATE_RAD_S,
+    }
     return {key: value for key, value in plain.items() if value != usual.get(key)}
 
 
@@ -197,11 +214,11 @@ class Scenario:
 
     environment: Annotated[Environment, _MAP, Field(alias="map")]
     laws: Annotated[tuple[Law, ...], Field(alias="controllers")] = (ControllerChoice("rapf"),)
-    robots: Annotated[int, Field(strict=True, ge=1, le=MOST_ROBOTS)] = 6
+    robots: Annotated[int, Field(strict=True, ge=1, le=MOST_ROBOTS)] = DEFAULT_ROBOTS
     start: Text | None = None
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     limits: Annotated[Limits, Field(alias="team")] = TeamSpec()
-    dt: Annotated[float, Field(strict=True, alias="dt_s", ge=1e-4, le=1)] = DEFAULT_DT
+    dt: Annotated[float, Field(strict=True, alias="dt_s", ge=1e-4, le=1)] = DEFAULT_DT_S
     given: Annotated[Array | None, _ROWS, Field(alias="starts_m")] = None
     moving: Annotated[Array | None, _ROWS, Field(alias="start_velocities_m_per_s")] = None
     conditions: Annotated[Conditions | None, _CONDITIONS] = None
