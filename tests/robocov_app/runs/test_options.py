@@ -60,15 +60,13 @@ def test_films_out_of_range_are_refused(wrong: dict[str, object]) -> None:
         FilmOptions(**wrong)  # type: ignore[arg-type]
 
 
-def test_defaults_that_stand_here_for_the_sake_of_quick_help_are_the_librarys() -> None:
+def test_options_have_the_defaults_of_the_library() -> None:
     from robocov.controllers import RECOMMENDED_CONTROLLER
-    from robocov.simulation import DEFAULT_DT_S
     from robocov.team import Team
     from robocov_app.commands.compare import Arguments as Compare
     from robocov_app.commands.run import Arguments as Run
 
     assert Run().controller == Compare().controllers[0] == RECOMMENDED_CONTROLLER
-    assert RunOptions().dt == DEFAULT_DT_S
     assert RunOptions().made_team().to_dict() == Team.homogeneous(6).to_dict()
 
 
