@@ -70,6 +70,10 @@ from .observation.region import Region as Region
 from .optimum import Optimum as Optimum
 from .optimum import find_optimum as find_optimum
 from .record import Record as Record
+from .scenario import Comparison as Comparison
+from .scenario import Scenario as Scenario
+from .scenario import compare as compare
+from .scenario import run as run
 from .sensor import RangeSensor as RangeSensor
 from .simulation import Simulation as Simulation
 from .simulation import SimulationBatch as SimulationBatch

@@ -199,6 +199,32 @@ def to_team_controller(controller: Any) -> Any:
     return controller
 
 
+def require_controller(value: Any) -> Controller:
+    """Return a controller of a team, or raise an error unless a value is a controller.
+
+    Parameters
+    ----------
+    value : Controller or IndividualController
+
+    Returns
+    -------
+    Controller
+        An individual controller is adapted to a team.
+
+    Raises
+    ------
+    ParameterError
+        If the value is not a controller.
+    """
+    team_controller = to_team_controller(value)
+    if isinstance(team_controller, type) or not isinstance(team_controller, Controller):
+        raise ParameterError(
+            "controller: expected a controller, as in Rapf(), with a method decide or force, "
+            f"got {quote(team_controller)}"
+        )
+    return team_controller
+
+
 def unwrap_controller(controller: Controller) -> Controller | IndividualController:
     """Return the individual controller within an adapter, which has the gains; any other one as it is."""
     if isinstance(controller, IndividualControllerAdapter):

@@ -80,6 +80,30 @@ def read_document(path: Path, model: type[DocumentType], format_name: str, versi
     where = str(path)
     document = parse_json(read_bytes(path), where)
     check_header(document, where, format_name, version)
+    return validate_document(document, where, model)
+
+
+def validate_document(document: object, where: str, model: type[DocumentType]) -> DocumentType:
+    """Check a JSON document against its model.
+
+    Parameters
+    ----------
+    document : object
+    where : str
+        Name of the document in messages.
+    model : type
+        Model of the content, a subclass of `Document`.
+
+    Returns
+    -------
+    Document
+        An instance of the model.
+
+    Raises
+    ------
+    MapError
+        If the document does not fit the model.
+    """
     try:
         return model.model_validate(document)
     except ValidationError as error:
@@ -169,6 +193,8 @@ def _build_mistake(detail: ErrorDetails) -> Mistake:
     path = tuple(step for step in detail["loc"] if step != "[key]")
     if detail["type"] == "missing":
         return Mistake.at_path(path, "missing")
+    if detail["type"] == "extra_forbidden":
+        return Mistake.at_path(path, "unknown key", at_key=True)
     if detail["type"] == _EXPECTED_ERROR:
         expected = detail["msg"]
     else:

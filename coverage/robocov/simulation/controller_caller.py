@@ -12,7 +12,7 @@ from robocov.controllers.base import Controller
 from robocov.controllers.individual import (
     IndividualController,
     IndividualControllerAdapter,
-    to_team_controller,
+    require_controller,
 )
 from robocov.controllers.user_modules import explain_fault, format_location
 from robocov.environment import Environment
@@ -53,12 +53,7 @@ class ControllerCaller:
     def __init__(
         self, controller: Controller | IndividualController, environment: Environment, time: float
     ) -> None:
-        team_controller = to_team_controller(controller)
-        if isinstance(team_controller, type) or not isinstance(team_controller, Controller):
-            raise ParameterError(
-                "controller: expected a controller, as in Rapf(), with a method decide or force, "
-                f"got {quote(team_controller)}"
-            )
+        team_controller = require_controller(controller)
         self.controller: Controller = team_controller
         self._is_built_in = type(team_controller) in CONTROLLERS.values()
         self._informed_controller: Controller = self._call(

@@ -1,0 +1,11 @@
+"""Scenarios: complete descriptions of runs, and how to run and compare them.
+
+- `scenario`: everything that the result of one run depends on
+- `scenario_document`: the JSON form of a scenario
+- `comparison`: several controllers in the same scenario
+"""
+
+from robocov.scenario.comparison import Comparison, compare
+from robocov.scenario.scenario import Scenario, run
+
+__all__ = ["Comparison", "Scenario", "compare", "run"]

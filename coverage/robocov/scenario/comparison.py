@@ -1,0 +1,171 @@
+"""Comparison of controllers that start from the same positions on the same map."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from robocov.controllers import Controller, IndividualController
+from robocov.cost import CoverageCost
+from robocov.defaults import DEFAULT_LATTICE
+from robocov.drawing import Drawable
+from robocov.environment import Environment
+from robocov.errors import ParameterError, quote
+from robocov.metrics import CostHistory, compute_cost_history, summarise
+from robocov.optional_imports import import_optional
+from robocov.record import Record
+from robocov.scenario.scenario import Scenario
+
+DEFAULT_CONTROLLERS = ("rapf", "rpf", "lloyd")
+"""The controllers of the paper."""
+_COLUMNS = {
+    "mean_distance_m": "mean distance (m)",
+    "above_best": "above best",
+    "settled_at_s": "settled at (s)",
+    "contacts": "contacts",
+    "mean_path_length_m": "path length (m)",
+}
+"""Columns of the table that is printed, with their headers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison(Drawable):
+    """Runs of several controllers in the same scenario.
+
+    Attributes
+    ----------
+    records : mapping of str to Record
+        The runs, by the labels of the controllers.
+    histories : mapping of str to CostHistory
+        The coverage cost along each run.
+    """
+
+    _drawing_name = "comparison"
+
+    records: Mapping[str, Record]
+    histories: Mapping[str, CostHistory]
+
+    @cached_property
+    def summaries(self) -> dict[str, dict[str, Any]]:
+        """Summaries of the runs by label, see `summarise`."""
+        return {label: summarise(record, self.histories[label]) for label, record in self.records.items()}
+
+    def table(self) -> list[dict[str, Any]]:
+        """Return the results as rows, in the order of the controllers.
+
+        Returns
+        -------
+        list of dict
+            One row for each controller. ``above_best`` is the relative excess of its final mean distance
+            over the lowest one.
+        """
+        best = min(summary["mean_distance_m"] for summary in self.summaries.values())
+        rows = []
+        for label, summary in self.summaries.items():
+            lengths = summary["path_length_m"]
+            row = {
+                "controller": label,
+                "mean_distance_m": summary["mean_distance_m"],
+                "above_best": summary["mean_distance_m"] / best - 1.0,
+                "uncovered_area_m2": summary["uncovered_area_m2"],
+                "settled_at_s": summary["settled_at_s"],
+                "contacts": summary["contacts"],
+                "min_clearance_m": summary["min_clearance_m"],
+                "mean_path_length_m": sum(lengths) / len(lengths),
+            }
+            rows.append(row)
+        return rows
+
+    def to_pandas(self) -> Any:
+        """Return the table as a data frame; requires pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+        """
+        pandas = import_optional("pandas", "pandas")
+        return pandas.DataFrame(self.table()).set_index("controller")
+
+    def __repr__(self) -> str:
+        lines = [["controller", *_COLUMNS.values()]]
+        for row in self.table():
+            settled = row["settled_at_s"]
+            line = [
+                row["controller"],
+                f"{row['mean_distance_m']:.3f}",
+                f"{100 * row['above_best']:.1f} %",
+                "-" if settled is None else f"{settled:.1f}",
+                str(row["contacts"]),
+                f"{row['mean_path_length_m']:.1f}",
+            ]
+            lines.append(line)
+        widths = [max(len(cell) for cell in column) for column in zip(*lines, strict=True)]
+        texts = []
+        for first, *others in lines:
+            cells = [first.ljust(widths[0])]
+            cells += [cell.rjust(width) for cell, width in zip(others, widths[1:], strict=True)]
+            texts.append("  ".join(cells))
+        return "\n".join(texts)
+
+
+def compare(
+    environment: Environment | str | Path,
+    controllers: Sequence[str | Controller | IndividualController] = DEFAULT_CONTROLLERS,
+    *,
+    lattice: int = DEFAULT_LATTICE,
+    **options: Any,
+) -> Comparison:
+    """Run several controllers from the same starting positions, and compute their coverage costs.
+
+    Parameters
+    ----------
+    environment : Environment, str or Path
+        A map, the name of a bundled map or the path of a file.
+    controllers : sequence
+        Names, or controllers with gains of their own, such as ``Rapf(k_rep=0.3)``.
+    lattice : int
+        The coverage cost is computed on this number of sites along each side of the map.
+    **options
+        Parameters of `Scenario`, the same for all controllers, such as `robots`, `seed` and `duration`.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    RobocovError
+        If an argument cannot be used, or a controller fails.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> comparison = rc.compare("rooms", ["rapf", "lloyd"], robots=4, duration=1.0, lattice=16)
+    >>> list(comparison.records)
+    ['RAPF', 'Lloyd']
+    """
+    if isinstance(controllers, str) or len(controllers) == 0:
+        raise ParameterError(f"controllers: expected a list of controllers, got {quote(controllers)}")
+    first = Scenario(environment, controllers[0], **options)
+    cost = CoverageCost(first.environment, lattice=lattice)
+    records: dict[str, Record] = {}
+    histories: dict[str, CostHistory] = {}
+    for controller in controllers:
+        record = first.replace(controller=controller).run()
+        label = _make_unique(record.label, records)
+        records[label] = record
+        histories[label] = compute_cost_history(record, cost)
+    return Comparison(records=records, histories=histories)
+
+
+def _make_unique(label: str, taken: Mapping[str, object]) -> str:
+    """Return a label, with a number if it is taken."""
+    unique = label
+    number = 1
+    while unique in taken:
+        number += 1
+        unique = f"{label} ({number})"
+    return unique

@@ -1,0 +1,623 @@
+"""A scenario: everything that the result of one run depends on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from robocov.arrays import Array
+from robocov.conditions import Conditions
+from robocov.controllers import CONTROLLERS, Controller, IndividualController, make_controller
+from robocov.controllers.gains import Value, get_gain_values
+from robocov.controllers.individual import require_controller, unwrap_controller
+from robocov.controllers.user_modules import ControllerSource, provide_modules
+from robocov.defaults import DEFAULT_CONTROLLER, DEFAULT_DT_S, DEFAULT_DURATION_S, DEFAULT_ROBOTS
+from robocov.environment import Environment
+from robocov.errors import (
+    InputError,
+    ParameterError,
+    describe_unknown_name,
+    format_count,
+    quote,
+    require_number,
+    require_type,
+)
+from robocov.files.documents import check_header, validate_document
+from robocov.files.strictjson import parse_json, read_bytes
+from robocov.files.writing import replace_file
+from robocov.mapfile import find_map_file, from_json, load_map, to_json
+from robocov.record import Record, Recorder
+from robocov.scenario.scenario_document import FORMAT, FORMAT_VERSION, ScenarioDocument
+from robocov.simulation import Simulation, TeamState, check_dt, check_joins
+from robocov.team import PARAMETERS, Team
+
+MAX_RECORD_ROWS = 2e7
+"""Maximum number of moments times robots in a record: about 2 GB."""
+MAX_DURATION_S = 1e6
+
+
+@dataclass(frozen=True, init=False, eq=False, repr=False)
+class Scenario:
+    """Everything that the result of one run depends on.
+
+    Parameters
+    ----------
+    environment : Environment, str or Path
+        A map, or what `load_map` accepts: the name of a bundled map or the path of a file.
+    controller : str, Controller or IndividualController
+        A name as `make_controller` accepts it, or the controller itself.
+    gains : mapping of str to float, str or None
+        Gains that differ from their defaults; only together with a name.
+    robots : int or None
+        Number of robots with the default properties; 6 by default. Only without `team`.
+    team : Team or None
+        The robots, if they do not have the default properties.
+    start : str or None
+        Name of the start of the map from which the positions are sampled; by default its first.
+    seed : int or None
+        Seed of the starting positions, from 0. None if the positions were not sampled.
+    starts : (n, 2) array_like or None, m
+        Starting positions, which are not sampled then.
+    velocities : (n, 2) array_like or None, m/s
+        Initial velocities; by default robots are at rest.
+    steering : (n, 2) array_like or None, rad and rad/s
+        Initial headings and turning rates of unicycles, see `TeamState`.
+    duration : float, s
+        Simulated time.
+    dt : float, s
+        Control period.
+    conditions : Conditions or None
+        Noise, message loss, and robots that fail or join; ideal by default.
+    source : ControllerSource or None
+        The file of a controller, if it may no longer be where its name says.
+
+    Attributes
+    ----------
+    controller : str
+        Name of the controller.
+    gains : mapping
+        The gains that were given. Of a controller object, all of its gains.
+    given_starts : (n, 2) array or None, m
+        Starting positions, unless they are sampled.
+
+    Raises
+    ------
+    ParameterError
+        If an argument cannot be used.
+    MapError
+        If the map cannot be read.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> scenario = rc.Scenario("rooms", controller="rapf", robots=4, duration=1.0)
+    >>> scenario.run()
+    <Record rapf on Rooms, 4 robots, 1.0 s>
+    >>> scenario.replace(controller="lloyd").run()
+    <Record lloyd on Rooms, 4 robots, 1.0 s>
+    """
+
+    environment: Environment
+    controller: str
+    gains: Mapping[str, Value]
+    team: Team
+    start: str | None
+    seed: int | None
+    given_starts: Array | None
+    velocities: Array | None
+    steering: Array | None
+    duration: float
+    dt: float
+    conditions: Conditions | None
+    source: ControllerSource | None
+    _controller_object: Controller | None
+
+    def __init__(  # noqa: PLR0913 - a keyword for everything that a result depends on
+        self,
+        environment: Environment | str | Path,
+        controller: str | Controller | IndividualController = DEFAULT_CONTROLLER,
+        gains: Mapping[str, Value] | None = None,
+        *,
+        robots: int | None = None,
+        team: Team | None = None,
+        start: str | None = None,
+        seed: int | None = 0,
+        starts: ArrayLike | None = None,
+        velocities: ArrayLike | None = None,
+        steering: ArrayLike | None = None,
+        duration: float = DEFAULT_DURATION_S,
+        dt: float = DEFAULT_DT_S,
+        conditions: Conditions | None = None,
+        source: ControllerSource | None = None,
+    ) -> None:
+        state = None
+        if starts is not None:
+            state = TeamState(positions=starts, velocities=velocities, steering=steering)  # type: ignore[arg-type]
+        elif velocities is not None or steering is not None:
+            raise ParameterError("velocities: expected starts as well, got none")
+        check_dt(dt)
+        if seed is not None:
+            require_number("seed", seed, 0, 2**63 - 1, whole=True)
+        values: dict[str, Any] = {
+            "environment": environment if isinstance(environment, Environment) else load_map(environment),
+            "team": _build_team(team, robots, state),
+            "start": start,
+            "seed": seed,
+            "given_starts": None if state is None else state.positions,
+            "velocities": None if state is None else state.velocities,
+            "steering": None if state is None else state.steering,
+            "duration": require_number("duration", duration, 0.0, MAX_DURATION_S, "s"),
+            "dt": dt,
+            "conditions": conditions,
+            "source": source,
+            **_describe_controller(controller, gains),
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+        if conditions is not None:
+            require_type("conditions", conditions, Conditions, "Conditions")
+            conditions.check_team(len(self.team))
+
+    def __repr__(self) -> str:
+        robots = format_count(len(self.team), "robot")
+        return f"<Scenario {self.controller} on {self.environment.name}, {robots}, {self.duration:g} s>"
+
+    @cached_property
+    def starts(self) -> Array:
+        """Starting positions, (n, 2) m, sampled unless they were given.
+
+        Raises
+        ------
+        StartError
+            If the start is unknown, or has no space for the team.
+        """
+        if self.given_starts is not None:
+            return self.given_starts
+        largest_radius = float(self.team.radius.max())
+        start = self.environment.start(self.start)
+        return start.sample(len(self.team), seed=self.seed or 0, radius=largest_radius)
+
+    @property
+    def robots(self) -> int:
+        """Number of robots."""
+        return len(self.team)
+
+    @property
+    def steps(self) -> int:
+        """Number of control steps."""
+        return round(self.duration / self.dt)
+
+    def check(self) -> None:
+        """Check what only becomes known when a run starts.
+
+        The code of a controller in a file is run.
+
+        Raises
+        ------
+        ParameterError
+            If the controller cannot be made, or a robot cannot join where it should.
+        StartError
+            If the start is unknown, or has no space for the team.
+        """
+        self.build_controller()
+        _ = self.starts
+        check_joins(self.environment, self.conditions)
+
+    def replace(self, **changes: Any) -> Scenario:
+        """Return the scenario with other values of some parameters.
+
+        Parameters
+        ----------
+        **changes
+            Parameters of `Scenario`. Another controller has its default gains, unless `gains` is given, too.
+
+        Returns
+        -------
+        Scenario
+
+        Raises
+        ------
+        ParameterError
+            If a value cannot be used.
+        """
+        arguments: dict[str, Any] = {
+            "environment": self.environment,
+            "controller": self.controller if self._controller_object is None else self._controller_object,
+            "gains": self.gains if self._controller_object is None else None,
+            "team": self.team,
+            "start": self.start,
+            "seed": self.seed,
+            "starts": self.given_starts,
+            "velocities": self.velocities,
+            "steering": self.steering,
+            "duration": self.duration,
+            "dt": self.dt,
+            "conditions": self.conditions,
+            "source": self.source,
+        }
+        if "controller" in changes:
+            arguments["gains"] = None
+            arguments["source"] = None
+        if "robots" in changes:
+            arguments["team"] = None
+        return Scenario(**(arguments | changes))
+
+    def build_controller(self) -> Controller:
+        """Make the controller; code outside robocov is run.
+
+        Returns
+        -------
+        Controller
+
+        Raises
+        ------
+        ParameterError
+            If there is no such controller or gain, or a value is out of range.
+        """
+        if self._controller_object is not None:
+            return self._controller_object
+        return make_controller(self.controller, self.gains, source=self.source)
+
+    def build_simulation(
+        self, controller: Controller | None = None, *, steps: int = 0, is_computed: bool = False
+    ) -> Simulation:
+        """Build the simulation of the run.
+
+        Parameters
+        ----------
+        controller : Controller or None
+            By default that of the scenario.
+        steps : int
+            Number of control steps taken before.
+        is_computed : bool
+            Whether a simulation computed the starting positions, see `TeamState`.
+
+        Returns
+        -------
+        Simulation
+        """
+        state = TeamState(
+            positions=self.starts,
+            velocities=self.velocities,
+            steering=self.steering,
+            steps=steps,
+            is_computed=is_computed,
+        )
+        return Simulation(
+            self.environment,
+            controller or self.build_controller(),
+            state,
+            self.team,
+            self.dt,
+            conditions=self.conditions,
+        )
+
+    def build_recorder(self, controller: Controller, name: str | None = None) -> Recorder:
+        """Build the recorder of the run.
+
+        Parameters
+        ----------
+        controller : Controller
+        name : str or None
+            Name under which the controller was found; by default its own.
+
+        Returns
+        -------
+        Recorder
+        """
+        start = self.start
+        if self.given_starts is None:
+            start = self.environment.start(self.start).name
+        return Recorder(
+            self.environment,
+            self.team,
+            controller,
+            self.dt,
+            name=name,
+            start=start,
+            seed=self.seed,
+            conditions=self.conditions,
+        )
+
+    def run(
+        self,
+        simulation: Simulation | None = None,
+        *,
+        every: int = 1,
+        should_stop: Callable[[int], bool] | None = None,
+    ) -> Record:
+        """Simulate and record the run.
+
+        Parameters
+        ----------
+        simulation : Simulation or None
+            By default a new one.
+        every : int
+            The record contains every `every`-th step and the last one.
+        should_stop : callable or None
+            Called with the number of each step; the run ends if it returns True.
+
+        Returns
+        -------
+        Record
+
+        Raises
+        ------
+        RobocovError
+            If the run cannot start, or the controller fails.
+        """
+        modules = {} if self.source is None else self.source.modules
+        with provide_modules(modules):
+            if simulation is None:
+                simulation = self.build_simulation()
+            recorder = self.build_recorder(simulation.controller, self.controller)
+            for step, snapshot in enumerate(simulation.snapshots(self.duration)):
+                is_last = step == self.steps
+                if should_stop is not None and should_stop(step):
+                    is_last = True
+                if is_last or step % every == 0:
+                    recorder.add(snapshot)
+                if is_last:
+                    break
+            return recorder.record(simulation.joined)
+
+    @classmethod
+    def from_record(cls, record: Record) -> Scenario:
+        """Return the scenario of a recorded run.
+
+        Parameters
+        ----------
+        record : Record
+
+        Returns
+        -------
+        Scenario
+            It starts from the recorded positions, and has the duration of the record. Robots that the user
+            moved, added or removed in the window are not part of a scenario.
+        """
+        has_velocities = bool(record.velocities[0].any())
+        return cls(
+            record.environment,
+            record.controller,
+            record.gains,
+            team=record.team,
+            start=record.start,
+            seed=record.seed,
+            starts=record.positions[0],
+            velocities=record.velocities[0] if has_velocities else None,
+            steering=None if record.steering is None else record.steering[0],
+            duration=float(record.time[-1] - record.time[0]),
+            dt=record.dt,
+            conditions=record.conditions,
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the scenario as a JSON object, which contains the map.
+
+        Returns
+        -------
+        dict
+            Its keys are those of ``run.json``.
+        """
+        document: dict[str, Any] = {
+            "format": FORMAT,
+            "version": FORMAT_VERSION,
+            "map": to_json(self.environment),
+            "controller": {"name": self.controller, "gains": dict(self.gains)},
+            "team": self.team.to_dict(),
+            "start": self.start,
+            "seed": self.seed,
+        }
+        arrays = {
+            "starts_m": self.given_starts,
+            "start_velocities_m_per_s": self.velocities,
+            "start_steering": self.steering,
+        }
+        document |= {key: array.tolist() for key, array in arrays.items() if array is not None}
+        document |= {"duration_s": self.duration, "dt_s": self.dt}
+        if self.conditions is not None:
+            document["conditions"] = self.conditions.to_dict()
+        return document
+
+    @classmethod
+    def from_json(
+        cls,
+        document: Mapping[str, Any],
+        where: str = "scenario",
+        *,
+        folder: Path | None = None,
+        controllers: Collection[str] = (),
+    ) -> Scenario:
+        """Build the scenario that a JSON object describes.
+
+        Parameters
+        ----------
+        document : mapping
+            As `to_json` returns it. Only ``format``, ``version`` and ``map`` are required; the map may also
+            be the name of a bundled map or the path of a file.
+        where : str
+            Name of the document in messages.
+        folder : Path or None
+            Folder to which the path of the map is relative.
+        controllers : collection of str
+            Names of controllers outside robocov that may be used. A document alone never runs code.
+
+        Returns
+        -------
+        Scenario
+
+        Raises
+        ------
+        InputError
+            If the document cannot be used. The message names the key.
+        """
+        check_header(document, where, FORMAT, FORMAT_VERSION)
+        content = validate_document(document, where, ScenarioDocument)
+        name = content.controller.name
+        if name not in CONTROLLERS and name not in controllers:
+            raise InputError(
+                f"{where}: controller.name: expected a built-in controller, got {quote(name)}; "
+                "a file does not run code unless the user names the controller, too"
+            )
+        try:
+            scenario = cls(
+                _load_environment(content.map, where, folder),
+                name,
+                content.controller.gains,
+                team=_read_team(content.team),
+                start=content.start,
+                seed=content.seed,
+                starts=content.starts_m,
+                velocities=content.start_velocities_m_per_s,
+                steering=content.start_steering,
+                duration=content.duration_s,
+                dt=content.dt_s,
+                conditions=_read_conditions(content.conditions),
+            )
+        except ParameterError as error:
+            raise InputError(f"{where}: {error}") from error
+        return scenario
+
+    def save(self, path: Path | str) -> None:
+        """Write the scenario to a JSON file, completely or not at all.
+
+        Parameters
+        ----------
+        path : Path or str
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        """
+        text = json.dumps(self.to_json(), indent=1, allow_nan=False)
+        with replace_file(Path(path)) as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: Path | str, *, controllers: Collection[str] = ()) -> Scenario:
+        """Read a scenario from a JSON file.
+
+        Parameters
+        ----------
+        path : Path or str
+        controllers : collection of str
+            See `from_json`.
+
+        Returns
+        -------
+        Scenario
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read or used. The message names the file and the key.
+        """
+        path = Path(path)
+        document = parse_json(read_bytes(path), str(path))
+        return cls.from_json(document, str(path), folder=path.parent, controllers=controllers)
+
+
+def run(
+    environment: Environment | str | Path,
+    controller: str | Controller | IndividualController = DEFAULT_CONTROLLER,
+    **options: Any,
+) -> Record:
+    """Simulate one run.
+
+    Parameters
+    ----------
+    environment : Environment, str or Path
+        A map, the name of a bundled map or the path of a file.
+    controller : str, Controller or IndividualController
+        A name as `make_controller` accepts it, or the controller itself.
+    **options
+        Other parameters of `Scenario`, such as `gains`, `robots`, `start`, `seed`, `duration` and
+        `conditions`.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    RobocovError
+        If an argument cannot be used, or the controller fails.
+
+    Examples
+    --------
+    >>> import robocov as rc
+    >>> rc.run("rooms", "rapf", robots=6, duration=1.0)
+    <Record rapf on Rooms, 6 robots, 1.0 s>
+    """
+    return Scenario(environment, controller, **options).run()
+
+
+def _build_team(team: Team | None, robots: int | None, state: TeamState | None) -> Team:
+    """Return the team, by default robots with the default properties, one for each given start."""
+    if team is not None:
+        require_type("team", team, Team, "a Team")
+        if robots not in (None, len(team)):
+            raise ParameterError(f"robots: expected {len(team)} as in the team, got {quote(robots)}")
+    elif state is not None and robots is None:
+        team = Team.homogeneous(len(state))
+    else:
+        team = Team.homogeneous(DEFAULT_ROBOTS if robots is None else robots)
+    if state is not None and len(state) != len(team):
+        raise ParameterError(f"starts: expected {format_count(len(team), 'robot')}, got {len(state)}")
+    return team
+
+
+def _describe_controller(
+    controller: str | Controller | IndividualController, gains: Mapping[str, Value] | None
+) -> dict[str, Any]:
+    """Return the attributes of a scenario that describe its controller."""
+    if isinstance(controller, str):
+        if controller in CONTROLLERS:
+            # Other controllers are checked when they are made, because that runs their code.
+            make_controller(controller, gains)
+        return {"controller": controller, "gains": dict(gains or {}), "_controller_object": None}
+    if gains:
+        raise ParameterError("gains: expected none together with a controller object, which has its own")
+    team_controller = require_controller(controller)
+    return {
+        "controller": team_controller.name,
+        "gains": get_gain_values(unwrap_controller(team_controller)),
+        "_controller_object": team_controller,
+    }
+
+
+def _load_environment(content: str | dict[str, Any], where: str, folder: Path | None) -> Environment:
+    """Return the map of a document: a map, the name of a bundled map, or a path relative to a folder."""
+    if not isinstance(content, str):
+        return from_json(content, f"{where}: map", folder)
+    path = find_map_file(content)
+    if folder is not None and not path.is_absolute():
+        path = folder / path
+    return load_map(path)
+
+
+def _read_team(content: Mapping[str, Any]) -> Team:
+    """Return the team of a document, in which every key may be missing."""
+    keys = ["robots", *(parameter.json_key for parameter in PARAMETERS.values())]
+    for key in content:
+        if key not in keys:
+            raise ParameterError(f"team: {describe_unknown_name('key', key, keys)}")
+    return Team.from_dict({**Team.homogeneous(DEFAULT_ROBOTS).to_dict(), **content})
+
+
+def _read_conditions(content: Mapping[str, Any] | None) -> Conditions | None:
+    """Return the conditions of a document, in which every key may be missing."""
+    if content is None:
+        return None
+    ideal = Conditions().to_dict()
+    for key in content:
+        if key not in ideal:
+            raise ParameterError(f"conditions: {describe_unknown_name('key', key, ideal)}")
+    return Conditions.from_dict({**ideal, **content})
