@@ -20,9 +20,10 @@ from robocov.cost import CoverageResult
 from robocov.defaults import DEFAULT_LATTICE
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, format_count, quote
-from robocov.mapfile import load_map, save_map
+from robocov.mapfile import save_map
 from robocov.metrics import CostHistory, compute_cost_history
 from robocov.record import Record
+from robocov.scenario import Scenario
 from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov.text import escape_controls
@@ -35,7 +36,6 @@ from robocov_app.report.pictures import Frame, map_picture
 from robocov_app.report.replay import ReplayRun, asset, replay_html
 from robocov_app.report.theme_css import theme_rules
 from robocov_app.runs.cost import PICTURE_LATTICE, built_cost
-from robocov_app.runs.spec import RunSpec
 from robocov_app.web.live import LiveWindow
 
 if TYPE_CHECKING:  # pages of HTML need no matplotlib
@@ -183,8 +183,7 @@ def show(
     if isinstance(map, Simulation):
         return _live(map, height) if here else map.copy().run(60.0)
     if not here:
-        environment = map if isinstance(map, Environment) else load_map(map)
-        return RunSpec(environment, controllers[0], team=Team.homogeneous(robots), seed=seed).record()
+        return Scenario(map, controllers[0], robots=robots, seed=seed).run()
     options = ["--robots", str(robots), "--seed", str(seed), "--controllers", *controllers]
     if not isinstance(map, Environment):
         return LiveWindow(["demo", str(map), *options], height)

@@ -54,10 +54,12 @@ def command(options: Arguments) -> int:
     gains = gains_for(names, parsed_gains(options.gains))
     # everything that the user gave is checked before a folder is made
     environment = load_map(options.map)
-    specs = [options.spec(environment, name, chosen) for name, chosen in zip(names, gains, strict=True)]
+    scenarios = [
+        options.build_scenario(environment, name, chosen) for name, chosen in zip(names, gains, strict=True)
+    ]
     options.film.layers()
     out = options.out or Path(f"{Path(options.map).stem}-comparison")
-    folders = dict(zip(folder_names(names), specs, strict=True))
+    folders = dict(zip(folder_names(names), scenarios, strict=True))
     runs, stopped = performed(folders, out, options, comparison=True)
     rows = rows_of(runs)
     columns = dict(_COLUMNS)

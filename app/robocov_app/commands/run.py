@@ -42,10 +42,10 @@ def command(options: Arguments) -> int:
     from robocov_app.runs.saved import folder_names
 
     # everything that the user gave is checked before a folder is made
-    spec = options.spec(load_map(options.map), options.controller, parsed_gains(options.gains))
+    scenario = options.build_scenario(load_map(options.map), options.controller, parsed_gains(options.gains))
     options.film.layers()
     out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
-    runs, stopped = performed({"": spec}, out, options)
+    runs, stopped = performed({"": scenario}, out, options)
     record, history, summary = runs[""].record, runs[""].history, runs[""].summary
     facts = f"{len(record.team)} robots, {record.time[-1]:.1f} s"
     lines = [f"{record.label} on {record.environment.name}, {facts}"]

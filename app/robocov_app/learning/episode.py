@@ -17,11 +17,11 @@ from robocov.observation import Decision, Observations, Scanning, Snapshot
 from robocov.observation.close_pairs import find_close_pairs
 from robocov.observation.region import Region
 from robocov.record import Record
+from robocov.scenario import Scenario
 from robocov.simulation import Simulation, SimulationBatch
 from robocov.team import Team
 from robocov_app.learning import task as tasks
 from robocov_app.learning.task import SEEDS, CoverageTask, Rows, Scenarios, changed_task, from_middle
-from robocov_app.runs.spec import RunSpec
 
 if TYPE_CHECKING:
     from robocov_app.render.picture import Painter
@@ -92,9 +92,9 @@ def drawn_episode(
             raise StartError(
                 f"positions: expected an array of shape (n, 2), got {quote(options['positions'])}"
             ) from None
-        start = {"positions": positions, "start": None, "seed": None}
+        start = {"starts": positions, "start": None, "seed": None}
     more: dict[str, Any] = {"duration": task.duration, "dt": task.dt, "conditions": conditions}
-    return Episode(task, RunSpec(environment, team=task.whole_team, **start, **more), cost, place)
+    return Episode(task, Scenario(environment, team=task.whole_team, **start, **more), cost, place)
 
 
 class SharedSimulation:
@@ -157,12 +157,13 @@ class Episode:
     """
 
     def __init__(
-        self, task: CoverageTask, spec: RunSpec, cost: CoverageCost, place: Place | None = None
+        self, task: CoverageTask, scenario: Scenario, cost: CoverageCost, place: Place | None = None
     ) -> None:
-        environment, positions, n = spec.environment, spec.starts, len(spec.team)
-        self.task, self.team, self.environment, self._spec = task, spec.team, environment, spec
-        if len(positions) != n:
-            raise StartError(f"starts: expected one for each of {n} robots, got {len(positions)}")
+        environment, positions = scenario.environment, scenario.starts
+        self.task = task
+        self.team = scenario.team
+        self.environment = environment
+        self._scenario = scenario
         shared, run = place or (None, 0)
         self.shared: SharedSimulation | None = None
         self.simulation: Simulation | SimulationBatch
@@ -173,17 +174,19 @@ class Episode:
             self._index = run
             self.simulation = shared.begin(run, positions)
         else:
-            self.simulation = spec.simulation(Learner.of(task))
+            self.simulation = scenario.build_simulation(Learner.of(task))
         self.working = self.simulation.working[self._index]
         self.cost, self._cost = cost, TimeVaryingCost(cost)
-        self._all_count = spec.conditions is None and not environment.has_moving_obstacles
+        self._all_count = scenario.conditions is None and not environment.has_moving_obstacles
         self._counted = self._cost.find_counted_robots(0.0, self.positions, self.working)
         result = self._cost(0.0, self.positions, self.working)
         if result is None or not result.mean_distance > 0.0:
             wanted = f"expected a finer lattice for map {environment.name!r}"
             raise ParameterError(f"lattice: {wanted}, got {task.lattice}")
         self.result = self.initial = result
-        self.reference = tasks.reference_distance(environment.free_area - result.uncovered_area, n)
+        self.reference = tasks.reference_distance(
+            environment.free_area - result.uncovered_area, scenario.robots
+        )
         self.trail = [self.positions]
         self._rewarded = 0
         self._scans = self.simulation.observe().scans
@@ -281,7 +284,7 @@ class Episode:
         """Return the episode so far as a record, without forces at its end; the task says `recording`."""
         if not self.task.recording or isinstance(self.simulation, SimulationBatch):
             raise ParameterError("record: expected a task with recording=True")
-        recorder = self._spec.recorder(self.simulation.controller)
+        recorder = self._scenario.build_recorder(self.simulation.controller)
         for moment in (*self._moments, self.snapshot()):
             recorder.add(moment)
         return recorder.record(self.simulation.joined)

@@ -5,7 +5,7 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,10 @@ import numpy as np
 
 from robocov.controllers import get_gain_values, make_controller
 from robocov.files.writing import replace_file
-from robocov.mapfile import load_map
 from robocov.record import list_versions
+from robocov.scenario import Scenario
 from robocov_app.figures.statistics import Interval, bootstrap
 from robocov_app.replication.plan import TEAM, Plan
-from robocov_app.runs.spec import RunSpec
 from robocov_app.sweep.study import team_of
 
 YARDSTICK = "rapf"  # the controller whose steps the others' are measured by
@@ -89,8 +88,8 @@ def step_times(
 def _timed(
     robots: int, names: Sequence[str], plan: Plan, stopped: Callable[[], bool], clock: Callable[[], float]
 ) -> dict[str, list[float]] | None:
-    spec = RunSpec(load_map(MAP), team=team_of(robots, TEAM), start="uniform", dt=plan.dt)
-    runs = {name: replace(spec, controller=name).simulation() for name in names}
+    scenario = Scenario(MAP, team=team_of(robots, TEAM), start="uniform", dt=plan.dt)
+    runs = {name: scenario.replace(controller=name).build_simulation() for name in names}
     for run in runs.values():
         for _ in range(plan.beyond.warm_up):
             run.step()

@@ -13,10 +13,10 @@ from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.errors import ParameterError, describe_unknown_name, format_count
 from robocov.files.result_folder import ResultKind, create_result
 from robocov.kernel_compilation import compile_kernels
+from robocov.scenario import Scenario
 from robocov_app.runs.cost import built_cost, cost_for_pictures
 from robocov_app.runs.options import RunOptions
 from robocov_app.runs.run import Run, saved_run
-from robocov_app.runs.spec import RunSpec
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import finite, write_csv, write_json
 from robocov_app.terminal.progress import counting, progress
@@ -35,18 +35,18 @@ _FIGURES = (
 
 
 def performed(
-    specs: Mapping[str, RunSpec], out: Path, options: RunOptions, *, comparison: bool = False
+    scenarios: Mapping[str, Scenario], out: Path, options: RunOptions, *, comparison: bool = False
 ) -> tuple[dict[str, Run], bool]:
     """Do one run, or compare several on one map, by their folders' names; also tell if Ctrl-C ended it."""
     compile_kernels()
-    cost = built_cost(next(iter(specs.values())).environment, options.lattice, quiet=options.json)
+    cost = built_cost(next(iter(scenarios.values())).environment, options.lattice, quiet=options.json)
     kind: ResultKind = "comparison" if comparison else "run"
-    parts, runs = specs if comparison else (), dict[str, Run]()
+    parts, runs = scenarios if comparison else (), dict[str, Run]()
     with create_result(out, kind, overwrite=options.overwrite, parts=parts) as result, Interruption() as stop:
         if comparison:
-            begin_comparison(result.staging, list(specs))
-        for part, spec in specs.items():
-            runs[part] = saved_run(spec, cost, result, part if comparison else "", options, stop)
+            begin_comparison(result.staging, list(scenarios))
+        for part, scenario in scenarios.items():
+            runs[part] = saved_run(scenario, cost, result, part if comparison else "", options, stop)
             if stop.requested:
                 break
         if comparison:

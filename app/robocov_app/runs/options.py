@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
     from robocov.conditions import Conditions
     from robocov.environment import Environment
+    from robocov.scenario import Scenario
     from robocov.team import Team
     from robocov_app.render.theme import Theme
-    from robocov_app.runs.spec import RunSpec
 
 USUAL_ROWS = 4e6  # largest record where its rate is left open: about 320 MB
 
@@ -268,16 +268,16 @@ class RunOptions(ScenarioOptions, JsonOption):
         require_number("--seed", self.seed, 0, 2**63 - 1)
         require_number("--duration", self.duration, 0.0, 1e6, "s")
         require_number("--lattice", self.lattice, 2, 2048)
+        from robocov.scenario import MAX_RECORD_ROWS
         from robocov.simulation import check_dt  # asking for help must not load the physics
-        from robocov_app.runs.spec import MOST_ROWS
 
         check_dt(self.dt)
         if self.record_hz is not None:
             require_number("--record-hz", self.record_hz, 0.001, 1e4, "Hz")
         rows = self.duration / self.dt * self.robots / self.record_every
-        if rows > MOST_ROWS:
+        if rows > MAX_RECORD_ROWS:
             size = f"{self.duration:g} s of {self.robots} robots are {rows:.3g} rows of the record"
-            wanted = f"expected at most {MOST_ROWS:.0e}"
+            wanted = f"expected at most {MAX_RECORD_ROWS:.0e}"
             raise ParameterError(f"--record-hz: {wanted}, got {self.record_hz:g} Hz for {size}")
 
     @property
@@ -303,15 +303,23 @@ class RunOptions(ScenarioOptions, JsonOption):
             said["kinematics"] = self.kinematics
         return Team.homogeneous(self.robots, **said) if self.team is None else read_team(self.team, said)
 
-    def spec(self, environment: Environment, controller: str, gains: Mapping[str, Any]) -> RunSpec:
+    def build_scenario(self, environment: Environment, controller: str, gains: Mapping[str, Any]) -> Scenario:
         """Return what is to be run; raises InputError when it cannot be."""
-        from robocov_app.runs.spec import RunSpec
+        from robocov.scenario import Scenario
 
-        said: dict[str, Any] = {name: getattr(self, name) for name in ("start", "seed", "duration", "dt")}
-        conditions = self.conditions.conditions(self.seed, self.robots)
-        spec = RunSpec(environment, controller, gains, team=self.made_team(), conditions=conditions, **said)
-        spec.check()
-        return spec
+        scenario = Scenario(
+            environment,
+            controller,
+            gains,
+            team=self.made_team(),
+            start=self.start,
+            seed=self.seed,
+            duration=self.duration,
+            dt=self.dt,
+            conditions=self.conditions.conditions(self.seed, self.robots),
+        )
+        scenario.check()
+        return scenario
 
 
 def robots_of(team: Team, robots: int, default: int, path: Path) -> int:

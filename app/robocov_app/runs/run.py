@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 from robocov.cost import CoverageCost
 from robocov.files.result_folder import ResultFolder
 from robocov.metrics import CostHistory, compute_cost_history, select_sampled_moments, summarise
+from robocov.metrics.cost_history import DEFAULT_RATE_HZ
 from robocov.record import Record
-from robocov_app.runs.spec import COST_RATE, RunSpec
+from robocov.scenario import Scenario
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import finite, write_csv
 from robocov_app.terminal.progress import counting, progress
@@ -40,7 +41,7 @@ class Run:
 
 def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: bool) -> Run:
     """Evaluate the coverage cost along a record, after Ctrl-C at fewer moments, and sum the run up."""
-    rate = COST_RATE
+    rate = DEFAULT_RATE_HZ
     if stop.requested and record.time[-1] > 0:
         rate = min(rate, STOPPED_SAMPLES / float(record.time[-1]))
     with progress("coverage cost", len(select_sampled_moments(record, rate)), quiet=quiet) as update:
@@ -49,20 +50,28 @@ def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: 
 
 
 def saved_run(
-    spec: RunSpec, cost: CoverageCost, into: ResultFolder, part: str, options: RunOptions, stop: Interruption
+    scenario: Scenario,
+    cost: CoverageCost,
+    into: ResultFolder,
+    part: str,
+    options: RunOptions,
+    stop: Interruption,
 ) -> Run:
     """Simulate and evaluate up to the end or to Ctrl-C, and save the numbers in a part of a folder."""
-    simulation, quiet = spec.simulation(), options.json
+    simulation, quiet = scenario.build_simulation(), options.json
     # what a user's controller prints must not get among the answer
     chatter = redirect_stdout(sys.stderr) if quiet else nullcontext()
-    with chatter, progress(f"simulating {simulation.controller.label}", spec.steps, quiet=quiet) as update:
+    with (
+        chatter,
+        progress(f"simulating {simulation.controller.label}", scenario.steps, quiet=quiet) as update,
+    ):
 
         def watch(step: int) -> bool:
-            if step % 10 == 0 or step == spec.steps or stop.requested:
+            if step % 10 == 0 or step == scenario.steps or stop.requested:
                 update(step)
             return stop.requested
 
-        record = spec.record(simulation, every=options.record_every, watch=watch)
+        record = scenario.run(simulation, every=options.record_every, should_stop=watch)
     record.save(into.staging / part)
     into.save_progress()  # what took long is safe, whatever happens to the evaluation
     run = evaluated(record, cost, stop, quiet=quiet)

@@ -44,11 +44,11 @@ from robocov.errors import (
     require_type,
 )
 from robocov.mapfile import to_json
+from robocov.scenario import MAX_RECORD_ROWS
 from robocov.simulation import check_dt, check_joins
 from robocov.team import KINEMATICS, Team
 from robocov.team import UNITS as TEAM_UNITS
 from robocov.team_files import build_team
-from robocov_app.runs.spec import MOST_ROWS
 
 T = TypeVar("T")
 Scale: TypeAlias = Literal["linear", "log"]
@@ -413,10 +413,10 @@ class Study:
         for name, value in zip(("sources", "gains"), self._controllers(), strict=True):
             object.__setattr__(self, name, value)
         rows = self.duration / self.dt * max(self.robots)
-        if rows > MOST_ROWS:
+        if rows > MAX_RECORD_ROWS:
             rows_of = f"{self.duration:g} s of {max(self.robots)} robots at {self.dt:g} s are {rows:.3g} rows"
             raise ParameterError(
-                f"duration: expected at most {MOST_ROWS:.0e} rows of a record, got {rows_of}"
+                f"duration: expected at most {MAX_RECORD_ROWS:.0e} rows of a record, got {rows_of}"
             )
 
     def _count_values(self) -> dict[str, int]:

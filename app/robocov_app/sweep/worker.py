@@ -8,7 +8,6 @@ import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -23,9 +22,9 @@ from robocov.metrics import compute_cost_history, summarise
 from robocov.metrics.run_metrics import compute_final_metrics
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.record import Record, list_versions
+from robocov.scenario import Scenario
 from robocov.simulation import Simulation
 from robocov_app.runs.run import cost_table
-from robocov_app.runs.spec import RunSpec
 from robocov_app.sweep.study import Task, conditions_of, source_json, team_of
 from robocov_app.terminal.output import csv_text, finite, json_text
 from robocov_app.toolkit.worker import Line
@@ -127,22 +126,30 @@ def simulated(task: Task, environment: Environment) -> Record:
 
 def measured(task: Task, environment: Environment) -> tuple[Record, dict[str, float | None]]:
     """Simulate a run, and return the whole of it, and what it took: what ``effort.json`` holds."""
-    law, team = (task.controller, task.gains, task.source), team_of(task.robots, task.team)
-    more: dict[str, Any] = {"duration": task.duration, "dt": task.dt}
-    more["conditions"] = conditions_of(task.team, task.seed, task.robots)
-    spec = RunSpec(environment, *law, team, task.start, task.seed, **more)
-    with provide_modules(spec.source.modules if spec.source else {}):
-        simulation = spec.simulation()
+    scenario = Scenario(
+        environment,
+        task.controller,
+        task.gains,
+        source=task.source,
+        team=team_of(task.robots, task.team),
+        start=task.start,
+        seed=task.seed,
+        duration=task.duration,
+        dt=task.dt,
+        conditions=conditions_of(task.team, task.seed, task.robots),
+    )
+    with provide_modules({} if task.source is None else task.source.modules):
+        simulation = scenario.build_simulation()
         telling = Telling(simulation)
 
-        def watch(step: int) -> bool:
+        def count_and_tidy(step: int) -> bool:
             if step and step % _TIDY == 0:
                 gc.collect(0)
             if step and task.metrics:
                 telling.count()
             return False
 
-        record = spec.record(simulation, watch=watch)
+        record = scenario.run(simulation, should_stop=count_and_tidy)
     return record, {"deciding_s": simulation.decision_time, "told_bytes": telling.bytes}
 
 

@@ -6,6 +6,6 @@
 """
 
 from robocov.scenario.comparison import Comparison, compare
-from robocov.scenario.scenario import Scenario, run
+from robocov.scenario.scenario import MAX_RECORD_ROWS, Scenario, run
 
-__all__ = ["Comparison", "Scenario", "compare", "run"]
+__all__ = ["MAX_RECORD_ROWS", "Comparison", "Scenario", "compare", "run"]

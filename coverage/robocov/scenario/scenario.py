@@ -21,7 +21,9 @@ from robocov.defaults import DEFAULT_CONTROLLER, DEFAULT_DT_S, DEFAULT_DURATION_
 from robocov.environment import Environment
 from robocov.errors import (
     InputError,
+    MapError,
     ParameterError,
+    StartError,
     describe_unknown_name,
     format_count,
     quote,
@@ -570,7 +572,7 @@ def _build_team(team: Team | None, robots: int | None, state: TeamState | None) 
     else:
         team = Team.homogeneous(DEFAULT_ROBOTS if robots is None else robots)
     if state is not None and len(state) != len(team):
-        raise ParameterError(f"starts: expected {format_count(len(team), 'robot')}, got {len(state)}")
+        raise StartError(f"starts: expected one for each of {len(team)} robots, got {len(state)}")
     return team
 
 
@@ -579,8 +581,8 @@ def _describe_controller(
 ) -> dict[str, Any]:
     """Return the attributes of a scenario that describe its controller."""
     if isinstance(controller, str):
-        if controller in CONTROLLERS:
-            # Other controllers are checked when they are made, because that runs their code.
+        if ":" not in controller:
+            # A class in a file is only loaded when it is needed, because that runs the file.
             make_controller(controller, gains)
         return {"controller": controller, "gains": dict(gains or {}), "_controller_object": None}
     if gains:
@@ -597,7 +599,10 @@ def _load_environment(content: str | dict[str, Any], where: str, folder: Path | 
     """Return the map of a document: a map, the name of a bundled map, or a path relative to a folder."""
     if not isinstance(content, str):
         return from_json(content, f"{where}: map", folder)
-    path = find_map_file(content)
+    try:
+        path = find_map_file(content)
+    except MapError as error:
+        raise MapError(f"{where}: map: {error}") from error
     if folder is not None and not path.is_absolute():
         path = folder / path
     return load_map(path)

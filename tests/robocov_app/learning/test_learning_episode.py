@@ -12,26 +12,26 @@ from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import InputError, ParameterError, StartError
 from robocov.metrics import compute_clearances, count_contacts
+from robocov.scenario import Scenario
 from robocov.simulation import Simulation
 from robocov_app.learning import CoverageTask, ObservationLayout
 from robocov_app.learning.episode import Episode, drawn_episode
 from robocov_app.learning.task import Scenarios, reference_distance
-from robocov_app.runs.spec import RunSpec
 
 STARTS = np.array([[1.0, 1.0], [2.0, 1.0], [1.0, 2.0]])
 
 
 def begun(environment: Environment, positions: np.ndarray = STARTS, **changes: Any) -> Episode:
     task = CoverageTask(**{"maps": environment, "robots": len(positions), "lattice": 16, **changes})
-    spec = RunSpec(
+    scenario = Scenario(
         environment,
         team=task.whole_team,
-        positions=positions,
+        starts=positions,
         seed=None,
         dt=task.dt,
         conditions=task.conditions,
     )
-    return Episode(task, spec, CoverageCost(environment, task.lattice))
+    return Episode(task, scenario, CoverageCost(environment, task.lattice))
 
 
 def pushed(episode: Episode, cycles: int, seed: int = 0) -> list[np.ndarray]:

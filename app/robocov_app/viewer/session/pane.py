@@ -11,10 +11,10 @@ from robocov.arrays import Array
 from robocov.controllers import has_memory
 from robocov.errors import StartError
 from robocov.observation import Snapshot
+from robocov.scenario import Scenario
 from robocov.simulation import Simulation
 from robocov.world.free_positions import relocate_robots
 from robocov_app.render.scene import Scene, Sensed
-from robocov_app.runs.spec import RunSpec
 from robocov_app.viewer.session.curves import Curve
 from robocov_app.viewer.session.moments import PaneSetup, State, Trail, of_robots
 from robocov_app.viewer.session.scenario import ControllerChoice
@@ -124,15 +124,21 @@ def begun(
     setup: PaneSetup, positions: Array, dt: float, velocities: Array | None = None, **later: Any
 ) -> Simulation:
     """Return a simulation that begins so, or goes on `later`; StartError, ParameterError as `Simulation`."""
-    law, steering = setup.law, later.pop("steering", None)
-    spec = RunSpec(
-        setup.solid, law.name, law.gains, team=setup.team, positions=positions, velocities=velocities,
-        steering=steering, dt=dt, conditions=setup.conditions,
-    )  # fmt: skip
-    return spec.simulation(law.made(), **later)
+    scenario = Scenario(
+        setup.solid,
+        setup.law.name,
+        setup.law.gains,
+        team=setup.team,
+        starts=positions,
+        velocities=velocities,
+        steering=later.pop("steering", None),
+        dt=dt,
+        conditions=setup.conditions,
+    )
+    return scenario.build_simulation(setup.law.made(), **later)
 
 
 def resumed(state: State, dt: float, step: int) -> Simulation:
-    later: dict[str, Any] = {"steering": state.steering, "steps": step, "resumed": True}
+    later: dict[str, Any] = {"steering": state.steering, "steps": step, "is_computed": True}
     simulation = begun(state.setup, state.positions, dt, state.velocities, **later)
     return simulation.with_memory(simulation.memory if state.memory is None else state.memory, state.inbox)
