@@ -23,7 +23,7 @@ from robocov.errors import ParameterError, RobocovError, format_count, quote
 from robocov.mapfile import save_map
 from robocov.metrics import CostHistory, compute_cost_history
 from robocov.record import Record
-from robocov.scenario import Scenario
+from robocov.scenario import Comparison, Scenario
 from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov.text import escape_controls
@@ -117,6 +117,50 @@ def plot_result(
     return axes
 
 
+def plot_comparison(
+    comparison: Comparison,
+    axes: Axes | None = None,
+    *,
+    theme: Theme | str = LIGHT,
+    colours: str = "paper",
+    size: tuple[int, int] | None = None,
+) -> Axes:
+    """Plot the runs of a comparison side by side.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    axes : None
+        A comparison needs a page of its own.
+    theme : {"light", "dark"}
+    colours : {"paper", "robots"}
+    size : (width, height) or None, px
+        Size of the page.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes of the last panel.
+
+    Raises
+    ------
+    ParameterError
+        If axes are given.
+    """
+    from robocov_app.figures import runs
+
+    if axes is not None:
+        raise ParameterError("axes: expected None, because a comparison has one panel for each run")
+    figure = runs.plot_comparison(
+        list(comparison.records.values()),
+        theme,
+        colours,
+        size,
+        mean_distances=[float(history.mean_distance[-1]) for history in comparison.histories.values()],
+    )
+    return figure.axes[-1]
+
+
 def environment_html(environment: Environment) -> str:
     """Return a map with its facts and a scale bar, in light or dark as the notebook is."""
     low_x, low_y, high_x, high_y = environment.region.bounds
@@ -150,6 +194,22 @@ def record_html(record: Record) -> str:
     width = max(Frame(record.environment, *_REPLAY_SIZE).width, _CONTROLS)
     begin = f'<style>{_RUN_CSS}</style><div class="robocov-run" style="max-width:{width:.0f}px">'
     return f"{begin}{replay_html([run])}</div>"
+
+
+def comparison_html(comparison: Comparison) -> str:
+    """Return a replay of the runs of a comparison, side by side, with their costs."""
+    runs = []
+    for label, record in comparison.records.items():
+        run = ReplayRun(
+            record, comparison.histories[label], f"{label} on {record.environment.name}", label=label
+        )
+        runs.append(run)
+    return f'<style>{_RUN_CSS}</style><div class="robocov-run">{replay_html(runs)}</div>'
+
+
+def comparison_png(comparison: Comparison) -> bytes:
+    """Return the picture of a comparison for notebooks that display no HTML."""
+    return _page_png(plot_comparison(comparison))
 
 
 def _history_to_show(record: Record) -> CostHistory | None:

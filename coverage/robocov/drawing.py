@@ -21,12 +21,12 @@ class DrawingBackend(Protocol):
 
     Attributes
     ----------
-    plot_environment, plot_record, plot_history, plot_result : callable
+    plot_environment, plot_record, plot_history, plot_result, plot_comparison : callable
         ``plot_...(item, axes=None, **options)`` draws an item on axes and returns them. If the axes are None,
         it draws on a page of its own, and returns the axes of that page.
-    environment_html, record_html : callable
+    environment_html, record_html, comparison_html : callable
         Return the HTML, a str, that a notebook displays for an item.
-    environment_png, record_png : callable
+    environment_png, record_png, comparison_png : callable
         Return the image, bytes, that a notebook displays if it displays no HTML.
     show : callable
         ``show(map, **options)`` returns what a notebook displays for `robocov.show`.
@@ -36,10 +36,13 @@ class DrawingBackend(Protocol):
     plot_record: Callable[..., Any]
     plot_history: Callable[..., Any]
     plot_result: Callable[..., Any]
+    plot_comparison: Callable[..., Any]
     environment_html: Callable[[Any], str]
     environment_png: Callable[[Any], bytes]
     record_html: Callable[[Any], str]
     record_png: Callable[[Any], bytes]
+    comparison_html: Callable[[Any], str]
+    comparison_png: Callable[[Any], bytes]
     show: Callable[..., Any]
 
 
@@ -55,7 +58,8 @@ class Drawable:
         Parameters
         ----------
         axes : matplotlib.axes.Axes or None
-            By default the axes of a new page, which is their ``figure``.
+            By default the axes of a new page; the page is ``axes.figure``. A comparison always has a page of
+            its own, with one panel for each run.
         backend : str or None
             Name of a drawing backend, see `robocov.drawing`; ``matplotlib`` by default.
         **options
@@ -65,7 +69,8 @@ class Drawable:
             size : (width, height), px
                 Size of the page.
             colours : {"paper", "robots"}
-                Of a record: green starts, red trajectories and blue final positions, or a hue for each robot.
+                Of a record or comparison: green starts, red trajectories and blue final positions, or a hue
+                for each robot.
             mean_distance, mean_time : float, m, s
                 Of a record's final positions, for the title of the page.
             label, controller, title : str

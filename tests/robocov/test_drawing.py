@@ -18,6 +18,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError
 from robocov.metrics import compute_cost_history
 from robocov.record import Record
+from robocov.scenario import Comparison
 from robocov.simulation import Simulation
 
 
@@ -29,7 +30,7 @@ class Sketches(ModuleType):
         self.asked: list[tuple[Any, ...]] = []
 
     def __getattr__(self, name: str) -> Any:
-        if not name.startswith(("plot_", "environment_", "record_")):
+        if not name.startswith(("plot_", "environment_", "record_", "comparison_")):
             raise AttributeError(name)
 
         def noted(*given: Any, **options: Any) -> Any:
@@ -65,7 +66,7 @@ def test_the_application_is_installed_as_the_backend() -> None:
     assert load_drawing_backend().__name__ == "robocov_app.notebook"  # type: ignore[attr-defined]
     assert load_drawing_backend("matplotlib") is load_drawing_backend()
     wanted = list(drawing.DrawingBackend.__annotations__)
-    assert len(wanted) == 9
+    assert len(wanted) == 12
     assert all(callable(getattr(load_drawing_backend(), name)) for name in wanted)
 
 
@@ -74,12 +75,15 @@ def test_another_backend_is_asked_for_by_name(
 ) -> None:
     offering(monkeypatch, matplotlib="robocov_app.notebook", sketches="sketches")
     cost = CoverageCost(empty, 8)
-    result, history = cost(record.positions[-1]), compute_cost_history(record, cost, 2.0)
+    result = cost(record.positions[-1])
+    history = compute_cost_history(record, cost, 2.0)
+    comparison = Comparison(records={"RAPF": record}, histories={"RAPF": history})
     for thing, name in (
         (empty, "plot_environment"),
         (record, "plot_record"),
         (result, "plot_result"),
         (history, "plot_history"),
+        (comparison, "plot_comparison"),
     ):
         axes = object()
         assert thing.plot(axes, backend="sketches", theme="dark") == f"{name} of sketches"

@@ -15,6 +15,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
+import robocov as rc
 from robocov.cost import CoverageCost
 from robocov.drawing import Drawable
 from robocov.errors import ParameterError
@@ -309,6 +310,18 @@ def test_a_comparison_is_shown_for_each_of_its_axes():
     assert shown[0] == shown[1]
 
 
+def test_a_comparison_is_a_page_with_a_panel_for_each_run():
+    comparison = rc.compare(ROOMS, ["rapf", "lloyd"], robots=3, duration=1.0, lattice=8)
+    axes = comparison.plot()
+    assert len(axes.figure.axes) >= 2
+    assert comparison._repr_png_().startswith(b"\x89PNG")
+    html = comparison._repr_html_()
+    assert html.count('class="robocov-replay"') == 1
+    assert "Lloyd on Rooms" in html
+    with pytest.raises(ParameterError, match="axes: expected None"):
+        comparison.plot(axes)
+
+
 def test_the_backend_has_no_options_of_its_own_beside_the_documented():
     """What `plot` documents is what it takes."""
     import inspect
@@ -325,10 +338,11 @@ def test_the_backend_has_no_options_of_its_own_beside_the_documented():
         ("plot_record", "record"),
         ("plot_result", "coverage result"),
         ("plot_history", "cost history"),
+        ("plot_comparison", "comparison"),
     ):
         parameters = inspect.signature(getattr(drawing_backend, function)).parameters.values()
         options = {each.name for each in parameters if each.kind is inspect.Parameter.KEYWORD_ONLY}
         if function in drawn_by:  # the others are handed on, after what is drawn and the axes
             options |= {*list(inspect.signature(drawn_by[function]).parameters)[2:]}
-        own = {name for name, words in documented.items() if f" {whose}" in words}
+        own = {name for name, words in documented.items() if re.search(rf"\b{whose}\b", words)}
         assert own | {"theme", "size"} == options
