@@ -317,7 +317,7 @@ def test_a_comparison_is_a_page_with_a_panel_for_each_run():
     assert comparison._repr_png_().startswith(b"\x89PNG")
     html = comparison._repr_html_()
     assert html.count('class="robocov-replay"') == 1
-    assert "Lloyd on Rooms" in html
+    assert f"Lloyd on {ROOMS.name}" in html
     with pytest.raises(ParameterError, match="axes: expected None"):
         comparison.plot(axes)
 
