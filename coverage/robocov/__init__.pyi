@@ -57,7 +57,7 @@ from .mapfile import save_map as save_map
 from .mapfile.check import check_map as check_map
 from .metrics import compute_cost_history as compute_cost_history
 from .metrics import find_settling_time as find_settling_time
-from .metrics import summarise as summarise
+from .metrics import summarize as summarize
 from .metrics.results import Results as Results
 from .metrics.results import read_results as read_results
 from .metrics.run_metrics import RunMetrics as RunMetrics
@@ -65,7 +65,7 @@ from .metrics.run_metrics import compute_run_metrics as compute_run_metrics
 from .observation import Decision as Decision
 from .observation import Observations as Observations
 from .observation import Snapshot as Snapshot
-from .observation.neighbours import Neighbours as Neighbours
+from .observation.neighbors import Neighbors as Neighbors
 from .observation.region import Region as Region
 from .optimum import Optimum as Optimum
 from .optimum import find_optimum as find_optimum

@@ -68,14 +68,14 @@ class Drawable:
             theme : {"light", "dark"}
             size : (width, height), px
                 Size of the page.
-            colours : {"paper", "robots"}
+            colors : {"paper", "robots"}
                 Of a record or comparison: green starts, red trajectories and blue final positions, or a hue
                 for each robot.
             mean_distance, mean_time : float, m, s
                 Of a record's final positions, for the title of the page.
             label, controller, title : str
                 Of a cost history: the label of the curve, the controller (those of the paper have their own
-                colours), and the title of the page.
+                colors), and the title of the page.
             radius : float or (n,) array, m
                 Of a coverage result: the radii of the robots.
 

@@ -404,7 +404,7 @@ def _describe_mismatch(name: str, value: object, expected: str) -> str:
     return f"{name}: expected {expected}, got {quote(value)}"
 
 
-def summarise_names(names: Sequence[str]) -> str:
+def summarize_names(names: Sequence[str]) -> str:
     """List the first three names and the number of the others.
 
     Parameters
@@ -417,7 +417,7 @@ def summarise_names(names: Sequence[str]) -> str:
 
     Examples
     --------
-    >>> summarise_names(["a", "b", "c", "d"])
+    >>> summarize_names(["a", "b", "c", "d"])
     'a, b, c and 1 more'
     """
     text = ", ".join(names[:_MAX_LISTED_NAMES])

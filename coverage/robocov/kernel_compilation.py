@@ -33,7 +33,7 @@ from robocov.cost import CoverageCost
 from robocov.density import Density, Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
 from robocov.environment import Environment, PolygonObstacle
 from robocov.files.writing import replace_file
-from robocov.metrics import compute_cost_history, summarise
+from robocov.metrics import compute_cost_history, summarize
 from robocov.simulation import Simulation
 from robocov.team import Team
 
@@ -70,7 +70,7 @@ def call_step_kernels() -> None:
 def call_summary_kernels() -> None:
     """Call the kernels of the metrics of a run."""
     record = Simulation(_MAP, Rapf(), _place_robots(2)).run(0.1)
-    summarise(record, compute_cost_history(record, CoverageCost(_MAP, 2)))
+    summarize(record, compute_cost_history(record, CoverageCost(_MAP, 2)))
 
 
 def call_large_team_kernels() -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.observation.bins import find_bin, sort_into_bins
-from robocov.observation.neighbours import NeighbourPositions
+from robocov.observation.neighbors import NeighborPositions
 
 CONTACT_DISTANCE = 0.01
 """Distance below which the repulsion no longer grows, m: a tenth of a robot's radius."""
@@ -57,7 +57,7 @@ class PotentialForces(NamedTuple):
     total
         Sum of the other three.
     attraction
-        The force (27) towards the goal.
+        The force (27) toward the goal.
     robots
         Sum of (24) over the robots within `rho_0`.
     obstacle
@@ -73,7 +73,7 @@ class PotentialForces(NamedTuple):
 @kernel
 def compute_potential_forces(
     positions: Array,
-    neighbours: NeighbourPositions,
+    neighbors: NeighborPositions,
     obstacle_points: Array,
     goals: Array,
     gains: PotentialGains,
@@ -83,7 +83,7 @@ def compute_potential_forces(
     Parameters
     ----------
     positions : (n, 2) array, m
-    neighbours : NeighbourPositions
+    neighbors : NeighborPositions
         Robots that repel each other.
     obstacle_points : (n, 2) array, m
         Closest obstacle point of each robot; nan if none is in range.
@@ -112,8 +112,8 @@ def compute_potential_forces(
         slope = _compute_attraction(dx * dx + dy * dy, gains.k_att, gains.max_attraction)
         attraction[i, 0] = slope * dx
         attraction[i, 1] = slope * dy
-    if len(neighbours.indptr) > 0:
-        robots = _sum_repulsion_of_neighbours(positions, neighbours, gains)
+    if len(neighbors.indptr) > 0:
+        robots = _sum_repulsion_of_neighbors(positions, neighbors, gains)
     else:
         robots = _sum_repulsion_of_all_robots(positions, gains)
     total = attraction + robots + obstacle
@@ -121,12 +121,12 @@ def compute_potential_forces(
 
 
 @kernel
-def compute_separations(robots: IntArray, neighbours: IntArray) -> Array:
+def compute_separations(robots: IntArray, neighbors: IntArray) -> Array:
     """Compute the directions in which pairs of robots at the same position are pushed apart.
 
     Parameters
     ----------
-    robots, neighbours : (m,) int array
+    robots, neighbors : (m,) int array
         Numbers of the two robots of each pair.
 
     Returns
@@ -136,7 +136,7 @@ def compute_separations(robots: IntArray, neighbours: IntArray) -> Array:
     """
     directions = np.empty((len(robots), 2))
     for k in range(len(robots)):
-        x, y = _compute_separation(robots[k], neighbours[k])
+        x, y = _compute_separation(robots[k], neighbors[k])
         directions[k, 0] = x
         directions[k, 1] = y
     return directions
@@ -174,18 +174,18 @@ def _compute_attraction(squared_distance: float, k_att: float, max_attraction: f
 
 
 @kernel
-def _sum_repulsion_of_neighbours(
-    positions: Array, neighbours: NeighbourPositions, gains: PotentialGains
+def _sum_repulsion_of_neighbors(
+    positions: Array, neighbors: NeighborPositions, gains: PotentialGains
 ) -> Array:
     """Return the sums of (24) over the robots that each robot knows of, (n, 2) N."""
     sums = np.zeros((len(positions), 2))
-    has_reports = len(neighbours.positions) > 0
+    has_reports = len(neighbors.positions) > 0
     for i in range(len(positions)):
-        for k in range(neighbours.indptr[i], neighbours.indptr[i + 1]):
-            j = neighbours.indices[k]
+        for k in range(neighbors.indptr[i], neighbors.indptr[i + 1]):
+            j = neighbors.indices[k]
             if has_reports:
-                dx = positions[i, 0] - neighbours.positions[k, 0]
-                dy = positions[i, 1] - neighbours.positions[k, 1]
+                dx = positions[i, 0] - neighbors.positions[k, 0]
+                dy = positions[i, 1] - neighbors.positions[k, 1]
             else:
                 dx = positions[i, 0] - positions[j, 0]
                 dy = positions[i, 1] - positions[j, 1]

@@ -114,9 +114,9 @@ class Team:
     viscosity : N s/m
         nu of equation (28), with the sign that dissipates energy.
     sensing_range : m
-        Distance from the robot's centre up to which the range sensor detects obstacles.
+        Distance from the robot's center up to which the range sensor detects obstacles.
     communication_range : m
-        Two robots are neighbours if each is within the range of the other. Infinity: no limit.
+        Two robots are neighbors if each is within the range of the other. Infinity: no limit.
     track_width : m
         Distance between the two driven wheels of a unicycle, a differential drive. 0, the default, stands for
         a point robot, which moves in any direction. Each wheel is limited to `max_speed` and

@@ -18,7 +18,7 @@ _UNSAFE_IN_LINE = re.compile(f"[{_CONTROLS}\t\n]")
 def escape_controls(text: str, *, single_line: bool = False) -> str:
     r"""Replace control characters in a text with visible escapes.
 
-    Names and messages from files and from users' controllers may contain characters that colour or overwrite
+    Names and messages from files and from users' controllers may contain characters that color or overwrite
     the terminal, or change the order in which text is displayed. Joiners, which some scripts need, are kept.
 
     Parameters

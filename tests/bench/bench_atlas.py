@@ -36,7 +36,7 @@ from robocov_app.benchmark.running import reference
 
 SIZES, SEEDS, SHORT = (1, 2, 3, 6, 8, 9, 12, 20, 50, 100, 200), range(901, 905), 3.0
 RANGES = ({}, {"communication_range": 3.0}, {"communication_range": 6.0}, {"sensing_range": 6.0})
-PROTOTYPE = {6: 0.168, 50: 0.263, 200: 0.575}  # ms, a vectorised step of RAPF before there was a compiled one
+PROTOTYPE = {6: 0.168, 50: 0.263, 200: 0.575}  # ms, a vectorized step of RAPF before there was a compiled one
 
 
 def walls(turn: float, door: float, width: float) -> tuple[WallObstacle, WallObstacle]:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import Delaunay
 
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.voronoi import partition
 
@@ -46,7 +46,7 @@ def main(budget: int) -> None:
     print(f"{'robots':>6} {'Delaunay':>12} {'partition':>18} {'limited range':>18} {'polygons':>12}")
     for n in (2, 4, 5, 6, 12, 50, 200, 1000):
         points = rng.uniform([0.0, 0.0], [10.0, 6.0], (n, 2))
-        heard = Neighbours.from_ranges(points, np.full(n, RANGE))
+        heard = Neighbors.from_ranges(points, np.full(n, RANGE))
         calls: dict[str, Callable[[], object]] = {
             "partition": lambda points=points: partition(points, REGION),
             "limited": lambda points=points, heard=heard: partition(points, REGION, heard),

@@ -71,9 +71,9 @@ def svg(*bodies: str) -> bytes:
 
 
 def geojson(rings: list[Any]) -> bytes:
-    """Return polygons in metres."""
+    """Return polygons in meters."""
     coordinates = [[[*ring, ring[0]]] for ring in rings]
-    return json.dumps({"type": "MultiPolygon", "units": "metres", "coordinates": coordinates}).encode()
+    return json.dumps({"type": "MultiPolygon", "units": "meters", "coordinates": coordinates}).encode()
 
 
 def wkt(ring: Any) -> bytes:

@@ -81,7 +81,7 @@ SVG = """\
 </svg>
 """
 
-COLOURED = """<svg xmlns="http://www.w3.org/2000/svg" width="20000mm" height="12000mm" viewBox="0 0 20 12">
+COLORED = """<svg xmlns="http://www.w3.org/2000/svg" width="20000mm" height="12000mm" viewBox="0 0 20 12">
   <defs>
     <linearGradient id="shade">
       <stop offset="0" stop-color="#eee"/><stop offset="1" stop-color="#111"/>
@@ -96,7 +96,7 @@ COLOURED = """<svg xmlns="http://www.w3.org/2000/svg" width="20000mm" height="12
   </g>
   <rect x="8.8" y="4" width=".4" height="1.5" fill="white"/>
   <circle cx="4" cy="5" r="1" fill="rgb(40 40 40 / 80%)" stroke="#888" stroke-width=".05"/>
-  <rect x="12" y="3" width="3" height="2" fill="url(#hatch) grey"/>
+  <rect x="12" y="3" width="3" height="2" fill="url(#hatch) gray"/>
   <path d="M10 8h4v2h-4z" fill="none" stroke="#777" stroke-width=".03" transform="skewX(10)"/>
 </svg>
 """
@@ -126,7 +126,7 @@ _DXF = [
 
 
 def png(rows: list[list[int]], depth: int = 8) -> bytes:
-    """Return a grey picture of one channel as PNG."""
+    """Return a gray picture of one channel as PNG."""
     width, height = len(rows[0]), len(rows)
     size = {8: "B", 16: "H"}[depth]
     raw = b"".join(b"\0" + struct.pack(f">{width}{size}", *row) for row in rows)
@@ -141,14 +141,14 @@ def chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def pgm(rows: list[list[int]], *, text: bool = False) -> bytes:
-    """Return a grey picture as PGM."""
+    """Return a gray picture as PGM."""
     head = f"{'P2' if text else 'P5'}\n# a comment\n{len(rows[0])} {len(rows)}\n255\n".encode()
     if text:
         return head + "\n".join(" ".join(map(str, row)) for row in rows).encode() + b"\n"
     return head + b"".join(map(bytes, rows))
 
 
-GREY = [
+GRAY = [
     [{"@": 0, "T": 0, "W": 205}.get(letter, 254) for letter in row for _ in range(2)]
     for row in PLAN.split("\n")
     for _ in range(2)
@@ -201,7 +201,7 @@ def _floats() -> bytes:
     import numpy as np
     from PIL import Image
 
-    samples = np.array(GREY, dtype=np.float32) / 255
+    samples = np.array(GRAY, dtype=np.float32) / 255
     samples[0, 0] = np.nan
     file = io.BytesIO()
     Image.fromarray(samples).save(file, "TIFF")
@@ -212,7 +212,7 @@ def _saved(kind: str, **options: Any) -> bytes:
     from PIL import Image
 
     file = io.BytesIO()
-    picture = Image.frombytes("L", (len(GREY[0]), len(GREY)), b"".join(map(bytes, GREY)))
+    picture = Image.frombytes("L", (len(GRAY[0]), len(GRAY)), b"".join(map(bytes, GRAY)))
     picture.convert("1" if kind == "PPM" else "RGB").save(file, kind, **options)
     return file.getvalue()
 
@@ -500,8 +500,8 @@ SEEDS: dict[str, list[Case]] = {
     "study": _one("study.toml", STUDY, 'maps = "*"\ncontrollers = ["rpf"]\n'),
     "movingai": _one("plan.map", f"type octile\nheight 9\nwidth 12\nmap\n{PLAN}\n"),
     "picture": [
-        *_one("plan.png", png(GREY), png([[257 * value for value in row] for row in GREY], 16), _rgba()),
-        *_one("plan.pgm", pgm(GREY), pgm(GREY, text=True)),
+        *_one("plan.png", png(GRAY), png([[257 * value for value in row] for row in GRAY], 16), _rgba()),
+        *_one("plan.pgm", pgm(GRAY), pgm(GRAY, text=True)),
         *_one("plan.jpg", _saved("JPEG"), _saved("JPEG", progressive=True)),
         *_one("plan.bmp", _saved("BMP"), _saved("PPM")),
         *_one(
@@ -512,8 +512,8 @@ SEEDS: dict[str, list[Case]] = {
         ),
     ],
     "ros": [
-        Case({"map.yaml": ROS.format("map.pgm").encode(), "map.pgm": pgm(GREY)}),
-        Case({"map.yaml": (ROS.format("map.png") + "mode: scale\n").encode(), "map.png": png(GREY)}),
+        Case({"map.yaml": ROS.format("map.pgm").encode(), "map.pgm": pgm(GRAY)}),
+        Case({"map.yaml": (ROS.format("map.png") + "mode: scale\n").encode(), "map.png": png(GRAY)}),
     ],
     "houseexpo": _one(
         "plan.json",
@@ -539,11 +539,11 @@ SEEDS: dict[str, list[Case]] = {
         *_one("plan.geojsonl", _sequence(b"")),
     ],
     "imdf": [Case(imdf_files(IMDF)), Case({"venue.zip": imdf_zip(IMDF)})],
-    "svg": _one("plan.svg", SVG, COLOURED),
+    "svg": _one("plan.svg", SVG, COLORED),
     "osm": [*_one("plan.osm", OSM, INDOOR), *_one("plan.json", json.dumps(OVERPASS, indent=1))],
     "dxf": _one("plan.dxf", "\n".join(map(str, _DXF)) + "\n"),
     "stage": [
-        Case({"hall.world": STAGE.encode(), "things.inc": THINGS.encode(), "map.png": png(GREY)}),
+        Case({"hall.world": STAGE.encode(), "things.inc": THINGS.encode(), "map.png": png(GRAY)}),
         Case({"hall.world": (THINGS + "table ( ) table ( pose [4 2 0 0] )").encode()}),
     ],
     "argos": _one("arena.argos", ARGOS),
@@ -554,7 +554,7 @@ SEEDS: dict[str, list[Case]] = {
                 "world.yaml": IRSIM.replace(
                     "step_time: 0.1", "obstacle_map: map.png\n  mdownsample: 2"
                 ).encode(),
-                "map.png": png(GREY),
+                "map.png": png(GRAY),
             }
         ),
     ],

@@ -45,7 +45,7 @@ _OPTIONS: dict[str, list[Any]] = {
     "water": ["obstacle", "free"],
     "anywhere": [True],
     "scale": [0.001, 0.5, 1.0, 100.0],
-    "units": ["metres", "degrees"],
+    "units": ["meters", "degrees"],
     "thickness": [0.01, 0.2, 5.0],
     "pillar": [0.01, 0.3],
     "outlines": ["free", "solid", "nested"],
@@ -56,10 +56,10 @@ _OPTIONS: dict[str, list[Any]] = {
     "skip": [["walls"], ["boundary"]],
     "hatches": [True],
     "level": ["0", "1", "-1", "G", "nan"],
-    "free_colour": [["white"], ["#c8c8c8", "black"], ["no colour"], ["#fffffff"]],
-    "solid_colour": [["white"], ["#777"], ["rgb(1,2,3)"]],
-    "ignore_colour": [["black"], ["red", "rgba(0,0,0,.5)"], []],
-    "colour_tolerance": [0.0, 40.0, 255.0],
+    "free_color": [["white"], ["#c8c8c8", "black"], ["no color"], ["#fffffff"]],
+    "solid_color": [["white"], ["#777"], ["rgb(1,2,3)"]],
+    "ignore_color": [["black"], ["red", "rgba(0,0,0,.5)"], []],
+    "color_tolerance": [0.0, 40.0, 255.0],
     "min_stroke": ["0.05", "3px", "1m", "0", "-1", "150px"],
 }
 _SHAPING: dict[str, list[Any]] = {

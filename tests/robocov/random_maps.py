@@ -44,8 +44,8 @@ def maze(rng, count):
     visited = {(0, 0)}
     while stack:
         i, j = stack[-1]
-        neighbours = [(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)]
-        rooms = [room for room in neighbours if room not in visited and min(room) >= 0 and max(room) < side]
+        neighbors = [(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)]
+        rooms = [room for room in neighbors if room not in visited and min(room) >= 0 and max(room) < side]
         if not rooms:
             stack.pop()
             continue

@@ -14,7 +14,7 @@ from robocov.controllers import Rapf
 from robocov.cost import CoverageCost
 from robocov.kernel_compilation import compile_kernels
 from robocov.mapfile import load_map
-from robocov.metrics import compute_cost_history, summarise
+from robocov.metrics import compute_cost_history, summarize
 from robocov.record import Recorder
 from robocov.simulation import Simulation
 
@@ -148,7 +148,7 @@ def test_kernels_of_a_run_are_compiled_beforehand() -> None:
         for snapshot in simulation.snapshots(0.1):
             recorder.add(snapshot)
         record = recorder.record()
-        summarise(record, compute_cost_history(record, CoverageCost(rooms, 16)))
+        summarize(record, compute_cost_history(record, CoverageCost(rooms, 16)))
     finally:
         on_compile.remove(newly_compiled.append)
     assert newly_compiled == []

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.observation.neighbours import NeighbourPositions, Neighbours
+from robocov.observation.neighbors import NeighborPositions, Neighbors
 from robocov.potential import (
     CONTACT_DISTANCE,
     PotentialGains,
@@ -22,14 +22,14 @@ def forces(
     obstacle_points: np.ndarray | None = None,
     goals: np.ndarray | None = None,
     k: tuple[float, ...] = (0.0, 2.0, 0.0, np.inf),
-    neighbours: Neighbours | None = None,
+    neighbors: Neighbors | None = None,
     reported: np.ndarray | None = None,
 ) -> np.ndarray:
     """Return all forces, by strength and range of the repulsion, strength and limit of the attraction."""
     points = np.full_like(positions, np.nan) if obstacle_points is None else obstacle_points
     goals = positions if goals is None else goals
-    graph = neighbours or Neighbours(len(positions))
-    known = NeighbourPositions.from_graph(graph, reported)
+    graph = neighbors or Neighbors(len(positions))
+    known = NeighborPositions.from_graph(graph, reported)
     return np.stack(compute_potential_forces(positions, known, points, goals, PotentialGains(*k)))
 
 
@@ -145,11 +145,11 @@ def test_all_forces_against_one_pair_after_the_other(n: int, seed: int, rho_0: f
     rng = np.random.default_rng(seed)
     positions, goals, points = rng.uniform(0.0, 10.0, (3, n, 2))
     points[rng.random(n) < 0.3] = np.nan
-    neighbours = Neighbours(n) if heard == "all" else Neighbours.from_ranges(positions, rng.uniform(0, 8, n))
-    robot, other = neighbours.list_pairs()
+    neighbors = Neighbors(n) if heard == "all" else Neighbors.from_ranges(positions, rng.uniform(0, 8, n))
+    robot, other = neighbors.list_pairs()
     places = positions[other] + (0.1 * rng.normal(size=(len(other), 2)) if heard == "reports" else 0.0)
     reported = places if heard == "reports" else None
-    found = forces(positions, points, goals, (0.7, rho_0, 1.3, 5.0), neighbours, reported)
+    found = forces(positions, points, goals, (0.7, rho_0, 1.3, 5.0), neighbors, reported)
     expected = np.zeros((4, n, 2))
     for i, place in zip(robot.tolist(), places, strict=True):
         expected[2, i] += repulsive_force((positions[i] - place)[None], 0.7, rho_0)[0]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from robocov.locational_cost import Performance, Sensing, SquaredDistance
 from robocov.observation import Cells
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
 
@@ -74,9 +74,9 @@ def huddled(region: Region, n: int, rng: np.random.Generator) -> Array:
 
 
 def huddles(region: Region, n: int, rng: np.random.Generator) -> Array:
-    """Return some single points, and some in groups of a micrometre."""
-    centres = scattered(region, max(2, n // 3), rng)
-    return centres[rng.integers(0, len(centres), n)] + 1e-6 * rng.uniform(-1, 1, (n, 2))
+    """Return some single points, and some in groups of a micrometer."""
+    centers = scattered(region, max(2, n // 3), rng)
+    return centers[rng.integers(0, len(centers), n)] + 1e-6 * rng.uniform(-1, 1, (n, 2))
 
 
 def almost_twins(region: Region, n: int, rng: np.random.Generator) -> Array:
@@ -157,13 +157,13 @@ def reach(cells: VoronoiPartition, region: Region) -> float:
 def partition_by_clipping(points: Array, region: Region) -> VoronoiPartition:
     """Return the partition by clipping alone, as with limited communication; all robots are in range."""
     n = len(points)
-    all_neighbours = Neighbours(
+    all_neighbors = Neighbors(
         n,
         np.full(n, 1e9),
         np.arange(n + 1) * (n - 1),
         np.array([j for i in range(n) for j in range(n) if j != i], dtype=np.intp),
     )
-    return partition(points, region, all_neighbours)
+    return partition(points, region, all_neighbors)
 
 
 def assert_same_ring(a: Array, b: Array, tolerance: float) -> None:

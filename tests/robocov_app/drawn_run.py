@@ -11,7 +11,7 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.observation import Decision, Observations, Snapshot
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.record import Record
 from robocov.team import Team
 from robocov.voronoi import partition
@@ -108,7 +108,7 @@ def explained(
     seen = Observations(
         positions,
         zero if velocities is None else velocities,
-        Neighbours.from_ranges(positions, team.communication_range),
+        Neighbors.from_ranges(positions, team.communication_range),
         np.full_like(positions, np.nan) if obstacle_points is None else obstacle_points,
         SQUARE.region,
         1.5,

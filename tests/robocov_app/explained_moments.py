@@ -9,7 +9,7 @@ from drawn_run import SQUARE
 from robocov import Simulation, Team
 from robocov.metrics import SETTLED_WINDOW_S
 from robocov.observation import Decision, Observations, Snapshot
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov_app.viewer.explain import Line, Report, explain
 
 
@@ -38,7 +38,7 @@ def moment(
     seen = Observations(
         positions,
         np.zeros_like(positions) if velocities is None else np.array(velocities, dtype=float),
-        Neighbours.from_ranges(positions, team.communication_range),
+        Neighbors.from_ranges(positions, team.communication_range),
         nothing if points is None else np.array(points, dtype=float),
         environment.region,
     )

@@ -8,7 +8,7 @@ from drawn_run import ROOMS, SQUARE
 
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
-from robocov.metrics import CostHistory, compute_cost_history, summarise
+from robocov.metrics import CostHistory, compute_cost_history, summarize
 from robocov.record import Record
 from robocov.team import Team
 from robocov_app.report.results import FIGURES, Entry, Result
@@ -148,7 +148,7 @@ def saved_run(folder: Path, record: Record) -> Run:
     """Write the folder of a run with its real cost."""
     folder.mkdir(parents=True)
     history = compute_cost_history(record, CoverageCost(record.environment, 16), 5.0)
-    run = Run(record, history, summarise(record, history))
+    run = Run(record, history, summarize(record, history))
     save_numbers(run, folder, 16)
     return run
 

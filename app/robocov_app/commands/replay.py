@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from robocov.errors import InputError, ParameterError, summarise_names
+from robocov.errors import InputError, ParameterError, summarize_names
 from robocov_app.runs.options import FilmOptions, JsonOption, WebOptions
 from robocov_app.terminal import output
 from robocov_app.terminal.arguments import window_size
@@ -98,7 +98,7 @@ def _replay(options: Arguments) -> int:
         load_controller_class(controller)
         names = [each.record.controller for each in saved]
         if controller.rpartition(":")[2] not in (name.rpartition(":")[2] for name in names):
-            wanted = f"expected the controller of a run ({summarise_names(names)})"
+            wanted = f"expected the controller of a run ({summarize_names(names)})"
             raise ParameterError(f"--controller: {wanted}, got {controller}")
     try:
         session = replayed_session(saved, options.controller)

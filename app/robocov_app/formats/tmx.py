@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array, BoolArray
 from robocov.environment import CircleObstacle
-from robocov.errors import MapError, ParameterError, format_count, quote, summarise_names, to_one_line
+from robocov.errors import MapError, ParameterError, format_count, quote, summarize_names, to_one_line
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import frame, moved
@@ -108,7 +108,7 @@ class _Map:
         self._add_objects([layer for layer in layers if layer.element.tag != "layer"], anything=not grids)
         shapes.require_known_names()
         if not (solid.any() or shapes.outlines or shapes.lines or shapes.pillars):
-            names = summarise_names([quote(layer.labels[0]) for layer in layers if layer.labels])
+            names = summarize_names([quote(layer.labels[0]) for layer in layers if layer.labels])
             nothing = "nothing is solid by properties, collision objects or names of layers"
             wanted = f"expected --only LAYER with one of walls: {names or 'there is none'}"
             raise MapError(f"{where}: {nothing}, {wanted}")

@@ -266,7 +266,7 @@ class ObservationLayout:
         obstacle[sensed, :2] = ((seen.obstacle_points - seen.positions) / reach)[sensed]
         obstacle[:, 2] = sensed
         if self.neighbours:
-            robot, _, offset, distance = seen.find_near_neighbours(4.0 * unit)
+            robot, _, offset, distance = seen.find_near_neighbors(4.0 * unit)
             nearest = np.zeros((n, self.neighbours, 3))
             farthest = np.full((n, self.neighbours), np.inf)
             _nearest(robot, offset, distance, unit, farthest, nearest)

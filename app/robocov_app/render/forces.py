@@ -112,11 +112,11 @@ def range_layer(kind: str, title: str) -> Layer:
 
 def draw_links(canvas: Canvas, scene: Scene) -> None:
     """Draw lines between neighbours; of a complete graph those whose cells share an edge."""
-    neighbours = scene.now.seen.neighbours
-    if neighbours.is_complete:
+    neighbors = scene.now.seen.neighbors
+    if neighbors.is_complete:
         pairs = scene.adjacency
     else:
-        pairs = np.column_stack(neighbours.list_pairs())
+        pairs = np.column_stack(neighbors.list_pairs())
         pairs = pairs[pairs[:, 0] < pairs[:, 1]]
     for start, end in () if pairs is None else canvas.camera.to_pixels(scene.now.positions)[pairs].tolist():
         _link(canvas, start, end)

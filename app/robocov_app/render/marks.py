@@ -204,8 +204,8 @@ def draw_selection(canvas: Canvas, scene: Scene) -> None:
         if isinstance(cells, VoronoiPartition) and len(cells.polygons[robot]) > 2:
             corners = canvas.camera.to_pixels(cells.polygons[robot])
             canvas.outline(corners, theme.ink, canvas.width(1.6 * theme.line))
-        known = [robot, *seen.neighbours.list_neighbours(robot).tolist()]
-        places = np.concatenate([seen.positions[[robot]], seen.get_neighbour_positions(robot)])
+        known = [robot, *seen.neighbors.list_neighbors(robot).tolist()]
+        places = np.concatenate([seen.positions[[robot]], seen.get_neighbor_positions(robot)])
         for other, place in zip(known, canvas.camera.to_pixels(places).tolist(), strict=True):
             hue = int(canvas.hues[other])
             canvas.dashes(there[other], place, mix(theme.robots[hue], theme.ink, 0.2), dash=3.0)

@@ -13,7 +13,7 @@ import shapely.affinity
 from robocov.arrays import Array, IntArray
 from robocov.environment import Environment
 from robocov.observation import Snapshot
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.record import Record
 from robocov.team import Team
 from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
@@ -193,12 +193,12 @@ def snapshot_of(snapshot: Snapshot, rows: IntArray) -> Snapshot:
     seen, decision = snapshot.seen, snapshot.decision
     number = np.full(len(seen.positions), -1, dtype=np.intp)
     number[rows] = np.arange(len(rows))
-    robot, neighbour = seen.neighbours.list_pairs()
-    kept = (number[robot] >= 0) & (number[neighbour] >= 0)
-    neighbours = Neighbours(len(rows))
-    if not seen.neighbours.is_complete:
-        ranges = None if seen.neighbours.ranges is None else seen.neighbours.ranges[rows]
-        neighbours = Neighbours.from_pairs(len(rows), number[robot[kept]], number[neighbour[kept]], ranges)
+    robot, neighbor = seen.neighbors.list_pairs()
+    kept = (number[robot] >= 0) & (number[neighbor] >= 0)
+    neighbors = Neighbors(len(rows))
+    if not seen.neighbors.is_complete:
+        ranges = None if seen.neighbors.ranges is None else seen.neighbors.ranges[rows]
+        neighbors = Neighbors.from_pairs(len(rows), number[robot[kept]], number[neighbor[kept]], ranges)
 
     def chosen(of: Any, which: Any, *names: str) -> dict[str, Any]:
         return {name: value[which] for name in names if (value := getattr(of, name)) is not None}
@@ -207,7 +207,7 @@ def snapshot_of(snapshot: Snapshot, rows: IntArray) -> Snapshot:
     told = chosen(seen, kept, "reported_positions", "report_ages")
     terms = {name: term[rows] for name, term in decision.terms.items()}
     return Snapshot(
-        replace(seen, neighbours=neighbours, scans=None, **own, **told),
+        replace(seen, neighbors=neighbors, scans=None, **own, **told),
         replace(decision, terms=terms, **chosen(decision, rows, "forces", "goals")),
         None if snapshot.truth is None else snapshot.truth[rows],
     )

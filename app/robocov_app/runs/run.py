@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from robocov.cost import CoverageCost
 from robocov.files.result_folder import ResultFolder
-from robocov.metrics import CostHistory, compute_cost_history, select_sampled_moments, summarise
+from robocov.metrics import CostHistory, compute_cost_history, select_sampled_moments, summarize
 from robocov.metrics.cost_history import DEFAULT_RATE_HZ
 from robocov.record import Record
 from robocov.scenario import Scenario
@@ -46,7 +46,7 @@ def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: 
         rate = min(rate, STOPPED_SAMPLES / float(record.time[-1]))
     with progress("coverage cost", len(select_sampled_moments(record, rate)), quiet=quiet) as update:
         history = compute_cost_history(record, cost, rate, counting(update))
-    return Run(record, history, summarise(record, history))
+    return Run(record, history, summarize(record, history))
 
 
 def saved_run(

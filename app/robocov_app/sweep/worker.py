@@ -18,7 +18,7 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import RobocovError
 from robocov.mapfile import from_json
-from robocov.metrics import compute_cost_history, summarise
+from robocov.metrics import compute_cost_history, summarize
 from robocov.metrics.run_metrics import compute_final_metrics
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.record import Record, list_versions
@@ -81,7 +81,7 @@ def perform(task: Task) -> Outcome:
             record, effort = measured(task, environment)
             history = compute_cost_history(record, cost, task.cost_hz)
             # of all moments: what is kept of them is for people to look at
-            summary = finite(summarise(record, history))
+            summary = finite(summarize(record, history))
             path = summary["path_length_m"]
             figures = {**summary, "path_length_m": sum(path) / len(path)}
             figures = {name: figures[name] for name in (*FIGURES, TIMED) if name in figures}

@@ -125,7 +125,7 @@ class _Case:
         point = _row(snapshot.seen.obstacle_points, robot)
         self.sensing = point is not None
         self.solid, self.others = _solid(environment, here, point, self.radius), []
-        for j in snapshot.seen.neighbours.list_neighbours(robot).tolist():
+        for j in snapshot.seen.neighbors.list_neighbors(robot).tolist():
             offset = (_row(snapshot.positions, j) or 0j) - here
             gap = abs(offset) - self.radius - float(team.radius[j])
             self.others.append(_Thing(f"robot {names[j]}", offset, gap))

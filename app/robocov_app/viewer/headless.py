@@ -18,7 +18,7 @@ from robocov.controllers import has_memory
 from robocov.environment import CircleObstacle
 from robocov.errors import InputError, to_one_line
 from robocov.files.result_folder import ResultFolder
-from robocov.metrics import CostHistory, summarise
+from robocov.metrics import CostHistory, summarize
 from robocov.record import Record, Recorder
 from robocov_app.render.density import cost_label, mean_label
 from robocov_app.render.fonts import label, shortened
@@ -169,7 +169,7 @@ def save_story(
             bare = replace(record, environment=part.setups[number].environment)
             costs.append(built_cost(bare.environment, options.lattice, quiet=True))
             history = evaluated(bare, costs[-1], stop, quiet=options.json).history
-            runs[name] = Run(record, history, summarise(record, history))
+            runs[name] = Run(record, history, summarize(record, history))
             save_numbers(runs[name], place, options.lattice)
             histories.append((part.begin * dt, name, history))
             mean = runs[name].summary["mean_distance_m"]

@@ -17,7 +17,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.conditions.conditions import TIME_TOLERANCE_S, Conditions
 from robocov.conditions.random_streams import LOSS_STREAM, create_generator
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 
 NEVER = -1
 """The step at which something has not happened."""
@@ -171,7 +171,7 @@ class Radio:
             newest_positions[receiver, sender] = broadcast.positions[sender]
         return Inbox(sent, arrived, newest_positions, in_flight[len(due) :])
 
-    def read_reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbours, Array, Array]:
+    def read_reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbors, Array, Array]:
         """Read the newest message that each working robot has from every robot that it has not forgotten.
 
         Parameters
@@ -184,19 +184,19 @@ class Radio:
 
         Returns
         -------
-        neighbours : Neighbours
+        neighbors : Neighbors
             The robots from which each robot has such a message.
         positions : (m, 2) array, m
-            Positions in the messages, in the order of ``neighbours.indices``.
+            Positions in the messages, in the order of ``neighbors.indices``.
         ages : (m,) array, s
             Times since the messages were sent.
         """
         silence = (step - inbox.arrived) * self._dt
         is_recent = silence <= self._conditions.forget_after + TIME_TOLERANCE_S
-        robot, neighbour = np.nonzero((inbox.arrived >= 0) & is_recent & working[:, None])
-        neighbours = Neighbours.from_pairs(len(working), robot, neighbour, self._ranges)
-        ages = (step - inbox.sent[robot, neighbour]) * self._dt
-        return neighbours, inbox.positions[robot, neighbour], np.asarray(ages)
+        robot, neighbor = np.nonzero((inbox.arrived >= 0) & is_recent & working[:, None])
+        neighbors = Neighbors.from_pairs(len(working), robot, neighbor, self._ranges)
+        ages = (step - inbox.sent[robot, neighbor]) * self._dt
+        return neighbors, inbox.positions[robot, neighbor], np.asarray(ages)
 
     def _is_sending(self, step: int) -> bool:
         """Return whether messages are sent in a step: at time zero, and whenever a period has passed."""
@@ -210,7 +210,7 @@ class Radio:
 
     def _find_receivers(self, step: int, positions: Array, working: BoolArray) -> BoolArray:
         """Find the receivers of each robot's message, an (n, n) mask of receivers by senders."""
-        links = Neighbours.from_ranges(positions, self._ranges).restrict_to_working(working)
+        links = Neighbors.from_ranges(positions, self._ranges).restrict_to_working(working)
         receiver, sender = links.list_pairs()
         is_received = np.zeros((len(positions), len(positions)), dtype=bool)
         is_received[receiver, sender] = True

@@ -169,4 +169,4 @@ def _build_place(path: str, value: Any) -> tuple[float, float]:
         x, y = value
         if all(is_number(coordinate) and math.isfinite(coordinate) for coordinate in (x, y)):
             return float(x), float(y)
-    raise ParameterError(f"{path}: expected a place [x, y] in metres, got {quote(value)}")
+    raise ParameterError(f"{path}: expected a place [x, y] in meters, got {quote(value)}")

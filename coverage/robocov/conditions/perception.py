@@ -83,13 +83,13 @@ class Perception:
             scans=self._add_scanning_noise(step, truth.scans),
         )
         if inbox is None or not self._conditions.uses_messages:
-            neighbours = truth.neighbours.restrict_to_working(working)
-            return replace(observations, neighbours=neighbours), None
+            neighbors = truth.neighbors.restrict_to_working(working)
+            return replace(observations, neighbors=neighbors), None
         inbox = self._radio.exchange_messages(inbox, step, positions, truth.positions, working)
-        neighbours, reported_positions, ages = self._radio.read_reports(inbox, step, working)
+        neighbors, reported_positions, ages = self._radio.read_reports(inbox, step, working)
         observations = replace(
             observations,
-            neighbours=neighbours,
+            neighbors=neighbors,
             reported_positions=reported_positions,
             report_ages=ages,
         )

@@ -63,24 +63,24 @@ class Adaptive(BaseController):
         da_i/dt = γ (λ_i - Λ_i a_i) + k P_i (C_i - p_i) + ζ Σ_j (a_j - a_i) / deg_i,    a_i >= `least`
 
     The first term fits all measurements of the robot. The second one makes the paper's Lyapunov function
-    fall, with P_i = ∫ K (q - p_i)^T dq over V_i. The third one is the consensus with the neighbours. Where no
+    fall, with P_i = ∫ K (q - p_i)^T dq over V_i. The third one is the consensus with the neighbors. Where no
     robot has been, the estimate stays close to the initial one: robots move to where the cost is low, not to
     where there is much to learn.
 
     With ``estimate="gp"`` robots exchange their measurements instead, one for each of 20 by 20 squares, as if
-    taken at its centre. The estimate is the mean of a Gaussian process with a squared exponential kernel of
+    taken at its center. The estimate is the mean of a Gaussian process with a squared exponential kernel of
     length `correlation`, following Luo and Sycara (ICRA 2018) and Santos, Diaz-Mercado and Egerstedt (2018),
     plus `explore` times its standard deviation. With `explore` above 0, which takes several times as long to
     compute, robots are drawn to where no robot has been.
 
-    The controller reads the density of the map at the positions of the robots, and nowhere else. Neighbours
-    exchange their estimates, so ``information`` is "shared map". A robot without neighbours
+    The controller reads the density of the map at the positions of the robots, and nowhere else. Neighbors
+    exchange their estimates, so ``information`` is "shared map". A robot without neighbors
     learns alone, and treats the whole region as its cell. Obstacles are not known; the robot slides along
     them, as with `lloyd`.
 
     The implementation follows summaries of the papers, not their texts. Decisions made here: parameters are
     integrated by implicit steps of `period` seconds, so that no gain is unstable; cells and centroids are
-    sampled on a lattice; w = 1; all neighbours have the same weight in the consensus. The Gaussian process is
+    sampled on a lattice; w = 1; all neighbors have the same weight in the consensus. The Gaussian process is
     the plain one, without the mixtures and bounds of the papers.
     """
 
@@ -94,7 +94,7 @@ class Adaptive(BaseController):
     prior: float = gain(1.0, "1", "density everywhere before the first measurement", low=1e-3)
     least: float = gain(0.05, "1", "minimum of the estimated density", low=1e-6)
     learning: float = gain(3.0, "1/s²", "γ, rate at which measurements are learned")
-    consensus: float = gain(1.0, "1/s", "ζ, rate at which neighbours agree")
+    consensus: float = gain(1.0, "1/s", "ζ, rate at which neighbors agree")
     coupling: float = gain(1e-3, "1/(m⁴ s)", "k, effect of the offset to the centroid")
     correlation: float = gain(
         0.12,
@@ -104,7 +104,7 @@ class Adaptive(BaseController):
     )
     explore: float = gain(0.0, "σ", "number of standard deviations that are added", high=100.0)
     period: float = gain(0.2, "s", "time from one estimate to the next", low=0.01, high=60.0)
-    k_prop: float = gain(2.0, "1/s", "desired speed per metre of distance to the centroid", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> AdaptiveMemory:
@@ -123,7 +123,7 @@ class Adaptive(BaseController):
         )
 
     def decide(self, seen: Observations, memory: AdaptiveMemory) -> Decision:
-        """Compute the forces towards the centroids, after a new estimate if it is time for one."""
+        """Compute the forces toward the centroids, after a new estimate if it is time for one."""
         next_plan_time = memory.plan_time + self.period - _TIME_TOLERANCE_S
         if memory.goals is None or not memory.plan_time <= seen.time < next_plan_time:
             memory = self._plan(seen, memory)
@@ -137,7 +137,7 @@ class Adaptive(BaseController):
     def _plan(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
         """Return the memory with new estimates, and the centroids of the cells by these as goals."""
         samples = memory.lattice.samples
-        robot, _, offset, _ = seen.find_near_neighbours(np.inf)
+        robot, _, offset, _ = seen.find_near_neighbors(np.inf)
         is_own = find_own_samples(samples, seen.positions, robot, seen.positions[robot] - offset)
         if self.estimate == "gp":
             memory = self._learn_by_process(seen, memory)
@@ -168,7 +168,7 @@ class Adaptive(BaseController):
         moments = is_own * (offsets * (goals - seen.positions)[:, None]).sum(axis=2) * lattice.sample_area
         change = (
             self.learning * projections
-            + self.consensus * self._average_neighbours(seen, memory.parameters)
+            + self.consensus * self._average_neighbors(seen, memory.parameters)
             + self.coupling * _multiply(moments, lattice.functions)
         )
         identity = np.eye(memory.parameters.shape[1])
@@ -183,25 +183,25 @@ class Adaptive(BaseController):
             projections=projections,
         )
 
-    def _average_neighbours(self, seen: Observations, parameters: Array) -> Array:
-        """Return the mean parameters of each robot's neighbours; its own ones if it has no neighbours."""
+    def _average_neighbors(self, seen: Observations, parameters: Array) -> Array:
+        """Return the mean parameters of each robot's neighbors; its own ones if it has no neighbors."""
         means = parameters.copy()
         for robot in range(len(parameters)):
-            neighbours = seen.neighbours.list_neighbours(robot)
-            if len(neighbours) > 0:
-                means[robot] = parameters[neighbours].mean(axis=0)
+            neighbors = seen.neighbors.list_neighbors(robot)
+            if len(neighbors) > 0:
+                means[robot] = parameters[neighbors].mean(axis=0)
         return means
 
     def _learn_by_process(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
-        """Return the memory with the robots' own measurements, and those of their neighbours."""
+        """Return the memory with the robots' own measurements, and those of their neighbors."""
         lattice = memory.lattice
         values = _measure(seen)
         measurements = memory.measurements.copy()
         estimates = memory.estimates.copy()
         for robot, position in enumerate(seen.positions):
             known = measurements[robot]
-            for neighbour in seen.neighbours.list_neighbours(robot):
-                known = np.where(np.isnan(known), memory.measurements[neighbour], known)
+            for neighbor in seen.neighbors.list_neighbors(robot):
+                known = np.where(np.isnan(known), memory.measurements[neighbor], known)
             square = ((lattice.squares - position) ** 2).sum(axis=1).argmin()
             known[square] = values[robot]
             measurements[robot] = known
@@ -274,13 +274,13 @@ class Lattice:
     sample_area: float
     """Area that each sample stands for, m²."""
     centers: Array
-    """(m, 2) m, centres of the basis functions."""
+    """(m, 2) m, centers of the basis functions."""
     width: float
     """Standard deviation of the basis functions, m."""
     functions: Array
     """(k, m) K at the samples."""
     squares: Array
-    """(s, 2) m, centres of the squares with one measurement each."""
+    """(s, 2) m, centers of the squares with one measurement each."""
     sample_covariance: Array
     """(k, s) Covariances of samples and squares."""
     square_covariance: Array
@@ -324,7 +324,7 @@ class Lattice:
 
 
 def _build_grid(region: Region, count: int) -> Array:
-    """Return the centres of `count` by `count` equal rectangles over the bounding box, (count², 2) m."""
+    """Return the centers of `count` by `count` equal rectangles over the bounding box, (count², 2) m."""
     low_x, low_y, high_x, high_y = region.bounds
     fractions = (np.arange(count) + 0.5) / count
     x, y = np.meshgrid(low_x + fractions * (high_x - low_x), low_y + fractions * (high_y - low_y))

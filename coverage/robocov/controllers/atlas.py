@@ -14,7 +14,7 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import BaseController
 from robocov.controllers.driving import update_returns
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.controllers.localization import Estimates, assume_closer_neighbours, estimate_positions
+from robocov.controllers.localization import Estimates, assume_closer_neighbors, estimate_positions
 from robocov.controllers.route_following import follow_routes
 from robocov.controllers.shared_map import (
     CERTAIN_RANGE_FRACTION,
@@ -209,7 +209,7 @@ class Atlas(BaseController):
 
     Twice a second each robot scans, and adds the scan to its own grid map (`DiscoveredMap`). Robots send
     nothing but positions; cells at the positions of others become free. A robot out of range is assumed to
-    move to its goal in the plan, and forgotten if it is not there. Once in `period` seconds a robot minimises
+    move to its goal in the plan, and forgotten if it is not there. Once in `period` seconds a robot minimizes
     the coverage cost (22) on its own map, in four stages:
 
     1. *A plan for the team*, on a coarse lattice: Lloyd's iteration from the former plan, alternating with
@@ -243,7 +243,7 @@ class Atlas(BaseController):
     and goals double with the path length of a robot (`settling`), not with time: a robot at rest stays as
     ready to move as it was. Path lengths start from zero when robots join or fail, and when a robot sees a
     wall appear or disappear. In a team of more than `MAX_PLANNING_GROUP` robots each one plans for itself and
-    its nearest neighbours, in the part of the map around them; the others stay where they are.
+    its nearest neighbors, in the part of the map around them; the others stay where they are.
 
     Examples
     --------
@@ -274,7 +274,7 @@ class Atlas(BaseController):
         0.5, "1", "path, in diameters, that doubles the required savings", low=1e-3, high=1e6
     )
     clearance: float = gain(0.03, "m", "that routes keep between rim and walls", high=10.0)
-    k_prop: float = gain(2.0, "1/s", "desired speed per metre of distance to the goal", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> AtlasMemory:
@@ -297,7 +297,7 @@ class Atlas(BaseController):
         if seen.reported_positions is not None:
             previous = estimates or Estimates.build_initial(len(seen.positions))
             seen, estimates = estimate_positions(seen, previous, memory.team)
-            cautious = assume_closer_neighbours(seen, estimates)
+            cautious = assume_closer_neighbors(seen, estimates)
         memory = self._add_scans(seen, memory)
         memory = self._plan_routes(seen, memory, first_plan_time=0.0 if estimates is None else _LISTENING_S)
         returns = update_returns(seen, memory.returns)
@@ -328,7 +328,7 @@ class Atlas(BaseController):
         legs = memory.legs.copy()
         for robot, state in enumerate(states):
             if seen.time >= max(state.next_plan_time, first_plan_time) - 1e-9:
-                reports = self._list_reports(states, seen.neighbours.list_neighbours(robot))
+                reports = self._list_reports(states, seen.neighbors.list_neighbors(robot))
                 states[robot], goal = self._plan(seen, memory.team, state, robot, reports)
                 planner = states[robot].planner
                 if goal is not None and planner is not None:
@@ -345,8 +345,8 @@ class Atlas(BaseController):
         later = []
         for robot, known_map in enumerate(maps):
             scanned = known_map.add_scan(seen.positions[robot], scans.distances[robot], scans.hit[robot])
-            neighbours = seen.get_neighbour_positions(robot)
-            later.append(scanned.add_robots(neighbours, float(radius[robot])))
+            neighbors = seen.get_neighbor_positions(robot)
+            later.append(scanned.add_robots(neighbors, float(radius[robot])))
         return later
 
     def _list_reports(self, states: Sequence[PlannerState], heard: IntArray) -> list[Teammates]:
@@ -458,7 +458,7 @@ class Atlas(BaseController):
         teammates = state.teammates
         position = seen.positions[robot]
         communication_range = float(team.communication_range[robot])
-        robots = seen.neighbours.list_neighbours(robot)
+        robots = seen.neighbors.list_neighbors(robot)
         silence = np.where(np.isin(teammates.robots, robots), 0.0, seen.time - teammates.heard_times)
         max_distance = teammates.heard_distances + 2.0 * float(team.max_speed[robot]) * silence
         has_failed = (silence > 0.0) & (max_distance < communication_range)
@@ -471,8 +471,8 @@ class Atlas(BaseController):
         is_gone = has_failed | is_missed
         met = state.met - {*teammates.robots[has_failed].tolist()}
         gone = {**state.gone, **dict.fromkeys(teammates.robots[is_gone].tolist(), seen.time)}
-        neighbours = seen.get_neighbour_positions(robot)
-        teammates = teammates.add_observation(robots, neighbours, position, seen.time, is_gone)
+        neighbors = seen.get_neighbor_positions(robot)
+        teammates = teammates.add_observation(robots, neighbors, position, seen.time, is_gone)
         if reports:
             teammates = teammates.add_reports(reports, robot, gone)
         return replace(state, teammates=teammates, met=met | {*teammates.robots.tolist()}, gone=gone)
@@ -480,7 +480,7 @@ class Atlas(BaseController):
     def _plan_for_team(
         self, state: PlannerState, seen: Observations, cooperation: _Cooperation
     ) -> PlannerState:
-        """Return the state with a plan for the team, or for the robot and its nearest neighbours."""
+        """Return the state with a plan for the team, or for the robot and its nearest neighbors."""
         assert state.planner is not None and state.positions is not None and state.group is not None
         size = len(state.group)
         if not cooperation.is_agreed:
@@ -693,7 +693,7 @@ class AtlasShared(Atlas):
     def _update_maps(
         self, maps: list[DiscoveredMap], seen: Observations, scans: Scans, radius: Array
     ) -> list[DiscoveredMap]:
-        circles = list_circles(seen.neighbours)
+        circles = list_circles(seen.neighbors)
         scanned_maps = update_maps(maps, seen, scans, circles)
         # Robots that share a map also share the next one.
         shared_maps: dict[tuple[int, Circle, float], DiscoveredMap] = {}

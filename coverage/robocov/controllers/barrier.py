@@ -16,7 +16,7 @@ from robocov.controllers.driving import (
 )
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.known_cells import cells_choice, compute_known_cells
-from robocov.observation import Decision, NearNeighbours, Observations, Scanning
+from robocov.observation import Decision, NearNeighbors, Observations, Scanning
 from robocov.potential import compute_separations
 from robocov.team import Team
 
@@ -29,15 +29,15 @@ _MIN_PASSING_CLEARANCE_M = 1e-3
 _MIN_NORM = 1e-300
 
 
-class HeardNeighbours(NamedTuple):
+class HeardNeighbors(NamedTuple):
     """Reported positions of near robots at one time."""
 
     time: float
     """s"""
     pair: IntArray
-    """(m,) robot * n + neighbour, ascending."""
+    """(m,) robot * n + neighbor, ascending."""
     positions: Array
-    """(m, 2) m, of the neighbours."""
+    """(m, 2) m, of the neighbors."""
 
 
 class HalfPlanes(NamedTuple):
@@ -51,9 +51,9 @@ class HalfPlanes(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BarrierMemory(Memory):
-    """Memory of the robots, with the neighbours at the last step."""
+    """Memory of the robots, with the neighbors at the last step."""
 
-    heard: HeardNeighbours | None = None
+    heard: HeardNeighbors | None = None
 
 
 @dataclass(frozen=True)
@@ -66,14 +66,14 @@ class Barrier(BaseController):
 
     This is ensured by dh_ij/dt >= -gamma h_ij³, which is linear in the accelerations. Each of the two robots
     takes the fraction alpha_i / (alpha_i + alpha_j) of it, so that all decide independently. The desired
-    acceleration, here Lloyd's, is changed as little as these half planes require: one quadratic programme for
+    acceleration, here Lloyd's, is changed as little as these half planes require: one quadratic program for
     each robot, solved exactly. If no acceleration is allowed, the robot brakes. An obstacle point does not
     move and does not contribute: alpha_j = 0. The closest point of a wall moves on as the robot passes;
     therefore the term for moving sideways past a single point is left out.
 
     Robots do not know the velocities of others: each derives them from two reported positions. Obstacle
     points are the closest one and those of the last scan. The bodies and limits of the others are assumed to
-    be known. Decisions made here: the square root is rounded over the last millimetre, and continued as an
+    be known. Decisions made here: the square root is rounded over the last millimeter, and continued as an
     odd function within the safe distance, so that robots that start too close to each other separate.
 
     The implementation follows summaries of the paper (IEEE T-RO 33, 661-674), not its text; h_ij is that of
@@ -91,7 +91,7 @@ class Barrier(BaseController):
     braking: float = gain(
         0.8, "a_max", "alpha, the fraction of the acceleration that is counted on", low=0.05, high=1.0
     )
-    k_prop: float = gain(2.0, "1/s", "desired speed per metre of distance to the centroid", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()
     cells: str = cells_choice()
 
@@ -132,10 +132,10 @@ class Barrier(BaseController):
         """
         team = memory.team
         returns = update_returns(seen, memory.returns)
-        near = self._find_near_neighbours(seen, team)
-        heard = _to_heard_neighbours(near, seen)
-        neighbour_velocities = _derive_velocities(heard, memory.heard, team.max_speed[near.neighbour])
-        robots = self._constrain_to_robots(seen, team, near, neighbour_velocities)
+        near = self._find_near_neighbors(seen, team)
+        heard = _to_heard_neighbors(near, seen)
+        neighbor_velocities = _derive_velocities(heard, memory.heard, team.max_speed[near.neighbor])
+        robots = self._constrain_to_robots(seen, team, near, neighbor_velocities)
         obstacles = self._constrain_to_obstacles(seen, team, collect_obstacle_points(seen, returns))
         nearest, is_feasible = find_nearest_allowed(
             desired,
@@ -149,13 +149,13 @@ class Barrier(BaseController):
         accelerations = np.where(is_feasible[:, None], nearest, seen.velocities * rate[:, None])
         return accelerations, replace(memory, heard=heard, returns=returns)
 
-    def _find_near_neighbours(self, seen: Observations, team: Team) -> NearNeighbours:
-        """Find the neighbours that constrain a robot now."""
+    def _find_near_neighbors(self, seen: Observations, team: Team) -> NearNeighbors:
+        """Find the neighbors that constrain a robot now."""
         # Two robots at full speed can stop from farther away. Twice that, because gamma h³ is then not small.
         stopping_distance = (
             2.0 * float(team.max_speed.max()) ** 2 / float(self._compute_braking_limits(team).min())
         )
-        return seen.find_near_neighbours(
+        return seen.find_near_neighbors(
             2.0 * float(team.radius.max()) + self.safe_gap + 2.0 * stopping_distance
         )
 
@@ -164,18 +164,18 @@ class Barrier(BaseController):
         return np.asarray(self.braking * team.max_acceleration)
 
     def _constrain_to_robots(
-        self, seen: Observations, team: Team, near: NearNeighbours, neighbour_velocities: Array
+        self, seen: Observations, team: Team, near: NearNeighbors, neighbor_velocities: Array
     ) -> HalfPlanes:
         """Return the half planes that keep robots apart."""
         n = len(seen.positions)
-        robot, neighbour, offset, distance = near
+        robot, neighbor, offset, distance = near
         alpha = self._compute_braking_limits(team)
-        relative_velocities = seen.velocities[robot] - neighbour_velocities
+        relative_velocities = seen.velocities[robot] - neighbor_velocities
         is_together = distance < _MIN_DISTANCE_M
         normal = offset / np.maximum(distance, _MIN_DISTANCE_M)[:, None]
-        normal[is_together] = compute_separations(robot[is_together], neighbour[is_together])
-        total_alpha = alpha[robot] + alpha[neighbour]
-        gap = distance - team.radius[robot] - team.radius[neighbour] - self.safe_gap
+        normal[is_together] = compute_separations(robot[is_together], neighbor[is_together])
+        total_alpha = alpha[robot] + alpha[neighbor]
+        gap = distance - team.radius[robot] - team.radius[neighbor] - self.safe_gap
         along = (normal * relative_velocities).sum(axis=1)
         squared_sideways = np.maximum((relative_velocities * relative_velocities).sum(axis=1) - along**2, 0.0)
         min_distance = self.safe_gap + _MIN_PASSING_CLEARANCE_M
@@ -199,7 +199,7 @@ class Barrier(BaseController):
         return HalfPlanes(normals=-normal, limits=np.where(np.isnan(along), np.inf, limit))
 
     def _limit_approach(self, gap: Array, along: Array, alpha: Array) -> Array:
-        """Return the maximum acceleration towards each other: gamma h³ plus the derivative of the root in h.
+        """Return the maximum acceleration toward each other: gamma h³ plus the derivative of the root in h.
 
         Parameters
         ----------
@@ -221,22 +221,22 @@ class Barrier(BaseController):
         return np.asarray(np.maximum(self.gamma * h**3 + 0.5 * root / rounded * along, -alpha))
 
 
-def _to_heard_neighbours(near: NearNeighbours, seen: Observations) -> HeardNeighbours:
-    """Return the reported positions of near neighbours."""
-    pair = near.robot * len(seen.positions) + near.neighbour
-    return HeardNeighbours(seen.time, pair, seen.positions[near.robot] - near.offset)
+def _to_heard_neighbors(near: NearNeighbors, seen: Observations) -> HeardNeighbors:
+    """Return the reported positions of near neighbors."""
+    pair = near.robot * len(seen.positions) + near.neighbor
+    return HeardNeighbors(seen.time, pair, seen.positions[near.robot] - near.offset)
 
 
-def _derive_velocities(heard: HeardNeighbours, previous: HeardNeighbours | None, max_speed: Array) -> Array:
-    """Derive the velocities of neighbours from two reported positions; unknown velocities are zero.
+def _derive_velocities(heard: HeardNeighbors, previous: HeardNeighbors | None, max_speed: Array) -> Array:
+    """Derive the velocities of neighbors from two reported positions; unknown velocities are zero.
 
     Parameters
     ----------
-    heard : HeardNeighbours
-    previous : HeardNeighbours or None
-        The neighbours heard at the last step.
+    heard : HeardNeighbors
+    previous : HeardNeighbors or None
+        The neighbors heard at the last step.
     max_speed : (m,) array, m/s
-        Maximum speeds of the neighbours. The position jumps when a message was late.
+        Maximum speeds of the neighbors. The position jumps when a message was late.
 
     Returns
     -------

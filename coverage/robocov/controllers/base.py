@@ -15,7 +15,7 @@ from robocov.voronoi.delaunay import Mesh
 
 Information: TypeAlias = Literal["own", "shared map", "whole map"]
 """Information that a controller uses: what each robot senses and hears itself ("own"); in addition maps, and
-the last known positions of other robots, that neighbours send each other ("shared map"); or the whole map
+the last known positions of other robots, that neighbors send each other ("shared map"); or the whole map
 from the start ("whole map")."""
 
 

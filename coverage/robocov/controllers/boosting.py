@@ -22,7 +22,7 @@ from robocov.controllers.driving import (
     update_returns,
 )
 from robocov.controllers.gains import choice, gain, response_time_gain
-from robocov.observation import Decision, NearNeighbours, Observations, Scanning, compute_ray_directions
+from robocov.observation import Decision, NearNeighbors, Observations, Scanning, compute_ray_directions
 from robocov.observation.scanned_view import (
     View,
     Windows,
@@ -44,7 +44,7 @@ _REST_RADIUS_M = 0.1
 _TRAIL_SPACING_M = 0.2
 """Distance between the points of the trail on which a robot returns."""
 _RETURN_GAIN = 2.0
-"""Speed per metre of distance to the next point of the trail, 1/s."""
+"""Speed per meter of distance to the next point of the trail, 1/s."""
 _MIN_DISTANCE_M = 1e-3
 """Lower bound of distances, to avoid division by zero."""
 _MIN_DETECTION = 1e-3
@@ -179,14 +179,14 @@ class Boosting(BaseController):
     """Coverage by joint detection, with boosting functions (Sun, Cassandras and Gokbayrak, CDC 2014).
 
     A robot detects an event at x, within its line of sight and its sensing range, with the probability
-    p_i = exp(-λ d) at the distance d. The team maximises
+    p_i = exp(-λ d) at the distance d. The team maximizes
 
         H = ∫ φ(x) (1 - Π_i (1 - p_i(x))) dx
 
     Notes
     -----
     Robot i contributes ∫ φ Φ_i p_i over its view, where Φ_i is the probability that no other robot detects x.
-    The gradient of that has three terms: w λ p_i towards each point in view, with w = φ Φ_i; for each corner
+    The gradient of that has three terms: w λ p_i toward each point in view, with w = φ Φ_i; for each corner
     that hides something, the integral of w p_i (s - ρ)/ρ along the edge of the view (see `Windows`); and
     w p_i along the arcs where the view ends at the sensing range.
 
@@ -194,7 +194,7 @@ class Boosting(BaseController):
 
         phi         κ Φ_i^γ w: points that no other robot detects count more
         p           κ (1 - Π (1 - p))^-γ w: points that the whole team hardly detects count more
-        neighbours  w, and each neighbour in range repels with κ / d^γ
+        neighbours  w, and each neighbor in range repels with κ / d^γ
 
     A robot follows it until it rests again, or for `patience`, and then its own gradient to the next optimum.
     If it contributes less there than before, it returns on its trail, and stays. The result is therefore no
@@ -206,8 +206,8 @@ class Boosting(BaseController):
 
     The implementation follows the abstract of the paper (arXiv 1409.0776), that of its sequel by Welikala and
     Cassandras (arXiv 1903.04133), and summaries of both, not their texts. There the map is known. Here a
-    robot uses its own scan, and assumes that a neighbour sees a point unless something that the scan has met
-    is in front of the line between them. Each robot boosts itself when it rests, without synchronisation. The
+    robot uses its own scan, and assumes that a neighbor sees a point unless something that the scan has met
+    is in front of the line between them. Each robot boosts itself when it rests, without synchronization. The
     trail back, the times, and avoiding obstacles and robots are ours as well. The gains of the boosts are of
     the known kinds, with our values.
     """
@@ -226,7 +226,7 @@ class Boosting(BaseController):
     gamma: float = gain(2.0, "1", "γ, its exponent", high=20.0)
     boosts: float = gain(3.0, "times", "maximum number of boosts of a robot", whole=True, high=1e3)
     patience: float = gain(8.0, "s", "maximum duration of a boost")
-    k_grad: float = gain(0.3, "1/s", "desired speed per metre of the gradient", high=100.0)
+    k_grad: float = gain(0.3, "1/s", "desired speed per meter of the gradient", high=100.0)
     jump: float = gain(0.3, "m", "minimum step of the depth in view at a window", low=0.01)
     clearance: float = gain(0.05, "m", "distance kept from obstacles and robots, rim to rim", high=10.0)
     response_time: float = response_time_gain()
@@ -287,7 +287,7 @@ class Boosting(BaseController):
             Maximum distance of each robot's view.
         """
         directions = compute_ray_directions(view.distances.shape[1])
-        pairs = seen.find_near_neighbours(2.0 * float(reach.max()))
+        pairs = seen.find_near_neighbors(2.0 * float(reach.max()))
         samples = self._sample_views(seen, view, pairs, directions, reach)
         windows = find_windows(view, directions, reach, self.jump)
         boosted_gradient = self._compute_gradient(
@@ -305,7 +305,7 @@ class Boosting(BaseController):
         )
 
     def _sample_views(
-        self, seen: Observations, view: View, pairs: NearNeighbours, directions: Array, reach: Array
+        self, seen: Observations, view: View, pairs: NearNeighbors, directions: Array, reach: Array
     ) -> _ViewSamples:
         """Sample the views of all robots."""
         angle = 2.0 * np.pi / len(directions)
@@ -356,9 +356,9 @@ class Boosting(BaseController):
 
 @kernel
 def compute_undetected(
-    depths: Array, walls: Array, directions: Array, pairs: NearNeighbours, reach: Array, decay: float
+    depths: Array, walls: Array, directions: Array, pairs: NearNeighbors, reach: Array, decay: float
 ) -> Array:
-    """Compute the probability that no neighbour detects the points of each robot's view.
+    """Compute the probability that no neighbor detects the points of each robot's view.
 
     Parameters
     ----------
@@ -368,9 +368,9 @@ def compute_undetected(
         Distances of the walls in view; infinite where there is none.
     directions : (rays, 2) array
         Unit vectors along the rays.
-    pairs : NearNeighbours
-        The neighbours that may see points of the view: within their own reach, unless a wall that the robot
-        sees is in front of the line between neighbour and point.
+    pairs : NearNeighbors
+        The neighbors that may see points of the view: within their own reach, unless a wall that the robot
+        sees is in front of the line between neighbor and point.
     reach : (n,) array, m
         Maximum distance of each robot's view.
     decay : float, 1/m
@@ -383,18 +383,18 @@ def compute_undetected(
     undetected = np.ones(depths.shape)
     for m in range(len(pairs.robot)):
         i = pairs.robot[m]
-        neighbour_x = -pairs.offset[m, 0]
-        neighbour_y = -pairs.offset[m, 1]
-        neighbour_reach = reach[pairs.neighbour[m]]
-        if is_behind_wall(neighbour_x, neighbour_y, walls[i]):
+        neighbor_x = -pairs.offset[m, 0]
+        neighbor_y = -pairs.offset[m, 1]
+        neighbor_reach = reach[pairs.neighbor[m]]
+        if is_behind_wall(neighbor_x, neighbor_y, walls[i]):
             continue
         for r in range(len(directions)):
             for c in range(depths.shape[2]):
                 x = depths[i, r, c] * directions[r, 0]
                 y = depths[i, r, c] * directions[r, 1]
-                dx = neighbour_x - x
-                dy = neighbour_y - y
+                dx = neighbor_x - x
+                dy = neighbor_y - y
                 distance = math.sqrt(dx * dx + dy * dy)
-                if distance <= neighbour_reach and is_path_clear(x, y, dx, dy, walls[i]):
+                if distance <= neighbor_reach and is_path_clear(x, y, dx, dy, walls[i]):
                     undetected[i, r, c] *= 1.0 - math.exp(-decay * distance)
     return undetected

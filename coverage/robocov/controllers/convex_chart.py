@@ -28,7 +28,7 @@ class ConvexChart:
     ----------
     environment : Environment
     clearance : float, m
-        Distance that the centres of robots keep from walls.
+        Distance that the centers of robots keep from walls.
     lattice : int
         Number of cells of the mesh along a side of the region.
     shrink : float
@@ -37,7 +37,7 @@ class ConvexChart:
     Attributes
     ----------
     configuration_space : shapely.Geometry
-        Space where the centres of robots may be.
+        Space where the centers of robots may be.
     points : (v, 2) array, m
         Vertices of a mesh of the region.
     triangles : (t, 3) int array
@@ -52,7 +52,7 @@ class ConvexChart:
     Notes
     -----
     F is a discrete harmonic map of a mesh of the whole region, obstacles included. Vertices on the boundary
-    are fixed; each other vertex is the weighted mean of its neighbours, with Floater's mean value weights
+    are fixed; each other vertex is the weighted mean of its neighbors, with Floater's mean value weights
     (2003), multiplied by `shrink` in obstacles. With positive weights and a convex boundary F is one-to-one
     (Tutte 1963, Floater 1997), for any `shrink`. An obstacle connected with the boundary shrinks to where it
     is connected, and a wall between two rooms becomes a slit. Without obstacles, or for a `shrink` of 1, F
@@ -237,7 +237,7 @@ def _find_indices(points: Array, selected: Array) -> IntArray:
 def _compute_harmonic_images(mesh: _Mesh, stiffness: Array) -> Array:
     """Return the images of the vertices, (v, 2) m, by the stiffness of each triangle, (t,).
 
-    Each vertex that is not fixed is the weighted mean of its neighbours. The weight of an edge is, by
+    Each vertex that is not fixed is the weighted mean of its neighbors. The weight of an edge is, by
     Floater's mean value coordinates, (tan(α/2) + tan(β/2)) / length with the two adjacent angles, each
     multiplied by the stiffness of its triangle.
     """
@@ -247,7 +247,7 @@ def _compute_harmonic_images(mesh: _Mesh, stiffness: Array) -> Array:
     right = weights[inner][:, fixed] @ mesh.points[fixed]
     laplacian = diags_array(weights.sum(axis=1)) - weights
     system = laplacian.tocsr()[inner][:, inner].tocoo()
-    # Vertices are sorted: the indices of neighbours are close, and the matrix has a narrow band.
+    # Vertices are sorted: the indices of neighbors are close, and the matrix has a narrow band.
     bandwidth = int(np.abs(system.row - system.col).max(initial=0))
     band = np.zeros((len(inner), 2 * bandwidth + 1))
     band[system.row, system.col - system.row + bandwidth] = system.data
@@ -257,7 +257,7 @@ def _compute_harmonic_images(mesh: _Mesh, stiffness: Array) -> Array:
 
 
 def _build_weights(mesh: _Mesh, stiffness: Array) -> csr_array:
-    """Return the (v, v) weights of neighbours in the mean."""
+    """Return the (v, v) weights of neighbors in the mean."""
     rows = []
     columns = []
     weights = []

@@ -54,7 +54,7 @@ class Diffeomorphism(WholeMapController):
 
     Notes
     -----
-    The motion minimises the cost of the images: its distances are those in the chart, not path lengths in the
+    The motion minimizes the cost of the images: its distances are those in the chart, not path lengths in the
     map. A room at the end of a long corridor is small in the chart, and hardly attracts robots.
 
     Any diffeomorphism will do; this one is a `ConvexChart`. For a `shrink` of 1 and without obstacles it is
@@ -79,7 +79,7 @@ class Diffeomorphism(WholeMapController):
     lattice: float = gain(64.0, "cells", "of the mesh along a side", low=4.0, high=512.0, whole=True)
     clearance: float = gain(0.03, "m", "that paths keep between rim and walls", high=10.0)
     period: float = gain(0.2, "s", "between two plans", high=60.0)
-    k_prop: float = gain(2.0, "1/s", "desired speed per metre to the centroid, in the map", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per meter to the centroid, in the map", high=100.0)
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> DiffeomorphismMemory:
@@ -114,12 +114,12 @@ class Diffeomorphism(WholeMapController):
 
 def _compute_centroids(seen: Observations, chart: ConvexChart, images: Array) -> Array:
     """Return the centroids, (n, 2) m, of the cells of robots with the given images in the chart."""
-    pairs = seen.find_near_neighbours(np.inf)
+    pairs = seen.find_near_neighbors(np.inf)
     if seen.reported_positions is None:
-        neighbour_images = images[pairs.neighbour]
+        neighbor_images = images[pairs.neighbor]
     else:
-        neighbour_images, _ = chart.map_to_chart(seen.positions[pairs.robot] - pairs.offset)
-    is_own = find_own_samples(chart.samples, images, pairs.robot, neighbour_images)
+        neighbor_images, _ = chart.map_to_chart(seen.positions[pairs.robot] - pairs.offset)
+    is_own = find_own_samples(chart.samples, images, pairs.robot, neighbor_images)
     return compute_sample_centroids(is_own, chart.samples, chart.mass, images)
 
 

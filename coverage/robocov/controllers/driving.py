@@ -1,4 +1,4 @@
-"""Safe velocities towards goals, and the forces that track them.
+"""Safe velocities toward goals, and the forces that track them.
 
 A controller computes a desired velocity, `avoid_collisions` returns the nearest velocity that is safe as far
 as the robot senses and hears, and `compute_drive_forces` returns the force that tracks it.
@@ -26,9 +26,9 @@ class Margins(NamedTuple):
     """Distances that `avoid_collisions` keeps, and how fast robots may approach them."""
 
     clearance: Array
-    """(n,) m, from the centre of each robot to obstacle points."""
+    """(n,) m, from the center of each robot to obstacle points."""
     separation: Array
-    """(n,) m, between the centres of robots."""
+    """(n,) m, between the centers of robots."""
     rate: float
     """1/s, rate of the exponential decrease of the remaining distance."""
     braking: float
@@ -50,14 +50,14 @@ class Margins(NamedTuple):
 
 
 def compute_approach_velocities(offsets: Array, gain: float, max_speed: Array) -> Array:
-    """Compute velocities towards goals.
+    """Compute velocities toward goals.
 
     Parameters
     ----------
     offsets : (n, 2) array, m
         From the robots to their goals.
     gain : float, 1/s
-        Speed per metre of distance; infinite for full speed.
+        Speed per meter of distance; infinite for full speed.
     max_speed : (n,) array, m/s
 
     Returns
@@ -126,7 +126,7 @@ def collect_obstacle_points(seen: Observations, returns: Array | None) -> Array:
 def avoid_collisions(
     velocities: Array, seen: Observations, team: Team, obstacle_points: Array, margins: Margins
 ) -> Array:
-    """Compute the safe velocities nearest to desired ones: slow towards obstacles and other robots.
+    """Compute the safe velocities nearest to desired ones: slow toward obstacles and other robots.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def avoid_collisions(
         team.max_speed / max(margins.rate, 1e-9), team.max_speed**2 / (2.0 * robot_braking)
     )
     reach = float((margins.separation + stopping_distance).max())
-    robot_offsets = list_neighbour_offsets(seen, reach)
+    robot_offsets = list_neighbor_offsets(seen, reach)
     wall_offsets = seen.positions[:, None] - obstacle_points
     robots = robot_offsets.shape[1]
     is_robot = np.arange(robots + wall_offsets.shape[1]) < robots
@@ -167,7 +167,7 @@ def avoid_collisions(
 def limit_approach_speed(
     velocities: Array, offsets: Array, clearance: Array, rate: float, braking: Array, max_speed: Array
 ) -> Array:
-    """Compute the velocities nearest to desired ones that are slow towards close objects.
+    """Compute the velocities nearest to desired ones that are slow toward close objects.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def find_nearest_allowed(
 
     Notes
     -----
-    Minimise |u - p|² subject to normals[k] · u <= offsets[k] for all k and |u| <= radius. Constraints are
+    Minimize |u - p|² subject to normals[k] · u <= offsets[k] for all k and |u| <= radius. Constraints are
     added one by one: if the optimum so far violates the next one, the new optimum lies on its line, in the
     interval that those before leave (de Berg et al., *Computational Geometry*, section 4.3, incremental
     linear programming, with this objective).
@@ -272,9 +272,9 @@ def find_nearest_allowed(
     return nearest, is_feasible
 
 
-def list_neighbour_offsets(seen: Observations, reach: float) -> Array:
-    """Return the offsets from each robot's neighbours within reach to itself, (n, k, 2) m, or nan."""
-    robot, _, offset, _ = seen.find_near_neighbours(reach)
+def list_neighbor_offsets(seen: Observations, reach: float) -> Array:
+    """Return the offsets from each robot's neighbors within reach to itself, (n, k, 2) m, or nan."""
+    robot, _, offset, _ = seen.find_near_neighbors(reach)
     return arrange_in_rows(robot, len(seen.positions), offset, np.nan)
 
 

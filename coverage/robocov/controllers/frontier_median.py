@@ -55,7 +55,7 @@ class FrontierMedian(SharedMapController):
     summary = "explores by frontiers (Yamauchi 1997, Burgard et al. 2005), then moves to the map's k-median"
 
     period: float = gain(1.0, "s", "between two plans", low=0.05, high=60.0)
-    beta: float = gain(0.05, "1/m", "β, utility of a metre of path length", high=1e3)
+    beta: float = gain(0.05, "1/m", "β, utility of a meter of path length", high=1e3)
     shortest: float = gain(0.15, "m", "minimum length of a frontier that is explored", high=100.0)
     threshold: float = gain(0.01, "1", "fraction of the cost that another placement must save", high=1.0)
 
@@ -90,7 +90,7 @@ class FrontierMedian(SharedMapController):
         window = planner.window
         state = window.crop(situation.known_map.state, np.uint8(FREE))
         is_unknown = (state == UNKNOWN) & ~planner.is_outside
-        # Gaps between neighbouring rays are not worth a visit.
+        # Gaps between neighboring rays are not worth a visit.
         is_area = ndimage.binary_opening(is_unknown, _BLOCK) & ~planner.is_tight
         is_frontier = (state == FREE) & ~planner.is_tight & ndimage.binary_dilation(is_area)
         labels, _ = ndimage.label(is_frontier, _BLOCK)

@@ -53,7 +53,7 @@ class GeodesicLloyd(WholeMapController):
 
     Pimenta et al. (CDC 2008) and Bhattacharya, Ghrist and Kumar (IJRR 33, 2014) replace the straight distance
     in the locational cost by the length d of the shortest path. Each robot moves along the shortest path to
-    the goal that minimises an upper bound of the cost of its cell. No other controller knows the whole map:
+    the goal that minimizes an upper bound of the cost of its cell. No other controller knows the whole map:
     this one is a bound for the others.
 
     Notes
@@ -61,7 +61,7 @@ class GeodesicLloyd(WholeMapController):
     For each point q of the geodesic cell, the gradient of the cost with f(d) points along the first straight
     piece of the path to q, with the magnitude f'(d). For f = d^s with 1 <= s <= 2, the cost as a function of
     the robot's position p is bounded from above by a paraboloid around the first waypoint c of q, with the
-    weight d^(s-1) / |c - p|. The goal minimises the sum of these paraboloids: it is the weighted mean of the
+    weight d^(s-1) / |c - p|. The goal minimizes the sum of these paraboloids: it is the weighted mean of the
     first waypoints. The cost never rises on a step to the goal, which is the centroid for s = 2 without
     obstacles, and a step of Weiszfeld's algorithm for s = 1, the cost (22). Points are weighted by the
     density of the map.
@@ -81,7 +81,7 @@ class GeodesicLloyd(WholeMapController):
     lattice: float = gain(48.0, "cells", "of the lattice along a side", low=4.0, high=512.0, whole=True)
     clearance: float = gain(0.03, "m", "that paths keep between rim and walls", high=10.0)
     period: float = gain(0.2, "s", "between two plans", high=60.0)
-    k_prop: float = gain(2.0, "1/s", "desired speed per metre of path to the goal", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per meter of path to the goal", high=100.0)
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> GeodesicMemory:
@@ -118,16 +118,16 @@ class GeodesicPlanner:
     ----------
     environment : Environment
     clearance : float, m
-        Distance that the centres of robots keep from walls.
+        Distance that the centers of robots keep from walls.
     lattice : int
         Number of cells of the lattice of the cost along a side of the region.
 
     Attributes
     ----------
     cost : CoverageCost
-        The cost that is minimised.
+        The cost that is minimized.
     configuration_space : shapely.MultiPolygon
-        Space where the centres of robots may be.
+        Space where the centers of robots may be.
     paths : Geodesics
         Shortest paths in that space.
     """
@@ -155,13 +155,13 @@ class GeodesicPlanner:
             s in f = d^s.
         """
         positions = find_nearest_inside(self.configuration_space, seen.positions)
-        if seen.neighbours.is_complete:
+        if seen.neighbors.is_complete:
             goals = self._compute_goals(positions, exponent)
         else:
             goals = np.empty_like(positions)
             for i in range(len(positions)):
-                neighbours = find_nearest_inside(self.configuration_space, seen.get_neighbour_positions(i))
-                goals[i] = self._compute_goals(np.vstack([positions[i], neighbours]), exponent)[0]
+                neighbors = find_nearest_inside(self.configuration_space, seen.get_neighbor_positions(i))
+                goals[i] = self._compute_goals(np.vstack([positions[i], neighbors]), exponent)[0]
         waypoints = goals.copy()
         remaining_lengths = np.zeros(len(goals))
         lines = shapely.linestrings(np.stack([positions, goals], axis=1))

@@ -28,7 +28,7 @@ class GreedySubmodular(SharedMapController):
     of positions: each position adds the less, the more there are. The greedy solution therefore gains at
     least 1 - 1/e of the maximum gain (Nemhauser, Wolsey and Fisher 1978).
 
-    The papers maximise a probability of detection on a known map. This controller minimises the cost (22).
+    The papers maximize a probability of detection on a known map. This controller minimizes the cost (22).
     The gain of a set of positions is the reduction of the cost of a single robot that is far from everything.
     This gain is submodular as well; the bound holds for it, not for the cost. The descent is Lloyd's
     iteration on geodesic cells, without interchange.

@@ -28,7 +28,7 @@ class OwnView:
     """(2,) m"""
     velocity: Array
     """(2,) m/s"""
-    neighbours: Array
+    neighbors: Array
     """(k, 2) m, positions of the robots within communication range, by their last messages."""
     obstacle_point: Array | None
     """(2,) m, the closest obstacle or boundary point within sensing range; None if there is none."""
@@ -136,7 +136,7 @@ class IndividualControllerAdapter:
         cells = partition(
             seen.positions,
             seen.region,
-            neighbours=seen.neighbours,
+            neighbors=seen.neighbors,
             triangulation=memory.triangulation,
             reported_positions=seen.reported_positions,
             density=seen.density,
@@ -181,7 +181,7 @@ def _build_view(seen: Observations, cells: VoronoiPartition, robot: int, memory:
         number=robot,
         position=seen.positions[robot].copy(),
         velocity=seen.velocities[robot].copy(),
-        neighbours=seen.get_neighbour_positions(robot),
+        neighbors=seen.get_neighbor_positions(robot),
         obstacle_point=obstacle_point,
         region=seen.region,
         time=seen.time,

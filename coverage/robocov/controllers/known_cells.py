@@ -41,7 +41,7 @@ def compute_known_cells(
             seen.positions,
             seen.max_speeds,
             seen.region,
-            neighbours=seen.neighbours,
+            neighbors=seen.neighbors,
             triangulation=triangulation,
             reported_positions=seen.reported_positions,
             density=seen.density,
@@ -49,7 +49,7 @@ def compute_known_cells(
     return partition(
         seen.positions,
         seen.region,
-        neighbours=seen.neighbours,
+        neighbors=seen.neighbors,
         triangulation=triangulation,
         reported_positions=seen.reported_positions,
         density=seen.density,

@@ -38,13 +38,13 @@ class WholeMapController(BaseController):
 
 
 def build_configuration_space(environment: Environment, clearance: float) -> shapely.Geometry:
-    """Build the space where the centres of robots may be.
+    """Build the space where the centers of robots may be.
 
     Parameters
     ----------
     environment : Environment
     clearance : float, m
-        Distance that centres keep from walls.
+        Distance that centers keep from walls.
 
     Returns
     -------

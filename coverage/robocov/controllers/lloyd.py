@@ -17,7 +17,7 @@ from robocov.voronoi import build_disc_limited_polygons, compute_disc_limited_mo
 class Lloyd(BaseController):
     """Lloyd's algorithm (Cortés et al. 2004; LA in section III-B of the paper).
 
-    Each robot moves to the centroid of its Voronoi cell at full speed, and slows down over the last metres
+    Each robot moves to the centroid of its Voronoi cell at full speed, and slows down over the last meters
     such that its deceleration stays within its limits. The drive tracks this velocity and compensates the
     viscosity. Obstacles are ignored: robots slide along them.
 
@@ -39,7 +39,7 @@ class Lloyd(BaseController):
     label = "Lloyd"
     summary = "Lloyd's algorithm: every robot moves to its cell's centroid, obstacles are ignored"
 
-    k_prop: float = gain(2.0, "1/s", "desired speed per metre of distance to the centroid", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()
     cells: str = cells_choice()
     target: str = choice("centroid", TARGETS, TARGET_HELP)
@@ -90,7 +90,7 @@ class RangeLimited(BaseController):
     interaction_range: float | None = gain(
         6.0, "m", "r, at most the communication range; null for that range itself", low=0.01, optional=True
     )
-    k_prop: float = gain(2.0, "1/s", "desired speed per metre of distance to the centroid", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the centroid", high=100.0)
     response_time: float = response_time_gain()
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:

@@ -93,12 +93,12 @@ class Estimates(NamedTuple):
 
 
 def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> tuple[Observations, Estimates]:
-    """Estimate the positions of robots and their neighbours.
+    """Estimate the positions of robots and their neighbors.
 
     Parameters
     ----------
     seen : Observations
-        With noisy positions, and reported ones of neighbours.
+        With noisy positions, and reported ones of neighbors.
     previous : Estimates
         Filter states after the observations before.
     team : Team
@@ -119,7 +119,7 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
     """
     assert seen.reported_positions is not None and seen.report_ages is not None
     positions, fixes, variance = _filter_own_positions(seen, previous, team)
-    robot, other = seen.neighbours.list_pairs()
+    robot, other = seen.neighbors.list_pairs()
     messages = _Messages(
         receiver=robot,
         sender=other,
@@ -142,10 +142,10 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
         tracks=tracks,
     )
     ages = np.clip(seen.time - tracks.sent[robot, other], 0.0, _MAX_EXTRAPOLATION_S)
-    neighbours = tracks.positions[robot, other] + ages[:, None] * tracks.velocities[robot, other]
+    neighbors = tracks.positions[robot, other] + ages[:, None] * tracks.velocities[robot, other]
     obstacle_points = seen.obstacle_points - seen.positions + positions
     estimated = replace(
-        seen, positions=positions, obstacle_points=obstacle_points, reported_positions=neighbours
+        seen, positions=positions, obstacle_points=obstacle_points, reported_positions=neighbors
     )
     return estimated, estimates
 
@@ -168,8 +168,8 @@ def _filter_own_positions(seen: Observations, previous: Estimates, team: Team) -
     return positions, fixes, variance
 
 
-def assume_closer_neighbours(seen: Observations, estimates: Estimates) -> Observations:
-    """Return the observations with neighbours as close as they may be, to avoid collisions.
+def assume_closer_neighbors(seen: Observations, estimates: Estimates) -> Observations:
+    """Return the observations with neighbors as close as they may be, to avoid collisions.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def assume_closer_neighbours(seen: Observations, estimates: Estimates) -> Observ
         The estimates that it returned with them.
     """
     assert seen.reported_positions is not None
-    robot, other = seen.neighbours.list_pairs()
+    robot, other = seen.neighbors.list_pairs()
     offset = seen.reported_positions - seen.positions[robot]
     distance = np.sqrt((offset**2).sum(axis=1))
     ages = np.clip(seen.time - estimates.tracks.sent[robot, other], 0.0, _MAX_EXTRAPOLATION_S)

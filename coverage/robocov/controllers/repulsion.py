@@ -19,8 +19,8 @@ from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.controllers.known_cells import cells_choice, compute_known_cells
 from robocov.locational_cost.best_points import HEIGHT_HELP, TARGET_HELP, TARGETS, find_targets
 from robocov.observation import Decision, Observations, Scanning
-from robocov.observation.neighbours import NeighbourPositions
-from robocov.observation.observations import NearNeighbours
+from robocov.observation.neighbors import NeighborPositions
+from robocov.observation.observations import NearNeighbors
 from robocov.observation.region import Region
 from robocov.potential import (
     CONTACT_DISTANCE,
@@ -51,17 +51,17 @@ def _compute_potential_forces(
 ) -> PotentialForces:
     """Return the forces of the potentials on all robots."""
     if includes_robots:
-        neighbours = NeighbourPositions.from_graph(seen.neighbours, seen.reported_positions)
+        neighbors = NeighborPositions.from_graph(seen.neighbors, seen.reported_positions)
     else:
-        neighbours = NeighbourPositions.build_empty(len(seen.positions))
-    return compute_potential_forces(seen.positions, neighbours, seen.obstacle_points, goals, gains)
+        neighbors = NeighborPositions.build_empty(len(seen.positions))
+    return compute_potential_forces(seen.positions, neighbors, seen.obstacle_points, goals, gains)
 
 
-def _find_separated_neighbours(seen: Observations, reach: float) -> NearNeighbours:
-    """Return near neighbours; robots at the same position get a direction as well."""
-    pairs = seen.find_near_neighbours(reach)
+def _find_separated_neighbors(seen: Observations, reach: float) -> NearNeighbors:
+    """Return near neighbors; robots at the same position get a direction as well."""
+    pairs = seen.find_near_neighbors(reach)
     is_same = pairs.distance < _MIN_DISTANCE_M
-    directions = compute_separations(pairs.robot[is_same], pairs.neighbour[is_same])
+    directions = compute_separations(pairs.robot[is_same], pairs.neighbor[is_same])
     pairs.offset[is_same] = _MIN_DISTANCE_M * directions
     return pairs
 
@@ -70,7 +70,7 @@ def _find_separated_neighbours(seen: Observations, reach: float) -> NearNeighbou
 class Rpf(BaseController):
     """Repulsive potential field (Howard, Mataric and Sukhatme 2002), equations (23)-(25).
 
-    Each robot is pushed away from all neighbours within `rho_0` and from the closest obstacle point;
+    Each robot is pushed away from all neighbors within `rho_0` and from the closest obstacle point;
     viscosity brings the team to rest. The team often oscillates there, because the closest obstacle point
     jumps: the stronger the repulsion, the larger the oscillation. To follow the paper's protocol, which gives
     RPF and RAPF the same parameters, set `k_rep` and `rho_0` of both.
@@ -84,7 +84,7 @@ class Rpf(BaseController):
     rho_0: float = gain(4.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)
 
     def decide(self, seen: Observations, memory: object) -> Decision:
-        """Compute the forces (24) of all neighbours and of the closest obstacle point."""
+        """Compute the forces (24) of all neighbors and of the closest obstacle point."""
         gains = PotentialGains(
             k_rep=float(self.k_rep), rho_0=float(self.rho_0), k_att=0.0, max_attraction=np.inf
         )
@@ -140,7 +140,7 @@ class Rapf(BaseController):
         """Return None: the memory, the triangulation of the last cells, is empty."""
 
     def decide(self, seen: Observations, memory: Mesh | None) -> Decision:
-        """Compute the forces (24) of neighbours and of the closest obstacle point, and (27) of the target."""
+        """Compute the forces (24) of neighbors and of the closest obstacle point, and (27) of the target."""
         cells = compute_known_cells(seen, self.cells, memory)
         goals = find_targets(cells, seen.density, self.target, self.height)
         gains = PotentialGains(
@@ -194,7 +194,7 @@ class Howard(BaseController):
     def decide(self, seen: Observations, memory: Memory) -> Decision:
         """Compute the forces F - ν q', less the viscosity, which the simulation adds itself."""
         returns = update_returns(seen, memory.returns)
-        pairs = _find_separated_neighbours(seen, 2.0 * seen.region.diameter)
+        pairs = _find_separated_neighbors(seen, 2.0 * seen.region.diameter)
         robots = sum_by_robot(
             pairs.robot, self.k_robots * _compute_inverse_squares(pairs.offset), len(seen.positions)
         )
@@ -223,10 +223,10 @@ def _compute_inverse_squares(offsets: Array) -> Array:
 
 @dataclass(frozen=True)
 class Poduri(BaseController):
-    """Constrained coverage (Poduri and Sukhatme, ICRA 2004): spread, but keep at least K neighbours.
+    """Constrained coverage (Poduri and Sukhatme, ICRA 2004): spread, but keep at least K neighbors.
 
     Robots at most R_c apart have a link. They repel each other along all links; along critical links, which
-    keep the number of neighbours from falling below K, they also attract each other. Viscosity brings the
+    keep the number of neighbors from falling below K, they also attract each other. Viscosity brings the
     team to rest.
 
     Notes
@@ -241,9 +241,9 @@ class Poduri(BaseController):
 
     The two forces, their balance at η R_c and the degree of at least K are based on general knowledge, not on
     the text of the paper. The following choices are ours. If at most K robots are within η R_c of a robot,
-    the links to its K nearest neighbours are critical for it, before they are in danger. Robots know only
+    the links to its K nearest neighbors are critical for it, before they are in danger. Robots know only
     positions of others: each also keeps a link that, by the positions that it knows, is critical for the
-    neighbour. The closest obstacle point repels with (24), within `rho_obs`.
+    neighbor. The closest obstacle point repels with (24), within `rho_obs`.
 
     Links are never lost if robots can exert these forces: two robots that move apart at full speed have to be
     able to stop within (1 - η) R_c.
@@ -251,10 +251,10 @@ class Poduri(BaseController):
 
     name = "poduri"
     label = "Constrained coverage"
-    summary = "spreads, but keeps at least K neighbours within R_c (Poduri and Sukhatme 2004)"
+    summary = "spreads, but keeps at least K neighbors within R_c (Poduri and Sukhatme 2004)"
 
     neighbours: float = gain(
-        2.0, "robots", "K, number of neighbours that each robot keeps", high=100.0, whole=True
+        2.0, "robots", "K, number of neighbors that each robot keeps", high=100.0, whole=True
     )
     link_range: float = gain(6.0, "m", "R_c, or the communication range if that is less", low=0.01, high=1e5)
     k_cover: float = gain(10.0, "N m²", "strength of F_cover")
@@ -285,68 +285,66 @@ class Poduri(BaseController):
         }
         return Decision(forces=repulsion + attraction + potential.obstacle, terms=terms, memory=memory)
 
-    def _find_links(self, seen: Observations, team: Team) -> tuple[NearNeighbours, Array]:
+    def _find_links(self, seen: Observations, team: Team) -> tuple[NearNeighbors, Array]:
         """Return the links of all robots, and the range R_c of each, (m,) m."""
         max_ranges = np.minimum(team.communication_range, self.link_range)
-        pairs = _find_separated_neighbours(seen, float(max_ranges.max()))
-        link_ranges = np.minimum(max_ranges[pairs.robot], max_ranges[pairs.neighbour])
+        pairs = _find_separated_neighbors(seen, float(max_ranges.max()))
+        link_ranges = np.minimum(max_ranges[pairs.robot], max_ranges[pairs.neighbor])
         is_linked = pairs.distance <= link_ranges
-        links = NearNeighbours(
+        links = NearNeighbors(
             robot=pairs.robot[is_linked],
-            neighbour=pairs.neighbour[is_linked],
+            neighbor=pairs.neighbor[is_linked],
             offset=pairs.offset[is_linked],
             distance=pairs.distance[is_linked],
         )
         return links, link_ranges[is_linked]
 
-    def _find_critical_links(
-        self, seen: Observations, links: NearNeighbours, link_ranges: Array
-    ) -> BoolArray:
-        """Return which links are critical for the robot or, as far as the robot knows, for the neighbour."""
+    def _find_critical_links(self, seen: Observations, links: NearNeighbors, link_ranges: Array) -> BoolArray:
+        """Return which links are critical for the robot or, as far as the robot knows, for the neighbor."""
         n = len(seen.positions)
         is_near = np.zeros((n, n), dtype=bool)
-        is_near[links.robot, links.neighbour] = links.distance <= self.eta * link_ranges
+        is_near[links.robot, links.neighbor] = links.distance <= self.eta * link_ranges
         rank = _rank_by_distance(links.robot, links.distance)
         is_critical: BoolArray = (is_near.sum(axis=1)[links.robot] <= self.neighbours) & (
             rank < self.neighbours
         )
         others = np.flatnonzero(~is_critical)
         if seen.reported_positions is None:
-            is_critical[others] = self._is_critical_for_neighbour(seen, links, is_near, others)
+            is_critical[others] = self._is_critical_for_neighbor(seen, links, is_near, others)
         else:
             is_critical[others] = self._is_critical_by_reports(seen, links, link_ranges, others)
         return is_critical
 
-    def _is_critical_for_neighbour(
-        self, seen: Observations, links: NearNeighbours, is_near: BoolArray, selected: IntArray
+    def _is_critical_for_neighbor(
+        self, seen: Observations, links: NearNeighbors, is_near: BoolArray, selected: IntArray
     ) -> BoolArray:
-        """Return whether links are critical for the neighbour, from the robots that the robot hears."""
+        """Return whether links are critical for the neighbor, from the robots that the robot hears."""
         n = len(is_near)
         hears = np.eye(n, dtype=bool)
-        first, second = seen.neighbours.list_pairs()
+        first, second = seen.neighbors.list_pairs()
         hears[first, second] = True
         # Products of float matrices are much faster than those of integers.
         near_counts = hears.astype(np.float32) @ is_near.astype(np.float32).T
-        is_critical = near_counts[links.robot, links.neighbour][selected] <= self.neighbours
+        is_critical = near_counts[links.robot, links.neighbor][selected] <= self.neighbours
         # The table of the remaining links is large: there are few of them.
         remaining = selected[is_critical]
         distances = np.full((n, n), np.inf)
-        distances[links.robot, links.neighbour] = links.distance
-        is_nearer = distances[links.neighbour[remaining]] < links.distance[remaining, None]
+        distances[links.robot, links.neighbor] = links.distance
+        is_nearer = distances[links.neighbor[remaining]] < links.distance[remaining, None]
         nearer_counts = (is_nearer & hears[links.robot[remaining]]).sum(axis=1)
         is_critical[is_critical] = nearer_counts < self.neighbours
         return np.asarray(is_critical)
 
     def _is_critical_by_reports(
-        self, seen: Observations, links: NearNeighbours, link_ranges: Array, selected: IntArray
+        self, seen: Observations, links: NearNeighbors, link_ranges: Array, selected: IntArray
     ) -> BoolArray:
-        """Return whether links are critical for the neighbour, from the positions that the robot received."""
+        """Return whether links are critical for the neighbor, from the positions that the robot received."""
         is_critical = np.zeros(len(selected), dtype=bool)
         for k, link in enumerate(selected.tolist()):
             robot = links.robot[link]
-            neighbour_positions = seen.get_neighbour_positions(robot)
-            index = int(np.flatnonzero(seen.neighbours.list_neighbours(robot) == links.neighbour[link])[0])
-            offsets = np.delete(neighbour_positions, index, axis=0) - neighbour_positions[index]
+            neighbor_positions = seen.get_neighbor_positions(robot)
+            index = int(np.flatnonzero(seen.neighbors.list_neighbors(robot) == links.neighbor[link])[0])
+            offsets = np.delete(neighbor_positions, index, axis=0) - neighbor_positions[index]
             distances = np.hypot(*offsets.T)
             near_range = self.eta * link_ranges[link]
             near_count = (distances <= near_range).sum() + (links.distance[link] <= near_range)
@@ -369,7 +367,7 @@ def _rank_by_distance(robot: IntArray, distance: Array) -> IntArray:
 class Dispersion(BaseController):
     """Local dispersion, the anonymous variant (Batalin and Sukhatme 2002, "Spreading out").
 
-    Three behaviours have priorities in this order:
+    Three behaviors have priorities in this order:
 
     - *Avoid*: a robot approaches obstacle points and robots only so fast that the distance decreases
       exponentially to `clearance`, and slides along them.
@@ -381,7 +379,7 @@ class Dispersion(BaseController):
 
     Notes
     -----
-    The behaviours and their order are based on the paper's abstract and on general knowledge, not
+    The behaviors and their order are based on the paper's abstract and on general knowledge, not
     on its text; the formulas are ours. Robots of the paper move at constant speed and never come to rest. To
     make placements comparable, `explore_speed` is 0 by default, and the speed falls to zero at `reach`, so
     that robots do not oscillate there. Each robot assumes that others may be as large as the largest of the
@@ -394,14 +392,14 @@ class Dispersion(BaseController):
     scanning = Scanning(rays=36, period=0.1)
 
     reach: float = gain(5.0, "m", "distance up to which a robot moves away from others", low=0.01, high=1e4)
-    k_disperse: float = gain(1.0, "1/s", "desired speed per metre that another robot is too near")
+    k_disperse: float = gain(1.0, "1/s", "desired speed per meter that another robot is too near")
     explore_speed: float = gain(0.0, "m/s", "speed of a robot without others in reach", high=1e3)
-    clearance: float = gain(0.2, "m", "from the centre of a robot to the surface of others", high=1e3)
-    k_avoid: float = gain(2.0, "1/s", "maximum approach speed per metre beyond the clearance", high=60.0)
+    clearance: float = gain(0.2, "m", "from the center of a robot to the surface of others", high=1e3)
+    k_avoid: float = gain(2.0, "1/s", "maximum approach speed per meter beyond the clearance", high=60.0)
     response_time: float = response_time_gain()
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
-        """Compute the forces that track the velocities of the behaviour with the highest priority."""
+        """Compute the forces that track the velocities of the behavior with the highest priority."""
         team = memory.team
         returns = update_returns(seen, memory.returns)
         clearance = np.full(len(team), self.clearance)
@@ -418,9 +416,9 @@ class Dispersion(BaseController):
         return Decision(forces=forces, terms={"attraction": forces}, memory=replace(memory, returns=returns))
 
     def _compute_velocities(self, seen: Observations, team: Team) -> Array:
-        """Return the velocities of the behaviours disperse and explore, (n, 2) m/s."""
+        """Return the velocities of the behaviors disperse and explore, (n, 2) m/s."""
         n = len(seen.positions)
-        pairs = _find_separated_neighbours(seen, self.reach)
+        pairs = _find_separated_neighbors(seen, self.reach)
         rate = self.k_disperse * (self.reach / np.maximum(pairs.distance, _MIN_DISTANCE_M) - 1.0)
         velocities = sum_by_robot(pairs.robot, pairs.offset * rate[:, None], n)
         if self.explore_speed > 0.0:

@@ -13,7 +13,7 @@ from robocov.controllers.driving import (
     collect_obstacle_points,
     compute_approach_velocities,
     compute_drive_forces,
-    list_neighbour_offsets,
+    list_neighbor_offsets,
 )
 from robocov.observation import Observations
 from robocov.team import Team
@@ -29,7 +29,7 @@ _WALL_GAP_M = 0.02
 _ROBOT_GAP_M = 0.04
 """Gap between two robots."""
 _APPROACH_RATE = 10.0
-"""Rate in 1/s at which a distance may decrease towards its gap."""
+"""Rate in 1/s at which a distance may decrease toward its gap."""
 _MIN_SPEED_LIMIT = 0.15
 """Speed in m/s that a robot may reach even close to a wall."""
 _MAX_EVASION_SPEED = 0.3
@@ -71,7 +71,7 @@ def follow_routes(
     returns : (n, rays, 2) array or None, m
         Points of the last scans, as `driving.update_returns` returns them.
     k_prop : float, 1/s
-        Speed per metre of distance to the goal.
+        Speed per meter of distance to the goal.
     response_time : float, s
         Time constant with which velocities are reached.
 
@@ -128,7 +128,7 @@ def _compute_speed_limits(seen: Observations, team: Team) -> Array:
 
 def _compute_evasion(seen: Observations, team: Team, velocities: Array, separation: Array) -> Array:
     """Return velocities, (n, 2) m/s, to the left of the other robot that each one approaches too fast."""
-    offsets = list_neighbour_offsets(seen, _EVASION_RANGE_M)
+    offsets = list_neighbor_offsets(seen, _EVASION_RANGE_M)
     if not offsets.shape[1]:
         return np.zeros_like(velocities)
     braking = _BRAKING_FRACTION * team.max_acceleration

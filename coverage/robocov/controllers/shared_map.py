@@ -21,7 +21,7 @@ from robocov.controllers.route_following import follow_routes
 from robocov.density import Density
 from robocov.k_median import run_lloyd
 from robocov.observation import Decision, Observations, Scanning, Scans
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
@@ -205,7 +205,7 @@ class SharedMapController(BaseController):
         1600.0, "nodes", "maximum number of nodes of the planning lattice", low=16.0, high=1e5, whole=True
     )
     clearance: float = gain(0.03, "m", "that routes keep between rim and walls", high=10.0)
-    k_prop: float = gain(2.0, "1/s", "desired speed per metre of distance to the goal", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
 
     @abstractmethod
@@ -226,7 +226,7 @@ class SharedMapController(BaseController):
     def decide(self, seen: Observations, memory: SharedMapMemory) -> Decision:
         """Compute the forces along the routes to the robots' own goals in their plans."""
         if seen.scans is not None:
-            maps = update_maps(memory.maps, seen, seen.scans, list_circles(seen.neighbours))
+            maps = update_maps(memory.maps, seen, seen.scans, list_circles(seen.neighbors))
             memory = replace(memory, maps=tuple(maps))
         if seen.time >= memory.next_plan_time - 1e-9:
             memory = self._plan_routes(seen, memory)
@@ -334,13 +334,12 @@ Circle: TypeAlias = tuple[int, ...]
 """Numbers of a robot and of those that it hears, ascending."""
 
 
-def list_circles(neighbours: Neighbours) -> list[Circle]:
+def list_circles(neighbors: Neighbors) -> list[Circle]:
     """Return the circle of each robot."""
-    if neighbours.is_complete:
-        return [tuple(range(neighbours.count))] * neighbours.count
+    if neighbors.is_complete:
+        return [tuple(range(neighbors.count))] * neighbors.count
     return [
-        tuple(sorted({robot, *neighbours.list_neighbours(robot).tolist()}))
-        for robot in range(neighbours.count)
+        tuple(sorted({robot, *neighbors.list_neighbors(robot).tolist()})) for robot in range(neighbors.count)
     ]
 
 
@@ -389,8 +388,8 @@ def update_maps(
 def _build_group(seen: Observations, team: Team, former_plan: Plan | None, robot: int) -> Group:
     """Return the group of a robot: itself, those that it hears, and those assumed to be at their goals."""
     position = seen.positions[robot : robot + 1]
-    robots = np.append(seen.neighbours.list_neighbours(robot), robot)
-    positions = np.vstack([seen.get_neighbour_positions(robot), position])
+    robots = np.append(seen.neighbors.list_neighbors(robot), robot)
+    positions = np.vstack([seen.get_neighbor_positions(robot), position])
     heard_times = np.full(len(robots), seen.time)
     if former_plan is not None:
         former = former_plan.group

@@ -155,7 +155,7 @@ class TangentBug(BaseController):
         optional=True,
     )
     moved: float = gain(0.25, "m", "move of a goal given up after which it is tried again", high=1e4)
-    k_prop: float = gain(2.0, "1/s", "desired speed per metre of distance to the goal", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
     cells: str = cells_choice()
 
@@ -234,7 +234,7 @@ class TangentBug(BaseController):
     def _compute_velocities(
         self, seen: Observations, team: Team, bugs: tuple[BugState, ...], centroids: Array
     ) -> Array:
-        """Return the desired velocities towards the waypoints, (n, 2) m/s."""
+        """Return the desired velocities toward the waypoints, (n, 2) m/s."""
         waypoints = np.array([bug.waypoint for bug in bugs])
         is_passing = np.array([bug.is_passing for bug in bugs])
         # A robot with its centroid in view follows it until the next scan.
@@ -278,13 +278,13 @@ class Navigator:
     points: Array
     """(m, 2) Obstacle points; nan for rays that met nothing."""
     met_points: Array
-    """(w, 2) Centres of the squares in which it has met an obstacle so far."""
+    """(w, 2) Centers of the squares in which it has met an obstacle so far."""
     directions: Array
     """(k, 2) Unit vectors of the rays."""
     free_distances: Array
     """(k,) Distance that the robot can move straight along each ray, m."""
     clearance: float
-    """Distance that its centre keeps from obstacles."""
+    """Distance that its center keeps from obstacles."""
     reach: float
     """Range of its sensor."""
 
@@ -323,12 +323,12 @@ class Navigator:
         return distance < _ARRIVAL_RADIUS_M or self._compute_free_distance(offset) >= distance - 1e-9
 
     def _compute_free_distance(self, offset: Array) -> float:
-        """Return the distance that the robot can move straight towards a point, m."""
+        """Return the distance that the robot can move straight toward a point, m."""
         direction = offset / max(math.hypot(*offset), 1e-300)
         return float(compute_free_distances(self.points, direction[None], self.clearance, self.reach)[0])
 
     def _find_contour_ends(self, direction: Array) -> dict[int, ContourEnd]:
-        """Return the ends of the contour that blocks the view in a direction, by the turn towards each."""
+        """Return the ends of the contour that blocks the view in a direction, by the turn toward each."""
         first_ray = int((self.directions * direction).sum(axis=1).argmax())
         blocked_distance = self._compute_free_distance(direction)
         ends = {}
@@ -478,11 +478,11 @@ def compute_free_distances(points: Array, directions: Array, clearance: float, r
     Parameters
     ----------
     points : (m, 2) array, m
-        Obstacle points relative to the centre of the disc; nan for none.
+        Obstacle points relative to the center of the disc; nan for none.
     directions : (k, 2) array
         Unit vectors.
     clearance : float, m
-        Distance that the centre keeps from the points. Points that are already nearer may be approached to
+        Distance that the center keeps from the points. Points that are already nearer may be approached to
         95 % of their distance.
     reach : float, m
         Maximum result.

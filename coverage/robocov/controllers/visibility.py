@@ -1,4 +1,4 @@
-"""Visibility-based coverage: robots maximise the area in view, each in its own cell."""
+"""Visibility-based coverage: robots maximize the area in view, each in its own cell."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ from robocov.controllers.driving import (
 )
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations, Scanning, compute_ray_directions
-from robocov.observation.observations import NearNeighbours
+from robocov.observation.observations import NearNeighbors
 from robocov.observation.scanned_view import (
     View,
     compute_step_fractions,
@@ -50,7 +50,7 @@ class VisibilityMemory(Memory):
 class Visibility(BaseController):
     """Coverage with visibility sensing constraints (Kantaros, Thanou and Tzes 2015).
 
-    The team maximises the area, weighted by the density, that is in view of any robot: within its sensing
+    The team maximizes the area, weighted by the density, that is in view of any robot: within its sensing
     range and its line of sight. Each robot moves along the gradient of the area of its own cell. Robots that
     see their whole cells are at rest; path lengths do not matter.
 
@@ -72,7 +72,7 @@ class Visibility(BaseController):
 
     The motion is based on the paper's abstract (Automatica 53, 195-207) and on general knowledge, not on its
     text. In the paper, robots send each other their views. Here they send positions, and a robot assumes that
-    a neighbour sees a point unless its own scan has met an obstacle in front of the line between the two.
+    a neighbor sees a point unless its own scan has met an obstacle in front of the line between the two.
     Avoiding collisions by slowing down is ours as well.
     """
 
@@ -83,7 +83,7 @@ class Visibility(BaseController):
     memory_type = VisibilityMemory
 
     k_area: float = gain(
-        0.1, "1/s", "desired speed per square metre of area in view and metre of motion", high=100.0
+        0.1, "1/s", "desired speed per square meter of area in view and meter of motion", high=100.0
     )
     jump: float = gain(0.3, "m", "minimum step of the depth in view at a window", low=0.01)
     clearance: float = gain(0.05, "m", "distance kept from obstacles and robots, rim to rim", high=10.0)
@@ -124,13 +124,13 @@ class Visibility(BaseController):
         Returns
         -------
         (n, 2) array, m
-            Growth of the area, weighted by φ, per metre of the robot's motion.
+            Growth of the area, weighted by φ, per meter of the robot's motion.
         """
         n, rays = view.distances.shape
         directions = compute_ray_directions(rays)
         depths = view.distances[..., None] * _SAMPLE_FRACTIONS
         walls = np.where(view.hit, view.distances, np.inf)
-        pairs = seen.find_near_neighbours(2.0 * float(reach.max()))
+        pairs = seen.find_near_neighbors(2.0 * float(reach.max()))
         points = seen.positions[:, None, None] + depths[..., None] * directions[:, None]
         weight = evaluate_density(seen.density, points)
         weight = weight * find_cells_in_view(depths, walls, directions, pairs, reach)
@@ -149,7 +149,7 @@ class Visibility(BaseController):
 
 @kernel
 def find_cells_in_view(
-    depths: Array, walls: Array, directions: Array, pairs: NearNeighbours, reach: Array
+    depths: Array, walls: Array, directions: Array, pairs: NearNeighbors, reach: Array
 ) -> BoolArray:
     """Find which points of each robot's view belong to its cell.
 
@@ -161,31 +161,31 @@ def find_cells_in_view(
         Distances of the walls in view; infinite where there is none.
     directions : (rays, 2) array
         Unit vectors along the rays.
-    pairs : NearNeighbours
-        The neighbours that may see points of the view.
+    pairs : NearNeighbors
+        The neighbors that may see points of the view.
     reach : (n,) array, m
         Maximum distance of each robot's view.
 
     Returns
     -------
     (n, rays, k) bool array
-        Whether no neighbour that sees the point has a lower power |q - p|² - R² there.
+        Whether no neighbor that sees the point has a lower power |q - p|² - R² there.
     """
     is_own = np.ones(depths.shape, dtype=np.bool_)
     for m in range(len(pairs.robot)):
         i = pairs.robot[m]
-        neighbour_x = -pairs.offset[m, 0]
-        neighbour_y = -pairs.offset[m, 1]
-        neighbour_reach = reach[pairs.neighbour[m]]
-        if is_behind_wall(neighbour_x, neighbour_y, walls[i]):
+        neighbor_x = -pairs.offset[m, 0]
+        neighbor_y = -pairs.offset[m, 1]
+        neighbor_reach = reach[pairs.neighbor[m]]
+        if is_behind_wall(neighbor_x, neighbor_y, walls[i]):
             continue
         for r in range(len(directions)):
             for c in range(depths.shape[2]):
                 x = depths[i, r, c] * directions[r, 0]
                 y = depths[i, r, c] * directions[r, 1]
-                dx = neighbour_x - x
-                dy = neighbour_y - y
-                power = dx * dx + dy * dy - neighbour_reach * neighbour_reach
+                dx = neighbor_x - x
+                dy = neighbor_y - y
+                power = dx * dx + dy * dy - neighbor_reach * neighbor_reach
                 own_power = depths[i, r, c] ** 2 - reach[i] ** 2
                 if power <= 0.0 and power < own_power and is_own[i, r, c]:
                     is_own[i, r, c] = not is_path_clear(x, y, dx, dy, walls[i])

@@ -37,10 +37,10 @@ class VoronoiGraphCoverage(SharedMapController):
     Notes
     -----
     The cost is the sum, over all vertices, of the mass times the distance along the graph to the nearest
-    robot. It is minimised by vertex substitution (Teitz and Bart 1968). The mass of a vertex is the area to
+    robot. It is minimized by vertex substitution (Teitz and Bart 1968). The mass of a vertex is the area to
     which it is the nearest vertex, by path length, times φ.
 
-    In the paper the graph is known, and robots know the neighbours of their neighbours. Here it is the graph
+    In the paper the graph is known, and robots know the neighbors of their neighbors. Here it is the graph
     of the map that robots discover and share, and each robot plans for all robots that it hears. Unknown
     space counts as free where a path may lead to, so that the graph extends into it. When the map has
     changed, the plan starts from the former vertices; the first exchange must then save the fraction

@@ -28,7 +28,7 @@ class CoverageCost:
     """The coverage cost (22) of one environment on a lattice of sites.
 
     The region's bounding box is widened to a square, anchored at its lower left corner, and cut into
-    ``lattice²`` square cells; the cell centres in the open free space are the sites. Distances are
+    ``lattice²`` square cells; the cell centers in the open free space are the sites. Distances are
     exact; only the mean over the sites is an approximation of the integral. If the environment has a
     density φ, each site is weighted by the exact mean of φ over its cell.
 
@@ -146,7 +146,7 @@ class CoverageCost:
             If there is no robot, a robot is outside the free space, or `speeds` is not one positive number
             per robot. The message names the robot.
         """
-        positions = to_floats("positions", positions, "[x, y] of each robot in metres", InputError)
+        positions = to_floats("positions", positions, "[x, y] of each robot in meters", InputError)
         if not positions.size:
             raise InputError("positions: expected at least one robot, got none")
         grid_positions, is_inside = self.geodesics.snap_to_free_space(positions)
@@ -184,7 +184,7 @@ class CoverageCost:
         >>> [round(result.mean_distance, 2) for result in results]
         [0.38, 0.49]
         """
-        teams = to_floats("positions", positions, "[x, y] of each robot of each team in metres", InputError)
+        teams = to_floats("positions", positions, "[x, y] of each robot of each team in meters", InputError)
         if teams.ndim != 3 or teams.shape[1] == 0 or teams.shape[2] != 2:
             raise InputError(
                 f"positions: expected an array of shape (r, n, 2) with n >= 1, got shape {teams.shape}"

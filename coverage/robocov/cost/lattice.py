@@ -31,7 +31,7 @@ _CELLS_PER_BLOCK = 1 << 18
 
 @dataclass(frozen=True, eq=False)
 class Sites:
-    """The sites of a lattice: the centres of its cells that are in the free space.
+    """The sites of a lattice: the centers of its cells that are in the free space.
 
     Attributes
     ----------
@@ -117,8 +117,8 @@ def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     all_components = []
     for first in range(0, side * side, _CELLS_PER_BLOCK):
         cells = np.arange(first, min(first + _CELLS_PER_BLOCK, side * side))
-        centres = _compute_centres(cells, side, spacing, geodesics.grid.origin)
-        is_inside = geodesics.count_windings(geodesics.grid.snap(centres)) == 1
+        centers = _compute_centers(cells, side, spacing, geodesics.grid.origin)
+        is_inside = geodesics.count_windings(geodesics.grid.snap(centers)) == 1
         is_free = is_inside.any(axis=1)
         all_cells.append(cells[is_free])
         all_components.append(is_inside[is_free].argmax(axis=1))
@@ -129,13 +129,13 @@ def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
             "side; choose a finer lattice"
         )
     cells.setflags(write=False)
-    points = freeze(_compute_centres(cells, side, spacing, geodesics.grid.origin))
+    points = freeze(_compute_centers(cells, side, spacing, geodesics.grid.origin))
     sites = Sites(side, spacing, points, cells)
     return sites, _build_tiles(sites, geodesics.grid.snap(points), np.concatenate(all_components))
 
 
-def _compute_centres(cells: IntArray, side: int, spacing: float, origin: Array) -> Array:
-    """Return the centres of cells, (m, 2) m."""
+def _compute_centers(cells: IntArray, side: int, spacing: float, origin: Array) -> Array:
+    """Return the centers of cells, (m, 2) m."""
     column_row = np.column_stack([cells % side, cells // side])
     return (column_row + 0.5) * spacing + origin
 

@@ -103,7 +103,7 @@ class CoverageResult(Drawable):
     def gradient(self) -> Array:
         """Derivative of `value` with respect to the positions, (n, 2) m²; with `speeds` in m s.
 
-        Each site pulls its owner towards its first waypoint, by a unit vector times the site's share of the
+        Each site pulls its owner toward its first waypoint, by a unit vector times the site's share of the
         integral of φ, divided by the owner's speed. The gradient is exact where `value` is differentiable and
         a small move changes neither owners nor corners.
         """

@@ -259,7 +259,7 @@ def _find_nearest_robots_of_tile(tiles: Tiles, search: Search, robots: Array, ti
         i = search.tile_robots[k]
         x = robots[i, 0]
         y = robots[i, 1]
-        # There are no branches, so that the compiler can vectorise the loop. The lengths are still squared.
+        # There are no branches, so that the compiler can vectorize the loop. The lengths are still squared.
         for slot in range(SLOTS):
             dx = tiles.x[tile, slot] - x
             dy = tiles.y[tile, slot] - y

@@ -143,7 +143,7 @@ class TimeVaryingCost:
     def compute_summary(
         self, time: float, positions: Array, working: BoolArray | None = None
     ) -> tuple[float, float, float]:
-        """Compute the numbers that summarise the coverage cost at a time.
+        """Compute the numbers that summarize the coverage cost at a time.
 
         Parameters
         ----------

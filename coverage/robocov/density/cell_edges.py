@@ -9,7 +9,7 @@ from robocov.arrays import Array, BoolArray, IntArray, compute_lengths
 from robocov.compiled import kernel
 
 REGION = -1
-"""Neighbour of an edge of a cell that is part of the region's boundary."""
+"""Neighbor of an edge of a cell that is part of the region's boundary."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

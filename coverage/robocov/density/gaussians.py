@@ -1,6 +1,6 @@
 """Sums of Gaussians, and their integrals over polygons in closed form.
 
-Let g = exp(-|q|²/2), and let an edge lie at the signed distance d from the centre along its outward
+Let g = exp(-|q|²/2), and let an edge lie at the signed distance d from the center along its outward
 normal n, between s₁ and s₂ along its direction t. As div[(1 - g) q / |q|²] = g, an edge adds to the mass
 
     ∫ d (1 - g) / (d² + s²) ds = [atan(s/d) - 2π T(d, s/d)] from s₁ to s₂
@@ -58,7 +58,7 @@ class Gaussian:
     ----------
     center : (x, y), m
     weight : float
-        Value at the centre, at least 0.
+        Value at the center, at least 0.
     sigma : float or None, m
         Standard deviation, above 0.
     covariance : 2 x 2 nested tuples or None, m²
@@ -135,7 +135,7 @@ class Gaussian:
             for integral in _integrate_along_edges(start, end)
         ]
         cells = _EdgeIntegrals(*sums)
-        # From the standard coordinates to moments about the centre of the Gaussian.
+        # From the standard coordinates to moments about the center of the Gaussian.
         mass = cells.mass
         x = factor.xx * cells.x
         y = factor.yx * cells.x + factor.yy * cells.y
@@ -159,7 +159,7 @@ class Gaussian:
         return _Factor(factor_xx, math.sqrt(yy - factor_yx * factor_yx), factor_yx)
 
     def _standardize(self, offset: Array) -> Array:
-        """Return (s, 2) offsets from the centre in the coordinates in which this is the standard Gaussian."""
+        """Return (s, 2) offsets from the center in the coordinates in which this is the standard Gaussian."""
         factor = self._factorize()
         u = offset[:, 0] / factor.xx
         return np.column_stack([u, (offset[:, 1] - factor.yx * u) / factor.yy])
@@ -204,7 +204,7 @@ class Gaussians(Density):
 
     @property
     def max_value(self) -> float:
-        """The sum of the constant and all peaks, an upper bound that is reached if their centres coincide."""
+        """The sum of the constant and all peaks, an upper bound that is reached if their centers coincide."""
         return self.floor + sum(peak.weight for peak in self.peaks)
 
     def evaluate(self, points: Array) -> Array:
@@ -264,7 +264,7 @@ def _integrate_along_edges(start: Array, end: Array) -> _EdgeIntegrals:
     mass = np.arctan(ratio2) - np.arctan(ratio1) - 2.0 * np.pi * (owens_t(d, ratio2) - owens_t(d, ratio1))
     # At distance 0 the two terms cancel.
     mass[~has_distance] = 0.0
-    # Far from the centre squares may overflow; the exponential is zero all the same.
+    # Far from the center squares may overflow; the exponential is zero all the same.
     peak = np.exp(-0.5 * d * d)
     e0 = peak * np.sqrt(np.pi / 2.0) * (erf(s2 / np.sqrt(2.0)) - erf(s1 / np.sqrt(2.0)))
     e1 = peak * (np.exp(-0.5 * s1 * s1) - np.exp(-0.5 * s2 * s2))

@@ -72,6 +72,6 @@ def compute_square_means(density: Density, centers: Array, side: float) -> Array
 
 
 def _build_edges(start: Array, end: Array, cell: IntArray) -> CellEdges:
-    """Return edges of polygons without neighbours."""
+    """Return edges of polygons without neighbors."""
     beyond = np.full(len(cell), REGION)
     return CellEdges(start, end, cell.astype(np.intp, copy=False), beyond)

@@ -1,4 +1,4 @@
-"""An image of a density: constant in each of its pixels, or linear between their centres."""
+"""An image of a density: constant in each of its pixels, or linear between their centers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MAX_RASTER_SIZE = 1024
 """Maximum number of rows, and of columns, of a raster."""
 
 Interpolation: TypeAlias = Literal["cells", "bilinear"]
-"""Whether a raster is constant in each of its pixels, or linear between their centres in both directions."""
+"""Whether a raster is constant in each of its pixels, or linear between their centers in both directions."""
 
 _GAUSS_NODE = 0.5 * 0.6**0.5
 """Distance of the outer nodes of Gauss's rule with three points on [0, 1] from the middle one."""
@@ -154,7 +154,7 @@ class Raster(Density):
             edges.cell,
             len(origins),
         )
-        # From steps of the grid to metres.
+        # From steps of the grid to meters.
         step_x, step_y = grid.step
         mass, x, y, xx, yy = (integrals * (step_x * step_y)).T
         x = x * step_x
@@ -171,7 +171,7 @@ class Raster(Density):
 
 
 def sample_density(density: Density | None, extent: Iterable[float], columns: int, rows: int) -> Raster:
-    """Sample a density at the centres of pixels, and return it as a bilinear raster.
+    """Sample a density at the centers of pixels, and return it as a bilinear raster.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def _build_grid(raster: Raster) -> _Grid:
     origin = np.array(raster.extent[:2])
     step = (np.array(raster.extent[2:]) - origin) / values.shape[::-1]
     if raster.interpolation == "bilinear":
-        # Squares reach from one pixel centre to the next; the border is repeated outside.
+        # Squares reach from one pixel center to the next; the border is repeated outside.
         padded = np.pad(values, 1, mode="edge")
         lower_left = padded[:-1, :-1]
         right = padded[:-1, 1:]

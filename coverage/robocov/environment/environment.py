@@ -22,7 +22,7 @@ from robocov.errors import StartError, describe_unknown_name, format_count, requ
 from robocov.observation.region import Region
 
 _DISPLACEMENT_DIGITS = 9
-"""Displacements are rounded to the nanometre, so that an obstacle returns to exactly the same position."""
+"""Displacements are rounded to the nanometer, so that an obstacle returns to exactly the same position."""
 _GEOMETRY_PROPERTIES = ("region", "boundary_polygon", "free", "blocked")
 """Cached properties that do not depend on the density."""
 

@@ -32,7 +32,7 @@ _COSINE_TOLERANCE = 1e-9
 _DISC_RELATIVE_TOLERANCE = 1e-9
 _DISC_TOLERANCE_M = 1e-12
 _DIGITS = 6
-"""Results are rounded to the grid of the derived geometry, a micrometre."""
+"""Results are rounded to the grid of the derived geometry, a micrometer."""
 
 
 class Gap(NamedTuple):
@@ -247,8 +247,8 @@ class _PassageSearch:
 def _close_cracks(free: MultiPolygon) -> MultiPolygon:
     """Return the free space without parts that are narrower than `_MAX_CRACK_M`.
 
-    Cracks between walls that nearly touch shrink to a nanometre. Corners of less than a degree are cut off,
-    and vertices that deviate from a straight wall by less than a micrometre are removed.
+    Cracks between walls that nearly touch shrink to a nanometer. Corners of less than a degree are cut off,
+    and vertices that deviate from a straight wall by less than a micrometer are removed.
     """
     for distance in (-_MAX_CRACK_M / 2, _MAX_CRACK_M / 2 - _FUSED_CRACK_M):
         free = free.buffer(distance, join_style="mitre", mitre_limit=_MITRE_LIMIT)

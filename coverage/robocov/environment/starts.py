@@ -154,7 +154,7 @@ class Start:
         return len(pack_densely(area, spacing))
 
     def compute_center_area(self, radius: float) -> BaseGeometry:
-        """Compute the area in which the centre of a robot may start. Not for a `PointsStart`.
+        """Compute the area in which the center of a robot may start. Not for a `PointsStart`.
 
         Parameters
         ----------
@@ -166,7 +166,7 @@ class Start:
         """
         area = self.free.buffer(-compute_start_clearance(radius))
         if isinstance(self.spec, DiscStart):
-            # The disc contains the centres; robots may stick out of it by their radius.
+            # The disc contains the centers; robots may stick out of it by their radius.
             center = shapely.Point(self.spec.center)
             area = area.intersection(center.buffer(self.spec.radius, quad_segs=_DISC_QUADRANT_SEGMENTS))
         return area
@@ -227,7 +227,7 @@ class Start:
 
 
 def compute_start_clearance(radius: float) -> float:
-    """Compute the minimum distance between the centre of a robot and walls at the start.
+    """Compute the minimum distance between the center of a robot and walls at the start.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def compute_start_clearance(radius: float) -> float:
 
 
 def compute_start_spacing(radius: float) -> float:
-    """Compute the minimum distance between the centres of two robots at the start.
+    """Compute the minimum distance between the centers of two robots at the start.
 
     Parameters
     ----------

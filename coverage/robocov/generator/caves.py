@@ -1,6 +1,6 @@
 """Maps of the kind `caves`: chambers and tunnels between smooth walls of rock, and pillars.
 
-The core of a cave, where the centre of a robot may be, is the area in which a random field, raised along the
+The core of a cave, where the center of a robot may be, is the area in which a random field, raised along the
 boundary, is below a level. Its parts are joined by tunnels, and it is dilated (J. Serra, *Image Analysis and
 Mathematical Morphology*, 1982) by at least half the gap. Where two dilated parts meet in a narrower window, a
 tunnel is led through it.

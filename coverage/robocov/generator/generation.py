@@ -49,14 +49,14 @@ _MIN_DISC_FRACTION = 0.4
 _DISC_SHRINKAGE = 0.9
 _DISC_MARGIN_SIDES = 0.02
 """Margin between the disc in the corner and the boundary, in shorter sides of the map."""
-_MAX_CENTRE_OFFSET_SIDES = 0.3
+_MAX_CENTER_OFFSET_SIDES = 0.3
 """Largest offset of the other disc from the middle along x and y, in shorter sides of the map."""
-_CENTRE_CANDIDATES = 41
-"""Points along x and along y that are compared as centres of that disc."""
-_CENTRE_DISC_FRACTION = 0.8
+_CENTER_CANDIDATES = 41
+"""Points along x and along y that are compared as centers of that disc."""
+_CENTER_DISC_FRACTION = 0.8
 """Largest radius of that disc, as a fraction of the one in the corner."""
-_CENTRE_OFFSET_WEIGHT = 0.2
-"""Clearance, m, that outweighs one metre of distance from the middle."""
+_CENTER_OFFSET_WEIGHT = 0.2
+"""Clearance, m, that outweighs one meter of distance from the middle."""
 _SCORE_DIGITS = 9
 """Scores are rounded so that rounding errors do not decide between equal ones."""
 _GAP_TOLERANCE_M = 1e-6
@@ -173,7 +173,7 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     Raises
     ------
     ParameterError
-        If a parameter is out of range, or no layout is found that fulfils all of them.
+        If a parameter is out of range, or no layout is found that fulfills all of them.
 
     Examples
     --------
@@ -224,7 +224,7 @@ def _choose_corner_disc(request: Request, rng: np.random.Generator) -> DiscStart
 def _build_environment(
     seed: int, kind: str, request: Request, layout: list[Obstacle], corner: DiscStart
 ) -> Environment | None:
-    """Return the map with its starts; None if it is not valid, or does not fulfil the request."""
+    """Return the map with its starts; None if it is not valid, or does not fulfill the request."""
     width = float(request.width)
     height = float(request.height)
     about = "about " if GENERATORS[kind].is_approximate else ""
@@ -251,15 +251,15 @@ def _build_environment(
         },
     )
     try:
-        if not _fulfils_request(environment, request):
+        if not _fulfills_request(environment, request):
             return None
         corner_disc = _shrink_corner_disc(environment, request, corner)
-        centre_disc = _choose_centre_disc(environment, request, corner)
-        if corner_disc is None or centre_disc is None:
+        center_disc = _choose_center_disc(environment, request, corner)
+        if corner_disc is None or center_disc is None:
             return None
         # The starts are added only now, because they depend on the free space, which is computed once.
         starts["corner"] = corner_disc
-        starts["centre"] = centre_disc
+        starts["centre"] = center_disc
         starts["uniform"] = UniformStart()
         check_rules(environment, environment.name)
     except (MapError, shapely.GEOSException):
@@ -280,10 +280,10 @@ def _shrink_corner_disc(environment: Environment, request: Request, corner: Disc
     return None
 
 
-def _choose_centre_disc(environment: Environment, request: Request, corner: DiscStart) -> DiscStart | None:
+def _choose_center_disc(environment: Environment, request: Request, corner: DiscStart) -> DiscStart | None:
     """Return a disc near the middle with as much clearance as possible; None if nothing is free there."""
-    max_offset = _MAX_CENTRE_OFFSET_SIDES * float(request.size.min())
-    steps = np.linspace(-max_offset, max_offset, _CENTRE_CANDIDATES)
+    max_offset = _MAX_CENTER_OFFSET_SIDES * float(request.size.min())
+    steps = np.linspace(-max_offset, max_offset, _CENTER_CANDIDATES)
     offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     points = request.round_points(offsets + request.size / 2.0)
     is_free = shapely.contains_xy(environment.free, points[:, 0], points[:, 1])
@@ -292,16 +292,16 @@ def _choose_centre_disc(environment: Environment, request: Request, corner: Disc
     points = points[is_free]
     offsets = offsets[is_free]
     clearances = shapely.distance(environment.free.boundary, shapely.points(points))
-    max_radius = _CENTRE_DISC_FRACTION * corner.radius
+    max_radius = _CENTER_DISC_FRACTION * corner.radius
     distances = np.hypot(offsets[:, 0], offsets[:, 1])
-    scores = np.minimum(clearances, max_radius) - _CENTRE_OFFSET_WEIGHT * distances
+    scores = np.minimum(clearances, max_radius) - _CENTER_OFFSET_WEIGHT * distances
     best = int(np.round(scores, _SCORE_DIGITS).argmax())
     radius = max(float(clearances[best]), _MIN_DISC_FRACTION * max_radius)
     center = (float(points[best, 0]), float(points[best, 1]))
     return DiscStart(center, request.round_down(min(radius, max_radius)))
 
 
-def _fulfils_request(environment: Environment, request: Request) -> bool:
+def _fulfills_request(environment: Environment, request: Request) -> bool:
     """Return whether a map has the blocked area and the gaps that were requested, and is connected."""
     free = environment.free
     blocked_fraction = 1.0 - environment.free_area / environment.area

@@ -151,8 +151,8 @@ def _compute_corridor_width(request: Request, shape: GridShape, thickness: float
     for length, count in zip((request.width, request.height), shape, strict=True):
         lines = _compute_lines(request, length, count, thickness)
         # As if the boundary had walls as well, whose faces are the sides of the map.
-        centre_lines = [-thickness / 2.0, *lines[1:-1], lines[-1] + thickness / 2.0]
-        widths.append(float(np.diff(centre_lines).min()) - thickness)
+        center_lines = [-thickness / 2.0, *lines[1:-1], lines[-1] + thickness / 2.0]
+        widths.append(float(np.diff(center_lines).min()) - thickness)
     return min(widths)
 
 
@@ -219,18 +219,18 @@ def grow_passages(shape: GridShape, rng: np.random.Generator) -> BoolArray:
         is_newest = rng.random() < newest_probability
         index = len(growing) - 1 if is_newest else int(rng.integers(len(growing)))
         column, row = growing[index]
-        neighbours = [(column + 1, row), (column, row + 1), (column - 1, row), (column, row - 1)]
-        unreached_neighbours = [cell for cell in neighbours if cell in unreached]
-        if not unreached_neighbours:
+        neighbors = [(column + 1, row), (column, row + 1), (column - 1, row), (column, row - 1)]
+        unreached_neighbors = [cell for cell in neighbors if cell in unreached]
+        if not unreached_neighbors:
             growing.pop(index)
             continue
-        neighbour = unreached_neighbours[int(rng.integers(len(unreached_neighbours)))]
+        neighbor = unreached_neighbors[int(rng.integers(len(unreached_neighbors)))]
         # The wall between two cells starts at the lower left post of the right or upper one.
-        post = max((column, row), neighbour)
-        is_horizontal = int(neighbour[0] == column)
+        post = max((column, row), neighbor)
+        is_horizontal = int(neighbor[0] == column)
         passages[post[0], post[1], is_horizontal] = True
-        unreached.remove(neighbour)
-        growing.append(neighbour)
+        unreached.remove(neighbor)
+        growing.append(neighbor)
     return passages
 
 
@@ -288,16 +288,16 @@ def trace_trails(walls: BoolArray) -> Iterator[list[Post]]:
     list of (int, int)
         The posts at the ends and bends of a poly-line.
     """
-    neighbours: defaultdict[Post, set[Post]] = defaultdict(set)
+    neighbors: defaultdict[Post, set[Post]] = defaultdict(set)
     for column, row, is_horizontal in np.argwhere(walls).tolist():
         start = (column, row)
         end = (column + is_horizontal, row + 1 - is_horizontal)
-        neighbours[start].add(end)
-        neighbours[end].add(start)
-    steps = sorted((post, neighbour) for post in neighbours for neighbour in neighbours[post])
+        neighbors[start].add(end)
+        neighbors[end].add(start)
+    steps = sorted((post, neighbor) for post in neighbors for neighbor in neighbors[post])
     traced: set[tuple[Post, Post]] = set()
     for start, second in steps:
-        is_end = _find_next_post(neighbours, second, start) is None
+        is_end = _find_next_post(neighbors, second, start) is None
         if not is_end or (start, second) in traced:
             continue
         trail = [start]
@@ -306,7 +306,7 @@ def trace_trails(walls: BoolArray) -> Iterator[list[Post]]:
         while True:
             traced.add((previous, post))
             traced.add((post, previous))
-            following = _find_next_post(neighbours, previous, post)
+            following = _find_next_post(neighbors, previous, post)
             if following != _step_straight(previous, post):
                 trail.append(post)
             if following is None:
@@ -316,9 +316,9 @@ def trace_trails(walls: BoolArray) -> Iterator[list[Post]]:
         yield trail
 
 
-def _find_next_post(neighbours: Mapping[Post, set[Post]], previous: Post, post: Post) -> Post | None:
+def _find_next_post(neighbors: Mapping[Post, set[Post]], previous: Post, post: Post) -> Post | None:
     """Return the post to which a polyline continues from a post; None if it ends there."""
-    others = neighbours[post] - {previous}
+    others = neighbors[post] - {previous}
     straight = _step_straight(previous, post)
     if straight in others:
         return straight

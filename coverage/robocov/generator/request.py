@@ -21,8 +21,8 @@ MAX_SIDE_M = 1000.0
 _MIN_AREA = 0.01
 _MAX_AREA = 0.9
 _MIN_GAPS_PER_SIDE = 3.0
-_MIN_CENTIMETRE_GAP_M = 0.5
-"""Coordinates are rounded to centimetres from this gap on, to millimetres below."""
+_MIN_CENTIMETER_GAP_M = 0.5
+"""Coordinates are rounded to centimeters from this gap on, to millimeters below."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,8 @@ class Request:
 
     @property
     def digits(self) -> int:
-        """Decimal places of all coordinates: centimetres, or millimetres if gaps are narrow."""
-        return 2 if self.gap >= _MIN_CENTIMETRE_GAP_M else 3
+        """Decimal places of all coordinates: centimeters, or millimeters if gaps are narrow."""
+        return 2 if self.gap >= _MIN_CENTIMETER_GAP_M else 3
 
     @property
     def step(self) -> float:

@@ -135,7 +135,7 @@ def is_box_hidden(boxes: Array, node: int, index: AngularWallIndex, source: int)
     dx = boxes[node, 0] + half_width - x
     dy = boxes[node, 1] + half_height - y
     # The angle that half the box spans is at most pi/2 times its sine, and its sine is the half diagonal
-    # divided by the distance to the centre. A pseudo-angle grows at most as fast as the angle.
+    # divided by the distance to the center. A pseudo-angle grows at most as fast as the angle.
     sine2 = (half_width * half_width + half_height * half_height) / (dx * dx + dy * dy)
     half_angle = np.sqrt(sine2) * (0.5 * np.pi) + _PADDING
     angle = compute_pseudo_angle(dx, dy)
@@ -445,7 +445,7 @@ def _is_box_off_segment(boxes: Array, node: int, x: float, y: float, dx: float, 
         return True
     half_width = 0.5 * (boxes[node, 2] - boxes[node, 0])
     half_height = 0.5 * (boxes[node, 3] - boxes[node, 1])
-    # Compare the distance from the line to the centre with the extent of the box across the line, both
+    # Compare the distance from the line to the center with the extent of the box across the line, both
     # multiplied by the length of the segment.
     side = dx * (boxes[node, 1] + half_height - y) - dy * (boxes[node, 0] + half_width - x)
     half_extent: float = abs(dx) * half_height + abs(dy) * half_width

@@ -23,7 +23,7 @@ def build_box_tree(low: Array, high: Array) -> Array:
     Parameters
     ----------
     low, high : (m, 2) array
-        Lower left and upper right corners of the items, in an order in which neighbours are close together.
+        Lower left and upper right corners of the items, in an order in which neighbors are close together.
 
     Returns
     -------
@@ -46,7 +46,7 @@ def build_box_tree(low: Array, high: Array) -> Array:
 
 
 def compute_z_order(column: IntArray, row: IntArray) -> IntArray:
-    """Compute positions along a Z-curve, on which neighbours in the plane are close together.
+    """Compute positions along a Z-curve, on which neighbors in the plane are close together.
 
     Parameters
     ----------

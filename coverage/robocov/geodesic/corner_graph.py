@@ -18,7 +18,7 @@ class CornerGraph(NamedTuple):
 
     first_link: IntArray
     """(k + 1,) The links of corner i are those from ``first_link[i]`` up to ``first_link[i + 1]``."""
-    neighbour: IntArray
+    neighbor: IntArray
     """(l,) The corner to which each link leads."""
     length: Array
     """(l,) Length of each link, grid steps."""
@@ -57,7 +57,7 @@ class CornerPaths(NamedTuple):
 
 
 class CornerQueue(NamedTuple):
-    """The corners whose neighbours may be reached by a shorter path; a ring buffer."""
+    """The corners whose neighbors may be reached by a shorter path; a ring buffer."""
 
     corners: IntArray
     """(k + 1,)"""
@@ -100,7 +100,7 @@ def build_corner_graph(corners: int, pairs: IntArray, lengths: Array) -> CornerG
     order = np.lexsort((end, start))
     return CornerGraph(
         first_link=np.searchsorted(start[order], np.arange(corners + 1)),
-        neighbour=end[order],
+        neighbor=end[order],
         length=np.tile(lengths, 2)[order],
     )
 
@@ -231,7 +231,7 @@ def relax_paths(graph: CornerGraph, paths: CornerPaths, queue: CornerQueue, wait
         head = head + 1 if head + 1 < size else 0
         queue.is_waiting[corner] = False
         for link in range(graph.first_link[corner], graph.first_link[corner + 1]):
-            other = graph.neighbour[link]
+            other = graph.neighbor[link]
             length = paths.length[corner] + graph.length[link]
             is_tie = length == paths.length[other]
             if length < paths.length[other] or (is_tie and paths.source[corner] < paths.source[other]):

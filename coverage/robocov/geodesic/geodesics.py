@@ -101,7 +101,7 @@ class Geodesics:
         self.grid = Grid.from_square(np.array([low_x, low_y]), self.size)
         self.free = shapely.transform(environment.free, self.grid.snap)
         self.walls: Walls = build_walls(self.free)
-        self.corners = self.grid.to_metres(self.walls.corners)
+        self.corners = self.grid.to_meters(self.walls.corners)
         self._name = environment.name
         self._entries_per_source = dict(_MIN_ENTRIES_PER_SOURCE)
         self.graph = self._build_graph(heartbeat)
@@ -201,7 +201,7 @@ class Geodesics:
         points = np.asarray(points, dtype=float)
         if points.ndim != 2 or points.shape[1] != 2:
             raise InputError(
-                f"{name}: expected an array of shape (n, 2), [x, y] in metres each, got shape {points.shape}"
+                f"{name}: expected an array of shape (n, 2), [x, y] in meters each, got shape {points.shape}"
             )
         grid_positions = self.grid.snap(points)
         # A point that is not finite counts as outside, like a point to the right of all walls, or above them.
@@ -212,7 +212,7 @@ class Geodesics:
         return grid_positions, is_inside
 
     def _move_inside(self, point: Array, name: str) -> Array:
-        """Return the free grid point nearest to a point in metres; raise InputError if it is too far away."""
+        """Return the free grid point nearest to a point in meters; raise InputError if it is too far away."""
         coordinates = f"[{point[0]:.12g}, {point[1]:.12g}]"
         if not np.isfinite(point).all():
             raise InputError(f"{name}: expected finite numbers, got {coordinates}")
@@ -348,7 +348,7 @@ class Geodesics:
         while corner >= 0:
             bends.append(corner)
             corner = int(paths.previous_corner[corner])
-        points = self.grid.to_metres(ends)
+        points = self.grid.to_meters(ends)
         return np.concatenate([points[:1], self.corners[bends[::-1]], points[1:]])
 
 

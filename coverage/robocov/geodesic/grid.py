@@ -73,8 +73,8 @@ class Grid:
         """
         return np.rint((points - self.origin) / self.unit)
 
-    def to_metres(self, points: Array) -> Array:
-        """Convert points from grid coordinates to metres.
+    def to_meters(self, points: Array) -> Array:
+        """Convert points from grid coordinates to meters.
 
         Parameters
         ----------

@@ -108,7 +108,7 @@ def find_targets(cells: Cells, density: Density | None, target: str, height: flo
     Centroid and median take all points of the cell into account. 1/(r²+h²) rewards points within a few h, so
     that the far ends of a much larger cell hardly count; if h is much larger than the cell, the target is the
     centroid. Without obstacles, the choice hardly affects the coverage cost (22). With walls it matters more:
-    a few centimetres in the goal can decide whether a robot gets around a wall, which is usually a
+    a few centimeters in the goal can decide whether a robot gets around a wall, which is usually a
     disadvantage of "sensing" with a low h.
     """
     if target == "centroid":

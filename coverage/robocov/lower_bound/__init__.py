@@ -4,7 +4,7 @@
 distances (`price_table`), and proves an upper bound on the worth of positions at these prices
 (`worth_bounds`).
 
-Minimising the cost (22) means finding the positions p of n robots for which the sum over the sites c of
+Minimizing the cost (22) means finding the positions p of n robots for which the sum over the sites c of
 w_c min_i d(c, p_i) is smallest: a p-median problem with geodesic distances d. For any prices u_c of the
 sites, this sum is at least
 

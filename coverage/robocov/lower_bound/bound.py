@@ -264,7 +264,7 @@ class _Dual:
         self.add_candidates(np.concatenate([robots, self._thin_out(inside)]))
 
     def _build_configuration_space(self, environment: Environment, radius: float) -> shapely.Geometry:
-        """Return the area for the centres of robots, m; it may be a little too large, but never too small."""
+        """Return the area for the centers of robots, m; it may be a little too large, but never too small."""
         components = np.array(environment.free.geoms)[self.is_covered]
         # The arcs around corners become chords, which makes the area larger.
         area = shapely.union_all(shapely.buffer(components, -_EROSION * radius, quad_segs=2))
@@ -347,25 +347,25 @@ class _Dual:
 
         Returns
         -------
-        centres : (t, 2) array, grid steps
+        centers : (t, 2) array, grid steps
             A point in each triangle.
         worths : (t,) array, m
             Worths of these points.
         bounds : (t,) array, m
             Upper bound on the worth of every point of each triangle.
         """
-        middles = self._geodesics.grid.to_metres(triangles.mean(axis=1))
-        centres, _ = self._geodesics.snap_to_free_space(middles)
+        middles = self._geodesics.grid.to_meters(triangles.mean(axis=1))
+        centers, _ = self._geodesics.snap_to_free_space(middles)
         scratch = TriangleScratch.allocate(len(self._geodesics.corners))
         worths = np.empty((2, len(triangles)))
         grid_prices = prices / self._unit
 
         def fill(index: AngularWallIndex, _numbers: IntArray, _lengths: Array) -> int:
-            return int(bound_worths(self._site_data, index, grid_prices, triangles, centres, scratch, worths))
+            return int(bound_worths(self._site_data, index, grid_prices, triangles, centers, scratch, worths))
 
         self._geodesics.run_with_index(1, SOURCE_BINS, fill)
         worths *= self._unit
-        return centres, worths[0], worths[1]
+        return centers, worths[0], worths[1]
 
     def prove(self, prices: Array, tolerance: float, heartbeat: Callable[[], None]) -> _Proof:
         """Prove a lower bound on the cost.
@@ -382,10 +382,10 @@ class _Dual:
         better = [np.empty((0, 3))]
         while len(triangles):
             heartbeat()
-            centres, worths, bounds = self.bound_worths(prices, triangles)
+            centers, worths, bounds = self.bound_worths(prices, triangles)
             best_worth = max(best_worth, float(worths.max()))
             count += len(triangles)
-            better.append(np.column_stack([worths, centres])[worths > table_worth])
+            better.append(np.column_stack([worths, centers])[worths > table_worth])
             is_leaf = (bounds <= best_worth + slack) | (count >= _MAX_TRIANGLES)
             worth_bound = max(worth_bound, float(bounds[is_leaf].max(initial=0.0)))
             leaves.append(triangles[is_leaf])

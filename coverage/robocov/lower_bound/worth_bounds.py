@@ -29,11 +29,11 @@ class TriangleScratch(NamedTuple):
     """Scratch space for one triangle, in grid steps."""
 
     corners: IntArray
-    """(k,) The corners that are visible from the centre."""
+    """(k,) The corners that are visible from the center."""
     corner_distances: Array
-    """(k,) Distances from the centre to these corners."""
+    """(k,) Distances from the center to these corners."""
     vertices: Array
-    """(3, 2) The vertices, relative to the centre."""
+    """(3, 2) The vertices, relative to the center."""
     min_distances: Array
     """(3,) A lower bound on the distance from each vertex to the current site."""
     max_worths: Array
@@ -66,11 +66,11 @@ def bound_worths(
     index: AngularWallIndex,
     prices: Array,
     triangles: Array,
-    centres: Array,
+    centers: Array,
     scratch: TriangleScratch,
     worths: Array,
 ) -> int:
-    """Compute the worths of the centres of triangles, and upper bounds on those of all their points.
+    """Compute the worths of the centers of triangles, and upper bounds on those of all their points.
 
     Parameters
     ----------
@@ -79,11 +79,11 @@ def bound_worths(
         Scratch space for one source.
     prices : (m,) array, grid steps
     triangles : (t, 3, 2) array, grid steps
-    centres : (t, 2) array, grid steps
+    centers : (t, 2) array, grid steps
         A point in each triangle.
     scratch : TriangleScratch
     worths : (2, t) array, grid steps
-        Result: the worths of the centres in the first row, the bounds in the second.
+        Result: the worths of the centers in the first row, the bounds in the second.
 
     Returns
     -------
@@ -93,8 +93,8 @@ def bound_worths(
     corners = site_data.walls.corners
     min_distances = scratch.min_distances
     for t in range(len(triangles)):
-        x = centres[t, 0]
-        y = centres[t, 1]
+        x = centers[t, 0]
+        y = centers[t, 1]
         if add_walls(site_data.walls, index, 0, x, y, np.inf, 0) < 0:
             return -1
         radius = _set_triangle(scratch, triangles[t], x, y)
@@ -127,7 +127,7 @@ def bound_worths(
 
 @kernel
 def _set_triangle(scratch: TriangleScratch, triangle: Array, x: float, y: float) -> float:
-    """Set the triangle and its centre (x, y); return the distance from there to the farthest vertex."""
+    """Set the triangle and its center (x, y); return the distance from there to the farthest vertex."""
     radius = 0.0
     for vertex in range(3):
         scratch.vertices[vertex, 0] = triangle[vertex, 0] - x
@@ -143,7 +143,7 @@ def _lower_by_corners(
 ) -> float:
     """Lower the distance bounds of a site to the tangents of its paths via the first `count` visible corners.
 
-    Return the length of the shortest of these paths from the centre (x, y).
+    Return the length of the shortest of these paths from the center (x, y).
     """
     corners = site_data.walls.corners
     min_distances = scratch.min_distances
@@ -165,7 +165,7 @@ def _lower_to_tangent(
 ) -> None:
     """Lower the distance bounds to the tangent of a path whose first segment points along -(dx, dy).
 
-    `length` is that of the whole path from the centre, `first_length` that of its first segment.
+    `length` is that of the whole path from the center, `first_length` that of its first segment.
     """
     for vertex in range(3):
         rise = dx * scratch.vertices[vertex, 0] + dy * scratch.vertices[vertex, 1]

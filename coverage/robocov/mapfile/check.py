@@ -23,7 +23,7 @@ from robocov.environment import (
     find_narrowest_gap,
     find_overlaps,
 )
-from robocov.errors import StartError, format_count, format_path, summarise_names
+from robocov.errors import StartError, format_count, format_path, summarize_names
 
 MANY_VERTICES = 5000
 """Maps with more vertices get a warning about computing time."""
@@ -270,7 +270,7 @@ def _find_path_warnings(environment: Environment) -> Iterator[str]:
         if outside is not None:
             names.append("the boundary")
         if names:
-            yield f"{_format_obstacle(environment, k)} moves through {summarise_names(names)}"
+            yield f"{_format_obstacle(environment, k)} moves through {summarize_names(names)}"
 
 
 def _format_obstacle(environment: Environment, k: int) -> str:

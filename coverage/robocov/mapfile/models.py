@@ -24,7 +24,7 @@ MIN_SIZE_M = 1e-3
 MAX_SIZE_M = 1e4
 """Range of the sizes of everything."""
 MAX_COORDINATE_M = 1e7
-"""National grids fit, and micrometres are still distinguished."""
+"""National grids fit, and micrometers are still distinguished."""
 MIN_WEIGHT = 1e-9
 """Smaller weights are read as 0, because they are written as 0."""
 MAX_LABEL_CHARACTERS = 100
@@ -47,7 +47,7 @@ def _limit(minimum: float, maximum: float, description: str | None = None) -> An
 
 Coordinate: TypeAlias = Annotated[
     float,
-    _limit(-MAX_COORDINATE_M, MAX_COORDINATE_M, "metres"),
+    _limit(-MAX_COORDINATE_M, MAX_COORDINATE_M, "meters"),
     AfterValidator(lambda value: 0.0 if -_TINY_M < value < _TINY_M else value),
 ]
 Size: TypeAlias = Annotated[float, _limit(MIN_SIZE_M, MAX_SIZE_M)]
@@ -119,7 +119,7 @@ _SIZE_EXPECTED = f"a number from {MIN_SIZE_M:g} to {MAX_SIZE_M:.0f} (m)"
 _SPEED_EXPECTED = f"a number from {MIN_SPEED_M_S:g} to {MAX_SPEED_M_S:g} (m/s)"
 COORDINATE_EXPECTED = f"a number from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} (m)"
 # Descriptions of an expected value, of its items, of their items, and so on.
-_POINT_EXPECTED = ("a point [x, y] in metres", COORDINATE_EXPECTED)
+_POINT_EXPECTED = ("a point [x, y] in meters", COORDINATE_EXPECTED)
 RING_EXPECTED = ("a list of at least 3 points [x, y]", *_POINT_EXPECTED)
 _LINE_EXPECTED = ("a list of at least 2 points [x, y]", *_POINT_EXPECTED)
 _POSITIONS_EXPECTED = ("a list of at least 1 point [x, y]", *_POINT_EXPECTED)
@@ -156,9 +156,9 @@ class KeySpecification(NamedTuple):
 
 KEYS = {
     "name": KeySpecification(Label, "Name, for people", "desk", (LABEL_EXPECTED,)),
-    "center": KeySpecification(Vertex, "Centre [x, y] in metres", [7.5, 3], _POINT_EXPECTED),
-    "radius": KeySpecification(Size, "Radius in metres", 0.5, (_SIZE_EXPECTED,)),
-    "sigma": KeySpecification(Size, "Standard deviation of a round peak in metres", 1.5, (_SIZE_EXPECTED,)),
+    "center": KeySpecification(Vertex, "Center [x, y] in meters", [7.5, 3], _POINT_EXPECTED),
+    "radius": KeySpecification(Size, "Radius in meters", 0.5, (_SIZE_EXPECTED,)),
+    "sigma": KeySpecification(Size, "Standard deviation of a round peak in meters", 1.5, (_SIZE_EXPECTED,)),
     "covariance": KeySpecification(
         Matrix, "Covariance of an elliptic peak in m²", [[2, 0.5], [0.5, 1]], _MATRIX_EXPECTED
     ),
@@ -180,8 +180,8 @@ KEYS = {
         _EXAMPLE_CORNERS,
         _LINE_EXPECTED,
     ),
-    "width": KeySpecification(Size, "Width in metres", 0.1, (_SIZE_EXPECTED,)),
-    "speed": KeySpecification(Speed, "Speed in metres per second", 0.5, (_SPEED_EXPECTED,)),
+    "width": KeySpecification(Size, "Width in meters", 0.1, (_SIZE_EXPECTED,)),
+    "speed": KeySpecification(Speed, "Speed in meters per second", 0.5, (_SPEED_EXPECTED,)),
     "repeat": KeySpecification(
         Repeat,
         "From the end straight to the first point, or back along the path",
@@ -189,10 +189,10 @@ KEYS = {
         ('"loop" or "back-and-forth"',),
     ),
     "positions": KeySpecification(
-        Positions, "[x, y] of each robot in metres", [[1, 1], [1.5, 1]], _POSITIONS_EXPECTED
+        Positions, "[x, y] of each robot in meters", [[1, 1], [1.5, 1]], _POSITIONS_EXPECTED
     ),
     "weight": KeySpecification(
-        Weight, "Weight of the points; for a peak, the weight added at its centre", 4, (WEIGHT_EXPECTED,)
+        Weight, "Weight of the points; for a peak, the weight added at its center", 4, (WEIGHT_EXPECTED,)
     ),
     "floor": KeySpecification(Weight, "Weight of all points without the peaks", 0.2, (WEIGHT_EXPECTED,)),
     "background": KeySpecification(Weight, "Weight of the points outside all areas", 1, (WEIGHT_EXPECTED,)),
@@ -258,11 +258,11 @@ class RasterModel(Model, title="raster density"):
         None,
     )
     interpolation: Interpolation = _describe(
-        "bilinear between the centres of the cells, or constant in each cell", "bilinear", "bilinear"
+        "bilinear between the centers of the cells, or constant in each cell", "bilinear", "bilinear"
     )
     rows: Rows | None = _describe("Rows of numbers, the top one first", [[1, 1, 2], [1, 4, 2]], None)
     picture: FileName | None = _describe(
-        "Instead of rows, a grey PNG or PGM file in the folder of the map", "density.png", None
+        "Instead of rows, a gray PNG or PGM file in the folder of the map", "density.png", None
     )
     black: Weight | None = _describe("Weight of black; 0 by default", 0.1, None)
     white: Weight | None = _describe("Weight of white; 1 by default", 5, None)
@@ -307,7 +307,7 @@ DensityModel: Any = _choose_by_kind("density", "The weights of the points of a m
 
 
 class MapModel(Model, title="robocov map"):
-    """A map of robocov: the outer boundary, obstacles, and named starts of the robots, in metres."""
+    """A map of robocov: the outer boundary, obstacles, and named starts of the robots, in meters."""
 
     schema_: Text | None = _describe(
         "Address of this schema, for editors", "./map.json", None, alias="$schema"

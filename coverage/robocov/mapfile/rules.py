@@ -118,10 +118,10 @@ def _build_crossing_mistake(path: JsonPath, points: Array, polygon: Polygon) -> 
     nearest_edges = np.argsort(distances, kind="stable")[:_MAX_MEETING_EDGES].tolist()
     first = nearest_edges[0]
     second = nearest_edges[1]
-    # Neighbours in the ring always meet. If another edge passes through the point as well, it is named.
+    # Neighbors in the ring always meet. If another edge passes through the point as well, it is named.
     for edge in nearest_edges:
-        is_neighbour = (edge - first) % len(points) in (0, 1, len(points) - 1)
-        if not is_neighbour and distances[edge] <= _MEETING_DISTANCE_M:
+        is_neighbor = (edge - first) % len(points) in (0, 1, len(points) - 1)
+        if not is_neighbor and distances[edge] <= _MEETING_DISTANCE_M:
             second = edge
             break
     first, second = sorted((first, second))
@@ -202,7 +202,7 @@ def _find_room_mistakes(
 
 
 def _certainly_has_room(environment: Environment, start: DiscStart | UniformStart) -> bool:
-    """Return whether a robot fits at the centre of a disc, which is faster than sampling."""
+    """Return whether a robot fits at the center of a disc, which is faster than sampling."""
     starts = [start] if isinstance(start, DiscStart) else environment.starts.values()
     centers = [disc.center for disc in starts if isinstance(disc, DiscStart)]
     points = shapely.points(np.reshape(centers, (-1, 2)))

@@ -47,7 +47,7 @@ _EXPECTED = {name: key.expected for name, key in KEYS.items()} | {
     "$schema": ("a text",),
     "obstacles": ("a list of obstacles",),
     "starts": ("an object of named starts",),
-    "extent": ("[x_min, y_min, x_max, y_max] in metres", COORDINATE_EXPECTED),
+    "extent": ("[x_min, y_min, x_max, y_max] in meters", COORDINATE_EXPECTED),
     "interpolation": ('"bilinear" or "cells"',),
     "rows": (
         f"a list of 1 to {MAX_RASTER_SIZE} rows",

@@ -23,7 +23,7 @@ _NUMERIC_KEYS = ("boundary", "obstacles", "starts", "density")
 _EXPANDED_KEYS = ("obstacles", "starts")
 """Keys whose items are written on lines of their own."""
 _DIGITS = 9
-"""Decimal places of coordinates in metres: no map means fractions of a nanometre."""
+"""Decimal places of coordinates in meters: no map means fractions of a nanometer."""
 _MAX_ERROR_ULPS = 16
 """Largest rounding error of a few sums and a rotation, in units in the last place, of 1 m at least."""
 

@@ -30,7 +30,7 @@ from robocov.metrics.motion import (
     count_stuck_robots,
     find_settling_time,
 )
-from robocov.metrics.summary import summarise
+from robocov.metrics.summary import summarize
 
 __all__ = [
     "MAX_CONTACT_GAP_M",
@@ -47,5 +47,5 @@ __all__ = [
     "find_settling_time",
     "measure_robot_gaps",
     "select_sampled_moments",
-    "summarise",
+    "summarize",
 ]

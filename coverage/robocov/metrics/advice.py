@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from robocov.arrays import Array, IntArray, compute_point_distances
-from robocov.errors import format_count, summarise_names
+from robocov.errors import format_count, summarize_names
 from robocov.metrics.clearance import MAX_CONTACT_GAP_M
 from robocov.record import Record
 
@@ -49,7 +49,7 @@ def advise(record: Record, clearances: Array) -> list[str]:
     Forces are constant during a control step of length dt. A robot of mass m and viscosity nu that is held
     by a stiffness K, such as the slope of the repulsion at its position, is stable under sampling only while
     K is below about 2 nu / dt: at longer periods it reacts too late, and swings with a period of a few
-    steps. Such robots stay in one place, although they move by centimetres in every step and turn sharply
+    steps. Such robots stay in one place, although they move by centimeters in every step and turn sharply
     between steps. This does not happen if the control period is short enough.
 
     In a passage, the same happens if a robot cannot accelerate enough: a swing of amplitude A across it
@@ -104,7 +104,7 @@ def find_trembling(record: Record) -> IntArray:
     trembles = step_lengths.mean(axis=0) >= MIN_TREMBLE_STEP_M
     trembles &= turning_angles.mean(axis=0) >= MIN_TREMBLE_TURN
     trembles &= step_lengths.sum(axis=0) >= MIN_TREMBLE_DETOUR * net_displacement
-    trembles &= record.travelled[-steps:].all(axis=0) & record.working[-steps:].all(axis=0)
+    trembles &= record.traveled[-steps:].all(axis=0) & record.working[-steps:].all(axis=0)
     return np.flatnonzero(trembles)
 
 
@@ -159,4 +159,4 @@ def _format_robots(record: Record, robots: IntArray) -> str:
     if len(robots) == len(record.team) > 1:
         return f"all {format_count(len(robots), 'robot')}"
     names = [str(record.robot_numbers[robot]) for robot in robots.tolist()]
-    return f"robot{'s' if len(names) > 1 else ''} {summarise_names(names)}"
+    return f"robot{'s' if len(names) > 1 else ''} {summarize_names(names)}"

@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from robocov.arrays import Array
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 
 _EIGENVALUE_DECIMALS = 12
 """Decimals to which eigenvalues are rounded; the others are rounding errors."""
@@ -52,15 +52,15 @@ def measure_connectivity(positions: Array, ranges: Array) -> Connectivity:
     n = len(positions)
     if n == 0:
         return Connectivity(0, 0.0)
-    neighbours = Neighbours.from_ranges(positions, ranges)
-    if neighbours.is_complete:
+    neighbors = Neighbors.from_ranges(positions, ranges)
+    if neighbors.is_complete:
         return Connectivity(1, float(n) if n > 1 else 0.0)
-    robot, neighbour = neighbours.list_pairs()
-    adjacency = coo_array((np.ones(len(robot)), (robot, neighbour)), (n, n))
+    robot, neighbor = neighbors.list_pairs()
+    adjacency = coo_array((np.ones(len(robot)), (robot, neighbor)), (n, n))
     components, _ = connected_components(adjacency, directed=False)
     if n == 1 or components > 1:
         return Connectivity(int(components), 0.0)
     laplacian = np.diag(np.bincount(robot).astype(float))
-    laplacian[robot, neighbour] = -1.0
+    laplacian[robot, neighbor] = -1.0
     second_eigenvalue = float(np.linalg.eigvalsh(laplacian)[1])
     return Connectivity(int(components), round(second_eigenvalue, _EIGENVALUE_DECIMALS))

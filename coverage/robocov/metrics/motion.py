@@ -63,14 +63,14 @@ def find_settling_time(
     return float(time[first_at_rest]) if first_at_rest < len(is_moving) else None
 
 
-def compute_path_lengths(positions: Array, travelled: BoolArray | None = None) -> Array:
+def compute_path_lengths(positions: Array, traveled: BoolArray | None = None) -> Array:
     """Compute the length of each robot's path.
 
     Parameters
     ----------
     positions : (T, n, 2) array, m
-    travelled : (T - 1, n) bool array, optional
-        Mask of the displacements that count, such as `Record.travelled`. By default, all count.
+    traveled : (T - 1, n) bool array, optional
+        Mask of the displacements that count, such as `Record.traveled`. By default, all count.
 
     Returns
     -------
@@ -82,8 +82,8 @@ def compute_path_lengths(positions: Array, travelled: BoolArray | None = None) -
     array([6.])
     """
     lengths = compute_point_distances(positions[1:], positions[:-1])
-    if travelled is not None:
-        lengths = np.where(travelled, lengths, 0.0)
+    if traveled is not None:
+        lengths = np.where(traveled, lengths, 0.0)
     return np.asarray(lengths.sum(axis=0))
 
 

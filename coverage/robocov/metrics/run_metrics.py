@@ -223,11 +223,11 @@ def _integrate(record: Record) -> _Integrals:
     squared_force = (forces**2).sum(axis=(1, 2))
     step = np.diff(record.time)
     distances = compute_point_distances(record.positions[1:], record.positions[:-1])
-    travelled = np.where(record.travelled, distances, 0.0).mean(axis=1)
+    traveled = np.where(record.traveled, distances, 0.0).mean(axis=1)
     return _Integrals(
         work=_accumulate(0.5 * (power[1:] + power[:-1]) * step),
         effort=_accumulate(squared_force[:-1] * step),
-        path_length=_accumulate(travelled),
+        path_length=_accumulate(traveled),
     )
 
 

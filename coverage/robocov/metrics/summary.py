@@ -14,8 +14,8 @@ MIN_REPORTED_OFFSET_M = 5e-4
 """Distance from the requested position above which it is reported that a robot joined elsewhere."""
 
 
-def summarise(record: Record, history: CostHistory) -> dict[str, Any]:
-    """Summarise a run for ``run.json``.
+def summarize(record: Record, history: CostHistory) -> dict[str, Any]:
+    """Summarize a run for ``run.json``.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def summarise(record: Record, history: CostHistory) -> dict[str, Any]:
     >>> rooms = rc.load_map("rooms")
     >>> record = rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(6, seed=0)).run(1.0)
     >>> history = rc.compute_cost_history(record, rc.CoverageCost(rooms, lattice=16))
-    >>> rc.summarise(record, history)["contacts"]
+    >>> rc.summarize(record, history)["contacts"]
     0
     """
     clearances = compute_clearances(record)
@@ -44,7 +44,7 @@ def summarise(record: Record, history: CostHistory) -> dict[str, Any]:
     }
     if history.mean_time is not None:
         summary["mean_time_s"] = float(history.mean_time[-1])
-    path_lengths = compute_path_lengths(record.positions, record.travelled)
+    path_lengths = compute_path_lengths(record.positions, record.traveled)
     summary |= {
         "cost_m3": float(history.cost[-1]),
         "uncovered_area_m2": float(history.uncovered_area[-1]),

@@ -145,7 +145,7 @@ def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterato
         first_corners = _intersect(walls_from_robot, sectors.start)
         second_corners = _intersect(walls_from_robot, sectors.end)
         corners = np.stack([first_corners, second_corners], axis=1).reshape(-1, 2)
-        view = shapely.Polygon(grid.to_metres(position + corners))
+        view = shapely.Polygon(grid.to_meters(position + corners))
         # The polygon may touch itself where corners are in line with the robot.
         yield view if shapely.is_valid(view) else shapely.make_valid(view)
 

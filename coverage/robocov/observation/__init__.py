@@ -1,12 +1,12 @@
 """Observations and decisions: the types that the world and the controllers exchange.
 
-Row i of `Observations` belongs to robot i: its own state, its neighbours, the nearest obstacle point that it
+Row i of `Observations` belongs to robot i: its own state, its neighbors, the nearest obstacle point that it
 senses, and the convex region. A controller computes all rows at once for speed, but row i of its `Decision`
-may depend only on row i and on the known positions of the neighbours of robot i. The types thus reflect that
+may depend only on row i and on the known positions of the neighbors of robot i. The types thus reflect that
 control is distributed and that the obstacles are unknown.
 
 - `observations`, `scans`, `region`: everything that the robots know
-- `neighbours`: the communication graph
+- `neighbors`: the communication graph
 - `decisions`, `cells`: the decision of a controller, and the cells that it uses
 - `snapshot`: the observations and the decision of one step
 - `scanned_view`: the free space that is visible in a scan
@@ -15,7 +15,7 @@ control is distributed and that the obstacles are unknown.
 
 from robocov.observation.cells import Cells
 from robocov.observation.decisions import Decision, check_decision, check_forces, copy_decision, to_numbers
-from robocov.observation.observations import NearNeighbours, Observations
+from robocov.observation.observations import NearNeighbors, Observations
 from robocov.observation.scans import MAX_RAYS, Scanning, Scans, compute_ray_directions
 from robocov.observation.snapshot import Snapshot
 
@@ -23,7 +23,7 @@ __all__ = [
     "MAX_RAYS",
     "Cells",
     "Decision",
-    "NearNeighbours",
+    "NearNeighbors",
     "Observations",
     "Scanning",
     "Scans",

@@ -21,7 +21,7 @@ class Bins(NamedTuple):
     bottom: float
     """y at which the first row begins, m."""
     scale: float
-    """Bins per metre."""
+    """Bins per meter."""
     columns: int
     rows: int
 
@@ -35,7 +35,7 @@ def find_bin(offset: float, scale: float) -> int:
     offset : float, m
         Distance from where the first row or column begins.
     scale : float, 1/m
-        Bins per metre.
+        Bins per meter.
 
     Returns
     -------

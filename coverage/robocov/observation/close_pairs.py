@@ -9,8 +9,8 @@ from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.observation.bins import find_bin, sort_into_bins
 
-_INITIAL_NEIGHBOURS = 8
-"""Number of neighbours per point for which memory is allocated at first."""
+_INITIAL_NEIGHBORS = 8
+"""Number of neighbors per point for which memory is allocated at first."""
 
 
 class ClosePairs(NamedTuple):
@@ -64,9 +64,9 @@ def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePa
     """
     n = len(points)
     indptr = np.zeros(n + 1, np.intp)
-    first = np.empty(_INITIAL_NEIGHBOURS * n, np.intp)
-    second = np.empty(_INITIAL_NEIGHBOURS * n, np.intp)
-    distance = np.empty(_INITIAL_NEIGHBOURS * n)
+    first = np.empty(_INITIAL_NEIGHBORS * n, np.intp)
+    second = np.empty(_INITIAL_NEIGHBORS * n, np.intp)
+    distance = np.empty(_INITIAL_NEIGHBORS * n)
     if n == 0:
         return indptr, ClosePairs(first, second, distance)
     starts = np.empty(2 * n + 8, np.intp)

@@ -8,20 +8,20 @@ from typing import NamedTuple
 from robocov.arrays import Array, IntArray, compute_point_distances
 from robocov.density.base import Density
 from robocov.observation.close_pairs import find_close_pairs
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.observation.scans import Scans
 
 
-class NearNeighbours(NamedTuple):
-    """Directed pairs of a robot and a near neighbour, sorted by robot, then neighbour."""
+class NearNeighbors(NamedTuple):
+    """Directed pairs of a robot and a near neighbor, sorted by robot, then neighbor."""
 
     robot: IntArray
     """(m,)"""
-    neighbour: IntArray
+    neighbor: IntArray
     """(m,)"""
     offset: Array
-    """(m, 2) m, from the known position of the neighbour to the robot."""
+    """(m, 2) m, from the known position of the neighbor to the robot."""
     distance: Array
     """(m,) m"""
 
@@ -35,7 +35,7 @@ class Observations:
     positions : (n, 2) array, m
     velocities : (n, 2) array, m/s
         A robot knows its own velocity, not those of others.
-    neighbours : Neighbours
+    neighbors : Neighbors
         The robots within communication range: their positions are known, nothing else.
     obstacle_points : (n, 2) array, m
         The nearest obstacle or boundary point within sensing range; nan if there is none.
@@ -44,10 +44,10 @@ class Observations:
     time : float, s
         Simulation time.
     max_speeds : (n,) array or None, m/s
-        The maximum speed of each robot, which its neighbours know as well. None if unknown.
+        The maximum speed of each robot, which its neighbors know as well. None if unknown.
     reported_positions : (m, 2) array or None, m
-        The positions of the neighbours in the newest messages that robots received, in the order of
-        ``neighbours.indices``. None: robots know the current positions of their neighbours.
+        The positions of the neighbors in the newest messages that robots received, in the order of
+        ``neighbors.indices``. None: robots know the current positions of their neighbors.
     report_ages : (m,) array or None, s
         The ages of these messages.
     density : Density or None
@@ -66,7 +66,7 @@ class Observations:
 
     positions: Array
     velocities: Array
-    neighbours: Neighbours
+    neighbors: Neighbors
     obstacle_points: Array
     region: Region
     time: float = 0.0
@@ -77,8 +77,8 @@ class Observations:
     scans: Scans | None = None
     steering: Array | None = None
 
-    def get_neighbour_positions(self, robot: int) -> Array:
-        """Return the known positions of a robot's neighbours.
+    def get_neighbor_positions(self, robot: int) -> Array:
+        """Return the known positions of a robot's neighbors.
 
         Parameters
         ----------
@@ -87,15 +87,15 @@ class Observations:
         Returns
         -------
         (k, 2) array, m
-            In the order of `Neighbours.list_neighbours`.
+            In the order of `Neighbors.list_neighbors`.
         """
-        if self.reported_positions is None or self.neighbours.indptr is None:
-            return self.positions[self.neighbours.list_neighbours(robot)]
-        start, stop = self.neighbours.indptr[robot : robot + 2]
+        if self.reported_positions is None or self.neighbors.indptr is None:
+            return self.positions[self.neighbors.list_neighbors(robot)]
+        start, stop = self.neighbors.indptr[robot : robot + 2]
         return self.reported_positions[start:stop]
 
-    def find_near_neighbours(self, reach: float) -> NearNeighbours:
-        """Find the neighbours that are at most `reach` metres away, by their known positions.
+    def find_near_neighbors(self, reach: float) -> NearNeighbors:
+        """Find the neighbors that are at most `reach` meters away, by their known positions.
 
         Parameters
         ----------
@@ -104,19 +104,19 @@ class Observations:
 
         Returns
         -------
-        NearNeighbours
-            Sorted, so that sums over the neighbours of a robot are bit-for-bit independent of other robots.
+        NearNeighbors
+            Sorted, so that sums over the neighbors of a robot are bit-for-bit independent of other robots.
         """
-        if self.reported_positions is None and self.neighbours.is_complete:
+        if self.reported_positions is None and self.neighbors.is_complete:
             pairs = find_close_pairs(self.positions, reach)
             offset = self.positions[pairs.first] - self.positions[pairs.second]
-            return NearNeighbours(pairs.first, pairs.second, offset, pairs.distance)
-        robot, neighbour = self.neighbours.list_pairs()
+            return NearNeighbors(pairs.first, pairs.second, offset, pairs.distance)
+        robot, neighbor = self.neighbors.list_pairs()
         if self.reported_positions is None:
-            known_positions = self.positions[neighbour]
+            known_positions = self.positions[neighbor]
         else:
             known_positions = self.reported_positions
         offset = self.positions[robot] - known_positions
         distance = compute_point_distances(self.positions[robot], known_positions)
         is_near = distance <= reach
-        return NearNeighbours(robot[is_near], neighbour[is_near], offset[is_near], distance[is_near])
+        return NearNeighbors(robot[is_near], neighbor[is_near], offset[is_near], distance[is_near])

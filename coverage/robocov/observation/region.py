@@ -11,7 +11,7 @@ from robocov.arrays import Array, BoolArray, compute_lengths, freeze
 from robocov.errors import InputError
 
 _MIN_BEND = 1e-9
-"""Change of direction at a vertex, rad, up to which it counts as collinear with its neighbours."""
+"""Change of direction at a vertex, rad, up to which it counts as collinear with its neighbors."""
 
 
 @dataclass(frozen=True, eq=False)

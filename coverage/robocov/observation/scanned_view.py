@@ -35,7 +35,7 @@ class Windows(NamedTuple):
 
     Seen from a position p, a corner v at distance ρ hides the space behind it. When p moves by d, the point
     of the edge at distance s from p moves by -(d · t) (s - ρ)/ρ, where t is the unit vector across the edge,
-    away from the obstacle. The view thus grows by t (s - ρ)/ρ per metre of edge and per metre of motion.
+    away from the obstacle. The view thus grows by t (s - ρ)/ρ per meter of edge and per meter of motion.
     """
 
     robot: IntArray

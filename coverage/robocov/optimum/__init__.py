@@ -1,4 +1,4 @@
-"""The centralised reference solution: the best positions for a team that knows the whole map.
+"""The centralized reference solution: the best positions for a team that knows the whole map.
 
 - `search`: the best of many restarts
 - `descent`: descent of the exact cost to a local minimum

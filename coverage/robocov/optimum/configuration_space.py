@@ -36,11 +36,11 @@ class ConfigurationSpace:
     Attributes
     ----------
     clearance : float, m
-        Minimum distance of a robot's centre from walls.
+        Minimum distance of a robot's center from walls.
     spacing : float, m
-        Minimum distance between the centres of two robots.
+        Minimum distance between the centers of two robots.
     components : tuple of shapely geometries, m
-        For each component of the free space, the area where the centre of a robot can be, which may be empty.
+        For each component of the free space, the area where the center of a robot can be, which may be empty.
 
     Examples
     --------

@@ -157,7 +157,7 @@ def find_optimum(
     it is.
 
     If the free space has several components, the robots first cover as much area as possible by occupying the
-    largest components, and then minimise the cost there. (The cost alone would be lowest with all robots in
+    largest components, and then minimize the cost there. (The cost alone would be lowest with all robots in
     the smallest room.) Components that are too small for a robot, or contain no site of the lattice, are
     ignored.
 

@@ -2,7 +2,7 @@
 
 All cells are *unknown* at first. A cell becomes *free* when a ray or a robot passes through it. It becomes a
 *wall* when a ray ends in it, and remains one until several rays have passed through it since a ray last ended
-there. If the ends of neighbouring rays are close together, they belong to one surface: the cells between them
+there. If the ends of neighboring rays are close together, they belong to one surface: the cells between them
 are *presumed* to be wall until a ray passes through them. Routes may lead through unknown cells. In the
 coverage cost, these count by their `openness`.
 """
@@ -30,7 +30,7 @@ CERTAIN_WALL = 6
 """States of a cell. All values from `WALL` to `CERTAIN_WALL` are walls; higher ones are more certain."""
 
 MAX_BRIDGED_GAP_M = 0.5
-"""Longest gap between the ends of neighbouring rays that is presumed to be wall.
+"""Longest gap between the ends of neighboring rays that is presumed to be wall.
 
 It must not exceed the width of the passages that a robot should find. Otherwise, doors seen from afar would
 be closed.
@@ -40,7 +40,7 @@ _RAY_STEP_CELLS = 0.7
 _END_DEPTH_CELLS = 0.25
 """A hit is attributed to the cell this far behind the end of the ray, which may lie on a cell border."""
 _CORE_HALF_WIDTH_CELLS = 0.3
-"""A ray clears a presumed wall only if it passes this close to the centre of the cell."""
+"""A ray clears a presumed wall only if it passes this close to the center of the cell."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +179,7 @@ def dilate(is_blocked: BoolArray, reach: float) -> BoolArray:
     ----------
     is_blocked : (rows, columns) bool array
     reach : float
-        Maximum distance between the centres of two cells, in cells.
+        Maximum distance between the centers of two cells, in cells.
 
     Returns
     -------
@@ -263,7 +263,7 @@ def _compute_ray_ends(grid: CellGrid, position: Array, directions: Array, length
 
 @kernel
 def _mark_presumed_walls(state: NDArray[np.uint8], grid: CellGrid, ends: Array, is_hit: BoolArray) -> None:
-    """Mark unknown cells between the ends of neighbouring rays as presumed walls; confirm walls there."""
+    """Mark unknown cells between the ends of neighboring rays as presumed walls; confirm walls there."""
     rows, columns = state.shape
     half_cell = 0.5 * grid.cell_size
     steps = math.ceil(MAX_BRIDGED_GAP_M / half_cell)
@@ -296,7 +296,7 @@ def _mark_hit_cells(state: NDArray[np.uint8], grid: CellGrid, ends: Array, is_hi
 
 @kernel
 def _mark_robots(state: NDArray[np.uint8], grid: CellGrid, positions: Array, radius: float) -> None:
-    """Mark the cells whose centre is within a radius of a robot as free, except for walls."""
+    """Mark the cells whose center is within a radius of a robot as free, except for walls."""
     rows, columns = state.shape
     for x, y in positions:
         first_column = find_column(x - radius, grid, columns)

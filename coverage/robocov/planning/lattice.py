@@ -1,6 +1,6 @@
 """A lattice of nodes in a window: its graph, shortest distances on it, and lines of sight.
 
-A node is joined to its neighbours in 16 directions: straight, diagonal, and a knight's move away. A path on
+A node is joined to its neighbors in 16 directions: straight, diagonal, and a knight's move away. A path on
 the lattice is therefore at most 2.8 % longer than the shortest one. Two nodes are joined if no cell on the
 straight line between them is too close to a wall. Nodes close to walls can be reached, but not passed.
 """
@@ -68,7 +68,7 @@ class Frame(NamedTuple):
 
 
 class _Moves(NamedTuple):
-    """The moves from a node to its neighbours."""
+    """The moves from a node to its neighbors."""
 
     rows: IntArray
     """(k,) Number of rows of nodes up."""
@@ -122,7 +122,7 @@ def _build_moves(stride: int, spacing: float) -> _Moves:
 
 @lru_cache(maxsize=512)
 def _list_crossed_cells(up: int, right: int, stride: int) -> tuple[tuple[int, int], ...]:
-    """Return the row and column, relative to a node, of each cell that the line to a neighbour crosses."""
+    """Return the row and column, relative to a node, of each cell that the line to a neighbor crosses."""
     along = np.linspace(0.0, 1.0, 2 * max(up, abs(right)) * stride + 1)
     row = np.rint(along * up * stride).astype(int)
     column = np.rint(along * right * stride).astype(int)
@@ -243,7 +243,7 @@ def compute_distances(
                 front[remaining] = node
                 remaining += 1
         front_size = remaining
-        # Shorten the distances of the neighbours of settled nodes.
+        # Shorten the distances of the neighbors of settled nodes.
         for k in range(settled_count):
             node = settled[k]
             for edge in range(edges.first_edge[node], edges.first_edge[node + 1]):
@@ -320,15 +320,15 @@ def find_clear_lines(
     for k in range(len(ends)):
         longest = max(longest, lengths[k])
     steps = math.ceil(longest / (_SIGHT_STEP_CELLS * frame.cell_size)) + 1
-    cells_per_metre = 1.0 / frame.cell_size
+    cells_per_meter = 1.0 / frame.cell_size
     is_clear = np.ones(len(ends), dtype=np.bool_)
     for k in range(len(ends)):
         for step in range(steps + 1):
             fraction = step * (1.0 / steps) if step < steps else 1.0
             x = position[0] + (ends[k, 0] - position[0]) * fraction
             y = position[1] + (ends[k, 1] - position[1]) * fraction
-            row = math.floor((y - frame.low_y) * cells_per_metre)
-            column = math.floor((x - frame.low_x) * cells_per_metre)
+            row = math.floor((y - frame.low_y) * cells_per_meter)
+            column = math.floor((x - frame.low_x) * cells_per_meter)
             row = min(max(row, frame.first_row), frame.last_row) - frame.first_row
             column = min(max(column, frame.first_column), frame.last_column) - frame.first_column
             is_ignored = ignored_length > 0.0 and lengths[k] * fraction <= ignored_length

@@ -95,7 +95,7 @@ class MapWindow:
 
     @property
     def spacing(self) -> float:
-        """Distance between neighbouring nodes, m."""
+        """Distance between neighboring nodes, m."""
         return self.window.stride * self.known_map.raster.cell_size
 
     @cached_property

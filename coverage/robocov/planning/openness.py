@@ -121,10 +121,10 @@ def _build_blocks(cells: NDArray[np.uint8], block_side: int) -> _BlockGrid:
 
 
 @kernel
-def _count_side(state: int, neighbour_state: int, i: int, j: int, blocks: _BlockGrid) -> None:
-    """Count the side between a cell in block (i, j) and its neighbour if only the cell itself is unknown."""
-    if state == UNKNOWN and neighbour_state != UNKNOWN and neighbour_state != _OUTSIDE:
-        if neighbour_state == FREE:
+def _count_side(state: int, neighbor_state: int, i: int, j: int, blocks: _BlockGrid) -> None:
+    """Count the side between a cell in block (i, j) and its neighbor if only the cell itself is unknown."""
+    if state == UNKNOWN and neighbor_state != UNKNOWN and neighbor_state != _OUTSIDE:
+        if neighbor_state == FREE:
             blocks.free_sides[i, j] += 1.0
         else:
             blocks.wall_sides[i, j] += 1.0
@@ -146,8 +146,8 @@ def _solve_laplace(blocks: _BlockGrid, block_side: int) -> Array:
             for j in range(block_columns):
                 if blocks.unknown_cells[i, j] == 0.0:
                     continue
-                # The centres of two blocks are one side apart, but the border of a block is only half a side
-                # from its centre, so that the flow across it is twice as large.
+                # The centers of two blocks are one side apart, but the border of a block is only half a side
+                # from its center, so that the flow across it is twice as large.
                 leak = blocks.unknown_cells[i, j] / (block_side * WALK_LENGTH_BLOCKS**2)
                 flow = 2.0 * blocks.free_sides[i, j] + leak * PRIOR_OPENNESS
                 links = 2.0 * (blocks.free_sides[i, j] + blocks.wall_sides[i, j]) + leak

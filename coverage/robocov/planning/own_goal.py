@@ -13,7 +13,7 @@ from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.team_placement import UNREACHABLE_M
 
 _MAX_STEPS = 6
-"""Maximum number of steps of a search, each to a neighbouring node."""
+"""Maximum number of steps of a search, each to a neighboring node."""
 
 
 class OwnGoal(NamedTuple):
@@ -26,7 +26,7 @@ class OwnGoal(NamedTuple):
     cell_distances: Array
     """(m,) m, distances from that node to the nodes of the robot's own cell, 0 for all other nodes."""
     cost: float
-    """Coverage cost J of the whole team, in cells times metres."""
+    """Coverage cost J of the whole team, in cells times meters."""
 
 
 def find_own_goal(
@@ -59,21 +59,21 @@ def find_own_goal(
 
     Notes
     -----
-    The search moves to a neighbouring node as long as one is better, for a few steps at most. The goal is the
-    minimum of two parabolas, in x and in y, through the costs of the last node and its neighbours.
+    The search moves to a neighboring node as long as one is better, for a few steps at most. The goal is the
+    minimum of two parabolas, in x and in y, through the costs of the last node and its neighbors.
     """
     search = _NodeSearch(planner, weights, other_positions, first_node)
     node = first_node
-    neighbours = search.list_neighbours(node)
+    neighbors = search.list_neighbors(node)
     for _ in range(_MAX_STEPS):
-        candidates = [neighbour for neighbour in neighbours if neighbour >= 0]
+        candidates = [neighbor for neighbor in neighbors if neighbor >= 0]
         best = min(candidates, key=search.costs.__getitem__, default=node)
         if not search.costs[best] < search.costs[node]:
             break
         node = best
-        neighbours = search.list_neighbours(node)
+        neighbors = search.list_neighbors(node)
     cell_distances = search.compute_cell_distances(node)
-    goal, excess = _refine_goal(planner, node, neighbours, search.costs, former_goal)
+    goal, excess = _refine_goal(planner, node, neighbors, search.costs, former_goal)
     if np.isfinite(former_goal).all():
         cell_cost = float((search.target_weights * cell_distances[search.targets]).sum())
         if excess < min_saving * cell_cost:
@@ -99,17 +99,17 @@ class _NodeSearch:
         self._distances: dict[int, Array] = {}
         self.costs: dict[int, float] = {}
 
-    def list_neighbours(self, node: int) -> list[int]:
-        """Return the neighbours of a node like `_list_neighbours`, and add their costs to `costs`."""
-        neighbours = _list_neighbours(self._planner, node)
-        new_nodes = [k for k in (node, *neighbours) if k >= 0 and k not in self._distances]
+    def list_neighbors(self, node: int) -> list[int]:
+        """Return the neighbors of a node like `_list_neighbors`, and add their costs to `costs`."""
+        neighbors = _list_neighbors(self._planner, node)
+        new_nodes = [k for k in (node, *neighbors) if k >= 0 and k not in self._distances]
         tables = self._planner.compute_distances_within(new_nodes, self._limit)
         for new_node, table in zip(new_nodes, tables, strict=True):
             distances = table[self.targets]
             nearest = np.minimum(self._other_distances, distances)
             self._distances[new_node] = distances
             self.costs[new_node] = float((self.target_weights * nearest).sum())
-        return neighbours
+        return neighbors
 
     def compute_cell_distances(self, node: int) -> Array:
         """Compute the distances from a node to those of the robot's own cell, 0 for all others, (m,) m."""
@@ -120,27 +120,27 @@ class _NodeSearch:
         return cell_distances
 
 
-def _list_neighbours(planner: GridPlanner, node: int) -> list[int]:
+def _list_neighbors(planner: GridPlanner, node: int) -> list[int]:
     """Return the nodes to the right, above, to the left and below; -1 where there is no roomy node."""
     rows = planner.window.rows
     columns = planner.window.columns
     row, column = divmod(node, columns)
     is_inside = (column + 1 < columns, row + 1 < rows, column > 0, row > 0)
-    neighbours = (node + 1, node + columns, node - 1, node - columns)
+    neighbors = (node + 1, node + columns, node - 1, node - columns)
     return [
-        neighbour if inside and planner.is_roomy[neighbour] else -1
-        for neighbour, inside in zip(neighbours, is_inside, strict=True)
+        neighbor if inside and planner.is_roomy[neighbor] else -1
+        for neighbor, inside in zip(neighbors, is_inside, strict=True)
     ]
 
 
 def _refine_goal(
-    planner: GridPlanner, node: int, neighbours: list[int], costs: Mapping[int, float], former_goal: Array
+    planner: GridPlanner, node: int, neighbors: list[int], costs: Mapping[int, float], former_goal: Array
 ) -> tuple[Array, float]:
     """Return the minimum of the parabolas around a node, and the excess cost of the former goal over it.
 
     The excess is infinite if the former goal is more than one spacing away, where the parabolas do not hold.
     """
-    right, up, left, down = neighbours
+    right, up, left, down = neighbors
     goal = planner.nodes[node].copy()
     excess = 0.0
     for axis, (ahead, behind) in enumerate(((right, left), (up, down))):

@@ -73,12 +73,12 @@ class Raster:
 
     @cached_property
     def is_outside(self) -> BoolArray:
-        """Whether the centre of each cell is outside the region, (rows, columns)."""
+        """Whether the center of each cell is outside the region, (rows, columns)."""
         rows, columns = np.indices(self.shape)
         return np.asarray(~self.region.contains(self.compute_centers(rows, columns)))
 
     def compute_centers(self, rows: IntArray, columns: IntArray) -> Array:
-        """Compute the centres of cells.
+        """Compute the centers of cells.
 
         Parameters
         ----------

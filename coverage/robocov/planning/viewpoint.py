@@ -28,19 +28,19 @@ def find_viewpoint(
     path_lengths : (m,) array, m
         Distances from the robot to all nodes.
     min_stake : float
-        Stake below which a patch is not worth a visit, in cells times metres.
+        Stake below which a patch is not worth a visit, in cells times meters.
     former_viewpoints : sequence of (2,) arrays, m
         Viewpoints that the robot has already visited.
 
     Returns
     -------
     (2,) array or None, m
-        Centre of a free cell at the border of the patch. None if no patch is worth a visit.
+        Center of a free cell at the border of the patch. None if no patch is worth a visit.
 
     Notes
     -----
     The stake of a patch is its expected contribution to the cost; it is close to zero for the inside of an
-    obstacle. The viewpoint maximises the stake divided by (1 m + path length).
+    obstacle. The viewpoint maximizes the stake divided by (1 m + path length).
     """
     window = planner.window
     raster = planner.known_map.raster

@@ -19,8 +19,8 @@ from robocov.compiled import kernel
 
 _MIN_FACING_ANGLE_RAD = math.radians(120.0)
 """Two walls face each other at a point if the directions to them differ by at least this angle."""
-_NEIGHBOURS = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)])
-"""The eight neighbours of a cell, in circular order. The even ones share a side with it."""
+_NEIGHBORS = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)])
+"""The eight neighbors of a cell, in circular order. The even ones share a side with it."""
 
 
 class VoronoiRoadmap(NamedTuple):
@@ -56,12 +56,12 @@ class VoronoiRoadmap(NamedTuple):
         """
         is_graph = find_voronoi_cells(is_roomy)
         steps = max(1, math.ceil(max(spacing, np.count_nonzero(is_graph) / max_vertices)))
-        first_cells, vertex_of_cell = _group_cells(is_graph, steps, _NEIGHBOURS)
+        first_cells, vertex_of_cell = _group_cells(is_graph, steps, _NEIGHBORS)
         vertices = np.column_stack(np.divmod(first_cells, is_roomy.shape[1]))
         starts, ends = _list_adjacent_groups(vertex_of_cell)
         lengths = compute_point_distances(vertices[starts], vertices[ends])
         graph = csr_array((lengths, (starts, ends)), shape=(len(vertices), len(vertices)))
-        _spread_groups(vertex_of_cell, is_free, _NEIGHBOURS[::2])
+        _spread_groups(vertex_of_cell, is_free, _NEIGHBORS[::2])
         return cls(
             vertices=vertices,
             distances=dijkstra(graph, directed=False),
@@ -102,12 +102,12 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
         is_between_walls[after] |= is_facing
     order = np.flatnonzero(is_graph)
     order = order[np.argsort(wall_distance.ravel()[order], kind="stable")]
-    _thin(is_graph, is_between_walls & is_graph, order, _NEIGHBOURS)
+    _thin(is_graph, is_between_walls & is_graph, order, _NEIGHBORS)
     return is_graph[1:-1, 1:-1]
 
 
 @kernel
-def _thin(is_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbours: IntArray) -> None:
+def _thin(is_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbors: IntArray) -> None:
     """Remove cells that no connection depends on, in the given order, until none is left to remove."""
     columns = is_graph.shape[1]
     has_changed = True
@@ -118,28 +118,28 @@ def _thin(is_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbours
             column = cell % columns
             if not is_graph[row, column] or must_stay[row, column]:
                 continue
-            if _count_crossings(is_graph, row, column, neighbours) == 1:
+            if _count_crossings(is_graph, row, column, neighbors) == 1:
                 is_graph[row, column] = False
                 has_changed = True
 
 
 @kernel
-def _count_crossings(is_graph: BoolArray, row: int, column: int, neighbours: IntArray) -> int:
-    """Return Hilditch's crossing number: 1 if the neighbours of a cell stay connected without it."""
+def _count_crossings(is_graph: BoolArray, row: int, column: int, neighbors: IntArray) -> int:
+    """Return Hilditch's crossing number: 1 if the neighbors of a cell stay connected without it."""
     crossings = 0
     for k in range(0, 8, 2):
         first = (k + 1) % 8
         second = (k + 2) % 8
-        if not is_graph[row + neighbours[k, 0], column + neighbours[k, 1]] and (
-            is_graph[row + neighbours[first, 0], column + neighbours[first, 1]]
-            or is_graph[row + neighbours[second, 0], column + neighbours[second, 1]]
+        if not is_graph[row + neighbors[k, 0], column + neighbors[k, 1]] and (
+            is_graph[row + neighbors[first, 0], column + neighbors[first, 1]]
+            or is_graph[row + neighbors[second, 0], column + neighbors[second, 1]]
         ):
             crossings += 1
     return crossings
 
 
 @kernel
-def _group_cells(is_graph: BoolArray, max_steps: int, neighbours: IntArray) -> tuple[IntArray, IntArray]:
+def _group_cells(is_graph: BoolArray, max_steps: int, neighbors: IntArray) -> tuple[IntArray, IntArray]:
     """Return the first cell of each group, and the group of each cell, (rows, columns), or -1 for none.
 
     A group consists of the cells within `max_steps` of its first cell that are not in an earlier group.
@@ -164,9 +164,9 @@ def _group_cells(is_graph: BoolArray, max_steps: int, neighbours: IntArray) -> t
             column = queue[head] % columns
             step = steps[head]
             head += 1
-            for k in range(len(neighbours)):
-                i = row + neighbours[k, 0]
-                j = column + neighbours[k, 1]
+            for k in range(len(neighbors)):
+                i = row + neighbors[k, 0]
+                j = column + neighbors[k, 1]
                 is_inside = 0 <= i < rows and 0 <= j < columns
                 if step < max_steps and is_inside and is_graph[i, j] and group[i, j] < 0:
                     group[i, j] = groups
@@ -191,7 +191,7 @@ def _list_adjacent_groups(group: IntArray) -> tuple[IntArray, IntArray]:
 
 
 @kernel
-def _spread_groups(group: IntArray, is_free: BoolArray, neighbours: IntArray) -> None:
+def _spread_groups(group: IntArray, is_free: BoolArray, neighbors: IntArray) -> None:
     """Give each free cell the group of the nearest cell that has one, measured in steps between cells."""
     rows, columns = is_free.shape
     queue = np.empty(is_free.size, dtype=np.intp)
@@ -205,9 +205,9 @@ def _spread_groups(group: IntArray, is_free: BoolArray, neighbours: IntArray) ->
         row = queue[head] // columns
         column = queue[head] % columns
         head += 1
-        for k in range(len(neighbours)):
-            i = row + neighbours[k, 0]
-            j = column + neighbours[k, 1]
+        for k in range(len(neighbors)):
+            i = row + neighbors[k, 0]
+            j = column + neighbors[k, 1]
             if 0 <= i < rows and 0 <= j < columns and is_free[i, j] and group[i, j] < 0:
                 group[i, j] = group[row, column]
                 queue[tail] = i * columns + j

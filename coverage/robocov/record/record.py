@@ -23,7 +23,7 @@ from robocov.files.result_folder import complete_commit
 from robocov.files.writing import replace_file
 from robocov.mapfile import from_json, to_json
 from robocov.observation import Decision, Observations, Snapshot
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.optional_imports import import_optional
 from robocov.record.package_versions import list_versions
 from robocov.record.record_arrays import ARRAYS, COLUMNS, STEERING, read_record_arrays
@@ -107,7 +107,7 @@ class Record(Drawable):
         return _protect(self.conditions.find_present(self.time, len(self.team)))
 
     @cached_property
-    def travelled(self) -> BoolArray:
+    def traveled(self) -> BoolArray:
         """Mask of the displacements that belong to a path, (T - 1, n) bool; read-only.
 
         A robot does not travel between two moments if it has not joined yet, or if the user moved it to
@@ -181,11 +181,11 @@ class Record(Drawable):
         Snapshot
         """
         working = None if self.conditions is None else self.working[k]
-        neighbours = Neighbours.from_ranges(self.positions[k], self.team.communication_range)
+        neighbors = Neighbors.from_ranges(self.positions[k], self.team.communication_range)
         observations = Observations(
             positions=self.positions[k],
             velocities=self.velocities[k],
-            neighbours=neighbours if working is None else neighbours.restrict_to_working(working),
+            neighbors=neighbors if working is None else neighbors.restrict_to_working(working),
             obstacle_points=self.obstacle_points[k],
             region=self.environment.region,
             time=float(self.time[k]),
@@ -303,7 +303,7 @@ class Record(Drawable):
         Parameters
         ----------
         summary : mapping or None
-            The summary of the run, see `metrics.summarise`.
+            The summary of the run, see `metrics.summarize`.
         lattice : int or None
             Lattice on which the cost of the run was computed.
 

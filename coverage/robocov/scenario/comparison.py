@@ -14,7 +14,7 @@ from robocov.defaults import DEFAULT_LATTICE
 from robocov.drawing import Drawable
 from robocov.environment import Environment
 from robocov.errors import ParameterError, quote
-from robocov.metrics import CostHistory, compute_cost_history, summarise
+from robocov.metrics import CostHistory, compute_cost_history, summarize
 from robocov.optional_imports import import_optional
 from robocov.record import Record
 from robocov.scenario.scenario import Scenario
@@ -50,8 +50,8 @@ class Comparison(Drawable):
 
     @cached_property
     def summaries(self) -> dict[str, dict[str, Any]]:
-        """Summaries of the runs by label, see `summarise`."""
-        return {label: summarise(record, self.histories[label]) for label, record in self.records.items()}
+        """Summaries of the runs by label, see `summarize`."""
+        return {label: summarize(record, self.histories[label]) for label, record in self.records.items()}
 
     def table(self) -> list[dict[str, Any]]:
         """Return the results as rows, in the order of the controllers.

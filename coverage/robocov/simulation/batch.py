@@ -16,7 +16,7 @@ from robocov.defaults import DEFAULT_DT_S
 from robocov.environment import Environment, require_environment
 from robocov.errors import ParameterError, StartError, format_count, to_floats
 from robocov.observation import Decision, Observations, Scans, Snapshot, check_forces
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.record import Record, Recorder
 from robocov.sensor import RangeSensor
 from robocov.simulation.checks import check_dt, check_team, count_steps
@@ -121,10 +121,10 @@ class SimulationBatch:
         obstacles = build_obstacles(environment)
         self._world = World(obstacles, self._joint_team, positions.reshape(-1, 2), runs=runs)
         self.sensor = RangeSensor(obstacles.walls)
-        self._complete_graphs: list[Neighbours] | None = None
+        self._complete_graphs: list[Neighbors] | None = None
         if np.isinf(self.team.communication_range).all():
-            self._complete_graphs = [Neighbours(robots)] * runs
-            self._complete_joint_graph = Neighbours.combine(self._complete_graphs)
+            self._complete_graphs = [Neighbors(robots)] * runs
+            self._complete_joint_graph = Neighbors.combine(self._complete_graphs)
         self._decides_jointly = robots <= MAX_JOINT_TEAM_SIZE and not has_memory(self.controller)
         self._memories: list[Any] = []
         if self._decides_jointly:
@@ -135,7 +135,7 @@ class SimulationBatch:
 
     def _start_step(self) -> None:
         """Discard observations and decision of the last step."""
-        self._graphs: list[Neighbours] | None = None
+        self._graphs: list[Neighbors] | None = None
         self._observations: Observations | None = None
         self._decision: _BatchDecision | None = None
 
@@ -167,7 +167,7 @@ class SimulationBatch:
 
     @property
     def positions(self) -> Array:
-        """Centres of the robots, (runs, n, 2) m."""
+        """Centers of the robots, (runs, n, 2) m."""
         return self._world.positions.reshape(len(self), -1, 2)
 
     @property
@@ -221,7 +221,7 @@ class SimulationBatch:
                 sensor=self.sensor,
                 environment=self.environment,
                 team=self._joint_team,
-                neighbours=self._get_joint_graph(),
+                neighbors=self._get_joint_graph(),
                 time=self.time,
                 scanning=scanning if is_scan_due(scanning, self._steps, self.dt) else None,
             )
@@ -247,7 +247,7 @@ class SimulationBatch:
             observations,
             positions=observations.positions[rows],
             velocities=observations.velocities[rows],
-            neighbours=self._get_graphs()[run],
+            neighbors=self._get_graphs()[run],
             obstacle_points=observations.obstacle_points[rows],
             max_speeds=self.team.max_speed,
             scans=scans,
@@ -262,22 +262,20 @@ class SimulationBatch:
         rows = len(self._joint_team)
         return check_forces(np.asarray(forces).reshape(rows, 2), rows, "forces")
 
-    def _get_graphs(self) -> list[Neighbours]:
+    def _get_graphs(self) -> list[Neighbors]:
         """Return the communication graph of each run in this step."""
         if self._complete_graphs is not None:
             return self._complete_graphs
         if self._graphs is None:
             ranges = self.team.communication_range
-            self._graphs = [
-                Neighbours.from_ranges(self._world.positions[rows], ranges) for rows in self._rows
-            ]
+            self._graphs = [Neighbors.from_ranges(self._world.positions[rows], ranges) for rows in self._rows]
         return self._graphs
 
-    def _get_joint_graph(self) -> Neighbours:
+    def _get_joint_graph(self) -> Neighbors:
         """Return the communication graph of all robots, which links only those of the same run."""
         if self._complete_graphs is not None:
             return self._complete_joint_graph
-        return Neighbours.combine(self._get_graphs())
+        return Neighbors.combine(self._get_graphs())
 
     def _observe_and_decide(self) -> _BatchDecision:
         """Let all robots observe and the controller decide, once in each step."""
@@ -376,7 +374,7 @@ class SimulationBatch:
 
 def _to_starts(starts: Any) -> Array:
     """Return the start positions of all runs, (runs, n, 2) m."""
-    positions = to_floats("starts", starts, "[x, y] of each robot of each run in metres", StartError)
+    positions = to_floats("starts", starts, "[x, y] of each robot of each run in meters", StartError)
     if positions.ndim != 3 or positions.shape[2] != 2 or 0 in positions.shape:
         raise StartError(
             "starts: expected an array of shape (runs, n, 2) with runs >= 1 and n >= 1, "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robocov.environment import Environment
 from robocov.observation import Observations, Scanning, Scans
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.sensor import RangeSensor
 from robocov.team import Team
 from robocov.world import ChangingWorld, World
@@ -15,7 +15,7 @@ def build_observations(
     sensor: RangeSensor,
     environment: Environment,
     team: Team,
-    neighbours: Neighbours,
+    neighbors: Neighbors,
     time: float,
     scanning: Scanning | None,
 ) -> Observations:
@@ -27,7 +27,7 @@ def build_observations(
     sensor : RangeSensor
     environment : Environment
     team : Team
-    neighbours : Neighbours
+    neighbors : Neighbors
         The communication graph.
     time : float, s
     scanning : Scanning or None
@@ -44,7 +44,7 @@ def build_observations(
     return Observations(
         positions=world.positions,
         velocities=world.velocities,
-        neighbours=neighbours,
+        neighbors=neighbors,
         obstacle_points=sensor.find_nearest_points(world.positions, team.sensing_range),
         region=environment.region,
         time=time,

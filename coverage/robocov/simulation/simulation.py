@@ -20,7 +20,7 @@ from robocov.drawing import show
 from robocov.environment import Environment, require_environment
 from robocov.errors import format_count
 from robocov.observation import Observations, Snapshot, check_forces
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.record import Record, Recorder
 from robocov.sensor import RangeSensor
 from robocov.simulation.checks import (
@@ -136,9 +136,9 @@ class Simulation:
         if self.conditions is not None:
             self._perception = Perception(self.conditions, self.team, dt)
             self.inbox = self._perception.create_inbox()
-        self._complete_graph: Neighbours | None = None
+        self._complete_graph: Neighbors | None = None
         if np.isinf(self.team.communication_range).all():
-            self._complete_graph = Neighbours(len(self.team))
+            self._complete_graph = Neighbors(len(self.team))
         self.memory: Any = self._caller.begin(environment.region, self.team, self.time)
         self._start_step()
 
@@ -186,7 +186,7 @@ class Simulation:
 
     @property
     def positions(self) -> Array:
-        """Centres of the robots, (n, 2) m."""
+        """Centers of the robots, (n, 2) m."""
         return self._world.positions
 
     @property
@@ -295,16 +295,16 @@ class Simulation:
 
     def _sense(self) -> Observations:
         """Return the observations of robots with ideal sensors and communication."""
-        neighbours = self._complete_graph
-        if neighbours is None:
-            neighbours = Neighbours.from_ranges(self.positions, self.team.communication_range)
+        neighbors = self._complete_graph
+        if neighbors is None:
+            neighbors = Neighbors.from_ranges(self.positions, self.team.communication_range)
         scanning = self._caller.scanning
         return build_observations(
             world=self._world,
             sensor=self.sensor,
             environment=self.environment,
             team=self.team,
-            neighbours=neighbours,
+            neighbors=neighbors,
             time=self.time,
             scanning=scanning if is_scan_due(scanning, self._steps, self.dt) else None,
         )

@@ -45,7 +45,7 @@ class TeamState:
     leans on something overlaps with it a little."""
 
     def __post_init__(self) -> None:
-        positions = to_floats("starts", self.positions, "[x, y] of each robot in metres", StartError)
+        positions = to_floats("starts", self.positions, "[x, y] of each robot in meters", StartError)
         if positions.ndim != 2 or positions.shape[1] != 2 or len(positions) < 1:
             raise StartError(
                 f"starts: expected an array of shape (n, 2) with n >= 1, got shape {positions.shape}"

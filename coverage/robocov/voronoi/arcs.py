@@ -22,7 +22,7 @@ END_X = 2
 END_Y = 3
 """Column of a piece: y of its end, m."""
 HALF_ANGLE = 4
-"""Column of a piece: half of the angle that it spans about the centre of its circle, rad."""
+"""Column of a piece: half of the angle that it spans about the center of its circle, rad."""
 CELL = 5
 """Column of a piece: the cell that it bounds."""
 BEYOND = 6
@@ -92,7 +92,7 @@ def _compute_moments(pieces: Array, cells: int, series: Array) -> Array:
 def _compute_segment_moments(half_angle: float, series: Array) -> tuple[float, float, float]:
     """Return the moments of the circular segment on a chord of length 1.
 
-    They are the area, the first moment about the line of the chord, away from the centre, and the polar
+    They are the area, the first moment about the line of the chord, away from the center, and the polar
     moment about the middle of the chord. With s and c the sine and cosine of the half angle x, and
     h = (x - s c - 2/3 s³) / s⁵, which is 1/5 at zero, all three are sums of terms that do not cancel.
     """
@@ -145,7 +145,7 @@ def _split_piece(piece: list[float], max_deviation: float) -> Array:
 
 
 def _count_chords(length: float, half_angle: float, max_deviation: float) -> int:
-    """Return the number of chords that replace an arc whose ends are `length` metres apart."""
+    """Return the number of chords that replace an arc whose ends are `length` meters apart."""
     radius = 0.5 * length / max(abs(np.sin(half_angle)), _MIN_LENGTH_M)
     if radius * half_angle**2 < 2.0 * max_deviation:
         return 1

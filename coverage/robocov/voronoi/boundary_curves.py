@@ -35,16 +35,16 @@ _CURVE_COLUMNS = 8
 
 PAIR_ROBOT = 0
 """Column of a pair: the robot."""
-PAIR_NEIGHBOUR = 1
-"""Column of a pair: its neighbour."""
+PAIR_NEIGHBOR = 1
+"""Column of a pair: its neighbor."""
 PAIR_DX = 2
-"""Column of a pair: offset in x to the neighbour's position as known to the robot, m."""
+"""Column of a pair: offset in x to the neighbor's position as known to the robot, m."""
 PAIR_DY = 3
 """Column of a pair: offset in y, m."""
 PAIR_OWN_SPEED = 4
 """Column of a pair: speed of the robot, m/s."""
 PAIR_OTHER_SPEED = 5
-"""Column of a pair: speed of the neighbour, m/s."""
+"""Column of a pair: speed of the neighbor, m/s."""
 
 _EDGE_CELL = 4
 _EDGE_BEYOND = 5
@@ -70,7 +70,7 @@ def trace_boundaries(
     sides : (k, 5) array
         The region, as `Region.sides`.
     pairs : (m, 6) array
-        Neighbours by robot; for the columns see `PAIR_ROBOT` and the following.
+        Neighbors by robot; for the columns see `PAIR_ROBOT` and the following.
     edges : (e, 6) array
         Edges of the cells that robots of equal speeds would share: x, y, u, v of the ends relative to the
         generator (m), cell and robot beyond, by cell.
@@ -160,7 +160,7 @@ def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
             curves[count, _BEGIN] = -np.inf
             curves[count, _END] = np.inf
             curves[count, _CURVE_CELL] = pairs[k, PAIR_ROBOT]
-            curves[count, _CURVE_BEYOND] = pairs[k, PAIR_NEIGHBOUR]
+            curves[count, _CURVE_BEYOND] = pairs[k, PAIR_NEIGHBOR]
             count += 1
     return count
 
@@ -201,13 +201,13 @@ def _write_lines(curves: Array, pairs: Array, edges: Array, sides: Array, point:
 
 
 @kernel
-def _write_bisector(curve: Array, pairs: Array, neighbour: float) -> None:
-    """Write the direction and distance of the bisector to a neighbour.
+def _write_bisector(curve: Array, pairs: Array, neighbor: float) -> None:
+    """Write the direction and distance of the bisector to a neighbor.
 
     They are not taken from the edge: it may be so short that rounding decides its direction.
     """
     for k in range(len(pairs)):
-        if pairs[k, PAIR_NEIGHBOUR] == neighbour:
+        if pairs[k, PAIR_NEIGHBOR] == neighbor:
             distance = np.sqrt(pairs[k, PAIR_DX] ** 2 + pairs[k, PAIR_DY] ** 2)
             curve[_NORMAL_X] = pairs[k, PAIR_DX] / distance
             curve[_NORMAL_Y] = pairs[k, PAIR_DY] / distance

@@ -13,7 +13,7 @@ from robocov.density.base import Density
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import InputError, quote
 from robocov.observation import Cells
-from robocov.observation.neighbours import NeighbourPositions, Neighbours
+from robocov.observation.neighbors import NeighborPositions, Neighbors
 from robocov.observation.region import Region
 from robocov.voronoi.clipped_cells import compute_clipped_cells
 from robocov.voronoi.clipping import CellArrays
@@ -53,7 +53,7 @@ class VoronoiPartition(Cells):
 def partition(
     generators: Array,
     region: Region,
-    neighbours: Neighbours | None = None,
+    neighbors: Neighbors | None = None,
     triangulation: Mesh | None = None,
     reported_positions: Array | None = None,
     density: Density | None = None,
@@ -66,15 +66,15 @@ def partition(
         They may lie on the region's boundary or outside. Generators at the same position
         do not cut each other's cells.
     region : Region
-    neighbours : Neighbours or None
-        Communication graph. Cell i is cut only by the bisectors to the neighbours of robot i, and depends, to
-        the last bit, on nothing else. By default each robot is a neighbour of all others.
+    neighbors : Neighbors or None
+        Communication graph. Cell i is cut only by the bisectors to the neighbors of robot i, and depends, to
+        the last bit, on nothing else. By default each robot is a neighbor of all others.
     triangulation : (2, 8 n + 4) int32 array or None
         `Cells.triangulation` of the previous partition. If the generators have moved little since, this one
         takes a fraction of the time. Its cells are the same, to the last bit unless four generators lie on a
         circle up to rounding.
     reported_positions : (m, 2) array or None, m
-        Known positions of the neighbours, in the order of ``neighbours.indices``. The cells of two
+        Known positions of the neighbors, in the order of ``neighbors.indices``. The cells of two
         robots may then overlap or leave a gap, as each is based on what its own robot knows. By default the
         true positions are known.
     density : Density or None
@@ -87,7 +87,7 @@ def partition(
     Raises
     ------
     InputError
-        If the generators are not finite numbers of shape (n, 2), or neighbours or reported positions do not
+        If the generators are not finite numbers of shape (n, 2), or neighbors or reported positions do not
         match them.
 
     Examples
@@ -98,11 +98,11 @@ def partition(
     (array([2., 2.]), array([[0, 1]]))
     """
     points = to_generators(generators)
-    if neighbours is None:
-        neighbours = Neighbours(len(points))
-    check_neighbours(neighbours, reported_positions, len(points))
-    known = NeighbourPositions.from_graph(neighbours, reported_positions)
-    mesh = _create_mesh(len(points), triangulation, is_complete=neighbours.is_complete)
+    if neighbors is None:
+        neighbors = Neighbors(len(points))
+    check_neighbors(neighbors, reported_positions, len(points))
+    known = NeighborPositions.from_graph(neighbors, reported_positions)
+    mesh = _create_mesh(len(points), triangulation, is_complete=neighbors.is_complete)
     cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=_NO_EDGES)
     count = _compute_cells(points, region.sides, known, mesh, cells)
     if count < 0:
@@ -146,12 +146,12 @@ def to_generators(values: object) -> Array:
     return points
 
 
-def check_neighbours(neighbours: Neighbours, reported_positions: Array | None, robots: int) -> None:
-    """Check that neighbours and reported positions match the number of robots.
+def check_neighbors(neighbors: Neighbors, reported_positions: Array | None, robots: int) -> None:
+    """Check that neighbors and reported positions match the number of robots.
 
     Parameters
     ----------
-    neighbours : Neighbours
+    neighbors : Neighbors
     reported_positions : (m, 2) array or None, m
     robots : int
 
@@ -160,13 +160,13 @@ def check_neighbours(neighbours: Neighbours, reported_positions: Array | None, r
     InputError
         If they do not match.
     """
-    if neighbours.count != robots:
-        raise InputError(f"neighbours: expected a graph of {robots} robots, got {neighbours.count}")
+    if neighbors.count != robots:
+        raise InputError(f"neighbors: expected a graph of {robots} robots, got {neighbors.count}")
     if reported_positions is None:
         return
-    if neighbours.indices is None:
+    if neighbors.indices is None:
         raise InputError("reported_positions: expected None without limited communication")
-    expected = (len(neighbours.indices), 2)
+    expected = (len(neighbors.indices), 2)
     if np.shape(reported_positions) != expected:
         got = np.shape(reported_positions)
         raise InputError(f"reported_positions: expected shape {expected}, got {got}")
@@ -210,7 +210,7 @@ def _create_mesh(robots: int, previous: Mesh | None, *, is_complete: bool) -> Me
     return np.full((2, size), -1, dtype=np.int32)
 
 
-def _find_edges(points: Array, sides: Array, known: NeighbourPositions, mesh: Mesh, count: int) -> CellEdges:
+def _find_edges(points: Array, sides: Array, known: NeighborPositions, mesh: Mesh, count: int) -> CellEdges:
     """Compute all cells once more, now with their edges, whose number is known."""
     edges = np.empty((count, 6))
     cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=edges)
@@ -226,7 +226,7 @@ def _find_edges(points: Array, sides: Array, known: NeighbourPositions, mesh: Me
 
 @kernel
 def _compute_cells(
-    points: Array, sides: Array, neighbours: NeighbourPositions, mesh: Mesh, cells: CellArrays
+    points: Array, sides: Array, neighbors: NeighborPositions, mesh: Mesh, cells: CellArrays
 ) -> int:
     """Compute all cells; return the number of edges, or -1 - i if generator i is not finite.
 
@@ -240,4 +240,4 @@ def _compute_cells(
         if total >= 0:
             return total
         mesh[CORNER, 0] = -1
-    return compute_clipped_cells(points, sides, neighbours, cells)
+    return compute_clipped_cells(points, sides, neighbors, cells)

@@ -1,12 +1,12 @@
-"""Cells that are clipped by all neighbours of their robots, one robot at a time."""
+"""Cells that are clipped by all neighbors of their robots, one robot at a time."""
 
 from robocov.arrays import Array
 from robocov.compiled import inlined_kernel, kernel
-from robocov.observation.neighbours import NeighbourPositions
+from robocov.observation.neighbors import NeighborPositions
 from robocov.voronoi.clipping import (
     CellArrays,
     Workspace,
-    add_neighbour,
+    add_neighbor,
     clip_cell,
     create_workspace,
     write_cell,
@@ -15,9 +15,9 @@ from robocov.voronoi.clipping import (
 
 @kernel
 def compute_clipped_cells(
-    points: Array, sides: Array, neighbours: NeighbourPositions, cells: CellArrays
+    points: Array, sides: Array, neighbors: NeighborPositions, cells: CellArrays
 ) -> int:
-    """Compute all cells, each clipped by the bisectors to the neighbours of its robot.
+    """Compute all cells, each clipped by the bisectors to the neighbors of its robot.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def compute_clipped_cells(
         The generators.
     sides : (k, 5) array
         The region, as `Region.sides`.
-    neighbours : NeighbourPositions
+    neighbors : NeighborPositions
     cells : CellArrays
         Changed in place.
 
@@ -37,8 +37,8 @@ def compute_clipped_cells(
     workspace = create_workspace(len(points), len(sides))
     total = 0
     for i in range(len(points)):
-        if len(neighbours.indptr):
-            count = _add_listed_neighbours(workspace, points, neighbours, i)
+        if len(neighbors.indptr):
+            count = _add_listed_neighbors(workspace, points, neighbors, i)
         else:
             count = _add_all_robots(workspace, points, i)
         polygon = clip_cell(workspace, count, points, sides, i)
@@ -47,15 +47,13 @@ def compute_clipped_cells(
 
 
 @inlined_kernel
-def _add_listed_neighbours(
-    workspace: Workspace, points: Array, neighbours: NeighbourPositions, i: int
-) -> int:
-    """Add the neighbours of robot i at their known positions; return their number."""
-    neighbour_rows = workspace.neighbours
-    indices = neighbours.indices
-    positions = neighbours.positions
+def _add_listed_neighbors(workspace: Workspace, points: Array, neighbors: NeighborPositions, i: int) -> int:
+    """Add the neighbors of robot i at their known positions; return their number."""
+    neighbor_rows = workspace.neighbors
+    indices = neighbors.indices
+    positions = neighbors.positions
     count = 0
-    for k in range(neighbours.indptr[i], neighbours.indptr[i + 1]):
+    for k in range(neighbors.indptr[i], neighbors.indptr[i + 1]):
         j = indices[k]
         if len(positions):
             dx = positions[k, 0] - points[i, 0]
@@ -63,17 +61,17 @@ def _add_listed_neighbours(
         else:
             dx = points[j, 0] - points[i, 0]
             dy = points[j, 1] - points[i, 1]
-        count = add_neighbour(neighbour_rows, count, dx, dy, j)
+        count = add_neighbor(neighbor_rows, count, dx, dy, j)
     return count
 
 
 @inlined_kernel
 def _add_all_robots(workspace: Workspace, points: Array, i: int) -> int:
-    """Add all robots as neighbours of robot i; return their number."""
-    neighbour_rows = workspace.neighbours
+    """Add all robots as neighbors of robot i; return their number."""
+    neighbor_rows = workspace.neighbors
     count = 0
     for j in range(len(points)):
         dx = points[j, 0] - points[i, 0]
         dy = points[j, 1] - points[i, 1]
-        count = add_neighbour(neighbour_rows, count, dx, dy, j)
+        count = add_neighbor(neighbor_rows, count, dx, dy, j)
     return count

@@ -1,4 +1,4 @@
-"""Clipping of one cell: the region is cut by the bisectors between a robot and its neighbours.
+"""Clipping of one cell: the region is cut by the bisectors between a robot and its neighbors.
 
 The polygon of a cell is stored in one of two rings, and each cut writes the other one. All coordinates are
 relative to the generator of the cell, so that a tiny cell far from the origin keeps its full precision.
@@ -20,20 +20,20 @@ BEYOND = 2
 """Column of a vertex: the robot on the other side of the edge that begins there, or `REGION`."""
 _EXCESS = 3
 """Column of a vertex: its excess q · d - |d|²/2 over the current bisector, with d the offset of the
-neighbour, m²; positive beyond the bisector."""
+neighbor, m²; positive beyond the bisector."""
 
 DX = 0
-"""Column of a neighbour: its offset from the generator in x, m."""
+"""Column of a neighbor: its offset from the generator in x, m."""
 DY = 1
-"""Column of a neighbour: its offset from the generator in y, m."""
+"""Column of a neighbor: its offset from the generator in y, m."""
 SQUARE = 2
-"""Column of a neighbour: its squared distance, m²."""
+"""Column of a neighbor: its squared distance, m²."""
 ROBOT = 3
-"""Column of a neighbour: its number."""
-_NEIGHBOUR_COLUMNS = 4
+"""Column of a neighbor: its number."""
+_NEIGHBOR_COLUMNS = 4
 
-_SORTED_NEIGHBOURS = 6
-"""Number of neighbours that cut a cell in order of distance; few others can then still cut it."""
+_SORTED_NEIGHBORS = 6
+"""Number of neighbors that cut a cell in order of distance; few others can then still cut it."""
 
 
 class Workspace(NamedTuple):
@@ -41,8 +41,8 @@ class Workspace(NamedTuple):
 
     rings: Array
     """(2, k, 4) Vertices of two polygons; the columns are `X`, `Y`, `BEYOND` and one for cuts."""
-    neighbours: Array
-    """(n, 4) Neighbours that may bound the cell; the columns are `DX`, `DY`, `SQUARE` and `ROBOT`."""
+    neighbors: Array
+    """(n, 4) Neighbors that may bound the cell; the columns are `DX`, `DY`, `SQUARE` and `ROBOT`."""
 
 
 class CellPolygon(NamedTuple):
@@ -82,44 +82,44 @@ def create_workspace(robots: int, sides: int) -> Workspace:
 
 
 @inlined_kernel
-def add_neighbour(neighbours: Array, count: int, dx: float, dy: float, robot: int) -> int:
-    """Add a neighbour that may bound a cell to those of a workspace.
+def add_neighbor(neighbors: Array, count: int, dx: float, dy: float, robot: int) -> int:
+    """Add a neighbor that may bound a cell to those of a workspace.
 
-    A neighbour at the position of the generator is left out: the two do not cut each other's cells.
+    A neighbor at the position of the generator is left out: the two do not cut each other's cells.
 
     Parameters
     ----------
-    neighbours : (n, 4) array
+    neighbors : (n, 4) array
         Changed in place; see `Workspace`.
     count : int
-        Number of neighbours before.
+        Number of neighbors before.
     dx, dy : float, m
-        Offset of the neighbour from the generator.
+        Offset of the neighbor from the generator.
     robot : int
-        Number of the neighbour.
+        Number of the neighbor.
 
     Returns
     -------
     int
-        Number of neighbours after.
+        Number of neighbors after.
     """
-    neighbours[count, DX] = dx
-    neighbours[count, DY] = dy
-    neighbours[count, SQUARE] = dx * dx + dy * dy
-    neighbours[count, ROBOT] = robot
-    return count + 1 if neighbours[count, SQUARE] > 0.0 else count
+    neighbors[count, DX] = dx
+    neighbors[count, DY] = dy
+    neighbors[count, SQUARE] = dx * dx + dy * dy
+    neighbors[count, ROBOT] = robot
+    return count + 1 if neighbors[count, SQUARE] > 0.0 else count
 
 
 @inlined_kernel
-def clip_cell(workspace: Workspace, neighbours: int, points: Array, sides: Array, i: int) -> CellPolygon:
-    """Cut the region by the bisectors between robot i and its neighbours.
+def clip_cell(workspace: Workspace, neighbors: int, points: Array, sides: Array, i: int) -> CellPolygon:
+    """Cut the region by the bisectors between robot i and its neighbors.
 
     Parameters
     ----------
     workspace : Workspace
-        Its first rows are the neighbours; they are reordered.
-    neighbours : int
-        Number of neighbours.
+        Its first rows are the neighbors; they are reordered.
+    neighbors : int
+        Number of neighbors.
     points : (n, 2) array, m
         The generators.
     sides : (k, 5) array
@@ -132,25 +132,25 @@ def clip_cell(workspace: Workspace, neighbours: int, points: Array, sides: Array
     CellPolygon
     """
     rings = workspace.rings
-    neighbour_rows = workspace.neighbours
+    neighbor_rows = workspace.neighbors
     ring = 0
     count = len(sides)
     for k in range(count):
         rings[ring, k, X] = sides[k, 0] - points[i, 0]
         rings[ring, k, Y] = sides[k, 1] - points[i, 1]
         rings[ring, k, BEYOND] = REGION
-    # A bisector lies half way to the neighbour: no farther neighbour can cut the cell.
+    # A bisector lies half way to the neighbor: no farther neighbor can cut the cell.
     max_square = _compute_max_square(rings, ring, count)
-    for row in range(neighbours):
-        if row < _SORTED_NEIGHBOURS:
-            _move_nearest(neighbour_rows, row, neighbours)
-        if neighbour_rows[row, SQUARE] <= max_square:
-            new_count = _cut(rings, ring, count, neighbour_rows, row)
+    for row in range(neighbors):
+        if row < _SORTED_NEIGHBORS:
+            _move_nearest(neighbor_rows, row, neighbors)
+        if neighbor_rows[row, SQUARE] <= max_square:
+            new_count = _cut(rings, ring, count, neighbor_rows, row)
             if new_count >= 0:
                 ring = 1 - ring
                 count = new_count
                 max_square = _compute_max_square(rings, ring, count)
-        elif row < _SORTED_NEIGHBOURS:
+        elif row < _SORTED_NEIGHBORS:
             break
     return CellPolygon(ring, count, 0)
 
@@ -167,26 +167,26 @@ def _compute_max_square(rings: Array, ring: int, count: int) -> float:
 
 
 @inlined_kernel
-def _move_nearest(neighbour_rows: Array, row: int, count: int) -> None:
-    """Swap the nearest of the neighbours from `row` onwards into that row."""
+def _move_nearest(neighbor_rows: Array, row: int, count: int) -> None:
+    """Swap the nearest of the neighbors from `row` onwards into that row."""
     nearest = row
     for k in range(row + 1, count):
-        if neighbour_rows[k, SQUARE] < neighbour_rows[nearest, SQUARE]:
+        if neighbor_rows[k, SQUARE] < neighbor_rows[nearest, SQUARE]:
             nearest = k
-    for column in range(_NEIGHBOUR_COLUMNS):
-        neighbour_rows[row, column], neighbour_rows[nearest, column] = (
-            neighbour_rows[nearest, column],
-            neighbour_rows[row, column],
+    for column in range(_NEIGHBOR_COLUMNS):
+        neighbor_rows[row, column], neighbor_rows[nearest, column] = (
+            neighbor_rows[nearest, column],
+            neighbor_rows[row, column],
         )
 
 
 @inlined_kernel
-def _cut(rings: Array, old: int, count: int, neighbour_rows: Array, row: int) -> int:
+def _cut(rings: Array, old: int, count: int, neighbor_rows: Array, row: int) -> int:
     """Write the part of a polygon on the generator's side of a bisector to the other ring.
 
     Return its number of vertices, or -1 if the bisector does not cut the polygon; nothing is written then.
     """
-    farthest = _compute_excess(rings, old, count, neighbour_rows, row)
+    farthest = _compute_excess(rings, old, count, neighbor_rows, row)
     if farthest < 0:
         return -1
     # The vertices beyond the bisector are consecutive, up to rounding, because the polygon is convex.
@@ -211,7 +211,7 @@ def _cut(rings: Array, old: int, count: int, neighbour_rows: Array, row: int) ->
         last_kept = k
         size += 1
         k = k + 1 if k + 1 < count else 0
-    robot = neighbour_rows[row, ROBOT]
+    robot = neighbor_rows[row, ROBOT]
     if rings[old, last_kept, _EXCESS] == 0.0:
         rings[1 - old, size - 1, BEYOND] = robot
     else:
@@ -224,11 +224,11 @@ def _cut(rings: Array, old: int, count: int, neighbour_rows: Array, row: int) ->
 
 
 @inlined_kernel
-def _compute_excess(rings: Array, ring: int, count: int, neighbour_rows: Array, row: int) -> int:
+def _compute_excess(rings: Array, ring: int, count: int, neighbor_rows: Array, row: int) -> int:
     """Compute the excess of each vertex over a bisector; return the vertex farthest beyond it, or -1."""
-    dx = neighbour_rows[row, DX]
-    dy = neighbour_rows[row, DY]
-    level = 0.5 * neighbour_rows[row, SQUARE]
+    dx = neighbor_rows[row, DX]
+    dy = neighbor_rows[row, DY]
+    level = 0.5 * neighbor_rows[row, SQUARE]
     farthest = -1
     max_excess = 0.0
     for k in range(count):

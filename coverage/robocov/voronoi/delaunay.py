@@ -1,7 +1,7 @@
 """The Delaunay triangulation of moving points, reused from step to step and repaired by flips.
 
 A mesh stores three half-edges for each triangle, counter-clockwise. Half-edge h begins at the point
-``mesh[CORNER, h]``, and ``mesh[TWIN, h]`` is the half-edge of the neighbouring triangle along the same
+``mesh[CORNER, h]``, and ``mesh[TWIN, h]`` is the half-edge of the neighboring triangle along the same
 edge, or -1. One entry after each triangle is unused, so that ``h & 3`` is the position of h within its
 triangle and ``h & -4`` the first half-edge of that triangle. Three distant sentinels enclose all points; they
 are the last three.
@@ -25,7 +25,7 @@ Mesh: TypeAlias = NDArray[np.int32]
 CORNER = 0
 """Row of a mesh: the point at which each half-edge begins."""
 TWIN = 1
-"""Row of a mesh: the half-edge of the neighbouring triangle along the same edge; -1 where there is none."""
+"""Row of a mesh: the half-edge of the neighboring triangle along the same edge; -1 where there is none."""
 
 _TOLERANCE = 1e-14
 """Sum of two cotangents, relative to their size, that counts as rounding; such an edge is not flipped."""

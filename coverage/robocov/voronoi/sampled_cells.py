@@ -8,9 +8,9 @@ from robocov.compiled import kernel
 
 @kernel
 def find_own_samples(
-    samples: Array, positions: Array, robot: IntArray, neighbour_positions: Array
+    samples: Array, positions: Array, robot: IntArray, neighbor_positions: Array
 ) -> BoolArray:
-    """Find the samples in the cell of each robot: those to which none of its neighbours is nearer.
+    """Find the samples in the cell of each robot: those to which none of its neighbors is nearer.
 
     Parameters
     ----------
@@ -18,9 +18,9 @@ def find_own_samples(
     positions : (n, 2) array, m
         Positions of the robots.
     robot : (m,) int array
-        The robot in each pair of a robot and one of its neighbours.
-    neighbour_positions : (m, 2) array, m
-        Position of the neighbour in each pair, as known to the robot.
+        The robot in each pair of a robot and one of its neighbors.
+    neighbor_positions : (m, 2) array, m
+        Position of the neighbor in each pair, as known to the robot.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def find_own_samples(
                 y = samples[k, 1]
                 square = (x - positions[i, 0]) ** 2 + (y - positions[i, 1]) ** 2
                 is_own[i, k] = (
-                    square <= (x - neighbour_positions[m, 0]) ** 2 + (y - neighbour_positions[m, 1]) ** 2
+                    square <= (x - neighbor_positions[m, 0]) ** 2 + (y - neighbor_positions[m, 1]) ** 2
                 )
     return is_own
 

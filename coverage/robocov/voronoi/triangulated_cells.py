@@ -1,4 +1,4 @@
-"""Cells from a Delaunay triangulation, in which the neighbours of a robot are those that bound its cell."""
+"""Cells from a Delaunay triangulation, in which the neighbors of a robot are those that bound its cell."""
 
 from typing import NamedTuple
 
@@ -42,12 +42,12 @@ class Triangulation(NamedTuple):
 class _Fan(NamedTuple):
     """The triangles around a robot, counter-clockwise."""
 
-    neighbours: int
-    """Number of neighbours, and of Voronoi vertices."""
+    neighbors: int
+    """Number of neighbors, and of Voronoi vertices."""
     first: int
-    """Half-edge to the neighbour with the lowest number."""
+    """Half-edge to the neighbor with the lowest number."""
     start: int
-    """Position of that neighbour among the neighbours."""
+    """Position of that neighbor among the neighbors."""
     max_square: float
     """Squared distance of the farthest Voronoi vertex, m²; infinite if the cell is not bounded by robots."""
 
@@ -121,7 +121,7 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
 
 @kernel
 def _compute_bounds(sides: Array) -> tuple[float, float, float]:
-    """Return the centre of the region's bounding box and the sum of its width and height, m."""
+    """Return the center of the region's bounding box and the sum of its width and height, m."""
     left = sides[0, 0]
     right = sides[0, 0]
     low = sides[0, 1]
@@ -136,7 +136,7 @@ def _compute_bounds(sides: Array) -> tuple[float, float, float]:
 
 @kernel
 def _compute_area(sides: Array) -> float:
-    """Return the area of the region, m², from coordinates relative to its centre."""
+    """Return the area of the region, m², from coordinates relative to its center."""
     x, y, _ = _compute_bounds(sides)
     area = 0.0
     for k in range(len(sides)):
@@ -155,21 +155,21 @@ def _find_cell(
     for k in range(len(sides)):
         clearance = min(clearance, sides[k, 4] - (sides[k, 2] * points[i, 0] + sides[k, 3] * points[i, 1]))
     if clearance > 0.0 and fan.max_square < clearance * clearance:
-        return CellPolygon(0, fan.neighbours, fan.start)
-    # Start at the neighbour with the lowest number, so that the result does not depend on the order of the
+        return CellPolygon(0, fan.neighbors, fan.start)
+    # Start at the neighbor with the lowest number, so that the result does not depend on the order of the
     # triangles.
     fan = _walk_around(workspace, triangulation, points, i, fan.first)
-    return clip_cell(workspace, fan.neighbours, points, sides, i)
+    return clip_cell(workspace, fan.neighbors, points, sides, i)
 
 
 @inlined_kernel
 def _walk_around(
     workspace: Workspace, triangulation: Triangulation, points: Array, i: int, first_half_edge: int
 ) -> _Fan:
-    """Write neighbours and Voronoi vertices of robot i, counter-clockwise from a half-edge on."""
+    """Write neighbors and Voronoi vertices of robot i, counter-clockwise from a half-edge on."""
     mesh = triangulation.mesh
     cotangents = triangulation.cotangents
-    neighbour_rows = workspace.neighbours
+    neighbor_rows = workspace.neighbors
     rings = workspace.rings
     n = len(points)
     count = 0
@@ -192,10 +192,10 @@ def _walk_around(
             x = 0.5 * (dx - cotangents[h] * dy)
             y = 0.5 * (dy + cotangents[h] * dx)
             max_square = max(max_square, x * x + y * y)
-            neighbour_rows[count, DX] = dx
-            neighbour_rows[count, DY] = dy
-            neighbour_rows[count, SQUARE] = dx * dx + dy * dy
-            neighbour_rows[count, ROBOT] = j
+            neighbor_rows[count, DX] = dx
+            neighbor_rows[count, DY] = dy
+            neighbor_rows[count, SQUARE] = dx * dx + dy * dy
+            neighbor_rows[count, ROBOT] = j
             rings[0, count, X] = x
             rings[0, count, Y] = y
             rings[0, count, BEYOND] = mesh[CORNER, back]

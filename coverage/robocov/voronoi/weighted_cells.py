@@ -22,14 +22,14 @@ from robocov.density.base import Density
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import InputError, quote
 from robocov.observation import Cells
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.voronoi.arcs import BEYOND, CELL, compute_moments, link_rings, split_into_chords
 from robocov.voronoi.boundary_curves import trace_boundaries
 from robocov.voronoi.bounded_partition import (
     VoronoiPartition,
     apply_density,
-    check_neighbours,
+    check_neighbors,
     partition,
     to_generators,
 )
@@ -101,14 +101,14 @@ def partition_by_travel_time(
     generators: Array,
     speeds: Array,
     region: Region,
-    neighbours: Neighbours | None = None,
+    neighbors: Neighbors | None = None,
     triangulation: Mesh | None = None,
     reported_positions: Array | None = None,
     density: Density | None = None,
 ) -> VoronoiPartition | WeightedCells:
     """Compute the cells of the points that each robot reaches first, on a straight line.
 
-    Each cell depends, to the last bit, only on the positions and speeds of its robot and of its neighbours.
+    Each cell depends, to the last bit, only on the positions and speeds of its robot and of its neighbors.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def partition_by_travel_time(
         fastest gets the cell, and the others get none.
     speeds : (n,) array, m/s
         Positive. If all are equal, the cells are those of `partition`, bit for bit.
-    region, neighbours, triangulation, reported_positions
+    region, neighbors, triangulation, reported_positions
         See `partition`.
     density : Density or None
         φ is integrated over cells whose arcs are replaced by chords, which deviate from them by at most 2e-5
@@ -144,33 +144,33 @@ def partition_by_travel_time(
     """
     points = to_generators(generators)
     speeds = _convert_speeds(speeds, len(points))
-    if neighbours is None:
-        neighbours = Neighbours(len(points))
-    check_neighbours(neighbours, reported_positions, len(points))
+    if neighbors is None:
+        neighbors = Neighbors(len(points))
+    check_neighbors(neighbors, reported_positions, len(points))
     if (speeds == speeds[:1]).all():
         return partition(
             points,
             region,
-            neighbours,
+            neighbors,
             triangulation=triangulation,
             reported_positions=reported_positions,
             density=density,
         )
-    cells = _compute_weighted_cells(points, speeds, region, neighbours, reported_positions)
+    cells = _compute_weighted_cells(points, speeds, region, neighbors, reported_positions)
     return apply_density(cells, density)
 
 
 def _compute_weighted_cells(
-    points: Array, speeds: Array, region: Region, neighbours: Neighbours, reported_positions: Array | None
+    points: Array, speeds: Array, region: Region, neighbors: Neighbors, reported_positions: Array | None
 ) -> WeightedCells:
     """Compute cells of robots whose speeds are not all equal, for a density of 1."""
-    robot, other = neighbours.list_pairs()
+    robot, other = neighbors.list_pairs()
     other_positions = points[other] if reported_positions is None else np.asarray(reported_positions)
     is_equal = speeds[robot] == speeds[other]
     equal_cells = partition(
         points,
         region,
-        Neighbours.from_pairs(len(points), robot[is_equal], other[is_equal]),
+        Neighbors.from_pairs(len(points), robot[is_equal], other[is_equal]),
         reported_positions=None if reported_positions is None else other_positions[is_equal],
     )
     edges = equal_cells.edges

@@ -20,7 +20,7 @@ from robocov.world.dynamics import compute_clip_factor
 from robocov.world.obstacle_pieces import Obstacles
 
 MAX_PENETRATION = 1e-3
-"""Maximum depth, in metres, to which robots may sink into walls or each other. A robot in contact moves no
+"""Maximum depth, in meters, to which robots may sink into walls or each other. A robot in contact moves no
 farther than this in one substep."""
 
 _MAX_SUBSTEPS = 64

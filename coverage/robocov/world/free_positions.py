@@ -60,7 +60,7 @@ def relocate_robots(environment: Environment, positions: Array, team: Team) -> A
 
 
 def _compute_center_areas(environment: Environment, team: Team) -> dict[float, BaseGeometry]:
-    """Return the areas for the centres of robots, by their radius."""
+    """Return the areas for the centers of robots, by their radius."""
     areas = {}
     for radius in np.unique(team.radius).tolist():
         areas[radius] = _compute_center_area(environment, radius)
@@ -183,7 +183,7 @@ def require_free_starts(
 
 
 def _compute_center_area(environment: Environment, radius: float) -> BaseGeometry:
-    """Return the area for the centre of a robot, away from walls."""
+    """Return the area for the center of a robot, away from walls."""
     return environment.free.buffer(-(radius + _CLEARANCE_M), join_style="round")
 
 

@@ -51,7 +51,7 @@ class Obstacles:
     movers : tuple of Mover
         Moving obstacles.
     failed_robots : (w, 3) array or None, m
-        Centre x, y and radius of robots that have failed.
+        Center x, y and radius of robots that have failed.
     """
 
     walls: tuple[Array, ...]

@@ -1,10 +1,10 @@
 """Unicycles: wheel speeds that make a two-wheeled robot follow the force that acts on a point robot.
 
 A controller's force gives the acceleration a of a point robot, within its limits and with viscosity.
-A unicycle (a differential drive with its centre between its wheels) has a speed v >= 0 along its heading h
+A unicycle (a differential drive with its center between its wheels) has a speed v >= 0 along its heading h
 and a turning rate ω. In every substep it turns that acceleration into
 
-- a turn towards the velocity v h + τ a that the point would have τ = 0.2 s later, which differs from the
+- a turn toward the velocity v h + τ a that the point would have τ = 0.2 s later, which differs from the
   heading by the angle e: ω* = e / τ, up to the turning rate, and never so fast that the wheels could not stop
   at e = 0;
 - a speed, from the acceleration along the heading, a·h. The part of a across the heading that turning at v ω
@@ -126,7 +126,7 @@ class _WheelLimits(NamedTuple):
     """Limits of one unicycle in one substep."""
 
     half_track: float
-    """Distance of each wheel from the centre, m."""
+    """Distance of each wheel from the center, m."""
     max_speed: float
     """Maximum speed of a wheel, m/s."""
     max_change: float
@@ -215,7 +215,7 @@ def compute_drive_command(
 @kernel
 def _choose_motion(motion: _Motion, along: float, across: float, limits: _WheelLimits, dt: float) -> _Motion:
     """Return the motion that follows a point whose velocity changes along the heading and across it, m/s."""
-    # The turning rate towards the velocity that the point would have after the response time.
+    # The turning rate toward the velocity that the point would have after the response time.
     future_along = motion.speed + along * (RESPONSE_TIME_S / dt)
     future_across = across * (RESPONSE_TIME_S / dt)
     error = math.atan2(future_across, future_along)

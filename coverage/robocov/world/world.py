@@ -82,7 +82,7 @@ class World:
     on nothing but positions, velocities and steering, so that a copy continues identically, bit for bit.
 
     Moving obstacles keep to their path and push robots aside. They may press a robot deeper into a wall, by
-    some millimetres and in very acute corners by centimetres. Walls take precedence: where no space is left
+    some millimeters and in very acute corners by centimeters. Walls take precedence: where no space is left
     between a moving obstacle and a wall, the robot stays in front of the wall and the obstacle passes over
     it. Once there is space, the robot is pushed out on the nearest side.
     """

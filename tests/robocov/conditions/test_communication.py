@@ -20,7 +20,7 @@ from robocov.controllers import CONTROLLERS, Controller, atlas, inform_controlle
 from robocov.environment import Environment
 from robocov.errors import InputError
 from robocov.observation import Observations, Scans
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.team import Team
 from robocov.voronoi import partition
@@ -107,8 +107,8 @@ def test_messages_agree_with_a_simulation_of_each_message(
     known_messages = simulate_messages(conditions, ranges, walks, working)
     for step, positions in enumerate(walks):
         inbox = radio.exchange_messages(inbox, step, positions, positions, working[step])
-        neighbours, reported, ages = radio.read_reports(inbox, step, working[step])
-        robot, other = neighbours.list_pairs()
+        neighbors, reported, ages = radio.read_reports(inbox, step, working[step])
+        robot, other = neighbors.list_pairs()
         pairs = sorted(known_messages[step])
         assert list(zip(robot.tolist(), other.tolist(), strict=True)) == pairs
         for k, pair in enumerate(pairs):
@@ -186,7 +186,7 @@ def test_messages_are_lost_with_the_given_probability() -> None:
 def build_observations(
     controller: Controller,
     positions: np.ndarray,
-    neighbours: Neighbours,
+    neighbors: Neighbors,
     reported: np.ndarray | None,
     seed: int,
 ) -> Observations:
@@ -201,7 +201,7 @@ def build_observations(
     return Observations(
         positions,
         rng.normal(size=positions.shape),
-        neighbours,
+        neighbors,
         obstacle_points,
         SQUARE,
         max_speeds=np.ones(len(positions)),
@@ -231,13 +231,13 @@ def test_reports_of_true_positions_change_no_decision(
     controller_type: type, n: int, seed: int, communication_range: float
 ) -> None:
     positions = np.random.default_rng(seed).uniform(1, 9, size=(n, 2))
-    neighbours = Neighbours.from_ranges(positions, np.full(n, communication_range))
+    neighbors = Neighbors.from_ranges(positions, np.full(n, communication_range))
     controller = build_controller(controller_type)
     memory = controller.begin(SQUARE, Team.homogeneous(n, communication_range=communication_range))
-    _, other = neighbours.list_pairs()
-    ideal = controller.decide(build_observations(controller, positions, neighbours, None, seed), memory)
+    _, other = neighbors.list_pairs()
+    ideal = controller.decide(build_observations(controller, positions, neighbors, None, seed), memory)
     by_reports = controller.decide(
-        build_observations(controller, positions, neighbours, positions[other], seed), memory
+        build_observations(controller, positions, neighbors, positions[other], seed), memory
     )
     assert by_reports.forces.tobytes() == ideal.forces.tobytes()
     if ideal.goals is not None and by_reports.goals is not None:
@@ -253,12 +253,12 @@ def test_robots_decide_by_reports_and_not_by_true_positions(controller_type: typ
     positions = rng.uniform(1, 9, size=(n, 2))
     is_linked = (rng.random((n, n)) < 0.7) & ~np.eye(n, dtype=bool)
     robot, other = np.nonzero(is_linked)
-    neighbours = Neighbours.from_pairs(n, robot, other)
+    neighbors = Neighbors.from_pairs(n, robot, other)
     reported = positions[other] + rng.normal(scale=0.5, size=(len(robot), 2))
     i = int(rng.integers(n))
     controller = build_controller(controller_type)
     memory = controller.begin(SQUARE, Team.homogeneous(n))
-    seen = build_observations(controller, positions, neighbours, reported, seed)
+    seen = build_observations(controller, positions, neighbors, reported, seed)
     other_positions = rng.uniform(1, 9, size=(n, 2))
     other_positions[i] = positions[i]
     other_reports = rng.uniform(1, 9, size=reported.shape)
@@ -274,15 +274,15 @@ def test_robots_decide_by_reports_and_not_by_true_positions(controller_type: typ
 def test_reports_affect_decisions(controller_type: type) -> None:
     """Robot 1 is told that robot 2 is close. Only robots that share maps notice that elsewhere."""
     positions = np.array([[4.0, 4.0], [5.0, 4.5], [8.0, 6.0]])
-    neighbours = Neighbours.from_ranges(positions, np.full(3, 20.0))
-    _, other = neighbours.list_pairs()
+    neighbors = Neighbors.from_ranges(positions, np.full(3, 20.0))
+    _, other = neighbors.list_pairs()
     true_reports = positions[other]
     close_reports = true_reports.copy()
     close_reports[0] = [3.77, 4.0]
     controller = build_controller(controller_type)
     memory = controller.begin(SQUARE, Team.homogeneous(3))
     forces = [
-        controller.decide(build_observations(controller, positions, neighbours, reports, 1), memory).forces
+        controller.decide(build_observations(controller, positions, neighbors, reports, 1), memory).forces
         for reports in (true_reports, close_reports)
     ]
     assert not np.array_equal(forces[0][0], forces[1][0])
@@ -296,8 +296,8 @@ def test_planning_controllers_decide_by_reports(name: str, monkeypatch: pytest.M
     monkeypatch.setattr(atlas, "_LISTENING_S", 0.0)
     controller_type = CONTROLLERS[name]
     positions = np.random.default_rng(5).uniform(1, 9, size=(4, 2))
-    neighbours = Neighbours.from_ranges(positions, np.full(4, 20.0))
-    robot, other = neighbours.list_pairs()
+    neighbors = Neighbors.from_ranges(positions, np.full(4, 20.0))
+    robot, other = neighbors.list_pairs()
     true_reports = positions[other]
     # Reports to all robots but the first one are wrong.
     wrong_reports = np.where(robot[:, None] == 0, true_reports, true_reports + 0.7)
@@ -305,7 +305,7 @@ def test_planning_controllers_decide_by_reports(name: str, monkeypatch: pytest.M
     for reports in (None, true_reports, wrong_reports):
         controller = build_controller(controller_type)
         memory = controller.begin(SQUARE, Team.homogeneous(4))
-        seen = build_observations(controller, positions, neighbours, reports, 5)
+        seen = build_observations(controller, positions, neighbors, reports, 5)
         forces.append(controller.decide(seen, memory).forces)
     assert forces[1].tobytes() == forces[0].tobytes()
     if name == "atlas":
@@ -318,8 +318,8 @@ def test_cells_by_reports_agree_with_a_partition_for_each_robot(n: int, seed: in
     positions = rng.uniform(0.5, 9.5, size=(n, 2))
     robot, other = np.nonzero((rng.random((n, n)) < 0.6) & ~np.eye(n, dtype=bool))
     reported = rng.uniform(0, 10, size=(len(robot), 2))
-    neighbours = Neighbours.from_pairs(n, robot, other)
-    cells = partition(positions, SQUARE, neighbours, reported_positions=reported)
+    neighbors = Neighbors.from_pairs(n, robot, other)
+    cells = partition(positions, SQUARE, neighbors, reported_positions=reported)
     for i in range(n):
         known_positions = np.concatenate([positions[i : i + 1], reported[robot == i]])
         own_cells = partition(known_positions, SQUARE)
@@ -331,18 +331,18 @@ def test_cells_by_reports_agree_with_a_partition_for_each_robot(n: int, seed: in
 
 @pytest.mark.parametrize("n", [3, 63, 66, 120])
 def test_cells_by_true_reports_equal_ordinary_cells(n: int) -> None:
-    """Half of the robots are a crowd, whose distant neighbours matter."""
+    """Half of the robots are a crowd, whose distant neighbors matter."""
     positions = np.random.default_rng(n).uniform(0.5, 9.5, size=(n, 2))
     positions[: n // 2] *= 0.05
-    neighbours = Neighbours.from_ranges(positions, np.full(n, 20.0))
-    _, other = neighbours.list_pairs()
-    ordinary = partition(positions, SQUARE, neighbours)
-    by_reports = partition(positions, SQUARE, neighbours, reported_positions=positions[other])
+    neighbors = Neighbors.from_ranges(positions, np.full(n, 20.0))
+    _, other = neighbors.list_pairs()
+    ordinary = partition(positions, SQUARE, neighbors)
+    by_reports = partition(positions, SQUARE, neighbors, reported_positions=positions[other])
     assert by_reports.mass.tobytes() == ordinary.mass.tobytes()
     assert by_reports.centroid.tobytes() == ordinary.centroid.tobytes()
 
 
-def test_reported_positions_without_neighbours_are_rejected() -> None:
+def test_reported_positions_without_neighbors_are_rejected() -> None:
     with pytest.raises(InputError, match="reported_positions: expected None without limited communication"):
         partition(np.ones((2, 2)), SQUARE, reported_positions=np.ones((2, 2)))
 

@@ -61,7 +61,7 @@ def test_conditions_are_ideal_by_default() -> None:
         ({"failures": (3,)}, r"conditions.failures\[0\]: expected a robot and a time, got 3"),
         (
             {"joins": ((1, 2, (1, 2, 3)),)},
-            r"conditions.joins\[0\]: expected a place \[x, y\] in metres, got \(1, 2, 3\)",
+            r"conditions.joins\[0\]: expected a place \[x, y\] in meters, got \(1, 2, 3\)",
         ),
         ({"joins": ((1, 2, (1, math.nan)),)}, r"conditions.joins\[0\]: expected a place .* got \(1, nan\)"),
         (

@@ -132,9 +132,9 @@ def test_noisy_distances_are_positive_and_keep_their_direction() -> None:
 def test_true_positions_decide_which_robots_are_in_range() -> None:
     lost = build_simulation(Conditions(position_noise=100.0), communication_range=2.5).observe()
     ideal = build_simulation(None, communication_range=2.5).observe()
-    robots, _ = ideal.neighbours.list_pairs()
+    robots, _ = ideal.neighbors.list_pairs()
     assert len(robots) > 0
-    assert lost.neighbours.list_pairs()[0].tolist() == robots.tolist()
+    assert lost.neighbors.list_pairs()[0].tolist() == robots.tolist()
 
 
 def test_kinds_of_noise_are_independent() -> None:
@@ -228,9 +228,9 @@ def test_records_contain_true_positions() -> None:
 
 def test_robots_report_the_positions_that_they_believe() -> None:
     seen = build_simulation(Conditions(position_noise=0.3, seed=9)).observe()
-    _, neighbours = seen.neighbours.list_pairs()
+    _, neighbors = seen.neighbors.list_pairs()
     assert seen.reported_positions is not None
-    np.testing.assert_array_equal(seen.reported_positions, seen.positions[neighbours])
+    np.testing.assert_array_equal(seen.reported_positions, seen.positions[neighbors])
     assert seen.report_ages is not None
     assert not seen.report_ages.any()
 
@@ -250,22 +250,22 @@ def test_reports_are_as_old_as_the_latency() -> None:
 def test_failed_robots_are_forgotten_after_a_while_without_messages() -> None:
     """The last message, of 0.25 s, is forgotten after 0.75 s."""
     conditions = Conditions(message_rate=20.0, forget_after=0.5, failures=((2, 0.3),))
-    assert list_steps_with_neighbour(build_simulation(conditions), steps=24) == list(range(16))
+    assert list_steps_with_neighbor(build_simulation(conditions), steps=24) == list(range(16))
 
 
 def test_failed_robots_are_forgotten_at_once_with_ideal_communication() -> None:
     ideal = build_simulation(Conditions(failures=((2, 0.3),)))
-    assert list_steps_with_neighbour(ideal, steps=10) == list(range(6))
+    assert list_steps_with_neighbor(ideal, steps=10) == list(range(6))
 
 
-def list_steps_with_neighbour(simulation: Simulation, steps: int) -> list[int]:
-    """Return the steps in which robot 2 is a neighbour of robot 1."""
-    steps_with_neighbour = []
+def list_steps_with_neighbor(simulation: Simulation, steps: int) -> list[int]:
+    """Return the steps in which robot 2 is a neighbor of robot 1."""
+    steps_with_neighbor = []
     for step in range(steps):
-        if 1 in simulation.observe().neighbours.list_neighbours(0):
-            steps_with_neighbour.append(step)
+        if 1 in simulation.observe().neighbors.list_neighbors(0):
+            steps_with_neighbor.append(step)
         simulation.step()
-    return steps_with_neighbour
+    return steps_with_neighbor
 
 
 def test_idle_robots_have_neither_forces_nor_goals() -> None:

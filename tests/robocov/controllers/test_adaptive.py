@@ -14,7 +14,7 @@ from robocov.density.base import Density
 from robocov.density.cell_edges import CellEdges
 from robocov.environment import Environment
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.simulation import Simulation
 from robocov.team import Team
 
@@ -56,9 +56,9 @@ def build_observations(
     positions: Array, time: float, density: Density | None, reach: float = np.inf
 ) -> Observations:
     n = len(positions)
-    neighbours = Neighbours.from_ranges(positions, np.full(n, reach))
+    neighbors = Neighbors.from_ranges(positions, np.full(n, reach))
     no_obstacles = np.full((n, 2), np.nan)
-    return Observations(positions, np.zeros((n, 2)), neighbours, no_obstacles, REGION, time, density=density)
+    return Observations(positions, np.zeros((n, 2)), neighbors, no_obstacles, REGION, time, density=density)
 
 
 def learn_everywhere(
@@ -106,7 +106,7 @@ def test_parameters_converge_on_rich_trajectories() -> None:
     np.testing.assert_allclose(memory.parameters, np.broadcast_to(truth, (5, 16)), atol=0.05)
 
 
-def test_robots_without_neighbours_learn_alone() -> None:
+def test_robots_without_neighbors_learn_alone() -> None:
     controller = Adaptive(coupling=0.0)
     together, alone = (learn_everywhere(controller, HOT, 40, reach) for reach in (np.inf, 0.01))
     spread = [np.ptp(memory.parameters, axis=0).max() for memory in (together, alone)]
@@ -119,7 +119,7 @@ def test_the_process_fits_the_measurements() -> None:
     memory = learn_everywhere(controller, HOT, 12)
     for i in range(5):
         known = np.flatnonzero(~np.isnan(memory.measurements[i]))
-        assert len(known) > 40, "also those of the neighbours"
+        assert len(known) > 40, "also those of the neighbors"
         squares = memory.lattice.squares[known]
         near = np.hypot(*(memory.lattice.samples[:, None] - squares).transpose(2, 0, 1)).argmin(axis=0)
         error = np.abs(

@@ -18,7 +18,7 @@ from robocov.errors import ParameterError
 from robocov.mapfile import load_map
 from robocov.metrics import compute_clearances, count_contacts
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.planning.discovered_map import FREE, UNKNOWN, WALL, DiscoveredMap
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -156,7 +156,7 @@ def test_the_information_is_stated() -> None:
 
 
 @pytest.mark.slow
-def test_a_single_robot_moves_to_the_centre() -> None:
+def test_a_single_robot_moves_to_the_center() -> None:
     simulation = build_simulation(n=1)
     for _ in range(300):
         simulation.step()
@@ -336,7 +336,7 @@ def test_the_latest_report_about_a_robot_counts() -> None:
 
 
 @pytest.mark.parametrize(("kind", "expected"), [(Atlas, [1]), (AtlasShared, [1, 2])])
-def test_only_with_shared_maps_a_robot_reports_others_to_its_neighbours(
+def test_only_with_shared_maps_a_robot_reports_others_to_its_neighbors(
     kind: type[Atlas], expected: list[int]
 ) -> None:
     """Robot 2, in the middle, hears robots 1 and 3, which do not hear each other."""
@@ -494,7 +494,7 @@ def test_a_robot_is_missed_only_after_a_while() -> None:
     observations = Observations(
         positions,
         np.zeros((2, 2)),
-        Neighbours.from_ranges(positions, team.communication_range),
+        Neighbors.from_ranges(positions, team.communication_range),
         np.full((2, 2), np.nan),
         ROOMS.region,
     )

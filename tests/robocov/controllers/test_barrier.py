@@ -15,7 +15,7 @@ from robocov.controllers.driving import find_nearest_allowed
 from robocov.environment import Environment
 from robocov.mapfile import load_map
 from robocov.observation import Decision, Observations, Scanning
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -185,7 +185,7 @@ def test_far_from_obstacles_and_robots_it_is_lloyds_algorithm() -> None:
     seen = Observations(
         np.array([[3.0, 5.0], [7.0, 5.0]]),
         np.zeros((2, 2)),
-        Neighbours(2),
+        Neighbors(2),
         np.full((2, 2), np.nan),
         SQUARE.region,
     )
@@ -195,14 +195,14 @@ def test_far_from_obstacles_and_robots_it_is_lloyds_algorithm() -> None:
     np.testing.assert_allclose(decision.forces, decision.terms["attraction"] + decision.terms["barrier"])
 
 
-def test_velocities_of_neighbours_are_derived_from_their_positions() -> None:
+def test_velocities_of_neighbors_are_derived_from_their_positions() -> None:
     """An approaching robot allows less acceleration than one at rest there, or one that drives ahead."""
     controller = Barrier()
     team = Team.homogeneous(2)
     here = Observations(
         np.array([[3.0, 5.0], [3.4, 5.0]]),
         np.array([[0.3, 0.0], [0.0, 0.0]]),
-        Neighbours(2),
+        Neighbors(2),
         np.full((2, 2), np.nan),
         SQUARE.region,
         time=1.0,

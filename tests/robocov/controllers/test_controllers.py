@@ -25,7 +25,7 @@ from robocov.controllers import (
 from robocov.controllers.gains import gain
 from robocov.environment import Environment
 from robocov.observation import Decision, Observations, Scans
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.team import Team
 
@@ -41,7 +41,7 @@ class Homing:
     def force(self, own: OwnView) -> np.ndarray:
         pull = self.stiffness * (own.centroid - own.position) - 0.1 * own.velocity
         away = sum(
-            ((own.position - other) / (1 + np.hypot(*(own.position - other))) for other in own.neighbours),
+            ((own.position - other) / (1 + np.hypot(*(own.position - other))) for other in own.neighbors),
             0.0,
         )
         wall = 0.0 if own.obstacle_point is None else own.position - own.obstacle_point
@@ -92,8 +92,8 @@ def sample_observations(positions: np.ndarray, reach: float, seed: int) -> Obser
     obstacle_points = positions + rng.normal(scale=0.8, size=(n, 2))
     obstacle_points[rng.random(n) < 0.4] = np.nan
     ranges = np.full(n, reach)
-    neighbours = Neighbours.from_ranges(positions, ranges)
-    seen = Observations(positions, rng.normal(size=(n, 2)), neighbours, obstacle_points, REGION, 3.0)
+    neighbors = Neighbors.from_ranges(positions, ranges)
+    seen = Observations(positions, rng.normal(size=(n, 2)), neighbors, obstacle_points, REGION, 3.0)
     return replace(seen, max_speeds=rng.choice([0.4, 0.7, 1.0], n))
 
 
@@ -123,7 +123,7 @@ def test_a_robot_uses_only_what_it_knows(controller: Controller, seed: int, n: i
         seen = replace(seen, time=step * 0.2, scans=sample_scans(controller, n, rng))
         is_source = np.arange(n) == i
         if get_information(controller) == "shared map":
-            is_source = find_connected(seen.neighbours, i)
+            is_source = find_connected(seen.neighbors, i)
         changed = change_others(seen, i, is_source, reach, rng)
         decision = controller.decide(seen, memory)
         changed_decision = controller.decide(changed, changed_memory)
@@ -136,15 +136,15 @@ def test_a_robot_uses_only_what_it_knows(controller: Controller, seed: int, n: i
             positions = positions + rng.uniform(-0.05, 0.05, size=(n, 2))
 
 
-def find_connected(neighbours: Neighbours, i: int) -> np.ndarray:
+def find_connected(neighbors: Neighbors, i: int) -> np.ndarray:
     """Return from which robots information may have reached robot i, directly or through others."""
-    is_connected = np.zeros(neighbours.count, dtype=bool)
+    is_connected = np.zeros(neighbors.count, dtype=bool)
     pending = [i]
     while pending:
         k = pending.pop()
         if not is_connected[k]:
             is_connected[k] = True
-            pending += neighbours.list_neighbours(k).tolist()
+            pending += neighbors.list_neighbors(k).tolist()
     return is_connected
 
 
@@ -154,22 +154,22 @@ def change_others(
     """Return observations in which everything is changed that neither robot i nor its sources know."""
     n = len(seen.positions)
     positions = seen.positions
-    is_neighbour = is_source.copy()
-    is_neighbour[seen.neighbours.list_neighbours(i)] = True
+    is_neighbor = is_source.copy()
+    is_neighbor[seen.neighbors.list_neighbors(i)] = True
     moved = positions.copy()
-    strangers = np.flatnonzero(~is_source & ~is_neighbour)
+    strangers = np.flatnonzero(~is_source & ~is_neighbor)
     for k in strangers:
         position = rng.uniform((0, -1), (12, 10))
         if REGION.contains(position) and np.hypot(*(position - positions[is_source]).T).min() > reach:
             moved[k] = position
     is_other = ~is_source[:, None]
-    neighbours = Neighbours.from_ranges(moved, np.full(n, reach))
-    assert np.array_equal(neighbours.list_neighbours(i), seen.neighbours.list_neighbours(i))
+    neighbors = Neighbors.from_ranges(moved, np.full(n, reach))
+    assert np.array_equal(neighbors.list_neighbors(i), seen.neighbors.list_neighbors(i))
     changed = replace(
         seen,
         positions=moved,
         velocities=np.where(is_other, rng.normal(size=(n, 2)), seen.velocities),
-        neighbours=neighbours,
+        neighbors=neighbors,
         obstacle_points=np.where(is_other, moved + rng.normal(size=(n, 2)), seen.obstacle_points),
     )
     max_speeds = np.array(seen.max_speeds)
@@ -254,7 +254,7 @@ def test_coincident_robots_get_finite_forces(controller: Controller, n: int) -> 
     seen = Observations(
         positions,
         np.zeros((n, 2)),
-        Neighbours.from_ranges(positions, np.full(n, np.inf)),
+        Neighbors.from_ranges(positions, np.full(n, np.inf)),
         positions.copy(),
         REGION,
     )
@@ -264,7 +264,7 @@ def test_coincident_robots_get_finite_forces(controller: Controller, n: int) -> 
 
 def test_two_robots_at_the_same_position_are_pushed_apart() -> None:
     positions = np.tile([5.0, 4.0], (2, 1))
-    seen = Observations(positions, np.zeros((2, 2)), Neighbours(2), np.full((2, 2), np.nan), REGION)
+    seen = Observations(positions, np.zeros((2, 2)), Neighbors(2), np.full((2, 2), np.nan), REGION)
     forces = Rpf().decide(seen, None).forces
     np.testing.assert_allclose(forces[0], -forces[1])
     assert np.hypot(*forces[0]) > 1.0
@@ -275,7 +275,7 @@ def test_lloyd_drives_within_its_limits() -> None:
     positions = np.array([[2.0, 2.0]])
     goal = REGION.centroid
     heading = (goal - positions[0]) / np.hypot(*(goal - positions[0]))
-    seen = Observations(positions, heading[None] * 1.0, Neighbours(1), np.full((1, 2), np.nan), REGION)
+    seen = Observations(positions, heading[None] * 1.0, Neighbors(1), np.full((1, 2), np.nan), REGION)
     controller = Lloyd()
     force = controller.decide(seen, controller.begin(REGION, Team.homogeneous(1))).forces
     np.testing.assert_allclose(force, 2.0 * heading[None], rtol=1e-9)

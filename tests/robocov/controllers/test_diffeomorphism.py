@@ -13,7 +13,7 @@ from robocov.environment import Environment, PolygonObstacle, WallObstacle, find
 from robocov.errors import ParameterError
 from robocov.mapfile import load_map
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_samples
@@ -88,11 +88,11 @@ def test_samples_belong_to_the_nearest_robot_that_is_heard() -> None:
     rng = np.random.default_rng(1)
     samples = rng.uniform(0, 10, (300, 2))
     positions = rng.uniform(0, 10, (7, 2))
-    robot, neighbour = Neighbours.from_ranges(positions, np.full(7, 5.0)).list_pairs()
-    is_own = find_own_samples(samples, positions, robot, positions[neighbour])
+    robot, neighbor = Neighbors.from_ranges(positions, np.full(7, 5.0)).list_pairs()
+    is_own = find_own_samples(samples, positions, robot, positions[neighbor])
     centroids = compute_sample_centroids(is_own, samples, np.ones(300), positions)
     for i in range(7):
-        known = [i, *neighbour[robot == i]]
+        known = [i, *neighbor[robot == i]]
         distances = np.hypot(*(samples[:, None] - positions[known]).transpose(2, 0, 1))
         np.testing.assert_array_equal(is_own[i], distances.argmin(axis=1) == 0)
         np.testing.assert_allclose(centroids[i], samples[is_own[i]].mean(axis=0))
@@ -116,7 +116,7 @@ def test_without_obstacles_it_is_lloyds_algorithm(density: Gaussians | None) -> 
     positions = np.array([[2.0, 2.0], [3.0, 5.0], [8.0, 4.0], [7.0, 1.5]])
     region = environment.region
     seen = Observations(
-        positions, np.zeros((4, 2)), Neighbours(4), np.full((4, 2), np.nan), region, density=density
+        positions, np.zeros((4, 2)), Neighbors(4), np.full((4, 2), np.nan), region, density=density
     )
     team = Team.homogeneous(4)
     memory = controller.decide(seen, controller.begin(region, team)).memory

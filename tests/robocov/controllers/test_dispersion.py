@@ -8,7 +8,7 @@ from robocov.environment import Environment
 from robocov.mapfile import load_map
 from robocov.metrics import find_settling_time
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.simulation import Simulation, TeamState
 from robocov.team import Team
 
@@ -29,7 +29,7 @@ def test_robots_leave_each_others_reach_and_come_to_rest() -> None:
 def test_robots_that_are_far_apart_are_at_rest() -> None:
     controller = Dispersion()
     positions = np.array([[20.0, 20.0], [40.0, 40.0]])
-    seen = Observations(positions, np.zeros((2, 2)), Neighbours(2), np.full((2, 2), np.nan), HALL.region)
+    seen = Observations(positions, np.zeros((2, 2)), Neighbors(2), np.full((2, 2), np.nan), HALL.region)
     decision = controller.decide(seen, controller.begin(HALL.region, Team.homogeneous(2)))
     np.testing.assert_array_equal(decision.forces, 0.0)
 

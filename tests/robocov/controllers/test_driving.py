@@ -1,4 +1,4 @@
-"""Velocities towards goals and next to obstacles and other robots, and the forces that track them."""
+"""Velocities toward goals and next to obstacles and other robots, and the forces that track them."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from robocov.controllers.driving import (
     compute_approach_velocities,
     compute_drive_forces,
     limit_approach_speed,
-    list_neighbour_offsets,
+    list_neighbor_offsets,
 )
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.team import Team
 
@@ -28,7 +28,7 @@ def test_robots_that_meet_brake_on_half_of_their_distance_each() -> None:
     team = Team.homogeneous(2, max_speed=5.0, max_acceleration=2.0)
     positions = np.array([[0.0, 0.0], [0.7, 0.0]])
     no_points = np.full((2, 1, 2), np.nan)
-    seen = Observations(positions, np.zeros((2, 2)), Neighbours(2), no_points[:, 0], REGION)
+    seen = Observations(positions, np.zeros((2, 2)), Neighbors(2), no_points[:, 0], REGION)
     margins = Margins(clearance=np.full(2, 0.2), separation=np.full(2, 0.2), rate=1000.0, braking=0.5)
     desired = np.array([[3.0, 0.0], [-3.0, 0.0]])
     velocities = avoid_collisions(desired, seen, team, no_points, margins)
@@ -36,7 +36,7 @@ def test_robots_that_meet_brake_on_half_of_their_distance_each() -> None:
     expected_speed = np.sqrt(2 * 0.5 * 0.5)
     np.testing.assert_allclose(velocities, [[expected_speed, 0.0], [-expected_speed, 0.0]])
 
-    alone = Observations(positions[:1], np.zeros((1, 2)), Neighbours(1), no_points[:1, 0], REGION)
+    alone = Observations(positions[:1], np.zeros((1, 2)), Neighbors(1), no_points[:1, 0], REGION)
     wall_points = positions[None, 1:]
     margins = margins._replace(clearance=np.full(1, 0.2), separation=np.full(1, 0.2))
     velocities = avoid_collisions(desired[:1], alone, team[:1], wall_points, margins)
@@ -82,13 +82,13 @@ def test_approach_velocities_are_proportional_and_limited(seed: int, n: int) -> 
 def test_drive_forces_compensate_viscosity() -> None:
     """At the desired velocity, the force is that of viscosity alone."""
     velocities = np.array([[0.5, 0.0]])
-    seen = Observations(np.zeros((1, 2)), velocities, Neighbours(1), np.full((1, 2), np.nan), REGION)
+    seen = Observations(np.zeros((1, 2)), velocities, Neighbors(1), np.full((1, 2), np.nan), REGION)
     team = Team.homogeneous(1, viscosity=3.0)
     np.testing.assert_allclose(compute_drive_forces(velocities, seen, team, 0.1), [[1.5, 0.0]])
 
 
 @given(seed=st.integers(0, 2**32))
-def test_only_the_velocity_towards_an_object_is_limited(seed: int) -> None:
+def test_only_the_velocity_toward_an_object_is_limited(seed: int) -> None:
     rng = np.random.default_rng(seed)
     n = 20
     desired = rng.normal(size=(n, 2))
@@ -129,11 +129,11 @@ def test_without_objects_velocities_do_not_change() -> None:
     np.testing.assert_allclose(velocities, desired, rtol=1e-12)
 
 
-def test_neighbour_offsets_are_those_within_reach() -> None:
+def test_neighbor_offsets_are_those_within_reach() -> None:
     n = 40
     positions = np.random.default_rng(0).uniform(20, 30, size=(n, 2))
-    seen = Observations(positions, np.zeros((n, 2)), Neighbours(n), np.full((n, 2), np.nan), REGION)
-    offsets = list_neighbour_offsets(seen, 1.5)
+    seen = Observations(positions, np.zeros((n, 2)), Neighbors(n), np.full((n, 2), np.nan), REGION)
+    offsets = list_neighbor_offsets(seen, 1.5)
     for i in range(n):
         expected = positions[i] - np.delete(positions, i, axis=0)
         expected = expected[np.hypot(*expected.T) <= 1.5]

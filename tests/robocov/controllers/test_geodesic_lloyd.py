@@ -21,7 +21,7 @@ from robocov.errors import ParameterError
 from robocov.generator import generate_map
 from robocov.mapfile import load_map
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.simulation import Simulation, TeamState
 from robocov.team import Team
@@ -33,7 +33,7 @@ DOOR = Environment("door", SQUARE.boundary, (WallObstacle(((5, 0), (5, 8)), 0.2)
 def observe(positions: np.ndarray, region: Region) -> Observations:
     """Return the observations of robots at rest that hear each other, far from obstacles."""
     n = len(positions)
-    return Observations(positions, np.zeros((n, 2)), Neighbours(n), np.full((n, 2), np.nan), region)
+    return Observations(positions, np.zeros((n, 2)), Neighbors(n), np.full((n, 2), np.nan), region)
 
 
 @settings(max_examples=8)
@@ -153,14 +153,14 @@ def test_a_simulation_informs_the_controller_and_keeps_the_original() -> None:
 
 
 def test_robots_plan_by_the_robots_that_they_hear_and_the_density() -> None:
-    """Two robots that do not hear each other both move to the centre of the density."""
+    """Two robots that do not hear each other both move to the center of the density."""
     bell = replace(SQUARE, density=Gaussians((Gaussian((7.0, 7.0), 1.0, 1.0),), floor=0.001))
     controller = inform_controller(GeodesicLloyd(exponent=2.0), bell)
     positions = np.array([[6.0, 6.5], [1.0, 1.0]])
     team = Team.homogeneous(2, communication_range=2.0)
     seen = replace(
         observe(positions, SQUARE.region),
-        neighbours=Neighbours.from_ranges(positions, team.communication_range),
+        neighbors=Neighbors.from_ranges(positions, team.communication_range),
     )
     decision = controller.decide(seen, controller.begin(SQUARE.region, team))
     np.testing.assert_allclose(decision.goals, [[7, 7], [7, 7]], atol=0.15)

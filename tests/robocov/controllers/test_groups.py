@@ -16,7 +16,7 @@ from robocov.controllers.shared_map import (
     assign_goals,
 )
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.team import Team
 
 
@@ -50,7 +50,7 @@ def test_silent_robots_are_expected_at_their_goals_until_they_are_missed_there(
 ) -> None:
     time = 60.0
     positions = np.array([[1.0, 1.0], [7.0, 3.0]])
-    not_linked = Neighbours.from_ranges(positions, np.full(2, 3.0))
+    not_linked = Neighbors.from_ranges(positions, np.full(2, 3.0))
     seen = Observations(positions, np.zeros((2, 2)), not_linked, np.full((2, 2), np.nan), REGION, time=time)
     former_group = Group(
         robots=np.array([0, 1]), positions=positions, heard_times=np.array([time, time - silence])

@@ -9,7 +9,7 @@ from robocov.controllers import Howard
 from robocov.controllers.driving import collect_obstacle_points, update_returns
 from robocov.environment import Environment
 from robocov.observation import Observations, Scans, compute_ray_directions
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.simulation import Simulation, TeamState
 from robocov.team import Team
 
@@ -20,7 +20,7 @@ def observe(positions: np.ndarray, scans: Scans | None = None) -> Observations:
     """Return the observations of robots at rest that hear each other, without obstacle points."""
     n = len(positions)
     return Observations(
-        positions, np.zeros((n, 2)), Neighbours(n), np.full((n, 2), np.nan), SQUARE.region, scans=scans
+        positions, np.zeros((n, 2)), Neighbors(n), np.full((n, 2), np.nan), SQUARE.region, scans=scans
     )
 
 

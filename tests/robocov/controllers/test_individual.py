@@ -12,7 +12,7 @@ from robocov.controllers import Controller, IndividualControllerAdapter, OwnView
 from robocov.controllers.individual import to_team_controller, unwrap_controller
 from robocov.errors import ParameterError
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.team import Team
 
@@ -34,7 +34,7 @@ def observe(positions: np.ndarray) -> Observations:
     obstacle_points = np.full(positions.shape, np.nan)
     obstacle_points[0] = [0.0, 1.0]
     return Observations(
-        positions, np.zeros(positions.shape), Neighbours(len(positions)), obstacle_points, REGION, time=2.0
+        positions, np.zeros(positions.shape), Neighbors(len(positions)), obstacle_points, REGION, time=2.0
     )
 
 
@@ -51,7 +51,7 @@ def test_each_robot_gets_its_own_view() -> None:
     np.testing.assert_array_equal(decision.forces, [[0.0, 0.0], [1.0, 0.0]])
     assert [view.number for view in views] == [0, 1]
     np.testing.assert_array_equal(views[1].position, positions[1])
-    np.testing.assert_array_equal(views[1].neighbours, positions[:1])
+    np.testing.assert_array_equal(views[1].neighbors, positions[:1])
     np.testing.assert_array_equal(views[0].obstacle_point, [0.0, 1.0])
     assert views[1].obstacle_point is None
     np.testing.assert_allclose(views[0].centroid, [2.5, 4.0])

@@ -11,11 +11,11 @@ from robocov.arrays import Array
 from robocov.conditions import Conditions
 from robocov.conditions.perception import Perception
 from robocov.controllers import Atlas
-from robocov.controllers.localization import Estimates, assume_closer_neighbours, estimate_positions
+from robocov.controllers.localization import Estimates, assume_closer_neighbors, estimate_positions
 from robocov.environment import Environment
 from robocov.metrics import compute_clearances, count_contacts
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -33,7 +33,7 @@ def driven(paths: Array, conditions: Conditions) -> tuple[Observations, Estimate
     speeds = np.gradient(paths, DT, axis=0)
     for k, (places, velocities) in enumerate(zip(paths, speeds, strict=True)):
         walls = places + [1.0, 0.0]
-        truth = Observations(places, velocities, Neighbours(n), walls, Region(SQUARE), k * DT)
+        truth = Observations(places, velocities, Neighbors(n), walls, Region(SQUARE), k * DT)
         seen, inbox = perception.perceive(truth, inbox, np.ones(n, dtype=bool))
         known, estimates = estimate_positions(seen, estimates, team)
         assert np.allclose(known.obstacle_points - known.positions, [1.0, 0.0])
@@ -53,14 +53,14 @@ def test_late_messages_of_who_goes_straight_on_are_made_up_for(seed: int, delay:
     known, _, errors = driven(paths, Conditions(delay=delay, message_rate=4.0))
     assert max(map(np.max, errors)) < 1e-9
     assert known.reported_positions is not None
-    _, other = known.neighbours.list_pairs()
+    _, other = known.neighbors.list_pairs()
     assert np.allclose(known.reported_positions, paths[-1][other], atol=1e-9)
 
 
 def test_others_are_extrapolated_for_a_limited_time() -> None:
     conditions = Conditions(delay=2.0, message_rate=2.0, forget_after=9.0)
     known, estimates, _ = driven(lines(2, 90), conditions)
-    robot, other = known.neighbours.list_pairs()
+    robot, other = known.neighbors.list_pairs()
     assert known.reported_positions is not None
     distances = np.hypot(*(known.reported_positions - estimates.tracks.positions[robot, other]).T)
     speeds = np.hypot(*estimates.tracks.velocities[robot, other].T)
@@ -83,7 +83,7 @@ def test_noise_is_averaged_out(seed: int) -> None:
     assert np.sqrt(np.mean(np.square(errors[80:]))) < 0.035
     assert np.all((estimates.variance > 0.06**2) & (estimates.variance < 0.14**2))
     assert known.reported_positions is not None
-    _, other = known.neighbours.list_pairs()
+    _, other = known.neighbors.list_pairs()
     off = np.hypot(*(known.reported_positions - paths[-1][other]).T)
     assert np.sqrt(np.mean(off**2)) < 0.09  # 0.141 m without a filter; of these seeds 20 is the worst, 0.0841
 
@@ -97,7 +97,7 @@ def test_who_is_carried_away_notices_it_at_once() -> None:
     inbox = perception.create_inbox()
     for k in range(62):
         velocities = (paths[1] - paths[0]) / DT
-        truth = Observations(paths[k], velocities, Neighbours(2), paths[k], Region(SQUARE), k * DT)
+        truth = Observations(paths[k], velocities, Neighbors(2), paths[k], Region(SQUARE), k * DT)
         seen, inbox = perception.perceive(truth, inbox, np.ones(2, dtype=bool))
         known, estimates = estimate_positions(seen, estimates, team)
     assert np.hypot(*(known.positions - paths[61]).T).max() < 0.1
@@ -112,21 +112,21 @@ def test_a_robot_knows_nothing_of_what_it_does_not_hear(seed: int) -> None:
     for far in (50.0, 70.0):
         estimates, inbox = Estimates.build_initial(4), perception.create_inbox()
         for k, places in enumerate(lines(4, 20, seed) * 0.05 + [[0, 0], [1, 0], [far, 0], [far, 1]]):
-            near = Neighbours.from_ranges(places, team.communication_range)
+            near = Neighbors.from_ranges(places, team.communication_range)
             truth = Observations(places, places * 0.0, near, places, Region(SQUARE), k * DT)
             seen, inbox = perception.perceive(truth, inbox, np.ones(4, dtype=bool))
             known, estimates = estimate_positions(seen, estimates, team)
-        close = assume_closer_neighbours(known, estimates)
+        close = assume_closer_neighbors(known, estimates)
         assert close.reported_positions is not None
-        rows = close.neighbours.list_pairs()[0] < 2
+        rows = close.neighbors.list_pairs()[0] < 2
         found.append([known.positions[:2].tobytes(), close.reported_positions[rows].tobytes()])
     assert found[0] == found[1]
 
 
 def test_others_may_be_nearer_by_the_noise_and_with_time() -> None:
     known, estimates, _ = driven(lines(3, 60), Conditions(position_noise=0.1, delay=0.5))
-    robot, other = known.neighbours.list_pairs()
-    close = assume_closer_neighbours(known, estimates)
+    robot, other = known.neighbors.list_pairs()
+    close = assume_closer_neighbors(known, estimates)
     assert known.reported_positions is not None and close.reported_positions is not None
     before, after = (
         np.hypot(*(each.reported_positions - each.positions[robot]).T) for each in (known, close)

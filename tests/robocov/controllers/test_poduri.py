@@ -12,7 +12,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.mapfile import load_map
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.simulation import Simulation
 from robocov.team import Team
 
@@ -27,7 +27,7 @@ def observe(positions: np.ndarray, communication_range: float = np.inf) -> Obser
     return Observations(
         positions,
         np.zeros((n, 2)),
-        Neighbours.from_ranges(positions, np.full(n, communication_range)),
+        Neighbors.from_ranges(positions, np.full(n, communication_range)),
         np.full((n, 2), np.nan),
         HALL.region,
     )
@@ -40,7 +40,7 @@ def count_links(positions: np.ndarray, link_range: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("k", "min_distance"), [(1, 2.0), (3, 1.4)])
-def test_every_robot_keeps_k_neighbours_while_the_team_spreads(k: int, min_distance: float) -> None:
+def test_every_robot_keeps_k_neighbors_while_the_team_spreads(k: int, min_distance: float) -> None:
     """The claim of the paper, far from walls."""
     simulation = Simulation(HALL, Poduri(neighbours=float(k), link_range=3.0, k_cover=1.0), CROWD)
     min_count = len(CROWD)
@@ -53,7 +53,7 @@ def test_every_robot_keeps_k_neighbours_while_the_team_spreads(k: int, min_dista
 
 
 @pytest.mark.parametrize("name", ["rooms", "blocks-a"])
-def test_robots_keep_two_neighbours_by_default(name: str) -> None:
+def test_robots_keep_two_neighbors_by_default(name: str) -> None:
     environment = load_map(name)
     simulation = Simulation(environment, Poduri(), environment.start().sample(6, seed=1))
     for _ in range(60 * 8):
@@ -61,7 +61,7 @@ def test_robots_keep_two_neighbours_by_default(name: str) -> None:
         assert count_links(simulation.positions, 6.0).min() >= 2
 
 
-def test_robots_with_fewer_neighbours_spread_farther() -> None:
+def test_robots_with_fewer_neighbors_spread_farther() -> None:
     spreads = []
     for k in (1.0, 6.0):
         simulation = Simulation(HALL, Poduri(neighbours=k, link_range=3.0, k_cover=1.0), CROWD)
@@ -72,7 +72,7 @@ def test_robots_with_fewer_neighbours_spread_farther() -> None:
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_robots_keep_their_neighbours_among_walls(seed: int) -> None:
+def test_robots_keep_their_neighbors_among_walls(seed: int) -> None:
     rooms = load_map("rooms")
     starts = rooms.start().sample(8, seed=seed)
     assert count_links(starts, 3.0).min() >= 2
@@ -87,10 +87,10 @@ def compute_expected_force(
 ) -> np.ndarray:
     """Return the force on robot i, which knows some robots, for k_cover = 0.5 and η = 0.8."""
 
-    def is_critical(robot: int, neighbour: int) -> bool:
+    def is_critical(robot: int, neighbor: int) -> bool:
         distances = {m: np.hypot(*(positions[robot] - positions[m])) for m in known if m != robot}
         near_count = sum(distance <= 0.8 * link_range for distance in distances.values())
-        nearer_count = sum(distance < distances[neighbour] for distance in distances.values())
+        nearer_count = sum(distance < distances[neighbor] for distance in distances.values())
         return near_count <= k and nearer_count < k
 
     force = np.zeros(2)
@@ -122,12 +122,12 @@ def test_forces_follow_the_rules_for_each_robot(
     controller = Poduri(neighbours=float(k), link_range=3.5, eta=0.8, k_cover=0.5)
     seen = observe(positions, communication_range)
     if reports:
-        _, neighbour = seen.neighbours.list_pairs()
-        seen = replace(seen, reported_positions=positions[neighbour])
+        _, neighbor = seen.neighbors.list_pairs()
+        seen = replace(seen, reported_positions=positions[neighbor])
     team = Team.homogeneous(n, communication_range=communication_range)
     forces = controller.decide(seen, controller.begin(HALL.region, team)).forces
     for i in range(n):
-        known = {i, *seen.neighbours.list_neighbours(i).tolist()}
+        known = {i, *seen.neighbors.list_neighbors(i).tolist()}
         expected = compute_expected_force(positions, i, known, k, min(communication_range, 3.5))
         np.testing.assert_allclose(forces[i], expected, rtol=1e-9, atol=1e-9)
 

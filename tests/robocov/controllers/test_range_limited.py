@@ -12,7 +12,7 @@ from robocov.controllers import Lloyd, RangeLimited
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -30,7 +30,7 @@ def observe(
     return Observations(
         positions,
         np.zeros((n, 2)),
-        Neighbours.from_ranges(positions, np.full(n, communication_range)),
+        Neighbors.from_ranges(positions, np.full(n, communication_range)),
         np.full((n, 2), np.nan),
         REGION,
         density=density,

@@ -21,7 +21,7 @@ from robocov.controllers import (
 from robocov.controllers.individual import to_team_controller
 from robocov.errors import ParameterError
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 
 REGION = Region(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 8.0], [0.0, 8.0]]))
@@ -76,7 +76,7 @@ def test_a_controller_in_a_file_is_made_with_its_gains(controller_file: Path) ->
     assert isinstance(controller, Controller)
     assert controller.name == "Mine"
     positions = np.array([[4.0, 4.0], [6.0, 5.0]])
-    seen = Observations(positions, np.zeros((2, 2)), Neighbours(2), np.full((2, 2), np.nan), REGION)
+    seen = Observations(positions, np.zeros((2, 2)), Neighbors(2), np.full((2, 2), np.nan), REGION)
     decision = controller.decide(seen, None)
     assert decision.goals is not None
     np.testing.assert_allclose(decision.forces, 2.0 * (decision.goals - positions))

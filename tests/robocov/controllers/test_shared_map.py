@@ -17,7 +17,7 @@ from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
 from robocov.metrics import compute_clearances, count_contacts
 from robocov.observation import Observations, Scans
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.planning.discovered_map import FREE, UNKNOWN, WALL, DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.raster import Raster
@@ -121,14 +121,14 @@ def test_the_number_of_nodes_is_checked() -> None:
 
 
 def add_scans(
-    maps: list[DiscoveredMap], neighbours: Neighbours, distances: np.ndarray, is_hit: np.ndarray
+    maps: list[DiscoveredMap], neighbors: Neighbors, distances: np.ndarray, is_hit: np.ndarray
 ) -> list[DiscoveredMap]:
     """Return the maps of robots at (2.02, 2.02) after scans, (n, rays)."""
     n = len(distances)
     seen = Observations(
-        np.tile([2.02, 2.02], (n, 1)), np.zeros((n, 2)), neighbours, np.full((n, 2), np.nan), ROOMS.region
+        np.tile([2.02, 2.02], (n, 1)), np.zeros((n, 2)), neighbors, np.full((n, 2), np.nan), ROOMS.region
     )
-    return update_maps(maps, seen, Scans(distances, is_hit), list_circles(neighbours))
+    return update_maps(maps, seen, Scans(distances, is_hit), list_circles(neighbors))
 
 
 def build_random_maps() -> list[DiscoveredMap]:
@@ -144,7 +144,7 @@ BLIND = np.zeros((4, 8))
 
 def test_robots_that_all_hear_each_other_share_one_map() -> None:
     maps = build_random_maps()
-    later = add_scans(maps, Neighbours(4), BLIND, BLIND > 0.0)
+    later = add_scans(maps, Neighbors(4), BLIND, BLIND > 0.0)
     assert len({id(known_map) for known_map in later}) == 1
     # The first robot that knows a cell counts.
     states = np.array([known_map.state for known_map in maps])
@@ -152,12 +152,12 @@ def test_robots_that_all_hear_each_other_share_one_map() -> None:
     np.testing.assert_array_equal(later[0].state, states[first_known, *np.indices(RASTER.shape)])
 
 
-def test_robots_in_a_line_get_the_maps_of_their_neighbours() -> None:
+def test_robots_in_a_line_get_the_maps_of_their_neighbors() -> None:
     """A robot trusts its own cells most; the last robot does not hear any other."""
     maps = build_random_maps()
     states = np.array([known_map.state for known_map in maps])
     positions = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [9.0, 0.0]])
-    line = Neighbours.from_ranges(positions, np.full(4, 1.5))
+    line = Neighbors.from_ranges(positions, np.full(4, 1.5))
     later = add_scans(maps, line, BLIND, BLIND > 0.0)
     np.testing.assert_array_equal(later[0].state, np.where(states[0] != UNKNOWN, states[0], states[1]))
     np.testing.assert_array_equal(later[1].state == UNKNOWN, (states[:3] == UNKNOWN).all(axis=0))
@@ -169,7 +169,7 @@ def test_errors_of_a_map_are_corrected_by_scans_of_robots_that_share_it() -> Non
     free = DiscoveredMap(RASTER, np.full(RASTER.shape, FREE, np.uint8))
     unknown = DiscoveredMap(RASTER, np.full(RASTER.shape, UNKNOWN, np.uint8))
     positions = np.array([[0.0, 0.0], [1.0, 0.0], [8.0, 0.0], [9.0, 0.0]])
-    pairs = Neighbours.from_ranges(positions, np.full(4, 1.5))
+    pairs = Neighbors.from_ranges(positions, np.full(4, 1.5))
     distances = np.array([[0.0], [1.0], [0.0], [0.0]])
     later = add_scans([free, unknown, free, unknown], pairs, distances, distances > 0.0)
     assert later[0] is later[1]
@@ -253,7 +253,7 @@ def test_a_final_plan_is_computed_again_for_another_density() -> None:
     controller = GreedySubmodular(nodes=100.0)
     density = Gaussians((Gaussian((7.0, 7.0), 50.0, 0.5),), floor=0.01)
     seen = Observations(
-        np.array([[1.0, 1.0]]), np.zeros((1, 2)), Neighbours(1), np.full((1, 2), np.nan), ROOMS.region
+        np.array([[1.0, 1.0]]), np.zeros((1, 2)), Neighbors(1), np.full((1, 2), np.nan), ROOMS.region
     )
     known_map = DiscoveredMap(RASTER, np.full(RASTER.shape, FREE, dtype=np.uint8))
     memory = replace(controller.begin(ROOMS.region, Team.homogeneous(1)), maps=(known_map,))

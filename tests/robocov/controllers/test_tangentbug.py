@@ -21,7 +21,7 @@ SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 DT = 0.05
 """Robots scan about ten times a second: more steps in between change little."""
 
-# The trap is open to the left; the centre of the square is behind its right wall.
+# The trap is open to the left; the center of the square is behind its right wall.
 U_TRAP = Environment("u", SQUARE, (WallObstacle(((1.5, 3.5), (4, 3.5), (4, 6.5), (1.5, 6.5)), 0.2),))
 
 

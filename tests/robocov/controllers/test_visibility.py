@@ -1,4 +1,4 @@
-"""Views, and the controllers Visibility and Boosting that maximise what is in view."""
+"""Views, and the controllers Visibility and Boosting that maximize what is in view."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from robocov.controllers.boosting import Ascent, BoostLimits, Mode, compute_unde
 from robocov.controllers.visibility import find_cells_in_view
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, PolygonObstacle
-from robocov.observation import NearNeighbours, Observations, compute_ray_directions
-from robocov.observation.neighbours import Neighbours
+from robocov.observation import NearNeighbors, Observations, compute_ray_directions
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.observation.scanned_view import View, compute_step_fractions, find_windows
 from robocov.simulation import Simulation
@@ -48,7 +48,7 @@ def observe(positions: np.ndarray, density: Gaussians | None = None) -> Observat
     """Return the observations of robots at rest that hear each other, without obstacle points."""
     n = len(positions)
     return Observations(
-        positions, np.zeros((n, 2)), Neighbours(n), np.full((n, 2), np.nan), REGION, density=density
+        positions, np.zeros((n, 2)), Neighbors(n), np.full((n, 2), np.nan), REGION, density=density
     )
 
 
@@ -116,7 +116,7 @@ def test_a_point_belongs_to_the_robot_with_the_lowest_power(seed: int, n: int) -
     reach = rng.uniform(1.0, 4.0, n)
     directions = compute_ray_directions(16)
     depths = reach[:, None, None] * np.broadcast_to(rng.uniform(0.0, 1.0, 5), (n, 16, 5))
-    pairs = observe(positions).find_near_neighbours(np.inf)
+    pairs = observe(positions).find_near_neighbors(np.inf)
     is_own = find_cells_in_view(depths, np.full((n, 16), np.inf), directions, pairs, reach)
     for i in range(n):
         points = positions[i] + depths[i][..., None] * directions[:, None]
@@ -124,9 +124,9 @@ def test_a_point_belongs_to_the_robot_with_the_lowest_power(seed: int, n: int) -
         np.testing.assert_array_equal(is_own[i], power.argmin(axis=-1) == i)
 
 
-def test_neighbours_behind_walls_do_not_share_the_view() -> None:
+def test_neighbors_behind_walls_do_not_share_the_view() -> None:
     positions = np.random.default_rng(0).uniform((1, 1), (9, 7), size=(4, 2))
-    pairs = observe(positions).find_near_neighbours(np.inf)
+    pairs = observe(positions).find_near_neighbors(np.inf)
     walls = np.full((4, 16), 1e-9)
     is_own = find_cells_in_view(
         np.ones((4, 16, 5)), walls, compute_ray_directions(16), pairs, np.full(4, 3.0)
@@ -189,12 +189,12 @@ def test_steps_are_halved_when_the_gradient_turns_back() -> None:
     assert compute_step_fractions(forward, forward, np.array([0.5])) == pytest.approx(0.6)
 
 
-def test_a_neighbour_behind_a_wall_detects_nothing_here() -> None:
-    """Φ is the product over the neighbours whose line to the point is in front of walls."""
+def test_a_neighbor_behind_a_wall_detects_nothing_here() -> None:
+    """Φ is the product over the neighbors whose line to the point is in front of walls."""
     directions = compute_ray_directions(72)
     depths = np.full((1, 72, 1), 1.0)
     walls = np.full((1, 72), np.inf)
-    pairs = NearNeighbours(np.array([0]), np.array([1]), np.array([[-2.0, 0.0]]), np.array([2.0]))
+    pairs = NearNeighbors(np.array([0]), np.array([1]), np.array([[-2.0, 0.0]]), np.array([2.0]))
     reach = np.full(2, 3.0)
     undetected = compute_undetected(depths, walls, directions, pairs, reach, 0.5)
     distance = np.hypot(*(directions - [2.0, 0.0]).T)

@@ -43,7 +43,7 @@ def test_the_value_tends_to_the_integral_with_the_square_of_the_spacing(environm
     assert errors[0] > 3 * errors[1] > 9 * errors[2]
 
 
-def test_sites_are_the_free_cell_centres_of_the_square_over_the_bounding_box():
+def test_sites_are_the_free_cell_centers_of_the_square_over_the_bounding_box():
     environment = build_environment(build_ring(2, 1, 4, 2), boundary=((1, 1), (5, 1), (5, 3), (1, 3)))
     cost = CoverageCost(environment, lattice=8)
     assert cost.spacing == 0.5
@@ -181,7 +181,7 @@ def test_the_cost_scales_and_moves_with_the_map(scale, shift):
 
     transformed = build_environment(*map(transform, rings), boundary=transform(build_ring(0, 0, 8, 8)))
     result = CoverageCost(transformed, lattice=32)(robots * scale + shift)
-    # Coordinates are rounded to a grid of a micrometre.
+    # Coordinates are rounded to a grid of a micrometer.
     assert result.mean_distance == pytest.approx(
         original.mean_distance * scale, rel=1e-4 if scale < 1 else 1e-7
     )
@@ -208,7 +208,7 @@ def test_the_lattice_must_be_a_whole_number_in_range(lattice):
         CoverageCost(PILLAR, lattice=lattice)
 
 
-def test_building_reports_progress_and_can_be_cancelled():
+def test_building_reports_progress_and_can_be_canceled():
     fractions = []
     CoverageCost(OFFICE, lattice=64, progress=fractions.append)
     assert fractions == sorted(fractions)

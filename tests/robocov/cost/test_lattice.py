@@ -19,7 +19,7 @@ def build_environment(*obstacles):
     return Environment("test", SQUARE, obstacles)
 
 
-def test_the_sites_are_the_free_cell_centres_row_by_row():
+def test_the_sites_are_the_free_cell_centers_row_by_row():
     environment = build_environment(CircleObstacle((4.0, 2.0), 0.7))
     sites, _ = build_lattice(Geodesics(environment), 20)
     centers = (np.arange(20) + 0.5) / 20 * 4.0

@@ -57,7 +57,7 @@ def test_only_the_latest_maps_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     assert time_varying_cost.get_cost(1.0) is not first
 
 
-def test_building_the_cost_of_another_time_can_be_cancelled() -> None:
+def test_building_the_cost_of_another_time_can_be_canceled() -> None:
     def stop(done: float) -> None:
         raise InterruptedError
 

@@ -22,7 +22,7 @@ from robocov.density import (
     sample_density,
 )
 from robocov.errors import ParameterError
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.voronoi import partition
 
@@ -230,7 +230,7 @@ def test_a_cell_depends_on_nothing_but_what_its_robot_hears(density):
     ranges = np.full(len(points), 1.6)
 
     def row(places, i):
-        heard = Neighbours.from_ranges(places, ranges[: len(places)])
+        heard = Neighbors.from_ranges(places, ranges[: len(places)])
         cells = partition(places, SQUARE, heard, density=density)
         return cells.mass[i], *cells.centroid[i], cells.polar_moment[i]
 

@@ -15,7 +15,7 @@ SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 
 
 @pytest.mark.parametrize("radius", [0.005, 0.05, 0.5, 5.0, 50.0])
-def test_a_circle_is_a_polygon_of_at_most_a_millimetre_of_sagitta(radius: float) -> None:
+def test_a_circle_is_a_polygon_of_at_most_a_millimeter_of_sagitta(radius: float) -> None:
     polygon = CircleObstacle((1.0, 2.0), radius).polygon
     center = shapely.Point(1.0, 2.0)
     assert radius - center.distance(polygon.exterior) <= 1e-3 + 1e-12

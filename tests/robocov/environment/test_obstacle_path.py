@@ -140,7 +140,7 @@ def test_a_file_keeps_it() -> None:
         ({"points": [[0, 0]], "speed": 1}, r"path.points: expected a list of at least 2 points"),
         (
             {"points": [[0, 0], [1]], "speed": 1},
-            r"path.points\[1\]: expected a point \[x, y\] in metres, got \[1\]",
+            r"path.points\[1\]: expected a point \[x, y\] in meters, got \[1\]",
         ),
         ({"points": [[0, 0], [1, 1e9]], "speed": 1}, r"path.points\[1\]\[1\]: expected .*, got 1000000000"),
         ({"points": [[0, 0], [0, 0]], "speed": 1}, r"path.points: expected a path of at least 1 mm, got 0 m"),

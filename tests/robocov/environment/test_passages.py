@@ -108,7 +108,7 @@ def rooms_with_blocks(draw: st.DrawFn) -> Polygon:
 
 
 def topology(space: BaseGeometry, radius: float) -> tuple[int, int]:
-    """Return the numbers of parts and holes of the places for the centre of a disc of some radius."""
+    """Return the numbers of parts and holes of the places for the center of a disc of some radius."""
     parts = shapely.get_parts(space.buffer(-radius, quad_segs=64))
     parts = parts[shapely.area(parts) > 0]
     return len(parts), int(sum(len(part.interiors) for part in parts))

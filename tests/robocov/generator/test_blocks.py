@@ -17,7 +17,7 @@ def polygon(cell):
     return shapely.Polygon([edge[:2] for edge in cell])
 
 
-# GEOS computes wrong offsets for lengths below a micrometre.
+# GEOS computes wrong offsets for lengths below a micrometer.
 LENGTHS = st.floats(0.0, 1.5).map(lambda length: round(length, 6))
 
 

@@ -80,7 +80,7 @@ def test_walls_are_of_one_thickness_and_corridors_of_one_width(seed: int) -> Non
     count, (thickness,) = corridors(environment)
     gap = find_narrowest_gap(environment.free)
     assert gap is not None
-    # Eight corridors and seven walls side by side, on whole centimetres.
+    # Eight corridors and seven walls side by side, on whole centimeters.
     assert gap.width == pytest.approx((10.0 - 7 * thickness) / 8, abs=0.011)
     assert 10 < count < 49
     assert sum(len(wall.points) for wall in environment.obstacles) < 3 * count + 10  # type: ignore[union-attr]

@@ -17,7 +17,7 @@ from robocov.geodesic.angular_index import (
 )
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
-STEPS_PER_METRE = 2.0**48
+STEPS_PER_METER = 2.0**48
 
 
 def build_geodesics(*obstacles):
@@ -57,7 +57,7 @@ def test_visibility_does_not_depend_on_the_number_of_bins(bins):
     rng = np.random.default_rng(2)
     triangles = [rng.uniform(0.1, 0.9, 2) + 0.07 * np.array([[1, 0], [0, 1], [-1, 0.3]]) for _ in range(12)]
     geodesics = build_geodesics(*triangles)
-    points = np.rint(rng.uniform(size=(40, 2)) * STEPS_PER_METRE)
+    points = np.rint(rng.uniform(size=(40, 2)) * STEPS_PER_METER)
     points = points[shapely.intersects_xy(geodesics.free, *points.T)]
     source, target = np.indices((len(points), len(points))).reshape(2, -1)
     lines = shapely.linestrings(np.stack([points[source], points[target]], axis=1))
@@ -70,19 +70,19 @@ def test_visibility_does_not_depend_on_the_number_of_bins(bins):
 
 def test_the_index_contains_only_walls_within_reach():
     geodesics = build_geodesics([(0.7, 0.2), (0.8, 0.2), (0.8, 0.8), (0.7, 0.8)])
-    source = np.array([0.6, 0.5]) * STEPS_PER_METRE
-    target = np.array([0.9, 0.5]) * STEPS_PER_METRE
+    source = np.array([0.6, 0.5]) * STEPS_PER_METER
+    target = np.array([0.9, 0.5]) * STEPS_PER_METER
     for reach, has_walls in ((0.05, False), (0.31, True)):
-        index = build_index(geodesics, [source], reach * STEPS_PER_METRE)
+        index = build_index(geodesics, [source], reach * STEPS_PER_METER)
         assert (index.head >= 0).any() == has_walls
         assert not compute_visibility(geodesics, index, [target])
 
 
 def test_a_source_on_a_wall_does_not_see_through_it():
     geodesics = build_geodesics([(0.25, 0.25), (0.75, 0.25), (0.75, 0.75), (0.25, 0.75)])
-    sources = np.array([[0.25, 0.5], [0.5, 0.75]]) * STEPS_PER_METRE
+    sources = np.array([[0.25, 0.5], [0.5, 0.75]]) * STEPS_PER_METER
     targets = np.array([[0.875, 0.5], [0.125, 0.5], [0.25, 0.875], [0.5, 0.875], [0.5, 0.125]])
-    targets *= STEPS_PER_METRE
+    targets *= STEPS_PER_METER
     is_seen = compute_visibility(geodesics, build_index(geodesics, sources, np.inf), targets)
     assert is_seen.tolist() == [[False, True, True, False, False], [False, False, True, True, False]]
 

@@ -32,7 +32,7 @@ def build_walls_around(*obstacles, boundary=HALL):
 
 
 def list_corners(walls):
-    """Return the corners in metres, sorted."""
+    """Return the corners in meters, sorted."""
     return sorted(map(tuple, (walls.corners * SIZE / 2.0**48).tolist()))
 
 
@@ -137,5 +137,5 @@ def test_the_grid_keeps_dyadic_numbers():
     grid = Grid.from_square(np.array([-3.0, 5.0]), 10.0)
     points = np.array([[-2.875, 5.5], [7.0, 14.99]])
     assert grid.unit == 2.0**-44
-    np.testing.assert_allclose(grid.to_metres(grid.snap(points)), points, rtol=0, atol=grid.unit)
-    np.testing.assert_array_equal(grid.to_metres(grid.snap(points))[0], points[0])
+    np.testing.assert_allclose(grid.to_meters(grid.snap(points)), points, rtol=0, atol=grid.unit)
+    np.testing.assert_array_equal(grid.to_meters(grid.snap(points))[0], points[0])

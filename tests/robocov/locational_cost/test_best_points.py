@@ -19,7 +19,7 @@ from robocov.locational_cost import (
     compute_locational_costs,
 )
 from robocov.locational_cost.best_points import _compute_descent_step, find_best_points
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition, partition_by_travel_time
 
@@ -233,7 +233,7 @@ def test_a_cell_is_its_own_affair_to_the_last_bit() -> None:
     rng = np.random.default_rng(3)
     region = REGIONS["pentagon"]
     points = np.vstack([scattered(region, 9, rng), region.centroid + 1e-7 * rng.normal(size=(4, 2))])
-    cells = partition(points, region, Neighbours(len(points)))
+    cells = partition(points, region, Neighbors(len(points)))
     edges = cells.edges
     for f in FUNCTIONS:
         together = find_best_points(cells, f)

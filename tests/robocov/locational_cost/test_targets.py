@@ -14,7 +14,7 @@ from robocov.errors import ParameterError
 from robocov.locational_cost import Distance, Sensing, compute_locational_costs
 from robocov.locational_cost.best_points import TARGETS, find_best_points, find_targets
 from robocov.observation import Observations
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -59,7 +59,7 @@ def test_other_words_are_refused() -> None:
 @pytest.mark.parametrize("target", TARGETS)
 def test_laws_head_for_their_target(law: str, target: str) -> None:
     n = len(POINTS)
-    seen = Observations(POINTS, np.zeros((n, 2)), Neighbours(n), np.full((n, 2), np.nan), PENTAGON)
+    seen = Observations(POINTS, np.zeros((n, 2)), Neighbors(n), np.full((n, 2), np.nan), PENTAGON)
     controller = make_controller(law, {"target": target, "height": 0.7})
     decision = controller.decide(seen, controller.begin(PENTAGON, Team.homogeneous(n)))
     expected = find_targets(partition(POINTS, PENTAGON), None, target, 0.7)

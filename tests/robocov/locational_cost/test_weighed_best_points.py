@@ -12,7 +12,7 @@ from voronoi_cases import performance
 from robocov.density import Gaussian, Gaussians, WeightedArea, WeightedPolygons
 from robocov.locational_cost import Distance, Sensing
 from robocov.locational_cost.best_points import find_best_points, find_targets
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.voronoi import partition
 
@@ -93,8 +93,8 @@ def test_a_target_depends_on_nothing_but_what_its_robot_hears(target):
     ranges = np.full(len(points), 1.6)
 
     def row(places):
-        neighbours = Neighbours.from_ranges(places, ranges[: len(places)])
-        cells = partition(places, SQUARE, neighbours, density=density)
+        neighbors = Neighbors.from_ranges(places, ranges[: len(places)])
+        cells = partition(places, SQUARE, neighbors, density=density)
         return find_targets(cells, density, target, 1.0)[0].tolist()
 
     near = np.flatnonzero(np.hypot(*(points - points[0]).T) <= 1.6)

@@ -98,7 +98,7 @@ def test_no_place_in_a_triangle_is_worth_more_than_is_proved(kind, seed, halving
     _, worth, bound = dual.bound_worths(prices, triangles)
     part = rng.dirichlet([0.5, 0.5, 0.5], (len(triangles), 12))
     part[:, :3] = np.eye(3)
-    places = cost.geodesics.grid.to_metres(np.einsum("tpk,tkd->tpd", part, triangles).reshape(-1, 2))
+    places = cost.geodesics.grid.to_meters(np.einsum("tpk,tkd->tpd", part, triangles).reshape(-1, 2))
     distances = cost.geodesics.compute_distances(places, cost.points[dual.sites])
     worths = np.maximum(prices - distances, 0.0).sum(axis=1).reshape(len(triangles), 12)
     slack = 1e-9 * dual.total_weight
@@ -133,7 +133,7 @@ def test_places_near_walls_count_where_the_robot_fits():
     where = load_map("cave")
     cost, radius = CoverageCost(where, 16), 0.3
     triangles = _Dual(cost, cost.points[[0]], radius)._triangles
-    polygons = shapely.polygons(cost.geodesics.grid.to_metres(triangles))
+    polygons = shapely.polygons(cost.geodesics.grid.to_meters(triangles))
     low_x, low_y, high_x, high_y = where.free.bounds
     places = shapely.points(np.random.default_rng(0).uniform((low_x, low_y), (high_x, high_y), (20_000, 2)))
     fit = shapely.contains(where.free, places) & (shapely.distance(where.free.boundary, places) >= radius)

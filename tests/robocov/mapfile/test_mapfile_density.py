@@ -193,28 +193,28 @@ def map_with(folder: Path, picture: str, **more) -> Path:
     return path
 
 
-def grey(path: Path, rows, mode: str = "L") -> None:
+def gray(path: Path, rows, mode: str = "L") -> None:
     kind = np.uint16 if mode == "I;16" else np.uint8
     Image.fromarray(np.array(rows, dtype=kind)).save(path)
 
 
 def test_a_picture_next_to_the_map(tmp_path):
-    grey(tmp_path / "phi.png", [[0, 255], [51, 102]])
+    gray(tmp_path / "phi.png", [[0, 255], [51, 102]])
     density = load_map(map_with(tmp_path, "phi.png", black=1, white=6)).density
     assert isinstance(density, Raster)
     assert density.values.tolist() == [[2.0, 3.0], [1.0, 6.0]]
     (tmp_path / "more").mkdir()
-    grey(tmp_path / "more" / "deep.png", [[0, 65535]], "I;16")
+    gray(tmp_path / "more" / "deep.png", [[0, 65535]], "I;16")
     density = load_map(map_with(tmp_path, "more/deep.png", extent=[0, 0, 10, 6])).density
     assert isinstance(density, Raster) and density.values.tolist() == [[0.0, 1.0]]
-    Image.fromarray(np.full((2, 2, 3), 255, dtype=np.uint8)).save(tmp_path / "colour.png")
-    assert load_map(map_with(tmp_path, "colour.png")).density.values.min() == 1.0
+    Image.fromarray(np.full((2, 2, 3), 255, dtype=np.uint8)).save(tmp_path / "color.png")
+    assert load_map(map_with(tmp_path, "color.png")).density.values.min() == 1.0
     (tmp_path / "phi.pgm").write_bytes(b"P5 2 1 255\n\x00\xff")
     assert load_map(map_with(tmp_path, "phi.pgm")).density.values.tolist() == [[0.0, 1.0]]
 
 
 def test_pictures_are_written_as_rows(tmp_path):
-    grey(tmp_path / "phi.png", [[0, 200], [7, 102]])
+    gray(tmp_path / "phi.png", [[0, 200], [7, 102]])
     environment = load_map(map_with(tmp_path, "phi.png", black=0.1, white=5))
     document = to_json(environment)
     assert "picture" not in document["density"] and from_json(document) == environment
@@ -229,7 +229,7 @@ def test_pictures_are_written_as_rows(tmp_path):
 def test_a_picture_stays_in_the_folder(tmp_path, name):
     folder = tmp_path / "inner"
     folder.mkdir()
-    grey(tmp_path / "phi.png", [[1, 2]])
+    gray(tmp_path / "phi.png", [[1, 2]])
     with pytest.raises(MapError, match="expected a file in the folder of the map"):
         load_map(map_with(folder, name))
 
@@ -237,7 +237,7 @@ def test_a_picture_stays_in_the_folder(tmp_path, name):
 def test_links_out_of_the_folder_are_not_followed(tmp_path):
     folder = tmp_path / "inner"
     folder.mkdir()
-    grey(tmp_path / "phi.png", [[1, 2]])
+    gray(tmp_path / "phi.png", [[1, 2]])
     (folder / "link.png").symlink_to(tmp_path / "phi.png")
     with pytest.raises(MapError, match="expected a file in the folder of the map"):
         load_map(map_with(folder, "link.png"))
@@ -253,7 +253,7 @@ def test_pictures_that_cannot_be_used(tmp_path):
     assert 'density.picture: "none.png": no such file' in refused("none.png")
     (tmp_path / "text.png").write_text("not a picture")
     assert "cannot be read as PNG or PGM" in refused("text.png")
-    grey(tmp_path / "whole.png", np.arange(10_000).reshape(100, 100) % 251)
+    gray(tmp_path / "whole.png", np.arange(10_000).reshape(100, 100) % 251)
     (tmp_path / "cut.png").write_bytes((tmp_path / "whole.png").read_bytes()[:-2000])
     assert "cannot be read as PNG or PGM" in refused("cut.png")
     (tmp_path / "wide.pgm").write_bytes(b"P5 1025 1 255\n" + bytes(1025))
@@ -265,7 +265,7 @@ def test_pictures_that_cannot_be_used(tmp_path):
     with (tmp_path / "heavy.png").open("wb") as file:
         file.truncate(MAX_PICTURE_BYTES + 1)
     assert "expected at most 8 MB, got more" in refused("heavy.png")
-    grey(tmp_path / "black.png", [[0, 0]])
+    gray(tmp_path / "black.png", [[0, 0]])
     assert "density.picture: expected at least one weight above 0, got none" in refused("black.png")
     (tmp_path / "folder.png").mkdir()
     assert "no such file" in refused("folder.png")

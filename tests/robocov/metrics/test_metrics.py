@@ -21,7 +21,7 @@ from robocov.metrics import (
     count_stuck_robots,
     find_settling_time,
     select_sampled_moments,
-    summarise,
+    summarize,
 )
 from robocov.metrics.clearance import measure_robot_gaps
 from robocov.metrics.run_metrics import compute_run_metrics
@@ -253,7 +253,7 @@ def test_cost_history_samples_at_the_rate_and_at_the_end(record: Record) -> None
 
 def test_summaries_contain_the_figures_of_a_run(record: Record) -> None:
     history = compute_cost_history(record, CoverageCost(record.environment, lattice=24))
-    summary = summarise(record, history)
+    summary = summarize(record, history)
     assert set(summary) == {
         "mean_distance_m",
         "mean_distance_over_run_m",

@@ -87,7 +87,7 @@ def test_no_descent_of_another_kind_ends_below(count):
     room = TRAP.free.buffer(-0.102)
     shapely.prepare(room)
 
-    def penalised(flat):
+    def penalized(flat):
         positions = flat.reshape(-1, 2)
         points = shapely.points(positions)
         off = shapely.distance(room, points)
@@ -98,7 +98,7 @@ def test_no_descent_of_another_kind_ends_below(count):
     ends = []
     for _ in range(6):
         begin = rng.uniform((0, 0), (5, 4), (count, 2))
-        found = minimize(penalised, begin.ravel(), method="Nelder-Mead", options={"maxfev": 300})
+        found = minimize(penalized, begin.ravel(), method="Nelder-Mead", options={"maxfev": 300})
         ends.append(found.fun)
     best = find_optimum(TRAP, count, lattice=24)
     assert best.mean_distance <= min(ends) * (1.0 + 1e-6)

@@ -82,7 +82,7 @@ def test_nothing_is_known_beyond_the_sensing_range(cluttered: Environment, senso
     assert np.hypot(*(centers - positions[0]).T).max() < 0.8 + 0.1
 
 
-def test_ends_of_neighbouring_rays_are_joined_until_a_ray_passes_between(empty: Environment) -> None:
+def test_ends_of_neighboring_rays_are_joined_until_a_ray_passes_between(empty: Environment) -> None:
     raster = Raster(empty.region, 0.1)
     unknown_map = DiscoveredMap.build_unknown(raster)
     closed = unknown_map.add_scan(np.array([2.05, 2.05]), np.full(24, 1.5), np.ones(24, dtype=bool))

@@ -25,10 +25,10 @@ def simulate_walks(state: np.ndarray, row: int, column: int, seed: int, count: i
     for _ in range(count):
         r, c = row, column
         while state[r, c] == UNKNOWN:
-            neighbours = [(r, c + 1), (r + 1, c), (r, c - 1), (r - 1, c)]
-            neighbours = [(i, j) for i, j in neighbours if 0 <= i < rows and 0 <= j < columns]
-            weight = np.array([1.0 if state[cell] == UNKNOWN else 2.0 for cell in neighbours])
-            r, c = neighbours[int(rng.choice(len(neighbours), p=weight / weight.sum()))]
+            neighbors = [(r, c + 1), (r + 1, c), (r, c - 1), (r - 1, c)]
+            neighbors = [(i, j) for i, j in neighbors if 0 <= i < rows and 0 <= j < columns]
+            weight = np.array([1.0 if state[cell] == UNKNOWN else 2.0 for cell in neighbors])
+            r, c = neighbors[int(rng.choice(len(neighbors), p=weight / weight.sum()))]
         free_ends += state[r, c] == FREE
     return free_ends / count
 

@@ -132,7 +132,7 @@ def test_there_is_no_viewpoint_if_everything_is_known() -> None:
     assert find_viewpoint(planner, ones, ones, 0.0, ()) is None
 
 
-def test_the_own_goal_minimises_the_cost() -> None:
+def test_the_own_goal_minimizes_the_cost() -> None:
     planner = build_planner()
     weights = compute_node_weights(planner)
     others = np.array([[6.0, 2.0]])

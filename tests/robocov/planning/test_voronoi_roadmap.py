@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from robocov.planning.voronoi_roadmap import VoronoiRoadmap, find_voronoi_cells
 
-EIGHT_NEIGHBOURS = np.ones((3, 3))
+EIGHT_NEIGHBORS = np.ones((3, 3))
 
 
 def build_rooms(seed: int, free_fraction: float) -> np.ndarray:
@@ -18,7 +18,7 @@ def build_rooms(seed: int, free_fraction: float) -> np.ndarray:
 
 
 def count_pieces(cells: np.ndarray) -> int:
-    return int(ndimage.label(cells, EIGHT_NEIGHBOURS)[1])
+    return int(ndimage.label(cells, EIGHT_NEIGHBORS)[1])
 
 
 def count_obstacles(is_free: np.ndarray) -> int:
@@ -33,7 +33,7 @@ def test_thinning_preserves_all_connections(seed: int, free_fraction: float) -> 
     assert not (is_graph & ~is_free).any()
     assert count_pieces(is_graph) == count_pieces(is_free)
     assert count_obstacles(is_graph) == count_obstacles(is_free)
-    pieces, count = ndimage.label(is_free, EIGHT_NEIGHBOURS)
+    pieces, count = ndimage.label(is_free, EIGHT_NEIGHBORS)
     assert set(np.unique(pieces[is_graph])) == set(range(1, count + 1))
 
 
@@ -64,7 +64,7 @@ def test_distances_are_along_the_graph_and_every_cell_belongs_to_a_vertex(seed: 
     straight = np.sqrt(((vertices[:, None] - vertices) ** 2).sum(axis=2))
     np.testing.assert_allclose(roadmap.distances, roadmap.distances.T)
     assert (roadmap.distances >= straight - 1e-9).all()
-    pieces = ndimage.label(is_free, EIGHT_NEIGHBOURS)[0][tuple(vertices.T)]
+    pieces = ndimage.label(is_free, EIGHT_NEIGHBORS)[0][tuple(vertices.T)]
     assert np.array_equal(np.isfinite(roadmap.distances), pieces[:, None] == pieces)
     has_vertex = roadmap.vertex_of_cell >= 0
     # Vertices spread over shared sides: free cells that only share corners with the graph have none.

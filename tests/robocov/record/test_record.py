@@ -81,8 +81,8 @@ def test_a_snapshot_of_the_record_is_the_one_of_the_run(record: Record, cluttere
     np.testing.assert_array_equal(live.positions, saved.positions)
     np.testing.assert_array_equal(live.decision.forces, saved.decision.forces)
     np.testing.assert_array_equal(live.decision.goals, saved.decision.goals)
-    assert [list(live.seen.neighbours.list_neighbours(i)) for i in range(4)] == [
-        list(saved.seen.neighbours.list_neighbours(i)) for i in range(4)
+    assert [list(live.seen.neighbors.list_neighbors(i)) for i in range(4)] == [
+        list(saved.seen.neighbors.list_neighbors(i)) for i in range(4)
     ]
 
 
@@ -91,7 +91,7 @@ def test_what_a_record_says_of_a_moment_is_said_of_who_worked_then(empty: Enviro
     starts, failing = [[2.0, 2.0], [4.0, 2.0], [3.0, 4.0]], Conditions(failures=((1, 0.1),))
     made = Simulation(empty, Rapf(cells="time"), starts, team, 0.05, conditions=failing).run(0.2)
     assert made.has_travel_time_cells and not replace(made, team=Team.homogeneous(3)).has_travel_time_cells
-    assert made.snapshot(-1).seen.neighbours.list_pairs()[0].tolist() == [1, 2]
+    assert made.snapshot(-1).seen.neighbors.list_pairs()[0].tolist() == [1, 2]
     expected = partition_by_travel_time(made.positions[-1, 1:], team.max_speed[1:], empty.region)
     assert made.cells().mass.tolist() == expected.mass.tolist()
     for part in (made.until(0.1), made.thin(10.0)):
@@ -288,7 +288,7 @@ def test_a_spoilt_folder_is_refused_in_one_line(record: Record, tmp_path: Path, 
 def test_what_later_versions_may_add_is_passed_over(record: Record, tmp_path: Path) -> None:
     """And what earlier ones did not write yet may be missing."""
     record.save(tmp_path)
-    for path in (("mood",), ("controller", "label"), ("team", "colour_rgb"), ("session", "weather")):
+    for path in (("mood",), ("controller", "label"), ("team", "color_rgb"), ("session", "weather")):
         edited(*path, to={"fine": [1, None]})(tmp_path)
     for name in ("lattice", "versions", "summary", "starts_m", "duration_s"):
         edited(name)(tmp_path)

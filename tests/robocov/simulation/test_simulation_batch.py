@@ -145,14 +145,14 @@ def test_robots_observe_their_own_run_only() -> None:
         assert observations.positions.tobytes() == expected.positions.tobytes()
         assert observations.obstacle_points.tobytes() == expected.obstacle_points.tobytes()
         assert (
-            observations.neighbours.list_neighbours(0).tolist()
-            == expected.neighbours.list_neighbours(0).tolist()
+            observations.neighbors.list_neighbors(0).tolist()
+            == expected.neighbors.list_neighbors(0).tolist()
             == [1, 2]
         )
         assert observations.scans is not None and expected.scans is not None
         assert observations.scans.distances.tobytes() == expected.scans.distances.tobytes()
-    robot, neighbour = batch.observe().neighbours.list_pairs()
-    assert (robot // 3 == neighbour // 3).all()
+    robot, neighbor = batch.observe().neighbors.list_pairs()
+    assert (robot // 3 == neighbor // 3).all()
 
 
 def test_given_forces_replace_those_of_the_controller() -> None:

@@ -12,11 +12,11 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def circle(
-    radius: float, pieces: int, *, turns: int = 1, centre: tuple[float, float] = (0.0, 0.0)
+    radius: float, pieces: int, *, turns: int = 1, center: tuple[float, float] = (0.0, 0.0)
 ) -> np.ndarray:
     """Return a circle as arcs of cell 0, counter-clockwise or, for `turns` -1, clockwise."""
     turn = turns * np.linspace(0.0, 2.0 * np.pi, pieces + 1)
-    ends = np.array(centre) + radius * np.column_stack([np.cos(turn), np.sin(turn)])
+    ends = np.array(center) + radius * np.column_stack([np.cos(turn), np.sin(turn)])
     return arcs(ends[:-1], ends[1:], turns * np.pi / pieces)
 
 
@@ -47,10 +47,10 @@ def test_moments_of_an_arc_agree_with_quadrature(seed: int, log_size: float, sig
 
 @pytest.mark.parametrize("pieces", [2, 3, 7, 40])
 def test_moments_of_a_whole_circle(pieces: int) -> None:
-    ((area, *first, polar),) = compute_moments(circle(2.0, pieces, centre=(5.0, 1.0)), 1)
+    ((area, *first, polar),) = compute_moments(circle(2.0, pieces, center=(5.0, 1.0)), 1)
     assert area == pytest.approx(4 * np.pi, rel=1e-14)
     np.testing.assert_allclose(first, 4 * np.pi * np.array([5.0, 1.0]), rtol=1e-13)
-    # pi r⁴ / 2 about its own centre, and the parallel axis theorem
+    # pi r⁴ / 2 about its own center, and the parallel axis theorem
     assert polar == pytest.approx(8 * np.pi + 4 * np.pi * 26.0, rel=1e-13)
 
 
@@ -78,7 +78,7 @@ def test_segments_stay_segments() -> None:
 
 
 def test_rings_are_linked_from_pieces_in_any_order() -> None:
-    outer, hole = circle(3.0, 5), circle(1.0, 3, turns=-1, centre=(0.5, 0.5))
+    outer, hole = circle(3.0, 5), circle(1.0, 3, turns=-1, center=(0.5, 0.5))
     order = np.random.default_rng(0).permutation(8)
     found = link_rings(np.concatenate([outer, hole])[order], 1e-5)
     areas = [area(ring) for ring in found]

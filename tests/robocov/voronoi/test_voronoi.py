@@ -28,7 +28,7 @@ from voronoi_cases import (
 
 from robocov.density.cell_edges import REGION
 from robocov.errors import InputError
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.voronoi import partition, partition_by_travel_time
 
@@ -197,13 +197,13 @@ def test_the_centroid_of_an_empty_cell_is_its_generator() -> None:
 
 @settings(deadline=None, max_examples=200)
 @given(seeds, st.integers(2, 90), st.floats(0.1, 5.0))
-def test_a_cell_depends_only_on_the_neighbours_to_the_last_bit(seed: int, n: int, range_: float) -> None:
+def test_a_cell_depends_only_on_the_neighbors_to_the_last_bit(seed: int, n: int, range_: float) -> None:
     rng = np.random.default_rng(seed)
     points = scattered(SQUARE, n, rng)
     robot = int(rng.integers(n))
-    neighbours = Neighbours.from_ranges(points, np.full(n, range_))
-    heard = np.union1d(neighbours.list_neighbours(robot), [robot])
-    before = partition(points, SQUARE, neighbours)
+    neighbors = Neighbors.from_ranges(points, np.full(n, range_))
+    heard = np.union1d(neighbors.list_neighbors(robot), [robot])
+    before = partition(points, SQUARE, neighbors)
 
     # the others move, out of range still, and some leave the team or join it
     moved = points.copy()
@@ -216,7 +216,7 @@ def test_a_cell_depends_only_on_the_neighbours_to_the_last_bit(seed: int, n: int
     joined = joined[np.hypot(*(joined - points[robot]).T) > range_]
     moved = np.concatenate([moved[kept], joined])
     again = int(np.searchsorted(kept, robot))
-    after = partition(moved, SQUARE, Neighbours.from_ranges(moved, np.full(len(moved), range_)))
+    after = partition(moved, SQUARE, Neighbors.from_ranges(moved, np.full(len(moved), range_)))
 
     assert after.mass[again] == before.mass[robot]
     assert after.centroid[again].tolist() == before.centroid[robot].tolist()
@@ -226,12 +226,12 @@ def test_a_cell_depends_only_on_the_neighbours_to_the_last_bit(seed: int, n: int
 
 @settings(deadline=None, max_examples=120)
 @given(seeds, st.integers(1, 12), st.floats(0.1, 6.0))
-def test_limited_cells_equal_those_of_the_neighbours_alone(seed: int, n: int, range_: float) -> None:
+def test_limited_cells_equal_those_of_the_neighbors_alone(seed: int, n: int, range_: float) -> None:
     points = scattered(PENTAGON, n, np.random.default_rng(seed))
-    neighbours = Neighbours.from_ranges(points, np.full(n, range_))
-    cells = partition(points, PENTAGON, neighbours)
+    neighbors = Neighbors.from_ranges(points, np.full(n, range_))
+    cells = partition(points, PENTAGON, neighbors)
     for robot in range(n):
-        heard = np.concatenate([points[robot : robot + 1], points[neighbours.list_neighbours(robot)]])
+        heard = np.concatenate([points[robot : robot + 1], points[neighbors.list_neighbors(robot)]])
         area, mx, my, _ = map(float, compute_exact_cell(0, heard, PENTAGON))
         assert cells.mass[robot] == pytest.approx(area, abs=1e-11)
         lever = cells.centroid[robot] - points[robot]
@@ -281,15 +281,15 @@ def test_generators_of_the_wrong_shape_are_rejected() -> None:
         partition(np.zeros(3), SQUARE)
 
 
-def test_neighbours_that_do_not_fit_the_generators_are_rejected() -> None:
+def test_neighbors_that_do_not_fit_the_generators_are_rejected() -> None:
     """Kernels check no bounds: they would read whatever lies behind the arrays."""
     points = np.array([[1.0, 1.0], [2.0, 1.0], [3.0, 1.0]])
-    neighbours = Neighbours.from_ranges(points, np.full(3, 1.5))
-    with pytest.raises(InputError, match="neighbours: expected a graph of 2 robots, got 3"):
-        partition(points[:2], SQUARE, neighbours)
+    neighbors = Neighbors.from_ranges(points, np.full(3, 1.5))
+    with pytest.raises(InputError, match="neighbors: expected a graph of 2 robots, got 3"):
+        partition(points[:2], SQUARE, neighbors)
     with pytest.raises(InputError, match=r"reported_positions: expected shape \(4, 2\), got \(3, 2\)"):
-        partition(points, SQUARE, neighbours, reported_positions=points)
+        partition(points, SQUARE, neighbors, reported_positions=points)
     with pytest.raises(InputError, match=r"reported_positions: expected shape \(4, 2\), got \(3, 2\)"):
-        partition_by_travel_time(points, [1.0, 2.0, 3.0], SQUARE, neighbours, reported_positions=points)
-    with pytest.raises(InputError, match="neighbours: expected a graph of 2 robots, got 3"):
-        partition_by_travel_time(points[:2], [1.0, 2.0], SQUARE, neighbours)
+        partition_by_travel_time(points, [1.0, 2.0, 3.0], SQUARE, neighbors, reported_positions=points)
+    with pytest.raises(InputError, match="neighbors: expected a graph of 2 robots, got 3"):
+        partition_by_travel_time(points[:2], [1.0, 2.0], SQUARE, neighbors)

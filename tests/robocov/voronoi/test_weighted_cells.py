@@ -23,7 +23,7 @@ from voronoi_cases import (
 from robocov.density import Gaussian, Gaussians, Uniform
 from robocov.errors import InputError
 from robocov.observation.close_pairs import find_close_pairs
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
 
@@ -55,9 +55,9 @@ def build_cell_of_discs(
             cell = cell.intersection(shapely.Polygon(corners))
             continue
         square = (speeds[i] / speeds[j]) ** 2
-        centre = points[i] - offset * square / (1.0 - square)
+        center = points[i] - offset * square / (1.0 - square)
         radius = np.sqrt(square) * distance / abs(1.0 - square)
-        disc = shapely.Point(centre).buffer(radius, quad_segs=4000)
+        disc = shapely.Point(center).buffer(radius, quad_segs=4000)
         cell = cell.intersection(disc) if square < 1.0 else cell.difference(disc)
     return cell
 
@@ -68,7 +68,7 @@ def test_cells_tile_the_region(seed: int, name: str, family: str, speeds: str, n
     region = REGIONS[name]
     points = np.unique(DEGENERATE[family](region, n, rng), axis=0)
     cells = partition_by_travel_time(points, SPEEDS[speeds](len(points), rng), region)
-    # circles of some micrometres and of a kilometre, that nearly touch, keep fewer digits
+    # circles of some micrometers and of a kilometer, that nearly touch, keep fewer digits
     tolerance = 1e-6 if speeds == "very different" else 1e-9
     assert cells.mass.sum() == pytest.approx(region.area, rel=tolerance)
     first = cells.mass @ (cells.centroid - region.centroid)
@@ -83,10 +83,10 @@ def test_cells_agree_with_discs_cut_by_shapely(seed: int, name: str, reach: floa
     points = scattered(region, int(rng.integers(2, 9)), rng)
     n = len(points)
     speeds = rng.choice([0.4, 1.0, 1.0, 1.7], n)
-    neighbours = Neighbours.from_ranges(points, np.full(n, reach))
-    cells = partition_by_travel_time(points, speeds, region, neighbours)
+    neighbors = Neighbors.from_ranges(points, np.full(n, reach))
+    cells = partition_by_travel_time(points, speeds, region, neighbors)
     for i in range(n):
-        expected = build_cell_of_discs(i, points, speeds, region, neighbours.list_neighbours(i))
+        expected = build_cell_of_discs(i, points, speeds, region, neighbors.list_neighbors(i))
         assert cells.mass[i] == pytest.approx(expected.area, abs=1e-6 * region.area)
         if expected.area > 1e-3 * region.area:
             np.testing.assert_allclose(cells.centroid[i], expected.centroid.coords[0], atol=1e-4)
@@ -144,7 +144,7 @@ def test_nearly_equal_speeds_give_nearly_equal_cells(seed: int, name: str, n: in
 def test_a_fast_robot_encloses_a_slow_one_whose_cell_is_a_disc() -> None:
     cells = partition_by_travel_time(np.array([[3.0, 3.0], [4.0, 3.0]]), np.array([1.0, 3.0]), SQUARE)
     assert isinstance(cells, WeightedCells)
-    # Apollonius: centre p - d / (k² - 1), radius k d / (k² - 1), k = 3
+    # Apollonius: center p - d / (k² - 1), radius k d / (k² - 1), k = 3
     assert cells.mass[0] == pytest.approx(np.pi * (3 / 8) ** 2, rel=1e-14)
     np.testing.assert_allclose(cells.centroid[0], [3.0 - 1 / 8, 3.0], atol=1e-15)
     assert cells.mass[1] == pytest.approx(36.0 - cells.mass[0], rel=1e-14)
@@ -213,23 +213,23 @@ def test_the_cost_of_given_cells_is_minimal_at_the_centroid(seed: int, n: int) -
 
 @settings(max_examples=40)
 @given(seeds, st.integers(2, 25), st.floats(0.5, 6.0))
-def test_a_cell_depends_only_on_the_neighbours_of_its_robot(seed: int, n: int, reach: float) -> None:
+def test_a_cell_depends_only_on_the_neighbors_of_its_robot(seed: int, n: int, reach: float) -> None:
     rng = np.random.default_rng(seed)
     points = scattered(SQUARE, n, rng)
     speeds = rng.choice([0.5, 1.0], n)
-    neighbours = Neighbours.from_ranges(points, np.full(n, reach))
+    neighbors = Neighbors.from_ranges(points, np.full(n, reach))
     i = int(rng.integers(n))
     strangers = np.ones(n, dtype=bool)
     strangers[i] = False
-    strangers[neighbours.list_neighbours(i)] = False
+    strangers[neighbors.list_neighbors(i)] = False
     other, slower = points.copy(), speeds.copy()
     for k in np.flatnonzero(strangers):
         place = scattered(SQUARE, 1, rng)[0]
         if np.hypot(*(place - points[i])) > reach:
             other[k] = place
         slower[k] = rng.choice([0.5, 1.0, 2.0])
-    before = partition_by_travel_time(points, speeds, SQUARE, neighbours)
-    after = partition_by_travel_time(other, slower, SQUARE, Neighbours.from_ranges(other, np.full(n, reach)))
+    before = partition_by_travel_time(points, speeds, SQUARE, neighbors)
+    after = partition_by_travel_time(other, slower, SQUARE, Neighbors.from_ranges(other, np.full(n, reach)))
     assert before.mass[i].tobytes() == after.mass[i].tobytes()
     assert before.centroid[i].tobytes() == after.centroid[i].tobytes()
 
@@ -237,12 +237,12 @@ def test_a_cell_depends_only_on_the_neighbours_of_its_robot(seed: int, n: int, r
 def test_reported_positions_replace_the_true_ones() -> None:
     points = np.array([[1.0, 1.0], [5.0, 1.0], [3.0, 5.0]])
     speeds = np.array([1.0, 2.0, 1.0])
-    neighbours = Neighbours.from_ranges(points, np.full(3, 100.0))
-    heard = points[neighbours.indices] + [[0.3, 0.1]] * 6
-    cells = partition_by_travel_time(points, speeds, SQUARE, neighbours, reported_positions=heard)
+    neighbors = Neighbors.from_ranges(points, np.full(3, 100.0))
+    heard = points[neighbors.indices] + [[0.3, 0.1]] * 6
+    cells = partition_by_travel_time(points, speeds, SQUARE, neighbors, reported_positions=heard)
     for i in range(3):
         known = points.copy()
-        known[neighbours.list_neighbours(i)] = heard[neighbours.indptr[i] : neighbours.indptr[i + 1]]
+        known[neighbors.list_neighbors(i)] = heard[neighbors.indptr[i] : neighbors.indptr[i + 1]]
         alone = partition_by_travel_time(known, speeds, SQUARE)
         assert cells.mass[i] == pytest.approx(alone.mass[i], rel=1e-12)
 

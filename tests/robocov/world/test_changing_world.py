@@ -12,7 +12,7 @@ from robocov.controllers import Rapf
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError, StartError
-from robocov.metrics import compute_clearances, compute_cost_history, count_contacts, summarise
+from robocov.metrics import compute_clearances, compute_cost_history, count_contacts, summarize
 from robocov.record import Record
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -94,7 +94,7 @@ def test_a_run_continues_after_all_robots_have_failed() -> None:
     history = compute_cost_history(record, CoverageCost(HALL, 16), 2.0)
     assert np.isnan(history.mean_distance[-1])
     assert history.uncovered_area[-1] == pytest.approx(80.0)
-    assert summarise(record, history)["stuck_robots"] is None
+    assert summarize(record, history)["stuck_robots"] is None
 
 
 def test_only_working_robots_count_in_the_coverage_cost() -> None:

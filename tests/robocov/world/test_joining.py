@@ -32,7 +32,7 @@ def run_with_joins(*joins: tuple[object, ...], duration: float = 3.0) -> Record:
 @pytest.mark.parametrize("place", [(19.0, 9.0), (10.0, 5.0), (20.0, 10.0), (0.0, 0.0)])
 def test_paths_start_where_robots_join(place: tuple[float, float]) -> None:
     record = run_with_joins((3, 1.0, place))
-    lengths = compute_path_lengths(record.positions, record.travelled)
+    lengths = compute_path_lengths(record.positions, record.traveled)
     first_moment = int(np.argmax(record.present[:, 2]))
     np.testing.assert_array_equal(lengths[2], compute_path_lengths(record.positions[first_moment:])[2])
     assert 0.0 < lengths[2] <= 2.0  # in 2 s at 1 m/s
@@ -52,7 +52,7 @@ def test_moved_joining_positions_are_recorded(tmp_path: Path) -> None:
     record.save(tmp_path)
     loaded = Record.load(tmp_path)
     assert loaded.joined == record.joined
-    np.testing.assert_array_equal(loaded.travelled, record.travelled)
+    np.testing.assert_array_equal(loaded.traveled, record.traveled)
 
 
 def test_robots_with_enough_space_join_at_the_requested_position() -> None:
@@ -108,16 +108,16 @@ def test_robots_that_are_placed_by_the_user_do_not_travel() -> None:
     session = {"placed": [{"time_s": float(record.time[20]), "robots": [7]}], "robots": [4, 7, 9]}
     edited = replace(record, positions=positions, session=session)
     original_lengths = compute_path_lengths(record.positions)
-    lengths = compute_path_lengths(edited.positions, edited.travelled)
+    lengths = compute_path_lengths(edited.positions, edited.traveled)
     np.testing.assert_allclose(lengths[[0, 2]], original_lengths[[0, 2]])
     step_length = np.hypot(*(record.positions[20, 1] - record.positions[19, 1]))
     assert lengths[1] == pytest.approx(original_lengths[1] - step_length)
-    assert edited.until(0.5).travelled.all()
+    assert edited.until(0.5).traveled.all()
 
 
 def test_robots_of_ordinary_records_travel_in_every_step() -> None:
     record = run_with_joins()
     assert record.joined == ()
-    assert record.travelled.all()
+    assert record.traveled.all()
     assert "events" not in record.to_json()
     assert advise(record, compute_clearances(record)) == []

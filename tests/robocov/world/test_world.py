@@ -98,7 +98,7 @@ def test_no_robot_enters_a_wall_however_it_is_driven(cluttered: Environment, dt:
 def test_a_pressed_crowd_neither_overlaps_nor_sinks_into_walls(
     empty: Environment, ratio: float, speed: float, radii: tuple[float, ...]
 ) -> None:
-    """Robots of any mass drive to the centre and into a corner, with light ones between heavy ones."""
+    """Robots of any mass drive to the center and into a corner, with light ones between heavy ones."""
     n = 16
     equal_team = Team.homogeneous(n, max_speed=speed, max_acceleration=20.0 * speed)
     mass = np.geomspace(1.0, ratio, n)

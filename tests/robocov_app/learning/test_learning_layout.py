@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from robocov.errors import ParameterError
 from robocov.observation import Observations, Scans
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.team import Team
 from robocov.voronoi import partition
@@ -25,7 +25,7 @@ def seen_at(positions: np.ndarray, reach: float = np.inf, seed: int = 0, rays: i
     return Observations(
         positions,
         rng.uniform(-0.7, 0.7, size=(n, 2)),
-        Neighbours.from_ranges(positions, np.full(n, reach)),
+        Neighbors.from_ranges(positions, np.full(n, reach)),
         points,
         REGION,
         scans=scans,
@@ -50,7 +50,7 @@ def told(layout: ObservationLayout, seen: Observations, robot: int, reach: float
         distances, hit = seen.scans.distances[robot], seen.scans.hit[robot]
         row += [d / 2.0 if h else 1.0 for d, h in zip(distances, hit, strict=True)]
     if layout.centroid:
-        row += [*(partition(seen.positions, REGION, seen.neighbours).centroid[robot] - [x, y]) / 10.0]
+        row += [*(partition(seen.positions, REGION, seen.neighbors).centroid[robot] - [x, y]) / 10.0]
     return [min(max(value, -1.0), 1.0) for value in row]
 
 
@@ -86,7 +86,7 @@ def test_a_row_tells_only_what_the_robot_knows(seed: int, n: int, reach: float) 
     i = int(rng.integers(n))
     before = layout.rows(seen, team)[i]
     heard = np.zeros(n, dtype=bool)
-    heard[[*seen.neighbours.list_neighbours(i), i]] = True
+    heard[[*seen.neighbors.list_neighbors(i), i]] = True
     moved = positions.copy()
     for k in np.flatnonzero(~heard):
         place = rng.uniform((0, 0), (8, 6))
@@ -113,7 +113,7 @@ def test_rows_stay_within_their_bounds(seed: int, n: int, sensing: float) -> Non
 
 def test_a_message_that_is_old_is_told_as_it_came() -> None:
     positions = np.array([[1.0, 1.0], [2.0, 1.0]])
-    linked = Neighbours.from_ranges(positions, np.full(2, 5.0))
+    linked = Neighbors.from_ranges(positions, np.full(2, 5.0))
     seen = Observations(
         positions,
         np.zeros((2, 2)),

@@ -15,7 +15,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.metrics import compute_clearances, count_contacts
 from robocov.observation import Decision, Observations, Scanning
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -164,7 +164,7 @@ def test_a_robot_uses_only_what_it_knows(seed: int, n: int, reach: float) -> Non
         seen = Observations(
             places,
             np.where(own, velocities, rng.normal(size=(n, 2))),
-            Neighbours.from_ranges(places, np.full(n, reach)),
+            Neighbors.from_ranges(places, np.full(n, reach)),
             np.where(own, points, places + rng.normal(size=(n, 2))),
             REGION,
         )

@@ -55,7 +55,7 @@ def test_robots_that_work_failed_ones_and_obstacles_where_they_are(record: Recor
 def test_neighbours_are_renumbered(record: Record) -> None:
     scene = record_scene(record, 30)
     assert scene.snapshot is not None
-    whole, part = record.snapshot(30).seen.neighbours, scene.snapshot.seen.neighbours
+    whole, part = record.snapshot(30).seen.neighbors, scene.snapshot.seen.neighbors
     rows = np.array(scene.numbers) - 1
     robot, neighbour = whole.list_pairs()
     expected = set(zip(robot.tolist(), neighbour.tolist(), strict=True))

@@ -14,7 +14,7 @@ import pytest
 from swept import HEAD, ROOM, controller, small_study
 
 from robocov.cost import CoverageCost
-from robocov.metrics import compute_cost_history, summarise
+from robocov.metrics import compute_cost_history, summarize
 from robocov.metrics.results import read_history
 from robocov.record import ARRAYS, Record
 from robocov_app.sweep.study import Study, StudyMap, Task, tasks_of
@@ -57,7 +57,7 @@ def test_figures_are_those_of_all_moments_not_of_those_that_are_kept(tmp_path: P
     task = first(small_study(duration=6.0, controllers=("lloyd",), robots=(5,), record_hz=0.0))
     whole = simulated(task, ROOM)
     history = compute_cost_history(whole, CoverageCost(ROOM, task.lattice), task.cost_hz)
-    summary = summarise(whole, history)
+    summary = summarize(whole, history)
     outcome = perform(task)
     assert list(outcome.figures) == list(FIGURES)
     assert outcome.figures == {

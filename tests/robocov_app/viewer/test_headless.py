@@ -194,4 +194,4 @@ def test_a_robot_that_is_put_elsewhere_does_not_travel_there() -> None:
     assert placed["robots"] == [2] and placed["time_s"] == pytest.approx(0.2)
     jump = np.hypot(*np.diff(record.positions[:, 1], axis=0).T)
     assert jump.max() > 1.0
-    assert compute_path_lengths(record.positions, record.travelled)[1] < 0.5
+    assert compute_path_lengths(record.positions, record.traveled)[1] < 0.5

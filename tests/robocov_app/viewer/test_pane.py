@@ -216,7 +216,7 @@ def test_robots_that_failed_are_sensed_as_obstacles_are():
     failed = replace(THEN, failed={8: (1.3, 1.5)})
     pane = lane_in(failed)
     seen = pane.simulation.observe_and_decide().seen
-    assert len(seen.positions) == seen.neighbours.count == 3
+    assert len(seen.positions) == seen.neighbors.count == 3
     away = np.hypot(*(seen.obstacle_points - (1.3, 1.5)).T)
     assert away == pytest.approx(0.1, abs=2e-3)
     assert isinstance(pane.simulation.observe_and_decide().decision, Decision)

@@ -182,7 +182,7 @@ def test_limits_are_those_of_all():
     session.set_limits(TeamSpec(max_speed=0.3, communication_range=0.5))
     for pane in session.panes:
         assert pane.simulation.team.max_speed.tolist() == [0.3] * 3
-        assert not pane.simulation.observe_and_decide().seen.neighbours.is_complete
+        assert not pane.simulation.observe_and_decide().seen.neighbors.is_complete
     assert session.events[-1].kind == "limits"
     before = all_told(session)
     for limits in (TeamSpec(max_speed=0.0), TeamSpec(radius=1.9)):

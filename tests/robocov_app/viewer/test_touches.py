@@ -197,12 +197,12 @@ def test_who_fails_is_not_heard_but_sensed():
     session = begun(RPF, robots=3, given=np.array([[3.0, 3.0], [3.4, 3.0], [1.0, 1.0]]))
     pane = session.panes[0]
     before = pane.simulation.observe_and_decide()
-    assert before.seen.neighbours.list_neighbours(0).tolist() == [1, 2]
+    assert before.seen.neighbors.list_neighbors(0).tolist() == [1, 2]
     session.fail_robot(2)
     seen = pane.simulation.observe_and_decide().seen
     assert pane.numbers == (1, 3)
-    assert seen.neighbours.count == 2
-    assert seen.neighbours.list_neighbours(0).tolist() == [1]
+    assert seen.neighbors.count == 2
+    assert seen.neighbors.list_neighbors(0).tolist() == [1]
     # its rim, where there was nothing nearer than a wall
     assert seen.obstacle_points[0] == pytest.approx([3.3, 3.0], abs=2e-3)
     assert pane.simulation.observe_and_decide().decision.terms["repulsion_obstacle"][0, 0] < 0.0

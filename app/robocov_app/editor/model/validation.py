@@ -15,7 +15,7 @@ from robocov import environment as env
 from robocov.arrays import Array
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Obstacle, Point, Ring, StartSpec
-from robocov.errors import MapError, StartError, format_count, summarise_names
+from robocov.errors import MapError, StartError, format_count, summarize_names
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_LABEL_CHARACTERS, MAX_SIZE_M, MIN_SIZE_M
 from robocov.mapfile.rules import check_rules
 from robocov.mapfile.structure import validate_document
@@ -346,7 +346,7 @@ def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
         names = [numbered_name(sketch, key) for key in met] + ([] if beyond is None else ["the boundary"])
         if names:
             where = shapely.union_all([*met.values(), beyond])
-            yield Problem(f" moves through {summarise_names(names)}", where, item.key, False)
+            yield Problem(f" moves through {summarize_names(names)}", where, item.key, False)
 
 
 def _sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:

@@ -14,7 +14,7 @@ from robocov.defaults import DEFAULT_DT_S
 from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations, Snapshot
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 from robocov.sensor import RangeSensor
 from robocov.voronoi import partition_by_travel_time
 from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
@@ -27,8 +27,8 @@ def replayed_snapshot(state: State, time: float, dt: float = DEFAULT_DT_S) -> Sn
     region, density, sensor = setup.solid.region, setup.solid.density, sensor_in(setup.solid)
     sensor.set_time(time)
     points = sensor.find_nearest_points(positions, team.sensing_range)
-    neighbours = Neighbours.from_ranges(positions, team.communication_range)
-    seen = Observations(positions, state.velocities, neighbours, points, region, time, team.max_speed)
+    neighbors = Neighbors.from_ranges(positions, team.communication_range)
+    seen = Observations(positions, state.velocities, neighbors, points, region, time, team.max_speed)
     seen = replace(seen, density=density, steering=state.steering)
     if (perception := _perception(setup, dt)) is not None:
         inbox = perception.create_inbox() if state.inbox is None else state.inbox

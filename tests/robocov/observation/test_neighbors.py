@@ -1,4 +1,4 @@
-"""The communication graph, and neighbours within a reach."""
+"""The communication graph, and neighbors within a reach."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from voronoi_cases import SQUARE
 
 from robocov.observation import Observations
 from robocov.observation.close_pairs import find_close_pairs
-from robocov.observation.neighbours import Neighbours
+from robocov.observation.neighbors import Neighbors
 
 
 @given(n=st.integers(1, 120), reach=st.floats(0.0, 8.0), seed=st.integers(0, 2**32))
@@ -28,46 +28,46 @@ def test_close_pairs_agree_with_all_distances(n: int, reach: float, seed: int) -
 
 
 @given(n=st.integers(1, 60), seed=st.integers(0, 2**32))
-def test_two_robots_are_neighbours_when_both_are_in_range(n: int, seed: int) -> None:
+def test_two_robots_are_neighbors_when_both_are_in_range(n: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     positions = rng.uniform(0, 10, size=(n, 2))
     ranges = rng.uniform(0, 8, size=n)
-    neighbours = Neighbours.from_ranges(positions, ranges)
-    assert not neighbours.is_complete
+    neighbors = Neighbors.from_ranges(positions, ranges)
+    assert not neighbors.is_complete
     for i in range(n):
         expected = [
             j
             for j in range(n)
             if j != i and np.hypot(*(positions[i] - positions[j])) <= min(ranges[i], ranges[j])
         ]
-        assert neighbours.list_neighbours(i).tolist() == expected
+        assert neighbors.list_neighbors(i).tolist() == expected
 
 
-def build_observations(positions: np.ndarray, neighbours: Neighbours) -> Observations:
-    return Observations(positions, positions, neighbours, positions, SQUARE)
+def build_observations(positions: np.ndarray, neighbors: Neighbors) -> Observations:
+    return Observations(positions, positions, neighbors, positions, SQUARE)
 
 
 def test_infinite_ranges_give_the_complete_graph() -> None:
     positions = np.array([[0.0, 0.0], [1e5, 0.0], [0.0, 2.0]])
-    neighbours = Neighbours.from_ranges(positions, np.full(3, np.inf))
-    assert neighbours.is_complete
-    assert neighbours.list_neighbours(1).tolist() == [0, 2]
-    first, second, _, _ = build_observations(positions, neighbours).find_near_neighbours(5.0)
+    neighbors = Neighbors.from_ranges(positions, np.full(3, np.inf))
+    assert neighbors.is_complete
+    assert neighbors.list_neighbors(1).tolist() == [0, 2]
+    first, second, _, _ = build_observations(positions, neighbors).find_near_neighbors(5.0)
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(0, 2), (2, 0)]
 
 
 @pytest.mark.parametrize("communication_range", [10.0, np.inf])
-def test_neighbours_at_exactly_the_reach_are_near(communication_range: float) -> None:
+def test_neighbors_at_exactly_the_reach_are_near(communication_range: float) -> None:
     positions = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.5]])
-    neighbours = Neighbours.from_ranges(positions, np.full(3, communication_range))
-    near = build_observations(positions, neighbours).find_near_neighbours(2.0)
+    neighbors = Neighbors.from_ranges(positions, np.full(3, communication_range))
+    near = build_observations(positions, neighbors).find_near_neighbors(2.0)
     assert list(zip(near[0].tolist(), near[1].tolist(), strict=True)) == [(0, 1), (1, 0)]
 
 
-def test_near_neighbours_are_within_communication_range() -> None:
+def test_near_neighbors_are_within_communication_range() -> None:
     positions = np.array([[0.0, 0.0], [1.0, 0.0], [1.5, 0.0]])
-    neighbours = Neighbours.from_ranges(positions, np.array([0.5, 3.0, 3.0]))
-    first, second, offset, distance = build_observations(positions, neighbours).find_near_neighbours(2.0)
+    neighbors = Neighbors.from_ranges(positions, np.array([0.5, 3.0, 3.0]))
+    first, second, offset, distance = build_observations(positions, neighbors).find_near_neighbors(2.0)
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(1, 2), (2, 1)]
     np.testing.assert_allclose(distance, 0.5)
     np.testing.assert_allclose(offset, [[-0.5, 0.0], [0.5, 0.0]])

@@ -16,7 +16,7 @@ _NO_POSITIONS: Array = np.empty((0, 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Neighbours:
+class Neighbors:
     """A communication graph in compressed sparse rows; a complete graph is stored without its n² entries.
 
     Attributes
@@ -26,7 +26,7 @@ class Neighbours:
     ranges : (n,) array or None, m
         Communication ranges; None if all robots communicate at any distance.
     indptr : (n + 1,) int array or None
-        ``indices[indptr[i]:indptr[i + 1]]``, ascending, are the neighbours of robot i. None if the graph is
+        ``indices[indptr[i]:indptr[i + 1]]``, ascending, are the neighbors of robot i. None if the graph is
         complete.
     indices : (m,) int array or None
         See `indptr`.
@@ -38,7 +38,7 @@ class Neighbours:
     indices: IntArray | None = None
 
     @classmethod
-    def from_ranges(cls, positions: Array, ranges: Array) -> Neighbours:
+    def from_ranges(cls, positions: Array, ranges: Array) -> Neighbors:
         """Link robots whose distance is at most the smaller of their communication ranges.
 
         Parameters
@@ -49,12 +49,12 @@ class Neighbours:
 
         Returns
         -------
-        Neighbours
+        Neighbors
 
         Examples
         --------
         >>> positions = np.array([[0.0, 0.0], [1.0, 0.0], [5.0, 0.0]])
-        >>> Neighbours.from_ranges(positions, np.full(3, 2.0)).list_neighbours(0)
+        >>> Neighbors.from_ranges(positions, np.full(3, 2.0)).list_neighbors(0)
         array([1])
         """
         if np.isinf(ranges).all():
@@ -64,58 +64,58 @@ class Neighbours:
 
     @classmethod
     def from_pairs(
-        cls, count: int, robot: IntArray, neighbour: IntArray, ranges: Array | None = None
-    ) -> Neighbours:
+        cls, count: int, robot: IntArray, neighbor: IntArray, ranges: Array | None = None
+    ) -> Neighbors:
         """Build the graph from its directed pairs.
 
         Parameters
         ----------
         count : int
             Number of robots.
-        robot, neighbour : (m,) int arrays
-            Sorted by robot, then neighbour.
+        robot, neighbor : (m,) int arrays
+            Sorted by robot, then neighbor.
         ranges : (n,) array or None, m
 
         Returns
         -------
-        Neighbours
+        Neighbors
         """
         indptr = np.zeros(count + 1, dtype=np.intp)
         np.cumsum(np.bincount(robot, minlength=count), out=indptr[1:])
-        return cls(count, ranges, indptr, neighbour)
+        return cls(count, ranges, indptr, neighbor)
 
     @classmethod
-    def combine(cls, graphs: Sequence[Neighbours]) -> Neighbours:
+    def combine(cls, graphs: Sequence[Neighbors]) -> Neighbors:
         """Combine the graphs of separate runs into one.
 
         Parameters
         ----------
-        graphs : sequence of Neighbours
+        graphs : sequence of Neighbors
 
         Returns
         -------
-        Neighbours
+        Neighbors
             Graph of the robots of all runs, in the order of `graphs`, without links between runs.
         """
         if len(graphs) == 1:
             return graphs[0]
         count = 0
         robots = []
-        neighbours = []
+        neighbors = []
         for graph in graphs:
-            robot, neighbour = graph.list_pairs()
+            robot, neighbor = graph.list_pairs()
             robots.append(robot + count)
-            neighbours.append(neighbour + count)
+            neighbors.append(neighbor + count)
             count += graph.count
-        return cls.from_pairs(count, np.concatenate(robots), np.concatenate(neighbours))
+        return cls.from_pairs(count, np.concatenate(robots), np.concatenate(neighbors))
 
     @property
     def is_complete(self) -> bool:
         """Whether the graph is complete: all robots communicate at any distance."""
         return self.indptr is None
 
-    def list_neighbours(self, robot: int) -> IntArray:
-        """List the neighbours of a robot.
+    def list_neighbors(self, robot: int) -> IntArray:
+        """List the neighbors of a robot.
 
         Parameters
         ----------
@@ -131,19 +131,19 @@ class Neighbours:
         return self.indices[self.indptr[robot] : self.indptr[robot + 1]]
 
     def list_pairs(self) -> tuple[IntArray, IntArray]:
-        """List all directed pairs of a robot and a neighbour.
+        """List all directed pairs of a robot and a neighbor.
 
         Returns
         -------
-        robot, neighbour : (m,) int arrays
-            Sorted by robot, then neighbour.
+        robot, neighbor : (m,) int arrays
+            Sorted by robot, then neighbor.
         """
         if self.indptr is None or self.indices is None:
-            robot, neighbour = np.nonzero(~np.eye(self.count, dtype=bool))
-            return robot, neighbour
+            robot, neighbor = np.nonzero(~np.eye(self.count, dtype=bool))
+            return robot, neighbor
         return np.repeat(np.arange(self.count), np.diff(self.indptr)), self.indices
 
-    def restrict_to_working(self, working: BoolArray) -> Neighbours:
+    def restrict_to_working(self, working: BoolArray) -> Neighbors:
         """Return the graph without the links of robots that have failed or have not joined yet.
 
         Parameters
@@ -153,50 +153,50 @@ class Neighbours:
 
         Returns
         -------
-        Neighbours
+        Neighbors
         """
         if working.all():
             return self
-        robot, neighbour = self.list_pairs()
-        both_work = working[robot] & working[neighbour]
-        return Neighbours.from_pairs(self.count, robot[both_work], neighbour[both_work], self.ranges)
+        robot, neighbor = self.list_pairs()
+        both_work = working[robot] & working[neighbor]
+        return Neighbors.from_pairs(self.count, robot[both_work], neighbor[both_work], self.ranges)
 
 
-class NeighbourPositions(NamedTuple):
-    """The neighbours of each robot, and their positions as far as it knows, as plain arrays for kernels."""
+class NeighborPositions(NamedTuple):
+    """The neighbors of each robot, and their positions as far as it knows, as plain arrays for kernels."""
 
     indptr: IntArray
-    """(n + 1,) or (0,) ``indices[indptr[i]:indptr[i + 1]]`` are the neighbours of robot i. Empty if all other
-    robots are its neighbours."""
+    """(n + 1,) or (0,) ``indices[indptr[i]:indptr[i + 1]]`` are the neighbors of robot i. Empty if all other
+    robots are its neighbors."""
     indices: IntArray
     """(m,)"""
     positions: Array
-    """(m, 2) or (0, 2) m, in the order of `indices`. Empty if robots know their neighbours' own positions."""
+    """(m, 2) or (0, 2) m, in the order of `indices`. Empty if robots know their neighbors' own positions."""
 
     @classmethod
-    def from_graph(cls, neighbours: Neighbours, reported_positions: Array | None) -> NeighbourPositions:
+    def from_graph(cls, neighbors: Neighbors, reported_positions: Array | None) -> NeighborPositions:
         """Build the positions from a communication graph.
 
         Parameters
         ----------
-        neighbours : Neighbours
+        neighbors : Neighbors
         reported_positions : (m, 2) array or None, m
             As in `Observations`; ignored if the graph is complete.
 
         Returns
         -------
-        NeighbourPositions
+        NeighborPositions
         """
-        if neighbours.indptr is None or neighbours.indices is None:
+        if neighbors.indptr is None or neighbors.indices is None:
             return cls(_NO_INDICES, _NO_INDICES, _NO_POSITIONS)
         if reported_positions is None:
-            return cls(neighbours.indptr, neighbours.indices, _NO_POSITIONS)
+            return cls(neighbors.indptr, neighbors.indices, _NO_POSITIONS)
         positions = np.ascontiguousarray(reported_positions, dtype=np.float64)
-        return cls(neighbours.indptr, neighbours.indices, positions)
+        return cls(neighbors.indptr, neighbors.indices, positions)
 
     @classmethod
-    def build_empty(cls, robots: int) -> NeighbourPositions:
-        """Build the positions for robots that have no neighbours.
+    def build_empty(cls, robots: int) -> NeighborPositions:
+        """Build the positions for robots that have no neighbors.
 
         Parameters
         ----------
@@ -205,6 +205,6 @@ class NeighbourPositions(NamedTuple):
 
         Returns
         -------
-        NeighbourPositions
+        NeighborPositions
         """
         return cls(np.zeros(robots + 1, dtype=np.intp), _NO_INDICES, _NO_POSITIONS)
