@@ -30,6 +30,7 @@ from robocov.observation.scanned_view import (
     compute_view,
     evaluate_density,
     find_windows,
+    integrate_over_windows,
     is_behind_wall,
     is_path_clear,
 )
@@ -290,9 +291,8 @@ class Boosting(BaseController):
         pairs = seen.find_near_neighbors(2.0 * float(reach.max()))
         samples = self._sample_views(seen, view, pairs, directions, reach)
         windows = find_windows(view, directions, reach, self.jump)
-        boosted_gradient = self._compute_gradient(
-            self._boost_weight(samples), samples, view, windows, directions, reach
-        )
+        boosted_weight = self._boost_weight(samples)
+        boosted_gradient = self._compute_gradient(boosted_weight, samples, view, windows, reach)
         if self.boost == "neighbours":
             repulsion = self.kappa / np.maximum(pairs.distance, _MIN_DISTANCE_M) ** (self.gamma + 1.0)
             boosted_gradient = boosted_gradient + sum_by_robot(
@@ -300,7 +300,7 @@ class Boosting(BaseController):
             )
         return Slopes(
             value=(samples.weight * samples.detection * samples.areas).sum(axis=(1, 2)),
-            gradient=self._compute_gradient(samples.weight, samples, view, windows, directions, reach),
+            gradient=self._compute_gradient(samples.weight, samples, view, windows, reach),
             boosted_gradient=boosted_gradient,
         )
 
@@ -332,26 +332,17 @@ class Boosting(BaseController):
         return samples.weight
 
     def _compute_gradient(
-        self,
-        weight: Array,
-        samples: _ViewSamples,
-        view: View,
-        windows: Windows,
-        directions: Array,
-        reach: Array,
+        self, weight: Array, samples: _ViewSamples, view: View, windows: Windows, reach: Array
     ) -> Array:
         """Return the gradient of the integral of a weight times p over the views, (n, 2) m."""
-        density = weight * samples.detection
+        directions = compute_ray_directions(view.distances.shape[1])
         angle = 2.0 * np.pi / len(directions)
+        density = weight * samples.detection
         arcs = ~view.hit * np.exp(-self.decay * reach)[:, None] * reach[:, None] * angle
-        inward = self.decay * (density * samples.areas).sum(axis=2) + weight[..., -1] * arcs
-        window_depths = samples.depths[windows.robot, windows.ray]
-        beyond_corner = np.maximum(window_depths - windows.corner[:, None], 0.0)
-        swept = (density[windows.robot, windows.ray] * beyond_corner).sum(axis=1)
-        swept /= np.maximum(windows.corner, _MIN_DISTANCE_M)
-        swept *= view.distances[windows.robot, windows.ray] / _SAMPLES_PER_RAY
-        window_terms = sum_by_robot(windows.robot, swept[:, None] * windows.across, len(reach))
-        return np.asarray((inward[..., None] * directions).sum(axis=1) + window_terms)
+        ray_terms = self.decay * (density * samples.areas).sum(axis=2) + weight[..., -1] * arcs
+        growth = integrate_over_windows(windows, view, samples.depths, density)
+        window_terms = sum_by_robot(windows.robot, growth, len(reach))
+        return np.asarray((ray_terms[..., None] * directions).sum(axis=1) + window_terms)
 
 
 @kernel

@@ -25,6 +25,7 @@ from robocov.observation.scanned_view import (
     compute_view,
     evaluate_density,
     find_windows,
+    integrate_over_windows,
     is_behind_wall,
     is_path_clear,
 )
@@ -32,7 +33,6 @@ from robocov.observation.scanned_view import (
 _SAMPLES_PER_RAY = 12
 _SAMPLE_FRACTIONS = np.append((np.arange(_SAMPLES_PER_RAY) + 0.5) / _SAMPLES_PER_RAY, 1.0)
 """Points of each ray, as fractions of its length: samples of the integrals over edges, and the end."""
-_MIN_CORNER_DISTANCE_M = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,13 +137,9 @@ class Visibility(BaseController):
         arcs = ~view.hit * weight[..., -1] * reach[:, None] * (2.0 * np.pi / rays)
 
         windows = find_windows(view, directions, reach, self.jump)
-        window_depths = depths[windows.robot, windows.ray]
-        window_weight = weight[windows.robot, windows.ray]
-        beyond_corner = np.maximum(window_depths - windows.corner[:, None], 0.0)[:, :-1]
-        swept = (window_weight[:, :-1] * beyond_corner).sum(axis=1)
-        swept /= np.maximum(windows.corner, _MIN_CORNER_DISTANCE_M)
-        swept *= view.distances[windows.robot, windows.ray] / _SAMPLES_PER_RAY
-        window_terms = sum_by_robot(windows.robot, swept[:, None] * windows.across, n)
+        # The last sample is the end of the ray, which only the arcs need.
+        growth = integrate_over_windows(windows, view, depths[..., :-1], weight[..., :-1])
+        window_terms = sum_by_robot(windows.robot, growth, n)
         return np.asarray((arcs[..., None] * directions).sum(axis=1) + window_terms)
 
 

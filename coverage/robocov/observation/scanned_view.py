@@ -15,6 +15,8 @@ _PATH_PARTS = 4
 """Number of equal parts of a path; the points between them are checked for walls."""
 _MIN_DISTANCE_M = 1e-9
 """Lower limit of distances in divisions."""
+_MIN_CORNER_DISTANCE_M = 1e-3
+"""Lower limit of the distances of corners in divisions."""
 _STEP_DECREASE = 0.5
 """Factor by which the step changes if the gradient has turned by more than a right angle."""
 _STEP_INCREASE = 1.2
@@ -118,6 +120,32 @@ def find_windows(view: View, directions: Array, reach: Array, jump: float) -> Wi
         across=np.concatenate(across)[order],
         corner=np.concatenate(corners)[order],
     )
+
+
+def integrate_over_windows(windows: Windows, view: View, depths: Array, weight: Array) -> Array:
+    """Compute how fast the weighted area of a view grows at each of its windows.
+
+    Parameters
+    ----------
+    windows : Windows
+    view : View
+    depths : (n, rays, k) array, m
+        Distances of the midpoints of k equal parts of each ray.
+    weight : (n, rays, k) array
+        Weight of the area at these points.
+
+    Returns
+    -------
+    (w, 2) array, m
+        The integral of weight * (s - ρ)/ρ along the part of the edge beyond the corner, times t (see
+        `Windows`): the growth per metre of the robot's motion.
+    """
+    edge_depths = depths[windows.robot, windows.ray]
+    beyond_corner = np.maximum(edge_depths - windows.corner[:, None], 0.0)
+    integral = (weight[windows.robot, windows.ray] * beyond_corner).sum(axis=1)
+    integral /= np.maximum(windows.corner, _MIN_CORNER_DISTANCE_M)
+    integral *= view.distances[windows.robot, windows.ray] / depths.shape[2]
+    return np.asarray(integral[:, None] * windows.across)
 
 
 def _predict_depth(view: View, reach: Array, side: int) -> Array:

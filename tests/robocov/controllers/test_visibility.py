@@ -16,7 +16,13 @@ from robocov.environment import Environment, PolygonObstacle
 from robocov.observation import NearNeighbors, Observations, compute_ray_directions
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
-from robocov.observation.scanned_view import View, compute_step_fractions, find_windows
+from robocov.observation.scanned_view import (
+    View,
+    Windows,
+    compute_step_fractions,
+    find_windows,
+    integrate_over_windows,
+)
 from robocov.simulation import Simulation
 from robocov.team import Team
 
@@ -154,6 +160,17 @@ def test_the_end_of_a_wall_is_a_window() -> None:
     assert len(windows.robot) == 1
     assert windows.corner[0] == pytest.approx(np.hypot(1.0, 0.3), rel=0.1)
     assert windows.across[0] @ [0.3, 1.0] > 0.0
+
+
+def test_the_view_grows_along_the_edge_beyond_a_corner() -> None:
+    """For a constant weight, the integral of (s - ρ)/ρ from ρ to D is (D - ρ)²/(2 ρ)."""
+    view = View(distances=np.full((1, 4), 5.0), hit=np.zeros((1, 4), dtype=bool))
+    windows = Windows(
+        robot=np.array([0]), ray=np.array([2]), across=np.array([[0.0, 1.0]]), corner=np.array([2.0])
+    )
+    depths = view.distances[..., None] * (np.arange(100) + 0.5) / 100
+    growth = integrate_over_windows(windows, view, depths, np.full(depths.shape, 3.0))
+    np.testing.assert_allclose(growth, [[0.0, 3.0 * 2.25]], rtol=1e-3)
 
 
 def test_robots_that_see_their_whole_cells_are_at_rest() -> None:
