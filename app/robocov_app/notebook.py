@@ -35,7 +35,7 @@ from robocov_app.render.theme import LIGHT, Theme
 from robocov_app.report.pictures import Frame, map_picture
 from robocov_app.report.replay import ReplayRun, asset, replay_html
 from robocov_app.report.theme_css import theme_rules
-from robocov_app.runs.cost import PICTURE_LATTICE, built_cost
+from robocov_app.runs.cost import MIN_FIGURE_LATTICE, build_cost
 from robocov_app.web.live import LiveWindow
 
 if TYPE_CHECKING:  # pages of HTML need no matplotlib
@@ -107,8 +107,8 @@ def plot_result(
     if radius is not None:
         team = replace(team, radius=np.broadcast_to(np.asarray(radius, dtype=float), (n,)))
     facts = f"{format_count(n, 'robot')}, {mean_label(environment)} {result.mean_distance:.3f} m"
-    if sites.lattice < PICTURE_LATTICE:
-        finer = built_cost(environment, PICTURE_LATTICE, quiet=True)
+    if sites.lattice < MIN_FIGURE_LATTICE:
+        finer = build_cost(environment, MIN_FIGURE_LATTICE, quiet=True)
         sites, result = finer.sites, finer(result.positions)
     moment = Moment(environment, team, Field(FieldLattice(sites), result), environment.name, facts)
     if axes is None:
@@ -218,7 +218,7 @@ def _history_to_show(record: Record) -> CostHistory | None:
     span = float(record.time[-1] - record.time[0])
     rate = min(COST_SAMPLES / span, 10.0) if span > 0.0 else 0.0
     try:
-        return compute_cost_history(record, built_cost(record.environment, DEFAULT_LATTICE, quiet=True), rate)
+        return compute_cost_history(record, build_cost(record.environment, DEFAULT_LATTICE, quiet=True), rate)
     except RobocovError:  # a map without a free site, a robot in an obstacle
         return None
 

@@ -12,8 +12,8 @@ from robocov.metrics import CostHistory, compute_cost_history, summarize
 from robocov.record import Record
 from robocov.team import Team
 from robocov_app.report.results import FIGURES, Entry, Result
-from robocov_app.runs.run import Run, save_numbers
-from robocov_app.runs.saved import Saved
+from robocov_app.runs.execution import Run, save_numbers
+from robocov_app.runs.saved_runs import SavedRun
 from robocov_app.terminal.output import finite, write_json
 
 HOSTILE = "</script><!--\u2028'\"><img src=x onerror=alert(1)>&amp;{{7*7}}"
@@ -106,7 +106,7 @@ def result_of(
     entries: list[Entry],
     *,
     kind: str = "sweep",
-    loaded: dict[Path, Saved] | None = None,
+    loaded: dict[Path, SavedRun] | None = None,
     maps: dict[str, Environment] | None = None,
     wanted: int | None = None,
     units: dict[str, str] | None = None,
@@ -139,7 +139,7 @@ def watched(entries: list[Entry], environment: Environment = ROOMS, **walking: f
                 **walking,
             )
             history = falling(record, 2.0 if np.isnan(each.final) else each.final)
-            loaded[each.folder] = Saved(each.folder, record, history)
+            loaded[each.folder] = SavedRun(each.folder, record, history)
     names = dict.fromkeys(each.map for each in entries)
     return result_of(entries, loaded=loaded, maps=dict.fromkeys(names, environment))
 

@@ -31,7 +31,7 @@ from robocov_app.report.theme_css import hex_code
 def _coarse_pictures(request, monkeypatch):
     """Pictures of distances from few sites, which are soon there, but in the thorough run."""
     if request.node.get_closest_marker("slow") is None:
-        monkeypatch.setattr(drawing_backend, "PICTURE_LATTICE", 32)
+        monkeypatch.setattr(drawing_backend, "MIN_FIGURE_LATTICE", 32)
 
 
 RUN = run_of(ROOMS, 5)

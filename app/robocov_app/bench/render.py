@@ -16,9 +16,9 @@ from robocov.simulation import Simulation
 from robocov_app.bench.measure import Call, Case, Row, in_turn
 from robocov_app.render.picture import Painter
 from robocov_app.render.scene import record_scene
-from robocov_app.runs.encoding import png_bytes, save_film
-from robocov_app.runs.film import iter_frames
-from robocov_app.runs.options import FilmOptions
+from robocov_app.runs.encoding import encode_png, save_video
+from robocov_app.runs.frames import draw_frames
+from robocov_app.runs.settings import VideoSettings
 
 SIZE = (1280, 720)
 FRAME_GOALS = {50: 4e-3}  # wanted seconds for a frame, by number of robots
@@ -49,15 +49,15 @@ def cleared(canvas: pygame.Surface | None) -> Call:
 
 def _films(quick: bool) -> Iterator[Row]:
     record = _travelled("rooms", 6)
-    look = FilmOptions(colours="robots")
+    look = VideoSettings(colours="robots")
     shown = np.linspace(0, len(record) - 1, 60 if quick else 240).astype(np.intp)
-    frames = list(iter_frames(record, look, size=SIZE, rows=shown))
+    frames = list(draw_frames(record, look, size=SIZE, rows=shown))
     with tempfile.TemporaryDirectory() as folder:
         film = Path(folder) / "film.mp4"
         calls = {
-            "draw": lambda: list(iter_frames(record, look, size=SIZE, rows=shown)),
-            "film": lambda: save_film(film, frames),
-            "png": lambda: [png_bytes(frame) for frame in frames],
+            "draw": lambda: list(draw_frames(record, look, size=SIZE, rows=shown)),
+            "film": lambda: save_video(film, frames),
+            "png": lambda: [encode_png(frame) for frame in frames],
         }
         taken = in_turn(calls, 1 if quick else 3)
     for name, call in (("film encoded", "film"), ("PNGs encoded", "png")):

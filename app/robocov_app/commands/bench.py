@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from robocov.errors import ParameterError
-from robocov_app.runs.options import PlotOptions
+from robocov_app.commands.options import FigureOptions
 from robocov_app.terminal.output import RIGHT, console, echo, print_table, tell
 from robocov_app.terminal.progress import progress, tell_of_compiling
 
@@ -41,7 +41,7 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass
-class Arguments(PlotOptions):
+class Arguments(FigureOptions):
     """Measure speed, as ratios to yardsticks that are taken in turn with it, on one thread.
 
     Times on a shared machine mean little; ratios of medians taken in one run hold. The yardstick of

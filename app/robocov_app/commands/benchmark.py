@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from robocov.errors import InputError, ParameterError, format_count, require_number
-from robocov_app.runs.options import JsonOption
-from robocov_app.terminal.arguments import parsed_gains
+from robocov_app.commands.options import JsonOption
+from robocov_app.terminal.arguments import parse_gains
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
 from robocov_app.terminal.output import BOLD, RIGHT, echo, print_table, tell
 
@@ -95,7 +95,7 @@ def _run(options: Arguments) -> int:
     from robocov_app.benchmark.running import RESULT, Contender, Selection, run_benchmark
 
     assert options.controller is not None
-    contender = Contender(options.controller, parsed_gains(options.set))
+    contender = Contender(options.controller, parse_gains(options.set))
     selection, out = Selection(options.quick, options.track, options.maps), options.out or Path("benchmark")
     where: dict[str, Any] = {"workers": options.workers, "scheduler": options.scheduler}
     with Interruption() as stop:

@@ -1,14 +1,15 @@
 """`robocov compare`."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 
 from robocov.errors import ParameterError
-from robocov_app.runs.options import RunOptions
-from robocov_app.terminal.arguments import parsed_gains
+from robocov_app.commands.options import RunOptions
+from robocov_app.terminal.arguments import parse_gains
 from robocov_app.terminal.interruption import INTERRUPTED
 from robocov_app.terminal.output import BOLD, RIGHT, listed, print_table, tell
 
@@ -21,59 +22,73 @@ _COLUMNS = {
     "settled": "{settled}",
     "contacts": "{contacts}",
     "clearance": "{min_clearance_m:.3f} m",
-    "path": "{mean_path_length_m:.2f} m",
+    "path length": "{mean_path_length_m:.2f} m",
 }
+"""Titles of the table's columns, with the formats of their cells."""
 
 
 @dataclass
 class Arguments(RunOptions):
-    """Several controllers from the same starts, under the same limits.
+    """Compare controllers that start from the same positions, under the same limits.
 
-    The folder holds a run's folder for each controller, trajectories and cost curves side by side
-    as PNG and SVG, comparison.csv and comparison.json, and on request frames and a film.
-    --set k_rep=1 goes to every controller with such a gain, --set rapf.k_rep=1 to one.
+    The folder contains a run's folder for each controller, figures of the trajectories and costs side by side
+    as PNG and SVG, comparison.csv and comparison.json, and on request frames and a video.
+    --set k_rep=1 applies to every controller with such a gain, --set rapf.k_rep=1 to one.
 
     Example: robocov compare office --controllers rapf rpf lloyd --video --out office
     """
 
     controllers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("rapf", "rpf", "lloyd")
-    """Controllers by name, or mine.py:MyController."""
+    """Names of controllers, or mine.py:MyController."""
 
 
 def command(options: Arguments) -> int:
+    """Run `robocov compare`, and return its exit status."""
     from robocov.mapfile import load_map
+    from robocov_app.commands.gain_options import select_gains
     from robocov_app.render.density import density_lines
-    from robocov_app.runs.artifacts import gains_for, performed, rows_of
-    from robocov_app.runs.saved import folder_names
+    from robocov_app.runs.artifacts import build_comparison_rows, execute_comparison
+    from robocov_app.runs.saved_runs import name_folders
 
     names = options.controllers
+    _check_names(names)
+    # Everything that the user entered is checked before a folder is created.
+    gains = select_gains(names, parse_gains(options.gains))
+    environment = load_map(options.map)
+    scenarios = {
+        folder: options.build_scenario(environment, name, own_gains)
+        for folder, name, own_gains in zip(name_folders(names), names, gains, strict=True)
+    }
+    settings = options.build_output_settings()
+    out = options.out or Path(f"{Path(options.map).stem}-comparison")
+    runs, is_interrupted = execute_comparison(scenarios, out, settings)
+    rows = build_comparison_rows(runs)
+    if not options.json:
+        _print_rows(rows)
+    notes = [f"note: {row['label']}: {note}" for row in rows for note in row.get("notes", ())]
+    ending = "Interrupted. Partial results are in" if is_interrupted else "saved in"
+    saved = f"{ending} {out}/: {listed(out)}{options.describe_record()}"
+    answer = {"out": str(out), "interrupted": is_interrupted, "runs": rows}
+    tell(options, answer, *density_lines(environment), *notes, saved)
+    return INTERRUPTED if is_interrupted else 0
+
+
+def _check_names(names: Sequence[str]) -> None:
+    """Raise a ParameterError unless there are controllers, each once."""
     if not names:
         raise ParameterError("--controllers: expected at least one, got none")
     if len(set(names)) < len(names):
         raise ParameterError(f"--controllers: {' '.join(names)}: duplicate value")
-    gains = gains_for(names, parsed_gains(options.gains))
-    # everything that the user gave is checked before a folder is made
-    environment = load_map(options.map)
-    scenarios = [
-        options.build_scenario(environment, name, chosen) for name, chosen in zip(names, gains, strict=True)
-    ]
-    options.film.layers()
-    out = options.out or Path(f"{Path(options.map).stem}-comparison")
-    folders = dict(zip(folder_names(names), scenarios, strict=True))
-    runs, stopped = performed(folders, out, options, comparison=True)
-    rows = rows_of(runs)
+
+
+def _print_rows(rows: Sequence[dict[str, Any]]) -> None:
+    """Print the table of a comparison."""
     columns = dict(_COLUMNS)
     if not all("mean_time_s" in row for row in rows):
         del columns["mean time"]
     cells = []
     for row in rows:
-        settled = "not yet" if row["settled_at_s"] is None else f"{row['settled_at_s']:.1f} s"
-        cells.append([text.format(**row, settled=settled) for text in columns.values()])
-    if not options.json:
-        print_table([(title, RIGHT if title else BOLD) for title in columns], cells)
-    notes = [f"note: {row['label']}: {note}" for row in rows for note in row.get("notes", ())]
-    done = "stopped; what was done is in" if stopped else "saved in"
-    answer = {"out": str(out), "interrupted": stopped, "runs": rows}
-    saved = f"{done} {out}/: {listed(out)}{options.record_words}"
-    tell(options, answer, *density_lines(environment), *notes, saved)
-    return INTERRUPTED if stopped else 0
+        settling_time = row["settled_at_s"]
+        settled = "not yet" if settling_time is None else f"{settling_time:.1f} s"
+        cells.append([cell_format.format(**row, settled=settled) for cell_format in columns.values()])
+    print_table([(title, RIGHT if title else BOLD) for title in columns], cells)

@@ -9,7 +9,7 @@ from rich.text import Text
 from robocov.controllers import RECOMMENDED_CONTROLLER, get_gains, get_information, list_controller_classes
 from robocov.controllers.gains import Gain, Option, format_value
 from robocov.text import escape_controls
-from robocov_app.runs.options import JsonOption
+from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.output import console, tell
 
 

@@ -12,14 +12,14 @@ from robocov.arrays import Array
 from robocov.errors import InputError, ParameterError, describe_error, is_number, quote, require_number
 from robocov.files.writing import replace_file, resolve_target
 from robocov.mapfile import load_map
+from robocov_app.commands.options import FigureOptions
 from robocov_app.render.density import density_kind, density_lines, mean_label
-from robocov_app.runs.cost import built_cost, cost_for_pictures, draw_distances
-from robocov_app.runs.options import PlotOptions
+from robocov_app.runs.cost import build_cost, refine_cost_for_figures, save_distance_figure
 from robocov_app.terminal.output import tell
 
 
 @dataclass
-class Arguments(PlotOptions):
+class Arguments(FigureOptions):
     """Evaluate the exact coverage cost (22) of given positions; --plot draws a map of the distances.
 
     Example: robocov cost rooms --positions robots.json --lattice 256
@@ -47,7 +47,7 @@ def command(options: Arguments) -> None:
     environment = load_map(options.map)
     robots = read_positions(options.positions)
     speeds = speeds_of(options.speeds, len(robots))
-    cost = built_cost(environment, options.lattice, quiet=options.json)
+    cost = build_cost(environment, options.lattice, quiet=options.json)
     try:
         result = cost(robots)
         timed = None if speeds is None else cost(robots, speeds)
@@ -61,9 +61,9 @@ def command(options: Arguments) -> None:
     if options.plot is not None:
         mean = f"{mean_label(environment)} {result.mean_distance:.3f} m"
         mean = mean if timed is None else f"mean time {timed.mean_time:.3f} s"
-        fine = cost_for_pictures(environment, cost)
+        fine = refine_cost_for_figures(environment, cost)
         title, theme = "Coverage cost", options.theme
-        draw_distances(options.plot, fine, robots, mean, title=title, theme=theme, speeds=speeds)
+        save_distance_figure(options.plot, fine, robots, mean, title=title, theme=theme, speeds=speeds)
     answer: dict[str, Any] = {"mean_distance_m": result.mean_distance}
     lines = [f"mean distance   {result.mean_distance:.4f} m"]
     if timed is not None:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from robocov.errors import ParameterError, require_number
-from robocov_app.runs.options import LayerOptions, ScenarioOptions, WindowOptions, robots_of
-from robocov_app.terminal.arguments import parsed_gains, window_size
+from robocov_app.commands.options import LayerOptions, ScenarioOptions, WindowOptions, get_robot_count
+from robocov_app.terminal.arguments import parse_gains, parse_window_size
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
 from robocov_app.terminal.output import echo
 from robocov_app.terminal.progress import progress
@@ -107,8 +107,12 @@ def _open_window(options: Arguments, *, headless: bool) -> int:
             file = None  # it is saved to a file of its own, where it may be
     else:
         session = session_of(options)
-    also, without = options.layers()
-    look: dict[str, Any] = {"theme": options.theme, "size": window_size(options.size), "scale": options.scale}
+    also, without = options.read_layers()
+    look: dict[str, Any] = {
+        "theme": options.theme,
+        "size": parse_window_size(options.size),
+        "scale": options.scale,
+    }
     look |= {"also": also, "without": without, "headless": headless, "served": options.serve}
     first = file is None and options.lesson is None and not options.tour
     given: dict[str, Any] = {"laws": laws, "lattice": options.lattice, "file": file, "offers_lesson": first}
@@ -137,10 +141,13 @@ def session_of(options: Arguments) -> Session:
     robots, limits = options.robots, TeamSpec(radius=options.radius)
     if options.team is not None:
         team = read_team(options.team, {"radius": options.radius})
-        robots, limits = robots_of(team, robots, Arguments.robots, options.team), TeamSpec.of(team)
+        robots, limits = get_robot_count(team, robots, Arguments.robots, options.team), TeamSpec.of(team)
     first, *others = options.controllers
-    laws = (ControllerChoice(first, parsed_gains(options.gains)), *map(ControllerChoice, others))
-    conditions, start = options.conditions.conditions(options.seed, robots), (options.start, options.seed)
+    laws = (ControllerChoice(first, parse_gains(options.gains)), *map(ControllerChoice, others))
+    conditions, start = (
+        options.conditions.build_conditions(options.seed, robots),
+        (options.start, options.seed),
+    )
     environment = load_map(options.map)
     session = Session(Scenario(environment, laws, robots, *start, limits, options.dt, conditions=conditions))
     session.clock.speed = options.speed
@@ -151,13 +158,13 @@ def session_of(options: Arguments) -> Session:
 def rendered(opening: Launcher, options: Arguments) -> int:
     from robocov.files.result_folder import create_result
     from robocov.files.writing import resolve_target
-    from robocov_app.runs.encoding import encoder, save_moving_picture
+    from robocov_app.runs.encoding import find_encoder, save_frames_and_video
     from robocov_app.viewer.film import pixels
     from robocov_app.viewer.launch import HEADLESS_FPS
 
     if options.video is not None:
         resolve_target(options.video)
-        encoder()
+        find_encoder()
     made = nullcontext() if options.out is None else create_result(options.out, overwrite=False)
     with made as result, opening.window() as window, Interruption() as stop:
         _begin_lesson(window, options)
@@ -176,7 +183,7 @@ def rendered(opening: Launcher, options: Arguments) -> int:
                     update(done + 1)
 
             out = None if result is None else result.staging
-            save_moving_picture(frames(), out, options.video, HEADLESS_FPS)
+            save_frames_and_video(frames(), out, options.video, HEADLESS_FPS)
     for target in filter(None, (options.out, options.video)):
         echo(f"saved {target}")
     return INTERRUPTED if stop.requested else 0

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from robocov.errors import MapError, ParameterError
-from robocov_app.runs.options import WindowOptions
-from robocov_app.terminal.arguments import window_size
+from robocov_app.commands.options import WindowOptions
+from robocov_app.terminal.arguments import parse_window_size
 from robocov_app.terminal.output import echo
 
 
@@ -61,7 +61,11 @@ def _open_editor(options: Arguments) -> int:
     from robocov_app.editor.ui.launch import editor_window
     from robocov_app.web import show
 
-    look: dict[str, Any] = {"theme": options.theme, "size": window_size(options.size), "scale": options.scale}
+    look: dict[str, Any] = {
+        "theme": options.theme,
+        "size": parse_window_size(options.size),
+        "scale": options.scale,
+    }
     look |= {"headless": options.screenshot is not None, "served": options.serve}
     path = None if options.map is None else Path(options.map)
     if options.map in list_bundled_maps() or (path is not None and not path.suffix):
@@ -73,7 +77,7 @@ def _open_editor(options: Arguments) -> int:
             show(window, options, options.folder)
             return 0
         from robocov.files.writing import replace_file
-        from robocov_app.runs.encoding import png_bytes
+        from robocov_app.runs.encoding import encode_png
         from robocov_app.viewer.film import pixels
 
         window.panel.show_tab(options.page)
@@ -81,6 +85,6 @@ def _open_editor(options: Arguments) -> int:
         for _ in range(3):
             window.frame(0.2)
         with replace_file(options.screenshot) as part:
-            part.write_bytes(png_bytes(pixels(window.screen)))
+            part.write_bytes(encode_png(pixels(window.screen)))
     echo(f"saved {options.screenshot}")
     return 0

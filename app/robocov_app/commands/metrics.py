@@ -8,13 +8,13 @@ from typing import Annotated, Any
 import tyro
 
 from robocov.errors import require_number
-from robocov_app.runs.options import PlotOptions
+from robocov_app.commands.options import FigureOptions
 from robocov_app.terminal.output import BOLD, RIGHT, print_table, tell, write_csv
 from robocov_app.terminal.progress import counting, progress
 
 
 @dataclass
-class Arguments(PlotOptions):
+class Arguments(FigureOptions):
     """What the field measures of saved runs: covered and visible area, energy, ways, connectivity, clearance.
 
     Writes metrics.csv into the folder of each run, one row a moment. Areas: within the sensing range and in
@@ -39,9 +39,9 @@ def command(options: Arguments) -> None:
     from robocov.metrics.run_metrics import COLUMNS, compute_run_metrics, find_time_near_final
     from robocov.record import select_nearest_moments
     from robocov_app.figures.runs import Measured
-    from robocov_app.runs.saved import load_saved
+    from robocov_app.runs.saved_runs import load_saved_runs
 
-    measured, runs = [], load_saved(options.folder)
+    measured, runs = [], load_saved_runs(options.folder)
     answers: list[dict[str, Any]] = []
     folder = options.folder if options.folder.is_dir() else options.folder.parent
     with extend_result(folder) as result:

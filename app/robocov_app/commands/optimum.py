@@ -15,10 +15,10 @@ from robocov.files.writing import replace_file
 from robocov.lower_bound import MIN_PRECISION, LowerBound, compute_lower_bound
 from robocov.mapfile import load_map
 from robocov.optimum import MAX_RESTARTS, MAX_ROBOTS, find_optimum
+from robocov_app.commands.options import FigureOptions
 from robocov_app.render.density import density_kind, density_lines, mean_label
-from robocov_app.runs.cost import PICTURE_LATTICE, built_cost, draw_distances
-from robocov_app.runs.options import PlotOptions
-from robocov_app.runs.saved import Saved, load_saved
+from robocov_app.runs.cost import MIN_FIGURE_LATTICE, build_cost, save_distance_figure
+from robocov_app.runs.saved_runs import SavedRun, load_saved_runs
 from robocov_app.terminal.output import require_fresh, tell
 from robocov_app.terminal.progress import late_progress
 
@@ -27,7 +27,7 @@ _WITHIN = 0.001, 0.005, 0.02  # parts of the best within which restarts are coun
 
 
 @dataclass
-class Arguments(PlotOptions):
+class Arguments(FigureOptions):
     """The best positions for a team that knows the whole map: a reference for the coverage cost (22).
 
     The best of many restarts, each improved on a table of geodesic distances, then by descent of the
@@ -78,9 +78,9 @@ class Arguments(PlotOptions):
 
 
 def command(options: Arguments) -> None:
-    saved: list[Saved] = []
+    saved: list[SavedRun] = []
     if options.run is not None:
-        saved = load_saved(options.run)
+        saved = load_saved_runs(options.run)
         team = saved[0].record.team
         environment, robots, radius = saved[0].record.environment, len(team), float(team.radius.max())
     else:
@@ -100,7 +100,7 @@ def command(options: Arguments) -> None:
             bound = compute_lower_bound(environment, best.positions, radius=radius, **how)
     gaps = []
     if saved:
-        lattice_cost = built_cost(environment, lattice, quiet=options.json)
+        lattice_cost = build_cost(environment, lattice, quiet=options.json)
         for each in saved:
             if len(each.record.team) != robots:
                 raise InputError(f"{each.folder}: another number of robots than in {saved[0].folder}")
@@ -113,10 +113,12 @@ def command(options: Arguments) -> None:
         with replace_file(options.positions) as part:
             part.write_text(f"[{rows}]\n", encoding="utf-8")
     if options.plot is not None:
-        cost = built_cost(environment, PICTURE_LATTICE, quiet=True)
+        cost = build_cost(environment, MIN_FIGURE_LATTICE, quiet=True)
         mean = f"{mean_label(environment)} {best.mean_distance:.3f} m"
         title, theme = "Best positions found", options.theme
-        draw_distances(options.plot, cost, best.positions, mean, title=title, theme=theme, radius=radius)
+        save_distance_figure(
+            options.plot, cost, best.positions, mean, title=title, theme=theme, radius=radius
+        )
     agreement, count = {within: best.compute_agreement(within) for within in _WITHIN}, len(best.costs)
     answer: dict[str, Any] = {"mean_distance_m": best.mean_distance, "cost_m3": best.value}
     answer |= {"uncovered_area_m2": best.uncovered_area, "density": density_kind(environment)}

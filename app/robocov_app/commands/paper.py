@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import tyro
 
 from robocov.errors import InputError, format_count, require_number
-from robocov_app.runs.options import JsonOption
+from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
 from robocov_app.terminal.output import BOLD, RIGHT, echo, print_table, tell
 

@@ -12,7 +12,7 @@ import tyro
 from robocov.errors import InputError, OutputError, ParameterError, format_count
 from robocov.files.result_folder import REPORT_FILE, extend_result, is_report
 from robocov.files.writing import replace_file, resolve_target
-from robocov_app.runs.options import JsonOption
+from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import echo, tell
 from robocov_app.terminal.progress import progress
@@ -63,7 +63,7 @@ def parts_of(path: Path, temporary: Path) -> list[tuple[Path, str]]:
 
     words = run.Arguments(map=str(path), out=temporary / path.stem, all_branches=True, json=True)
     with Interruption() as stop:
-        stories = [Path(answer["out"]) for answer in run.saved_stories(words, stop)]
+        stories = [Path(answer["out"]) for answer in run.save_branches(words, stop)]
     return [part for story in stories for part in story_folders(story)]
 
 

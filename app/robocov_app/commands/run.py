@@ -1,94 +1,126 @@
 """`robocov run`."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from robocov_app.runs.options import RunOptions
-from robocov_app.terminal.arguments import parsed_gains
+from robocov.defaults import DEFAULT_CONTROLLER
+from robocov_app.commands.options import RunOptions
+from robocov_app.terminal.arguments import parse_gains
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
 from robocov_app.terminal.output import echo, listed, tell
+
+if TYPE_CHECKING:
+    from robocov_app.runs.execution import Run
+    from robocov_app.viewer.session.file import SavedSession
+    from robocov_app.viewer.session.undo_tree import Node
+
+_SESSION_SUFFIX = ".robocov"
 
 
 @dataclass
 class Arguments(RunOptions):
-    """Do one run without a window: a team under one controller, everything saved in a folder.
+    """Simulate one run without a window, and save everything in a folder.
 
-    The folder holds run.json and record.npz (all of the run), cost.csv, trajectories and cost as
-    PNG and SVG, and on request frames and a film.
+    The folder contains run.json and record.npz (the whole run), cost.csv, figures of the trajectories and
+    the cost as PNG and SVG, and on request frames and a video.
 
-    MAP may also be a session that the window saved, story.robocov: it is done again, touch by touch.
+    MAP may also be a session that was saved in the window, such as story.robocov: it is simulated again with
+    all edits.
 
     Example: robocov run rooms --controller rapf --set k_rep=0.3 --robots 8 --video --out eight
     """
 
-    controller: Annotated[str, tyro.conf.arg(metavar="NAME")] = "rapf"
-    """A controller by name, or mine.py:MyController; for a session, those it may load: a.py:A,b.py:B."""
+    controller: Annotated[str, tyro.conf.arg(metavar="NAME")] = DEFAULT_CONTROLLER
+    """Name of a controller, or mine.py:MyController; for a session, those it may load: a.py:A,b.py:B."""
     branch: str | None = None
-    """Branch of a session to do again, by name or number; by default the one it was saved in."""
+    """Branch of a session, by name or number; by default the one that was displayed when it was saved."""
     all_branches: bool = False
-    """Do all branches of a session, each into a folder of its own."""
+    """Simulate all branches of a session, each into its own folder."""
 
 
 def command(options: Arguments) -> int:
-    if options.map.endswith(".robocov"):
-        return remade(options)
+    """Run `robocov run`, and return its exit status."""
+    if options.map.endswith(_SESSION_SUFFIX):
+        return _replay_session(options)
     from robocov.mapfile import load_map
-    from robocov_app.render.density import density_lines
-    from robocov_app.runs.artifacts import performed
-    from robocov_app.runs.saved import folder_names
+    from robocov_app.runs.artifacts import execute_run
+    from robocov_app.runs.saved_runs import name_folders
 
-    # everything that the user gave is checked before a folder is made
-    scenario = options.build_scenario(load_map(options.map), options.controller, parsed_gains(options.gains))
-    options.film.layers()
-    out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
-    runs, stopped = performed({"": scenario}, out, options)
-    record, history, summary = runs[""].record, runs[""].history, runs[""].summary
-    facts = f"{len(record.team)} robots, {record.time[-1]:.1f} s"
-    lines = [f"{record.label} on {record.environment.name}, {facts}"]
-    first = f"(at the start {history.mean_distance[0]:.3f} m)"
-    lines += [f"  mean distance   {summary['mean_distance_m']:.3f} m   {first}"]
+    # Everything that the user entered is checked before a folder is created.
+    scenario = options.build_scenario(load_map(options.map), options.controller, parse_gains(options.gains))
+    settings = options.build_output_settings()
+    out = options.out
+    if out is None:
+        out = Path(f"{Path(options.map).stem}-{name_folders([options.controller])[0]}")
+    run, is_interrupted = execute_run(scenario, out, settings)
+    ending = "saved in"
+    if is_interrupted:
+        ending = f"Interrupted at {run.record.time[-1]:.1f} s. Partial results are in"
+    lines = [*_describe_run(run), f"{ending} {out}/: {listed(out)}{options.describe_record()}"]
+    tell(options, {"out": str(out), "interrupted": is_interrupted, **run.summary}, *lines)
+    return INTERRUPTED if is_interrupted else 0
+
+
+def _describe_run(run: Run) -> list[str]:
+    """Return the results of a run as lines of text."""
+    from robocov_app.render.density import density_lines
+
+    record = run.record
+    history = run.history
+    summary = run.summary
+    path_lengths = summary["path_length_m"]
+    settling_time = summary["settled_at_s"]
+    lines = [
+        f"{record.label} on {record.environment.name}, {len(record.team)} robots, {record.time[-1]:.1f} s",
+        f"  mean distance   {summary['mean_distance_m']:.3f} m   "
+        f"(at the start {history.mean_distance[0]:.3f} m)",
+    ]
     if history.mean_time is not None:
-        first = f"(at the start {history.mean_time[0]:.3f} s)"
-        lines += [f"  mean time       {summary['mean_time_s']:.3f} s   {first}"]
-    lines += [f"  coverage cost   {summary['cost_m3']:.2f} m³"]
+        lines.append(
+            f"  mean time       {summary['mean_time_s']:.3f} s   (at the start {history.mean_time[0]:.3f} s)"
+        )
+    lines.append(f"  coverage cost   {summary['cost_m3']:.2f} m³")
     lines += [f"  {line}" for line in density_lines(record.environment)]
     if summary["uncovered_area_m2"] > 0:
-        lines += [f"  uncovered area  {summary['uncovered_area_m2']:.2f} m²   (cut off from every robot)"]
-    settled = summary["settled_at_s"]
-    lines += [f"  settled         {'not yet' if settled is None else f'after {settled:.1f} s'}"]
-    clearance = f"(smallest clearance {summary['min_clearance_m']:.3f} m)"
-    lines += [f"  contacts        {summary['contacts']}   {clearance}"]
-    path = sum(summary["path_length_m"]) / len(summary["path_length_m"])
-    end = f"stopped at {record.time[-1]:.1f} s; what was done is in" if stopped else "saved in"
-    lines += [f"  path length     {path:.2f} m per robot"]
+        lines.append(f"  uncovered area  {summary['uncovered_area_m2']:.2f} m²   (cut off from every robot)")
+    lines += [
+        f"  settled         {'not yet' if settling_time is None else f'after {settling_time:.1f} s'}",
+        f"  contacts        {summary['contacts']}   (smallest clearance {summary['min_clearance_m']:.3f} m)",
+        f"  path length     {sum(path_lengths) / len(path_lengths):.2f} m per robot",
+    ]
     lines += [f"note: {note}" for note in summary.get("notes", ())]
-    lines += [f"{end} {out}/: {listed(out)}{options.record_words}"]
-    tell(options, {"out": str(out), "interrupted": stopped, **summary}, *lines)
-    return INTERRUPTED if stopped else 0
+    return lines
 
 
-def remade(options: Arguments) -> int:
+def _replay_session(options: Arguments) -> int:
+    """Simulate a session again, print its results, and return the exit status."""
     answers = []
-    with Interruption() as stop:
-        for answer in saved_stories(options, stop):
+    with Interruption() as interruption:
+        for answer in save_branches(options, interruption):
             answers.append(answer)
-            if options.json:
-                continue
-            for row in answer["runs"]:
-                told = answer["parts"][row["part"] - 1]
-                span = f"{told['from_s']:6.1f} to {told['to_s']:.1f} s"
-                echo(f"{span}  {row['controller']}  {row['mean_distance_m']:.3f} m  {told['words']}")
-            echo(f"saved in {answer['out']}/: {listed(Path(answer['out']))}")
+            if not options.json:
+                _print_branch(answer)
     tell(options, answers[0] if len(answers) == 1 else {"stories": answers})
-    return INTERRUPTED if stop.requested else 0
+    return INTERRUPTED if interruption.requested else 0
 
 
-def saved_stories(options: Arguments, stop: Interruption) -> Iterator[dict[str, Any]]:
-    """Make the stories of a session that the options name again, each in its folder; yield what was saved."""
+def _print_branch(answer: dict[str, Any]) -> None:
+    """Print the results of a branch: one line for each part and controller."""
+    for row in answer["runs"]:
+        part = answer["parts"][row["part"] - 1]
+        span = f"{part['from_s']:6.1f} to {part['to_s']:.1f} s"
+        echo(f"{span}  {row['controller']}  {row['mean_distance_m']:.3f} m  {part['words']}")
+    echo(f"saved in {answer['out']}/: {listed(Path(answer['out']))}")
+
+
+def save_branches(options: Arguments, interruption: Interruption) -> Iterator[dict[str, Any]]:
+    """Simulate the selected branches of a session, each into its own folder, and yield their results."""
     from robocov.errors import InputError
     from robocov.files.result_folder import create_result
     from robocov.kernel_compilation import compile_kernels
@@ -96,23 +128,34 @@ def saved_stories(options: Arguments, stop: Interruption) -> Iterator[dict[str, 
     from robocov_app.viewer.session.file import load_session, save_session
 
     path = Path(options.map)
-    saved = load_session(path, [name for name in options.controller.split(",") if ":" in name])
-    document, stories = saved.document, [(saved.head, saved.step, "")]
-    if options.branch is not None:
-        branch = document.branch(options.branch)
-        stories = [(branch.node, branch.end, "")]
-    elif options.all_branches:
-        stories = [(each.node, each.end, f"-{k}") for k, each in enumerate(document.branches(), 1)]
+    settings = options.build_output_settings()
+    session = load_session(path, [name for name in options.controller.split(",") if ":" in name])
+    branches = _select_branches(session, options)
     compile_kernels()
-    for node, step, suffix in stories:
+    for node, step, suffix in branches:
         out = Path(f"{options.out or path.stem}{suffix}")
         with create_result(out, "story", overwrite=options.overwrite) as result:
-            save_session(result.staging / f"session{path.suffix}", document, node, step, saved.view)
+            session_copy = result.staging / f"session{path.suffix}"
+            save_session(session_copy, session.document, node, step, session.view)
             try:
-                answer = {"out": str(out), **save_story(document, node, step, result, options, stop)}
+                results = save_story(session.document, node, step, result, settings, interruption)
             except InputError as error:
                 raise InputError(f"{path}: {error}") from None
             result.save_progress()
-        yield answer
-        if stop.requested:
+        yield {"out": str(out), **results}
+        if interruption.requested:
             return
+
+
+def _select_branches(session: SavedSession, options: Arguments) -> list[tuple[Node, int, str]]:
+    """Return the last node and step of each selected branch, and the suffix of its folder."""
+    document = session.document
+    if options.branch is not None:
+        branch = document.branch(options.branch)
+        return [(branch.node, branch.end, "")]
+    if options.all_branches:
+        return [
+            (branch.node, branch.end, f"-{number}")
+            for number, branch in enumerate(document.branches(), start=1)
+        ]
+    return [(session.head, session.step, "")]

@@ -8,7 +8,7 @@ import tyro
 
 from robocov.errors import ParameterError, format_count, require_number
 from robocov.optional_imports import import_optional
-from robocov_app.runs.options import JsonOption
+from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
 from robocov_app.terminal.output import tell
 

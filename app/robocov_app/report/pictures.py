@@ -18,7 +18,7 @@ from robocov_app.render.density import density_label, dots, shading
 from robocov_app.render.layout import fitted_radii, mark_size
 from robocov_app.render.scene import moving_obstacles
 from robocov_app.render.theme import DARK, LIGHT, ONE_HUE_EACH, mix, robot_hues
-from robocov_app.runs.saved import roster_of
+from robocov_app.runs.saved_runs import build_roster
 
 _MARGIN = 3.0  # pixels round the region
 _FINE = 0.2  # pixels by which a line may be simplified
@@ -119,7 +119,9 @@ def run_picture(
     parts += [f'<circle class="start" cx="{x:.1f}" cy="{y:.1f}" r="{ring:.1f}"/>' for x, y in starts]
     radii = fitted_radii(ends, record.team.radius * frame.zoom, 1.5, 9.0 if numbers else 4.5)
     states = zip(record.present[-1], record.working[-1], strict=True)
-    for number, (x, y), r, (there, works) in zip(roster_of(record).numbers, ends, radii, states, strict=True):
+    for number, (x, y), r, (there, works) in zip(
+        build_roster(record).numbers, ends, radii, states, strict=True
+    ):
         if not there:
             continue
         kind = "robot" if works else "failed"
@@ -156,7 +158,7 @@ def run_sentence(record: Record, history: CostHistory | None) -> str:
     head = f"{record.label} on map {record.environment.name}: trajectories of"
     words = [f"{head} {robots}{start} over {span:.4g} s."]
     changes = []  # who joined and who failed
-    for number, (begin, failed) in zip(roster_of(record).numbers, lives(record), strict=True):
+    for number, (begin, failed) in zip(build_roster(record).numbers, lives(record), strict=True):
         if record.conditions is not None and 0.0 < begin <= span:
             changes.append((begin, f"robot {number} joins at {begin:.1f} s"))
         if record.conditions is not None and failed is not None:

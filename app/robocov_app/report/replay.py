@@ -26,7 +26,7 @@ from robocov.text import escape_controls
 from robocov_app.figures.styles import MARKS, CurveStyle, styles_of
 from robocov_app.report.pictures import density_picture, has_path, lives, rings_of, run_picture
 from robocov_app.report.theme_css import theme_rules
-from robocov_app.runs.saved import roster_of
+from robocov_app.runs.saved_runs import build_roster
 
 MOST_PANES = 4  # runs side by side
 _SCRIPTS = ("data.js", "arena.js", "chart.js", "replay.js")
@@ -120,7 +120,7 @@ def embedded_run(run: ReplayRun, on: int, style: CurveStyle, rate: float, *, goa
         "map": on,
         "radius": radius[0] if len(set(radius)) == 1 else radius,
         **({"speeds": record.team.max_speed.tolist()} if record.has_travel_time_cells else {}),
-        "numbers": list(roster_of(record).numbers),
+        "numbers": list(build_roster(record).numbers),
         **({"begin": begin} if begin and record.environment.has_moving_obstacles else {}),
         **({"lives": life} if any(each != (0.0, None) for each in life) else {}),
         "path": has_path(record),
@@ -139,7 +139,7 @@ def embedded(
 ) -> dict[str, Any]:
     """Return all that a replay needs, at the rate up to `RATE`, and with goals, that fits the `budget`."""
     rate, goals = _affordable(runs, budget)
-    on = [roster_of(run.record).environment for run in runs]
+    on = [build_roster(run.record).environment for run in runs]
     maps = list(dict.fromkeys(on))
     found = [
         embedded_run(run, maps.index(environment), style, rate, goals=goals)

@@ -25,7 +25,7 @@ from robocov.metrics import CostHistory, compute_mean_over_run
 from robocov.metrics.results import read_history, read_results
 from robocov.optimum import find_optimum
 from robocov.record import Record
-from robocov_app.runs.saved import ComparisonDocument, Saved, load_saved, roster_of
+from robocov_app.runs.saved_runs import ComparisonDocument, SavedRun, build_roster, load_saved_runs
 from robocov_app.sweep.study import UNITS, parameter_column
 from robocov_app.sweep.table import gain_column
 
@@ -104,7 +104,7 @@ class Result:
     meanings: Mapping[str, str]
     # the same of all runs: ``duration_s``, ``dt_s``, ``lattice``, ``record_hz``, ``team``, ``versions``
     facts: Mapping[str, Any]
-    loaded: Mapping[Path, Saved]  # runs that were read already
+    loaded: Mapping[Path, SavedRun]  # runs that were read already
     damaged: tuple[Damaged, ...] = ()  # runs that cannot be read and are no entries
     references: Mapping[Setting, Reference] = field(default_factory=dict)  # of settings
     part: str = ""  # which part of a story it is
@@ -226,14 +226,14 @@ def _of_runs(folder: Path) -> Result:
     if path.is_file():
         kind, document = "comparison", read_document(path, ComparisonDocument, "robocov-comparison", 1)
         parts, unfinished = [folder / name for name in document.folders], not document.runs
-    saved: list[Saved] = []
+    saved: list[SavedRun] = []
     damaged: list[Damaged] = []
     for part in parts:
         if unfinished and not (part / "run.json").is_file():
             continue
         try:
-            each = load_saved(part)[0]
-            same = [roster_of(run.record).environment for run in (*saved[:1], each)]
+            each = load_saved_runs(part)[0]
+            same = [build_roster(run.record).environment for run in (*saved[:1], each)]
             if (same[0].boundary, same[0].obstacles) != (same[-1].boundary, same[-1].obstacles):
                 raise InputError(f"{part / 'run.json'}: another map than in {saved[0].folder.name}")
             saved.append(each)
@@ -247,7 +247,7 @@ def _of_runs(folder: Path) -> Result:
     for each in saved:
         record, content = each.record, _json(each.folder / "run.json")
         name = printable(record.environment.name)
-        maps.setdefault(name, roster_of(record).environment)
+        maps.setdefault(name, build_roster(record).environment)
         facts = facts or {"duration_s": float(record.time[-1]), "dt_s": record.dt} | {
             key: content.get(key) for key in ("lattice", "team", "versions")
         }

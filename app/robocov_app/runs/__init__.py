@@ -1,1 +1,8 @@
-"""Headless runs: done, saved, read back, filmed."""
+"""Runs of scenarios, and the files that are made of them.
+
+- `settings`: what is computed and drawn
+- `execution`, `artifacts`: simulate and evaluate scenarios, and write a folder of results
+- `saved_runs`: read such a folder again
+- `cost`: the coverage cost of a map, with progress
+- `frames`, `pane_layout`, `video`, `encoding`: frames and videos of runs
+"""

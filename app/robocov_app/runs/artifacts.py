@@ -1,4 +1,4 @@
-"""Artifacts of runs: a folder with numbers, pictures and a film of one, or of several side by side."""
+"""Folders of results: the numbers, figures and video of one run, or of several side by side."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robocov.controllers import get_gains, load_controller_class
 from robocov.cost import CoverageCost, TimeVaryingCost
-from robocov.errors import ParameterError, describe_unknown_name, format_count
-from robocov.files.result_folder import ResultKind, create_result
+from robocov.errors import format_count
+from robocov.files.result_folder import ResultFolder, create_result
 from robocov.kernel_compilation import compile_kernels
 from robocov.scenario import Scenario
-from robocov_app.runs.cost import built_cost, cost_for_pictures
-from robocov_app.runs.options import RunOptions
-from robocov_app.runs.run import Run, saved_run
+from robocov_app.runs.cost import build_cost, refine_cost_for_figures
+from robocov_app.runs.execution import Run, execute_scenario
+from robocov_app.runs.settings import OutputSettings
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import finite, write_csv, write_json
 from robocov_app.terminal.progress import counting, progress
@@ -27,148 +26,312 @@ if TYPE_CHECKING:
     from robocov_app.figures.coverage import Moment
     from robocov_app.figures.curves import Curve
 
-_HEAD = {"format": "robocov-comparison", "version": 1}
-_FIGURES = (
-    *("mean_distance_m", "cost_m3", "uncovered_area_m2", "settled_at_s", "contacts", "min_clearance_m"),
-    "mean_time_s",  # where robots are not equally fast
+_COMPARISON_HEADER = {"format": "robocov-comparison", "version": 1}
+_SUMMARY_COLUMNS = (
+    "mean_distance_m",
+    "cost_m3",
+    "uncovered_area_m2",
+    "settled_at_s",
+    "contacts",
+    "min_clearance_m",
+    "mean_time_s",  # only if some robots are faster than others
 )
+"""Entries of a summary that are columns of a comparison."""
+_JSON_ONLY_COLUMNS = ("label", "gains", "notes")
+"""Columns of ``comparison.json`` that ``comparison.csv`` does not have."""
+_FIGURE_SUFFIXES = (".png", ".svg")
 
 
-def performed(
-    scenarios: Mapping[str, Scenario], out: Path, options: RunOptions, *, comparison: bool = False
-) -> tuple[dict[str, Run], bool]:
-    """Do one run, or compare several on one map, by their folders' names; also tell if Ctrl-C ended it."""
+def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tuple[Run, bool]:
+    """Execute one scenario, and write the folder of its results.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    out : Path
+        The folder.
+    settings : OutputSettings
+
+    Returns
+    -------
+    run : Run
+    is_interrupted : bool
+        Whether Ctrl-C ended it early.
+
+    Raises
+    ------
+    RobocovError
+        If the run fails, or the folder cannot be written.
+    """
     compile_kernels()
-    cost = built_cost(next(iter(scenarios.values())).environment, options.lattice, quiet=options.json)
-    kind: ResultKind = "comparison" if comparison else "run"
-    parts, runs = scenarios if comparison else (), dict[str, Run]()
-    with create_result(out, kind, overwrite=options.overwrite, parts=parts) as result, Interruption() as stop:
-        if comparison:
-            begin_comparison(result.staging, list(scenarios))
-        for part, scenario in scenarios.items():
-            runs[part] = saved_run(scenario, cost, result, part if comparison else "", options, stop)
-            if stop.requested:
+    cost = build_cost(scenario.environment, settings.lattice, quiet=settings.quiet)
+    with (
+        create_result(out, "run", overwrite=settings.overwrite) as result,
+        Interruption() as interruption,
+    ):
+        run = execute_scenario(scenario, cost, result, "", settings, interruption)
+        save_figures([run], cost, result.staging, settings)
+        _save_videos([run], cost, result, settings, interruption)
+    return run, interruption.requested
+
+
+def execute_comparison(
+    scenarios: Mapping[str, Scenario], out: Path, settings: OutputSettings
+) -> tuple[dict[str, Run], bool]:
+    """Execute scenarios on one map, and write a folder with a subfolder for each.
+
+    Parameters
+    ----------
+    scenarios : mapping of str to Scenario
+        By the names of their subfolders.
+    out : Path
+        The folder.
+    settings : OutputSettings
+
+    Returns
+    -------
+    runs : dict of str to Run
+        Only those that were begun, if Ctrl-C ended the comparison early.
+    is_interrupted : bool
+
+    Raises
+    ------
+    RobocovError
+        If a run fails, or the folder cannot be written.
+    """
+    compile_kernels()
+    environment = next(iter(scenarios.values())).environment
+    cost = build_cost(environment, settings.lattice, quiet=settings.quiet)
+    runs: dict[str, Run] = {}
+    with (
+        create_result(out, "comparison", overwrite=settings.overwrite, parts=scenarios) as result,
+        Interruption() as interruption,
+    ):
+        start_comparison(result.staging, list(scenarios))
+        for subfolder, scenario in scenarios.items():
+            runs[subfolder] = execute_scenario(scenario, cost, result, subfolder, settings, interruption)
+            if interruption.requested:
                 break
-        if comparison:
-            save_comparison(runs, cost, result.staging, options)
-        else:
-            save_pictures(list(runs.values()), cost, result.staging, options)
-        result.save_progress()
-        if options.film.video or options.film.frames:
-            from robocov_app.runs.film import save_moving
-
-            save_moving(list(runs.values()), cost, result.staging, options.film, stop, quiet=options.json)
-    return runs, stop.requested
+        save_comparison(runs, cost, result.staging, settings)
+        _save_videos(list(runs.values()), cost, result, settings, interruption)
+    return runs, interruption.requested
 
 
-def gains_for(names: Sequence[str], given: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the gains of each controller: ``k_rep`` is for all that have it, ``rapf.k_rep`` for one."""
-    known = {name: get_gains(load_controller_class(name)) for name in names}
-    chosen: list[dict[str, Any]] = [{} for _ in names]
-    # what is said of one controller alone counts for more than what is said of all
-    for key, value in sorted(given.items(), key=lambda item: "." in item[0]):
-        owner, dot, gain = key.rpartition(".")
-        if dot and owner not in known:
-            raise ParameterError(f"--set {key}: {describe_unknown_name('controller', owner, known)}")
-        takers = [k for k, name in enumerate(names) if gain in known[name] and (not dot or name == owner)]
-        if not takers:
-            every = known[owner] if dot else {gain for name in names for gain in known[name]}
-            raise ParameterError(f"--set {key}: {describe_unknown_name('gain', gain, every)}")
-        for k in takers:
-            chosen[k][gain] = value
-    return chosen
-
-
-def rows_of(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
-    """Return one row for each run: its figures, and the excess of its mean distance over the best."""
-    best = min(run.summary["mean_distance_m"] for run in runs.values())
-    return [
-        {
-            "controller": name,
-            "label": run.record.label,
-            "gains": dict(run.record.gains),
-            **{figure: run.summary[figure] for figure in _FIGURES if figure in run.summary},
-            "mean_path_length_m": sum(run.summary["path_length_m"]) / len(run.record.team),
-            "above_best": run.summary["mean_distance_m"] / best - 1.0,
-            **({"notes": run.summary["notes"]} if "notes" in run.summary else {}),
-        }
-        for name, run in runs.items()
-    ]
-
-
-def begin_comparison(folder: Path, folders: Sequence[str]) -> None:
-    write_json(folder / "comparison.json", {**_HEAD, "folders": list(folders), "runs": []})
-
-
-def save_comparison(runs: Mapping[str, Run], cost: CoverageCost, folder: Path, options: RunOptions) -> None:
-    """Write ``comparison.json|csv``, and ``trajectories`` and ``cost`` as PNG and SVG."""
-    rows = rows_of(runs)
-    content = {**_HEAD, "lattice": options.lattice, "folders": list(runs), "runs": rows}
-    write_json(folder / "comparison.json", finite(content))
-    columns = [name for name in rows[0] if name not in ("label", "gains", "notes")]
-    write_csv(folder / "comparison.csv", ",".join(columns), ([row[name] for name in columns] for row in rows))
-    save_pictures(list(runs.values()), cost, folder, options, comparison=True)
-
-
-def save_pictures(
-    runs: Sequence[Run], cost: CoverageCost, folder: Path, options: RunOptions, *, comparison: bool = False
+def _save_videos(
+    runs: Sequence[Run],
+    cost: CoverageCost,
+    result: ResultFolder,
+    settings: OutputSettings,
+    interruption: Interruption,
 ) -> None:
-    """Draw ``trajectories.png|svg`` and ``cost.png|svg`` of a run, or of a comparison, if wanted."""
-    if options.no_pictures:
+    """Save frames and videos if they are wanted; everything before them is safe first."""
+    result.save_progress()
+    if settings.video.is_wanted:
+        from robocov_app.runs.video import save_videos
+
+        save_videos(runs, cost, result.staging, settings.video, interruption, quiet=settings.quiet)
+
+
+def build_comparison_rows(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
+    """Build the rows of a comparison.
+
+    Parameters
+    ----------
+    runs : mapping of str to Run
+        By the names of the controllers' folders.
+
+    Returns
+    -------
+    list of dict
+        One row for each run: its results, and ``above_best``, the relative excess of its mean distance over
+        the lowest one.
+    """
+    lowest = min(run.summary["mean_distance_m"] for run in runs.values())
+    rows = []
+    for name, run in runs.items():
+        summary = run.summary
+        row = {"controller": name, "label": run.record.label, "gains": dict(run.record.gains)}
+        row |= {column: summary[column] for column in _SUMMARY_COLUMNS if column in summary}
+        row["mean_path_length_m"] = sum(summary["path_length_m"]) / len(run.record.team)
+        row["above_best"] = summary["mean_distance_m"] / lowest - 1.0
+        if "notes" in summary:
+            row["notes"] = summary["notes"]
+        rows.append(row)
+    return rows
+
+
+def start_comparison(folder: Path, subfolders: Sequence[str]) -> None:
+    """Write ``comparison.json`` without results, so that the runs can be found if the program is killed.
+
+    Parameters
+    ----------
+    folder : Path
+    subfolders : sequence of str
+        Names of the subfolders of the runs.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    write_json(folder / "comparison.json", {**_COMPARISON_HEADER, "folders": list(subfolders), "runs": []})
+
+
+def save_comparison(
+    runs: Mapping[str, Run], cost: CoverageCost, folder: Path, settings: OutputSettings
+) -> None:
+    """Write ``comparison.json``, ``comparison.csv`` and the figures of a comparison.
+
+    Parameters
+    ----------
+    runs : mapping of str to Run
+        By the names of their subfolders.
+    cost : CoverageCost
+        Cost of the map.
+    folder : Path
+    settings : OutputSettings
+
+    Raises
+    ------
+    OutputError
+        If a file cannot be written.
+    """
+    rows = build_comparison_rows(runs)
+    content = {**_COMPARISON_HEADER, "lattice": settings.lattice, "folders": list(runs), "runs": rows}
+    write_json(folder / "comparison.json", finite(content))
+    columns = [name for name in rows[0] if name not in _JSON_ONLY_COLUMNS]
+    lines = ([row[name] for name in columns] for row in rows)
+    write_csv(folder / "comparison.csv", ",".join(columns), lines)
+    save_figures(list(runs.values()), cost, folder, settings, is_comparison=True)
+
+
+def save_figures(
+    runs: Sequence[Run],
+    cost: CoverageCost,
+    folder: Path,
+    settings: OutputSettings,
+    *,
+    is_comparison: bool = False,
+) -> None:
+    """Draw ``trajectories`` and ``cost`` as PNG and SVG, if figures are wanted.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    cost : CoverageCost
+        Cost of the map.
+    folder : Path
+    settings : OutputSettings
+    is_comparison : bool
+        Whether the runs are drawn side by side, also if there is only one.
+
+    Raises
+    ------
+    OutputError
+        If a file cannot be written.
+    """
+    if not settings.figures:
         return
-    from robocov_app.figures.coverage import plot_coverage
     from robocov_app.figures.files import save_figure
-    from robocov_app.figures.runs import plot_comparison, plot_trajectories
 
-    records, times = [run.record for run in runs], [run.final_time for run in runs]
-    finals = [float(run.history.mean_distance[-1]) for run in runs]
-    film = options.film
-    theme, size = film.colour_theme, film.picture_size()
-
-    def curves(kind: str) -> list[Curve]:
-        found = []
-        for run in runs:
-            value = getattr(run.history, kind)
-            if value is not None and (kind == "mean_distance" or np.isfinite(value).any()):
-                found.append((run.record.label, run.record.controller, run.history.time, value))
-        return found
-
-    with progress("pictures", 4, quiet=options.json) as update:
-        done = counting(update)
+    with progress("figures", 2 * len(_FIGURE_SUFFIXES), quiet=settings.quiet) as update:
+        report_figure = counting(update)
 
         def save(figure: Figure, stem: str) -> None:
-            for suffix in (".png", ".svg"):
+            for suffix in _FIGURE_SUFFIXES:
                 save_figure(figure, folder / (stem + suffix))
-                done()
+                report_figure()
 
-        look = (theme, film.colours, size)
-        if comparison:
-            save(plot_comparison(records, *look, finals, times), "trajectories")
-        else:
-            save(plot_trajectories(records[0], None, *look, finals[0], times[0]), "trajectories")
-        robots = format_count(len(records[0].team), "robot")
-        title = f"Coverage cost  ·  {records[0].environment.name}  ·  {robots}"
-        moments, timed = last_moments(runs, cost), curves("mean_time")
-        save(plot_coverage(curves("mean_distance"), moments, theme, size, title, timed), "cost")
+        save(_plot_trajectories(runs, settings, is_comparison=is_comparison), "trajectories")
+        save(_plot_cost(runs, cost, settings), "cost")
 
 
-def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
-    """Return the last moments of runs on one map, but for robots that failed at other places, to be drawn."""
+def _plot_trajectories(runs: Sequence[Run], settings: OutputSettings, *, is_comparison: bool) -> Figure:
+    from robocov_app.figures.runs import plot_comparison, plot_trajectories
+
+    video = settings.video
+    mean_distances = [float(run.history.mean_distance[-1]) for run in runs]
+    if is_comparison:
+        return plot_comparison(
+            [run.record for run in runs],
+            video.colour_theme,
+            video.colours,
+            video.size,
+            mean_distances,
+            [run.final_time for run in runs],
+        )
+    return plot_trajectories(
+        runs[0].record,
+        None,
+        video.colour_theme,
+        video.colours,
+        video.size,
+        mean_distances[0],
+        runs[0].final_time,
+    )
+
+
+def _plot_cost(runs: Sequence[Run], cost: CoverageCost, settings: OutputSettings) -> Figure:
+    from robocov_app.figures.coverage import plot_coverage
+
+    record = runs[0].record
+    robots = format_count(len(record.team), "robot")
+    return plot_coverage(
+        _build_curves(runs, "mean_distance"),
+        build_final_moments(runs, cost),
+        settings.video.colour_theme,
+        settings.video.size,
+        f"Coverage cost  ·  {record.environment.name}  ·  {robots}",
+        _build_curves(runs, "mean_time"),
+    )
+
+
+def _build_curves(runs: Sequence[Run], quantity: str) -> list[Curve]:
+    """Return the curves of ``mean_distance``, or of ``mean_time``, which not every run has."""
+    curves = []
+    for run in runs:
+        values = getattr(run.history, quantity)
+        is_known = values is not None and (quantity == "mean_distance" or np.isfinite(values).any())
+        if is_known:
+            curves.append((run.record.label, run.record.controller, run.history.time, values))
+    return curves
+
+
+def build_final_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
+    """Return the final moments of runs as figures of the coverage cost show them.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        On one map, except that robots may have failed at different positions.
+    cost : CoverageCost
+        Cost of the map of the first run.
+
+    Returns
+    -------
+    list of Moment
+        Those in which a robot works.
+    """
     from robocov_app.figures.coverage import Moment
     from robocov_app.render.distance_field import Field, FieldLattice
 
-    drawn, moments = runs[0].record.environment, []
-    cost = cost_for_pictures(drawn, cost)
+    environment = runs[0].record.environment
+    cost = refine_cost_for_figures(environment, cost)
+    moments = []
     for run in runs:
         record = run.record
-        if record.environment != drawn:
-            drawn = record.environment
-            cost = built_cost(drawn, cost.lattice, quiet=True)
-        momentary, time = TimeVaryingCost(cost), float(record.time[-1])
-        working = momentary.find_counted_robots(time, record.positions[-1], record.working[-1])
-        if working.any():
-            now, rows = momentary.get_cost(time), np.flatnonzero(working)
-            field = Field(FieldLattice(now.sites), now(record.positions[-1][rows]))
-            mean = float(run.history.mean_distance[-1])
-            moments.append(Moment.last_of(record, field, mean, rows, run.final_time))
+        if record.environment != environment:
+            environment = record.environment
+            cost = build_cost(environment, cost.lattice, quiet=True)
+        varying_cost = TimeVaryingCost(cost)
+        time = float(record.time[-1])
+        positions = record.positions[-1]
+        is_counted = varying_cost.find_counted_robots(time, positions, record.working[-1])
+        if not is_counted.any():
+            continue
+        final_cost = varying_cost.get_cost(time)
+        rows = np.flatnonzero(is_counted)
+        field = Field(FieldLattice(final_cost.sites), final_cost(positions[rows]))
+        mean_distance = float(run.history.mean_distance[-1])
+        moments.append(Moment.last_of(record, field, mean_distance, rows, run.final_time))
     return moments

@@ -1,4 +1,4 @@
-"""The coverage cost of a map, with progress; and its picture."""
+"""The coverage cost of a map, with progress; and a figure of it."""
 
 from pathlib import Path
 
@@ -12,27 +12,61 @@ from robocov.mapfile.check import MANY_VERTICES, count_vertices
 from robocov.team import Team
 from robocov_app.terminal.progress import late_progress
 
-PICTURE_LATTICE = 256  # coarsest lattice for maps of distances: its cells are to be narrower than walls
-FILM_LATTICE = 128  # the same for films, of which every frame takes its time
+MIN_FIGURE_LATTICE = 256
+"""Coarsest lattice of figures of distances: its cells should be narrower than walls."""
+MIN_VIDEO_LATTICE = 128
+"""Coarsest lattice of videos, in which every frame is computed."""
 
 
-def built_cost(
+def build_cost(
     environment: Environment, lattice: int, *, quiet: bool = False, geodesics: Geodesics | None = None
 ) -> CoverageCost:
-    """Return the coverage cost of a map; unless `quiet`, tell how far it is when it takes over a second."""
-    with late_progress("map of ways", quiet=quiet) as tell:
-        return CoverageCost(environment, lattice, progress=tell, geodesics=geodesics)
+    """Build the coverage cost of a map, and show progress if that takes over a second.
+
+    Parameters
+    ----------
+    environment : Environment
+    lattice : int
+        Number of sites along each side of the map.
+    quiet : bool
+        Whether progress is not shown.
+    geodesics : Geodesics or None
+        Shortest paths of the map, if they have been computed already.
+
+    Returns
+    -------
+    CoverageCost
+    """
+    with late_progress("shortest paths", quiet=quiet) as update:
+        return CoverageCost(environment, lattice, progress=update, geodesics=geodesics)
 
 
-def cost_for_pictures(environment: Environment, cost: CoverageCost, least: int | None = None) -> CoverageCost:
-    """Return `cost`, or where its lattice is too coarse to be drawn and the map is simple a finer one."""
-    least = least or PICTURE_LATTICE
-    if cost.lattice >= least or count_vertices(environment) > MANY_VERTICES:
+def refine_cost_for_figures(
+    environment: Environment, cost: CoverageCost, lattice: int | None = None
+) -> CoverageCost:
+    """Return a cost that is fine enough to be drawn.
+
+    Parameters
+    ----------
+    environment : Environment
+    cost : CoverageCost
+        Cost of this map. It is returned if it is fine enough, or the map has so many vertices that a finer
+        one would take too long.
+    lattice : int or None
+        Coarsest lattice; `MIN_FIGURE_LATTICE` by default.
+
+    Returns
+    -------
+    CoverageCost
+    """
+    if lattice is None:
+        lattice = MIN_FIGURE_LATTICE
+    if cost.lattice >= lattice or count_vertices(environment) > MANY_VERTICES:
         return cost
-    return built_cost(environment, least, quiet=True, geodesics=cost.geodesics)
+    return build_cost(environment, lattice, quiet=True, geodesics=cost.geodesics)
 
 
-def draw_distances(
+def save_distance_figure(
     path: Path,
     cost: CoverageCost,
     positions: Array,
@@ -43,12 +77,35 @@ def draw_distances(
     speeds: Array | None = None,
     radius: float = DEFAULT_RADIUS_M,
 ) -> None:
-    """Draw a map of the distances to the nearest robot, under words on their mean."""
+    """Draw a map of the distances to the nearest robot.
+
+    Parameters
+    ----------
+    path : Path
+        PNG, SVG or PDF file.
+    cost : CoverageCost
+    positions : (n, 2) array, m
+    mean : str
+        Text about the mean distance.
+    title : str
+    theme : str
+        ``light`` or ``dark``.
+    speeds : (n,) array or None, m/s
+        Speeds, if the nearest robot is the one that arrives first.
+    radius : float, m
+        Radius of the robots.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
     from robocov_app.figures.coverage import Moment, plot_coverage
     from robocov_app.figures.files import save_figure
     from robocov_app.render.distance_field import Field, FieldLattice
 
     team = Team.homogeneous(len(positions), radius=radius)
-    field, facts = Field(FieldLattice(cost.sites), cost(positions, speeds)), format_count(len(team), "robot")
-    moment = Moment(cost.environment, team, field, cost.environment.name, f"{facts}, {mean}")
+    field = Field(FieldLattice(cost.sites), cost(positions, speeds))
+    robots = format_count(len(team), "robot")
+    moment = Moment(cost.environment, team, field, cost.environment.name, f"{robots}, {mean}")
     save_figure(plot_coverage([], [moment], theme, title=title), path)

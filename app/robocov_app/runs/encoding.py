@@ -1,4 +1,4 @@
-"""Files of frames and films."""
+"""Files of frames and videos."""
 
 import contextlib
 import io
@@ -17,61 +17,110 @@ from numpy.typing import NDArray
 from robocov.errors import OutputError, ParameterError, describe_error, quote
 from robocov.files.writing import replace_file
 
-Frame: TypeAlias = NDArray[np.uint8]  # RGB, (height, width, 3), 0 to 255
+Frame: TypeAlias = NDArray[np.uint8]
+"""An RGB image, (height, width, 3), from 0 to 255."""
+_PNG_COMPRESSION_LEVEL = 2
+"""Low levels are several times as fast, and drawings of flat colours stay small."""
+_SECONDS_PER_KEYFRAME = 2
 
 
-def png_bytes(frame: Frame) -> bytes:
-    """Return the frame as a PNG file. The same pixels give the same bytes."""
+def encode_png(frame: Frame) -> bytes:
+    """Encode a frame as a PNG file. The same pixels give the same bytes.
+
+    Parameters
+    ----------
+    frame : Frame
+
+    Returns
+    -------
+    bytes
+    """
     from PIL import Image
 
     file = io.BytesIO()
-    # the lowest levels are several times as fast, and drawings of flat colours stay small all the same
-    Image.fromarray(frame).save(file, format="PNG", compress_level=2)
+    Image.fromarray(frame).save(file, format="PNG", compress_level=_PNG_COMPRESSION_LEVEL)
     return file.getvalue()
 
 
-def save_moving_picture(
-    frames: Iterable[Frame], folder: Path | None, film: Path | None, fps: float = 30.0
+def save_frames_and_video(
+    frames: Iterable[Frame], folder: Path | None, video: Path | None, fps: float = 30.0
 ) -> None:
-    """Write frames as ``000000.png``, ``000001.png``, ... into a folder, as a film, or both."""
-    frames = frames if folder is None else _kept(folder, frames)
-    if film is not None:
-        save_film(film, frames, fps=fps)
+    """Write frames to a folder, as a video, or both.
+
+    Parameters
+    ----------
+    frames : iterable of Frame
+        At least one for a video, all of one size.
+    folder : Path or None
+        Folder of ``000000.png``, ``000001.png`` and so on.
+    video : Path or None
+        MP4 file.
+    fps : float
+        Frames per second of the video.
+
+    Raises
+    ------
+    OutputError
+        If a file cannot be written, or there is no encoder.
+    """
+    if folder is not None:
+        frames = _save_each_frame(folder, frames)
+    if video is not None:
+        save_video(video, frames, fps=fps)
     else:
-        deque(frames, maxlen=0)
+        deque(frames, maxlen=0)  # consumes the frames, which writes them
 
 
-def _kept(folder: Path, frames: Iterable[Frame]) -> Iterator[Frame]:
+def _save_each_frame(folder: Path, frames: Iterable[Frame]) -> Iterator[Frame]:
+    """Write each frame to a folder, and yield it."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written: {describe_error(error)}") from error
     for number, frame in enumerate(frames):
-        with replace_file(folder / f"{number:06d}.png", durable=False) as part:
-            part.write_bytes(png_bytes(frame))
+        with replace_file(folder / f"{number:06d}.png", durable=False) as temporary:
+            temporary.write_bytes(encode_png(frame))
         yield frame
 
 
-def save_film(path: Path, frames: Iterable[Frame], *, fps: float = 30.0) -> None:
-    """Write frames of one size as an MP4 film, whole or not at all."""
-    source = iter(frames)
-    first = next(source, None)
+def save_video(path: Path, frames: Iterable[Frame], *, fps: float = 30.0) -> None:
+    """Write an MP4 video, completely or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    frames : iterable of Frame
+        At least one, all of one size.
+    fps : float
+        Frames per second.
+
+    Raises
+    ------
+    ParameterError
+        If there is no frame, or they have different sizes.
+    OutputError
+        If the file cannot be written, or there is no encoder.
+    """
+    iterator = iter(frames)
+    first = next(iterator, None)
     if first is None:
         raise ParameterError("frames: expected at least one, got none")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OutputError(f"{path.parent}: cannot be made ({describe_error(error)})") from error
-    with replace_file(path) as part, _encoder(part, path, _even(first), fps) as pipe:
-        for frame in chain([first], source):
+        raise OutputError(f"{path.parent}: cannot be created: {describe_error(error)}") from error
+    height, width, _ = _pad_to_even_size(first).shape
+    with replace_file(path) as temporary, _open_encoder(temporary, path, (width, height), fps) as pipe:
+        for frame in chain([first], iterator):
             if frame.shape != first.shape:
-                sizes = f"{quote(frame.shape)} after {quote(first.shape)}"
-                raise ParameterError(f"frames: expected one size, got {sizes}")
-            pipe.write(np.ascontiguousarray(_even(frame)).data)
+                raise ParameterError(
+                    f"frames: expected one size, got {quote(frame.shape)} after {quote(first.shape)}"
+                )
+            pipe.write(np.ascontiguousarray(_pad_to_even_size(frame)).data)
 
 
-def _even(frame: Frame) -> Frame:
-    """Return the frame with its last row or column repeated where its size is odd."""
+def _pad_to_even_size(frame: Frame) -> Frame:
+    """Repeat the last row or column of a frame whose height or width is odd, as encoders need even ones."""
     height, width, _ = frame.shape
     if height % 2 == width % 2 == 0:
         return frame
@@ -79,21 +128,26 @@ def _even(frame: Frame) -> Frame:
 
 
 @contextlib.contextmanager
-def _encoder(part: Path, path: Path, frame: Frame, fps: float) -> Iterator[BinaryIO]:
-    height, width, _ = frame.shape
-    command = film_command(part, (width, height), fps)
-    with tempfile.TemporaryFile() as said:
-        # in a session of its own: Ctrl-C in a terminal goes to us alone, and we end the film properly
+def _open_encoder(temporary: Path, path: Path, size: tuple[int, int], fps: float) -> Iterator[BinaryIO]:
+    """Run the encoder, and yield the pipe that takes raw frames."""
+    command = build_encoder_command(temporary, size, fps)
+    with tempfile.TemporaryFile() as error_output:
+        # In a session of its own, the encoder does not get the Ctrl-C of a terminal, and the video is
+        # completed.
         process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said, start_new_session=True
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=error_output,
+            start_new_session=True,
         )
         assert process.stdin is not None
-        broken = False
+        is_pipe_broken = False
         try:
             yield process.stdin  # type: ignore[misc]
             process.stdin.close()
         except BrokenPipeError:
-            broken = True
+            is_pipe_broken = True
         except BaseException:
             process.kill()
             raise
@@ -101,37 +155,71 @@ def _encoder(part: Path, path: Path, frame: Frame, fps: float) -> Iterator[Binar
             with contextlib.suppress(OSError):
                 process.stdin.close()
             status = process.wait()
-        if broken or status != 0:
-            said.seek(0)
-            lines = said.read().decode("utf-8", "replace").strip().splitlines()
-            why = lines[-1].strip() if lines else f"status {status}"
-            raise OutputError(f"{path}: the film's encoder failed ({why})")
+        if is_pipe_broken or status != 0:
+            error_output.seek(0)
+            lines = error_output.read().decode("utf-8", "replace").strip().splitlines()
+            reason = lines[-1].strip() if lines else f"status {status}"
+            raise OutputError(f"{path}: the video encoder failed ({reason})")
 
 
-def encoder() -> str:
-    """Return where ffmpeg is: that of the extra "film", else one on the path; raises OutputError for none."""
+def find_encoder() -> str:
+    """Find ffmpeg: that of the extra "film", or one on the path.
+
+    Returns
+    -------
+    str
+        Path of the program.
+
+    Raises
+    ------
+    OutputError
+        If there is none.
+    """
     with contextlib.suppress(ModuleNotFoundError, RuntimeError):
         from imageio_ffmpeg import get_ffmpeg_exe
 
         return str(get_ffmpeg_exe())
-    if found := shutil.which("ffmpeg"):
-        return found
-    ways = 'pip install "robocov[film]", or set IMAGEIO_FFMPEG_EXE to one'
-    raise OutputError(f"film: no ffmpeg was found: {ways}")
+    program = shutil.which("ffmpeg")
+    if program is None:
+        raise OutputError(
+            'video: ffmpeg was not found; pip install "robocov[film]", or set IMAGEIO_FFMPEG_EXE to its path'
+        )
+    return program
 
 
-def film_command(path: Path, size: tuple[int, int], fps: float, *, streamed: bool = False) -> list[str]:
-    """Return the encoder's command: raw RGB frames in, an MP4 film out, playable while `streamed`."""
-    flags = "+frag_keyframe+empty_moov+default_base_moof" if streamed else "+faststart"
-    return [
-        *(encoder(), "-y", "-nostdin", "-loglevel", "error"),
-        *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", f"{fps:g}", "-i", "-"),
-        *("-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "18", "-tune", "animation"),
-        # players take bt709 for high definition and bt601 otherwise unless the film says which
-        *("-vf", "scale=out_color_matrix=bt709:out_range=tv", "-pix_fmt", "yuv420p"),
-        *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
-        *(("-g", f"{round(2 * fps)}") if streamed else ()),
-        *("-movflags", flags, "-fflags", "+bitexact", "-flags:v", "+bitexact"),
-        # neither an option nor an address, whatever it looks like
-        f"file:{path.absolute()}",
-    ]
+def build_encoder_command(
+    path: Path, size: tuple[int, int], fps: float, *, streamed: bool = False
+) -> list[str]:
+    """Build the command that encodes raw RGB frames as an MP4 video.
+
+    Parameters
+    ----------
+    path : Path
+        File of the video.
+    size : (width, height), px
+        Both even.
+    fps : float
+        Frames per second.
+    streamed : bool
+        Whether the video can be played while it is being written.
+
+    Returns
+    -------
+    list of str
+    """
+    width, height = size
+    command = [find_encoder(), "-y", "-nostdin", "-loglevel", "error"]
+    command += ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:g}", "-i", "-"]
+    command += ["-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "18", "-tune", "animation"]
+    # Without these, players assume bt709 for high definition and bt601 otherwise.
+    command += ["-vf", "scale=out_color_matrix=bt709:out_range=tv", "-pix_fmt", "yuv420p"]
+    command += ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"]
+    command += ["-color_range", "tv"]
+    flags = "+faststart"
+    if streamed:
+        command += ["-g", f"{round(_SECONDS_PER_KEYFRAME * fps)}"]
+        flags = "+frag_keyframe+empty_moov+default_base_moof"
+    command += ["-movflags", flags, "-fflags", "+bitexact", "-flags:v", "+bitexact"]
+    # With "file:", no path is taken for an option or an address.
+    command.append(f"file:{path.absolute()}")
+    return command

@@ -24,7 +24,7 @@ from robocov.planning.discovered_map import DiscoveredMap
 from robocov.record import Record, list_versions
 from robocov.scenario import Scenario
 from robocov.simulation import Simulation
-from robocov_app.runs.run import cost_table
+from robocov_app.runs.execution import build_cost_table
 from robocov_app.sweep.study import Task, conditions_of, source_json, team_of
 from robocov_app.terminal.output import csv_text, finite, json_text
 from robocov_app.toolkit.worker import Line
@@ -91,7 +91,7 @@ def perform(task: Task) -> Outcome:
             kept, arrays = record.thin(task.record_hz), io.BytesIO()
             np.savez_compressed(arrays, **{name: getattr(kept, name) for name in kept.arrays})
             files = {"run.json": json_text(content).encode(), "record.npz": arrays.getvalue()}
-            files["cost.csv"] = csv_text(*cost_table(history)).encode()
+            files["cost.csv"] = csv_text(*build_cost_table(history)).encode()
             if task.metrics:
                 figures |= finite(compute_final_metrics(record, history))
                 files[EFFORT] = json_text(effort).encode()

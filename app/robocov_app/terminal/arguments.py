@@ -208,23 +208,23 @@ def one_line(boxed: str) -> str:
     return text
 
 
-def parsed_size(option: str, text: str, least: tuple[int, int], most: tuple[int, int]) -> tuple[int, int]:
+def parse_size(option: str, text: str, minimum: tuple[int, int], maximum: tuple[int, int]) -> tuple[int, int]:
     """Return width and height from a text like ``1280x720``; raises ParameterError."""
     match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", text)
     if not match:
         wanted = "expected WIDTHxHEIGHT in pixels, as in 1280x720"
         raise ParameterError(f"{option}: {wanted}, got {quote(text)}")
     width, height = int(match[1]), int(match[2])
-    require_number(option, width, least[0], most[0], "pixels wide")
-    require_number(option, height, least[1], most[1], "pixels high")
+    require_number(option, width, minimum[0], maximum[0], "pixels wide")
+    require_number(option, height, minimum[1], maximum[1], "pixels high")
     return width, height
 
 
-def window_size(text: str | None) -> tuple[int, int] | None:
-    return None if text is None else parsed_size("--size", text, (900, 600), (7680, 4320))
+def parse_window_size(text: str | None) -> tuple[int, int] | None:
+    return None if text is None else parse_size("--size", text, (900, 600), (7680, 4320))
 
 
-def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
+def parse_gains(texts: tuple[str, ...]) -> dict[str, Any]:
     """Return gains from texts like ``k_rep=0.3``; the value is JSON, ``null`` for no limit, or a word."""
     gains: dict[str, Any] = {}
     for text in texts:

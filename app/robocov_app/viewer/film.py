@@ -9,7 +9,7 @@ import numpy as np
 import pygame
 
 from robocov.errors import OutputError
-from robocov_app.runs.encoding import Frame, film_command
+from robocov_app.runs.encoding import Frame, build_encoder_command
 
 FPS = 30  # frames of a film per second
 _WAITING = 45  # frames that may wait to be written; what comes when there are more is left out
@@ -30,7 +30,7 @@ class Film:
         self._due = 0.0
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            command = film_command(path, self._size, FPS, streamed=True)
+            command = build_encoder_command(path, self._size, FPS, streamed=True)
             path.open("xb").close()  # a new file, and through no link
             self._process = Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=DEVNULL, start_new_session=True)
         except OSError as error:

@@ -25,13 +25,14 @@ from robocov_app.render.fonts import label, shortened
 from robocov_app.render.picture import Painter, pane_layers, scale_for, standard_layers
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Theme
-from robocov_app.runs.artifacts import begin_comparison, save_comparison, save_pictures
-from robocov_app.runs.cost import built_cost
+from robocov_app.runs.artifacts import save_comparison, save_figures, start_comparison
+from robocov_app.runs.cost import build_cost
 from robocov_app.runs.encoding import Frame
-from robocov_app.runs.film import FILM_HOLD, FILMS, pane_layout, write_moving
-from robocov_app.runs.options import FilmOptions, RunOptions
-from robocov_app.runs.run import Run, cost_table, evaluated, save_numbers
-from robocov_app.runs.saved import folder_names, wreck_name
+from robocov_app.runs.execution import Run, build_cost_table, evaluate_record, save_numbers
+from robocov_app.runs.pane_layout import build_pane_layout
+from robocov_app.runs.saved_runs import name_failed_robot, name_folders
+from robocov_app.runs.settings import OutputSettings, VideoSettings
+from robocov_app.runs.video import VIDEO_HOLD_S, get_video_name, write_frames_and_video
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import write_csv, write_json
 from robocov_app.viewer.film import pixels
@@ -107,7 +108,7 @@ def records_of_part(part: Part, root: Node) -> list[Record]:
 def _recorder(setup: PaneSetup, dt: float) -> Recorder:
     environment, law = setup.environment, setup.law
     for number, place in setup.failed.items():
-        wreck = CircleObstacle(place, setup.limits.radius_of(number), wreck_name(number))
+        wreck = CircleObstacle(place, setup.limits.radius_of(number), name_failed_robot(number))
         environment = with_obstacle(environment, wreck)
     return Recorder(environment, setup.team, law.made(), dt, name=law.name, conditions=setup.conditions)
 
@@ -148,7 +149,12 @@ def story_folders(folder: Path) -> list[tuple[Path, str]]:
 
 
 def save_story(
-    document: Document, node: Node, end: int, result: ResultFolder, options: RunOptions, stop: Interruption
+    document: Document,
+    node: Node,
+    end: int,
+    result: ResultFolder,
+    settings: OutputSettings,
+    stop: Interruption,
 ) -> dict[str, Any]:
     root = document.path(node)[0]
     parts, dt, told, rows = parts_of(document, node, end), root.begun.dt, [], []
@@ -156,49 +162,49 @@ def save_story(
     for k, part in enumerate(parts, 1):
         folder = f"{k:02d}-{_file_name(part.node.words)}" if several else ""
         records = records_of_part(part, root)
-        names = folder_names([record.controller for record in records])
+        names = name_folders([record.controller for record in records])
         runs: dict[str, Run] = {}
         if len(records) > 1:
             (result.staging / folder).mkdir(exist_ok=True)
-            begin_comparison(result.staging / folder, names)
+            start_comparison(result.staging / folder, names)
         costs = []
         for number, name, record in zip(part.setups, names, records, strict=True):
             place = result.staging / folder / (name if len(records) > 1 else "")
             record.save(place)
             # as in the window, robots that failed count as no obstacles of the cost
             bare = replace(record, environment=part.setups[number].environment)
-            costs.append(built_cost(bare.environment, options.lattice, quiet=True))
-            history = evaluated(bare, costs[-1], stop, quiet=options.json).history
+            costs.append(build_cost(bare.environment, settings.lattice, quiet=True))
+            history = evaluate_record(bare, costs[-1], stop, quiet=settings.quiet).history
             runs[name] = Run(record, history, summarize(record, history))
-            save_numbers(runs[name], place, options.lattice)
+            save_numbers(runs[name], place, settings.lattice)
             histories.append((part.begin * dt, name, history))
             mean = runs[name].summary["mean_distance_m"]
             rows.append({"part": k, "controller": name, "mean_distance_m": mean})
         if len(records) > 1:
-            save_comparison(runs, costs[0], result.staging / folder, options)
+            save_comparison(runs, costs[0], result.staging / folder, settings)
         else:
-            save_pictures([runs[names[0]]], costs[0], result.staging / folder, options)
+            save_figures([runs[names[0]]], costs[0], result.staging / folder, settings)
         times = {"from_s": part.begin * dt, "to_s": part.ends * dt}
         told.append({"folder": folder, **times, "words": part.node.words})
         result.save_progress()
     if several:
         write_json(result.staging / STORY, {"format": "robocov-story", "version": 1, "parts": told})
-        header = "controller," + cost_table(histories[0][2])[0]
+        header = "controller," + build_cost_table(histories[0][2])[0]
         lines: list[tuple[object, ...]] = []
         for begin, name, history in histories:
-            lines += [(name, begin + row[0], *row[1:]) for row in cost_table(history)[1]]
+            lines += [(name, begin + row[0], *row[1:]) for row in build_cost_table(history)[1]]
         write_csv(result.staging / "cost.csv", header, lines)
-    look = options.film
+    look = settings.video
     if look.video or look.frames:
-        film = result.staging / FILMS[len(parts[-1].setups) > 1]
-        total = round((end * dt / look.film_speed + FILM_HOLD) * look.fps) + 1
+        film = result.staging / get_video_name(len(parts[-1].setups))
+        total = round((end * dt / look.speed + VIDEO_HOLD_S) * look.fps) + 1
         frames = story_frames(document, node, end, parts, histories, look)
-        write_moving(frames, total, film, look, stop, quiet=options.json)
+        write_frames_and_video(frames, total, film, look, stop, quiet=settings.quiet)
     return {"parts": told, "runs": rows}
 
 
 def story_frames(
-    document: Document, node: Node, end: int, parts: list[Part], histories: list[History], film: FilmOptions
+    document: Document, node: Node, end: int, parts: list[Part], histories: list[History], film: VideoSettings
 ) -> Iterator[Frame]:
     """Draw a branch from its beginning: trajectories go on through all touches, each named below at its time.
 
@@ -208,30 +214,32 @@ def story_frames(
     widest, root = max(parts, key=lambda part: len(part.setups)), document.path(node)[0]
     count, dt = len(widest.setups), root.begun.dt
     layers = partial(standard_layers if count == 1 else pane_layers, film.colours)
-    width, height = film.film_size()
+    width, height = film.video_size
     strip, layout = round(STRIP * scale_for((width, height))), None
     if count > 1:
         scenes = [scene for part in parts for scene in part.scenes]
-        layout = pane_layout(records_of_part(widest, root), film, (width, height - strip), legend_of=scenes)
+        layout = build_pane_layout(
+            records_of_part(widest, root), film, (width, height - strip), legend_scenes=scenes
+        )
     due = 0.0
     for run, here in replayed(document, node, end):
         if run.time + 1e-9 < due and not (here is node and run.step >= end):
             continue
-        due += film.film_speed / film.fps
-        panes, names = [], folder_names([pane.law.name for pane in run.panes])
+        due += film.speed / film.fps
+        panes, names = [], name_folders([pane.law.name for pane in run.panes])
         for pane, name in zip(run.panes, names, strict=True):
             environment, painter = run.scenario.environment, painters.get(pane.number)
             if painter is None or painter.environment.boundary != environment.boundary:
                 size, scale = (layout.pane, layout.scale) if layout else ((width, height - strip), None)
                 painter = painters[pane.number] = Painter(environment, size, theme, layers(), scale)
-                painter.change(*film.layers())
+                painter.change(film.shown_layers, film.hidden_layers)
             painter.environment = environment
             panes.append(painter.frame(_scene(pane, histories, name)))
         words = "" if here.scenario is not None else f"{here.at * dt:.1f} s   {here.words}"
-        page = panes[0] if layout is None else layout.page(panes, theme)
+        page = panes[0] if layout is None else layout.compose_page(panes, theme)
         frame = np.concatenate([page, _caption(words, (width, strip), theme)])
         yield frame
-    for _ in range(round(FILM_HOLD * film.fps)):
+    for _ in range(round(VIDEO_HOLD_S * film.fps)):
         yield frame
 
 

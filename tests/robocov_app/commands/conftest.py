@@ -10,11 +10,11 @@ from robocov_app.sweep import sweeping
 def _quick(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures of distances from few sites, and sweeps in this process; but for the thorough run."""
     if request.node.get_closest_marker("slow") is None:
-        monkeypatch.setattr(run_cost, "PICTURE_LATTICE", 32)
+        monkeypatch.setattr(run_cost, "MIN_FIGURE_LATTICE", 32)
         monkeypatch.setattr(sweeping, "LocalPool", InProcess)
 
 
 @pytest.fixture
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs are not drawn, which takes longer than the runs."""
-    monkeypatch.setattr(artifacts, "save_pictures", lambda *_, **__: None)
+    monkeypatch.setattr(artifacts, "save_figures", lambda *_, **__: None)

@@ -11,7 +11,7 @@ from PIL import Image
 from touched_run import HALL, LLOYD, RAPF, RPF, begun, stepped
 
 from robocov_app.cli import main
-from robocov_app.runs.artifacts import begin_comparison
+from robocov_app.runs.artifacts import start_comparison
 from robocov_app.terminal.output import write_csv
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
@@ -43,7 +43,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     session.fail_robot(1)
     names = ["rpf", "lloyd"]
     (folder / "both").mkdir()
-    begin_comparison(folder / "both", names)
+    start_comparison(folder / "both", names)
     for name, each in zip(names, records_of(stepped(session, 60)), strict=True):
         (folder / "both" / name).mkdir()
         each.save(folder / "both" / name)

@@ -7,8 +7,8 @@ from called import SHORT, answer, complaint
 
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.runs.run import cost_table
-from robocov_app.runs.saved import load_saved
+from robocov_app.runs.execution import build_cost_table
+from robocov_app.runs.saved_runs import load_saved_runs
 
 TEAM = """
 [[group]]
@@ -40,11 +40,11 @@ def test_a_run_of_robots_that_differ(tmp_path: Path, team: Path, capsys: pytest.
     assert record.gains["cells"] == "time"
     header, *rows = (out / "cost.csv").read_text().splitlines()
     assert header == "time_s,mean_distance_m,cost_m3,uncovered_area_m2,mean_time_s"
-    saved = load_saved(out)[0]
+    saved = load_saved_runs(out)[0]
     assert saved.history is not None
     assert saved.history.mean_time is not None
     assert saved.history.mean_time[-1] == said["mean_time_s"] == float(rows[-1].split(",")[-1])
-    assert cost_table(saved.history)[0] == header
+    assert build_cost_table(saved.history)[0] == header
     apart = np.hypot(*(record.positions[0, 1] - record.positions[0, 2]))
     assert apart >= 0.4, "room for the largest"
     speeds = np.hypot(*np.moveaxis(record.velocities, -1, 0)).max(axis=0)

@@ -15,7 +15,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("metrics") / "both"
     words = ["compare", "rooms", "--controllers", "rapf", "rpf", "--robots", "3", *SHORT, "--out", str(out)]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(artifacts, "save_pictures", lambda *_, **__: None)
+        patch.setattr(artifacts, "save_figures", lambda *_, **__: None)
         assert main(words) == 0
     return out
 

@@ -18,8 +18,8 @@ from robocov_app.render import scene as module
 from robocov_app.render.picture import Painter, standard_layers
 from robocov_app.render.scene import CELL, Sensed, record_scene
 from robocov_app.render.theme import LIGHT
-from robocov_app.runs.film import iter_frames
-from robocov_app.runs.options import FilmOptions
+from robocov_app.runs.frames import draw_frames
+from robocov_app.runs.settings import VideoSettings
 
 CART = CircleObstacle((1.0, 3.0), 0.4, "cart", ObstaclePath(((1, 3), (5, 3)), 2.0, "back-and-forth"))
 HALL = Environment("hall", ((0, 0), (6, 0), (6, 4), (0, 4)), (CART,))
@@ -74,8 +74,8 @@ def test_who_joins_has_no_trail_before(record: Record) -> None:
 def test_films_and_plots_of_it_can_be_drawn(record: Record) -> None:
     frames = [
         frame.copy()
-        for frame in iter_frames(
-            record, FilmOptions(colours="robots"), size=(320, 240), rows=np.array([0, 12, 30])
+        for frame in draw_frames(
+            record, VideoSettings(colours="robots"), size=(320, 240), rows=np.array([0, 12, 30])
         )
     ]
     assert len({frame.tobytes() for frame in frames}) == 3

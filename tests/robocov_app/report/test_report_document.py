@@ -18,7 +18,7 @@ from robocov.text import escape_controls
 from robocov_app.figures.styles import MARKS
 from robocov_app.report.document import MOST_LETTERS, report
 from robocov_app.report.results import Damaged
-from robocov_app.runs.saved import Saved
+from robocov_app.runs.saved_runs import SavedRun
 
 SWEEP = [
     entry(name, seed, base + 0.2 * seed + 0.3 * k, gains=(("k_rep", k), ("limit", None if k > 1 else 2.0)))
@@ -143,7 +143,7 @@ def test_fifty_long_runs_of_large_teams_do_as_well() -> None:
     entries = [entry("rapf", seed, 2.0, robots=30) for seed in range(50)]
     result = watched(entries[:1], seconds=300.0, hz=5.0)
     (saved,) = result.loaded.values()
-    loaded = {each.folder: Saved(each.folder, saved.record, saved.history) for each in entries}
+    loaded = {each.folder: SavedRun(each.folder, saved.record, saved.history) for each in entries}
     page = report([result_of(entries, loaded=loaded, maps={"rooms": ROOMS})])
     assert page.shown == (50,) and len(page.html.encode()) < 3_000_000
 

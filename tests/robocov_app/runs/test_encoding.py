@@ -17,9 +17,10 @@ from hypothesis.extra.numpy import arrays
 
 from robocov.errors import OutputError, ParameterError
 from robocov.metrics import CostHistory
-from robocov_app.runs.encoding import encoder, png_bytes, save_film, save_moving_picture
-from robocov_app.runs.film import frame_rows, iter_frames
-from robocov_app.runs.options import FilmOptions
+from robocov_app.commands.options import VideoOptions
+from robocov_app.runs.encoding import encode_png, find_encoder, save_frames_and_video, save_video
+from robocov_app.runs.frames import draw_frames, select_frame_rows
+from robocov_app.runs.settings import VideoSettings
 from robocov_app.viewer.film import Film
 
 
@@ -43,7 +44,7 @@ class TestRows:
     @given(st.integers(2, 200), st.floats(0.5, 60), st.floats(0.1, 20), st.floats(0.01, 0.5))
     def test_film_time_times_speed_is_simulated_time(self, steps, fps, speed, dt):
         time = np.arange(steps) * dt
-        rows = frame_rows(time, fps, speed)
+        rows = select_frame_rows(time, fps, speed)
         wanted = np.minimum(np.arange(len(rows)) * speed / fps, time[-1])
         assert rows[0] == 0 and rows[-1] == steps - 1
         assert (np.diff(rows) >= 0).all()
@@ -53,22 +54,22 @@ class TestRows:
 
     def test_sums_of_steps_do_not_skip_a_row(self):
         time = np.cumsum(np.full(601, 1 / 30)) - 1 / 30
-        assert frame_rows(time, 30).tolist() == list(range(601))
+        assert select_frame_rows(time, 30).tolist() == list(range(601))
 
     def test_the_end_is_held(self):
-        assert frame_rows(np.array([0.0, 1.0]), 2, hold=1.0).tolist() == [0, 0, 1, 1, 1]
+        assert select_frame_rows(np.array([0.0, 1.0]), 2, hold=1.0).tolist() == [0, 0, 1, 1, 1]
 
 
 class TestFrames:
     def test_as_many_as_the_run_lasts_and_lazily(self):
         record = run_of(ROOMS, 3, steps=31)  # 3 s
-        frames = iter_frames(record, FilmOptions(fps=5, film_speed=2), size=(160, 120))
+        frames = draw_frames(record, VideoSettings(fps=5, speed=2), size=(160, 120))
         assert next(frames).shape == (120, 160, 3)
         assert 1 + sum(1 for _ in frames) == 9
 
     def test_each_shows_its_moment(self):
         record = run_of(SQUARE, 3, steps=21)
-        frames = list(iter_frames(record, FilmOptions(), size=(320, 240), rows=np.array([0, 10, 20, 20])))
+        frames = list(draw_frames(record, VideoSettings(), size=(320, 240), rows=np.array([0, 10, 20, 20])))
         assert (frames[0] != frames[1]).any() and (frames[1] != frames[2]).any()
         assert (frames[2] == frames[3]).all()
 
@@ -79,7 +80,7 @@ class TestFrames:
         def shown(times, values):
             mean = np.array(values)
             cost = CostHistory(np.array(times), mean, mean, mean) if times else None
-            return next(iter_frames(record, FilmOptions(), size=(480, 240), rows=rows, cost=cost)).tobytes()
+            return next(draw_frames(record, VideoSettings(), size=(480, 240), rows=rows, cost=cost)).tobytes()
 
         known = shown([0.0, 1.0, 1.5], [3.0, 2.0, 1.0])
         assert known == shown([0.9], [2.0])
@@ -92,14 +93,14 @@ class TestFrames:
         time, mean = np.array([0.0]), np.array([3.0])
         histories = [CostHistory(time, mean, mean, mean, other) for other in (None, mean, 2.0 * mean)]
         frames = [
-            next(iter_frames(record, FilmOptions(), cost=each, **options)).tobytes() for each in histories
+            next(draw_frames(record, VideoSettings(), cost=each, **options)).tobytes() for each in histories
         ]
         assert len(set(frames)) == 3
 
     def test_options_are_checked(self):
         record = run_of(SQUARE, 3, steps=5)
         with pytest.raises(ParameterError, match="theme"):
-            next(iter_frames(record, FilmOptions(theme="pink")))
+            next(draw_frames(record, VideoSettings(theme="pink")))
 
 
 @settings(deadline=None, max_examples=30)
@@ -107,16 +108,16 @@ class TestFrames:
 def test_png_holds_every_pixel(frame):
     import io
 
-    surface = pygame.image.load(io.BytesIO(png_bytes(frame)), "frame.png")
+    surface = pygame.image.load(io.BytesIO(encode_png(frame)), "frame.png")
     back = np.frombuffer(pygame.image.tobytes(surface, "RGB"), np.uint8).reshape(frame.shape)
     assert (back == frame).all()
-    assert png_bytes(frame) == png_bytes(frame.copy())
+    assert encode_png(frame) == encode_png(frame.copy())
 
 
 class TestSaveFrames:
     def test_names(self, tmp_path):
         folder = tmp_path / "new" / "frames"
-        save_moving_picture(plain(3), folder, None)
+        save_frames_and_video(plain(3), folder, None)
         assert sorted(path.name for path in folder.iterdir()) == ["000000.png", "000001.png", "000002.png"]
 
     def test_a_full_disk_is_named_and_leaves_whole_frames_only(self, tmp_path, monkeypatch):
@@ -130,19 +131,19 @@ class TestSaveFrames:
 
         monkeypatch.setattr(Path, "write_bytes", full)
         with pytest.raises(OutputError, match=r"000002\.png: cannot be written: No space"):
-            save_moving_picture(plain(5), tmp_path, None)
+            save_frames_and_video(plain(5), tmp_path, None)
         assert sorted(path.name for path in tmp_path.iterdir()) == ["000000.png", "000001.png"]
 
     def test_a_file_in_the_way_is_named(self, tmp_path):
         (tmp_path / "frames").write_text("")
         with pytest.raises(OutputError, match="frames"):
-            save_moving_picture(plain(1), tmp_path / "frames", None)
+            save_frames_and_video(plain(1), tmp_path / "frames", None)
 
 
 class TestSaveFilm:
     def test_it_can_be_read_back(self, tmp_path):
         path = tmp_path / "new" / "run.mp4"
-        save_film(path, plain(10), fps=25)
+        save_video(path, plain(10), fps=25)
         frames, about = read(path)
         assert len(frames) == 10
         assert frames[0].shape == (48, 64, 3)
@@ -154,7 +155,7 @@ class TestSaveFilm:
     def test_colours_survive(self, tmp_path):
         colours = [(214, 34, 34), (31, 95, 224), (30, 158, 54), (27, 35, 48)]
         frames = [np.broadcast_to(np.array(c, dtype=np.uint8), (720, 1280, 3)) for c in colours]
-        save_film(tmp_path / "a.mp4", frames)
+        save_video(tmp_path / "a.mp4", frames)
         back, _ = read(tmp_path / "a.mp4")
         for frame, colour in zip(back, colours, strict=True):
             assert np.abs(frame[300, 600].astype(int) - colour).max() <= 12
@@ -163,7 +164,7 @@ class TestSaveFilm:
     def test_odd_sizes_are_made_even_without_scaling(self, tmp_path, width, height):
         frame = np.zeros((height, width, 3), dtype=np.uint8)
         frame[:, ::8] = frame[:, -1] = 255
-        save_film(tmp_path / "odd.mp4", [frame] * 3)
+        save_video(tmp_path / "odd.mp4", [frame] * 3)
         frames, _ = read(tmp_path / "odd.mp4")
         assert frames[0].shape == (height + height % 2, width + width % 2, 3)
         bright = frames[0][20, :, 1] > 128
@@ -172,15 +173,15 @@ class TestSaveFilm:
     def test_same_frames_same_bytes(self, tmp_path):
         record = run_of(ROOMS, 5, steps=12)
         for name in ("a.mp4", "b.mp4"):
-            save_film(
-                tmp_path / name, iter_frames(record, FilmOptions(fps=10, film_speed=1.0), size=(320, 180))
+            save_video(
+                tmp_path / name, draw_frames(record, VideoSettings(fps=10, speed=1.0), size=(320, 180))
             )
         assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
 
     @pytest.mark.parametrize("name", ["-dash", "pipe:1", "tcp:x", "a%d b'c"])
     def test_a_name_is_neither_an_option_nor_an_address(self, tmp_path, monkeypatch, name):
         monkeypatch.chdir(tmp_path)
-        save_film(Path(name) / "run.mp4", plain(3))
+        save_video(Path(name) / "run.mp4", plain(3))
         assert len(read(tmp_path / name / "run.mp4")[0]) == 3
         film = Film(Path(f"{name}.mp4"), (64, 48), patient=True)
         film.add(pygame.Surface((64, 48)), 0.1)
@@ -189,12 +190,12 @@ class TestSaveFilm:
 
     def test_no_frames(self, tmp_path):
         with pytest.raises(ParameterError, match="frames"):
-            save_film(tmp_path / "a.mp4", [])
+            save_video(tmp_path / "a.mp4", [])
         assert list(tmp_path.iterdir()) == []
 
     def test_frames_of_different_sizes(self, tmp_path):
         with pytest.raises(ParameterError, match="one size"):
-            save_film(tmp_path / "a.mp4", [*plain(2), *plain(1, width=32)])
+            save_video(tmp_path / "a.mp4", [*plain(2), *plain(1, width=32)])
         assert list(tmp_path.iterdir()) == []
 
     @pytest.mark.parametrize("stop", [KeyboardInterrupt, RuntimeError])
@@ -207,7 +208,7 @@ class TestSaveFilm:
             raise stop
 
         with pytest.raises(stop):
-            save_film(path, frames())
+            save_video(path, frames())
         assert path.read_bytes() == b"older"
         assert list(tmp_path.iterdir()) == [path]
 
@@ -219,15 +220,15 @@ class TestSaveFilm:
         ],
         ids=["at once", "at the end"],
     )
-    @pytest.mark.skipif(os.name == "nt", reason="a shell script stands for the encoder")
+    @pytest.mark.skipif(os.name == "nt", reason="a shell script stands for the find_encoder")
     def test_a_failing_encoder_leaves_nothing_and_is_quoted(self, tmp_path, monkeypatch, script):
         fake = tmp_path / "ffmpeg"
         fake.write_text(f"#!/bin/sh\n{script}\n")
         fake.chmod(fake.stat().st_mode | stat.S_IXUSR)
         monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(fake))
         folder = tmp_path / "out"
-        with pytest.raises(OutputError, match=r"run\.mp4: the film's encoder failed .*No space left"):
-            save_film(folder / "run.mp4", plain(200, width=320, height=240))
+        with pytest.raises(OutputError, match=r"run\.mp4: the film's find_encoder failed .*No space left"):
+            save_video(folder / "run.mp4", plain(200, width=320, height=240))
         assert list(folder.iterdir()) == []
 
     def test_a_missing_encoder_is_named(self, tmp_path, monkeypatch):
@@ -237,16 +238,16 @@ class TestSaveFilm:
         monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", missing)
         monkeypatch.setenv("PATH", str(tmp_path))
         with pytest.raises(OutputError, match=r"pip install .robocov\[film\]., or set IMAGEIO_FFMPEG_EXE"):
-            save_film(tmp_path / "run.mp4", plain(2))
+            save_video(tmp_path / "run.mp4", plain(2))
         assert list(tmp_path.iterdir()) == []
         # before a run that would be in vain
         with pytest.raises(OutputError, match="no ffmpeg"):
-            FilmOptions(video=True)
+            VideoOptions(video=True)
         (tmp_path / "ffmpeg").write_text("")
         (tmp_path / "ffmpeg").chmod(0o755)
-        assert encoder() == str(tmp_path / "ffmpeg")
+        assert find_encoder() == str(tmp_path / "ffmpeg")
 
     def test_a_folder_that_cannot_be_made_is_named(self, tmp_path):
         (tmp_path / "file").write_text("")
         with pytest.raises(OutputError, match="file"):
-            save_film(tmp_path / "file" / "run.mp4", plain(2))
+            save_video(tmp_path / "file" / "run.mp4", plain(2))

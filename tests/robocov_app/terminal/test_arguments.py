@@ -5,7 +5,7 @@ import pytest
 from tyro.conf import Positional, arg
 
 from robocov.errors import InputError
-from robocov_app.terminal.arguments import _default_hint, by_option, one_line, parsed, parsed_gains
+from robocov_app.terminal.arguments import _default_hint, by_option, one_line, parse_gains, parsed
 
 
 @dataclass
@@ -66,7 +66,7 @@ def test_a_message_names_the_option() -> None:
 
 
 def test_gains_are_json_or_words() -> None:
-    gains = parsed_gains(("k_rep=0.3", "attraction_limit=null", "target=median"))
+    gains = parse_gains(("k_rep=0.3", "attraction_limit=null", "target=median"))
     assert gains == {"k_rep": 0.3, "attraction_limit": None, "target": "median"}
 
 

@@ -18,7 +18,7 @@ from robocov.simulation import Simulation
 from robocov_app.render.picture import Painter, standard_layers
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import LIGHT
-from robocov_app.runs.saved import load_saved
+from robocov_app.runs.saved_runs import load_saved_runs
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.session.pane import Continuation
 from robocov_app.viewer.session.recorded import replayed_session
@@ -168,7 +168,7 @@ def test_a_saved_run_is_looked_at_again_and_gone_on_from(tmp_path: Path) -> None
     team = TeamSpec(communication_range=4.0).team(4)
     simulation = Simulation(HALL, ControllerChoice("rapf").made(), STARTS, team, 0.05, conditions=BAD)
     simulation.run(1.5).save(tmp_path)
-    session = replayed_session(load_saved(tmp_path))
+    session = replayed_session(load_saved_runs(tmp_path))
     pane = session.panes[0]
     told = []
     for when in (0.5, 0.9, 1.5):

@@ -15,7 +15,7 @@ from robocov.environment import CircleObstacle
 from robocov.metrics import compute_path_lengths
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.runs.options import FilmOptions
+from robocov_app.runs.settings import VideoSettings
 from robocov_app.viewer.headless import parts_of, story_frames
 from robocov_app.viewer.session.changes import Place
 from robocov_app.viewer.session.file import load_session, save_session
@@ -114,7 +114,7 @@ def test_a_report_takes_stories_and_sessions(tmp_path: Path, capsys: pytest.Capt
 
 
 def test_a_film_explains_what_it_shows_and_says_what_was_done(tmp_path: Path) -> None:
-    session, film = played(), FilmOptions(size="640x360", fps=10, film_speed=1.0)
+    session, film = played(), VideoSettings(size=(640, 360), fps=10, speed=1.0)
     parts = parts_of(session.document, session.head, session.step_now)
     frames = list(story_frames(session.document, session.head, session.step_now, parts, [], film))
     assert {frame.shape for frame in frames} == {(360, 640, 3)}

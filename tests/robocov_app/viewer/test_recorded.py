@@ -14,7 +14,7 @@ from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov.team import Team
 from robocov.voronoi import WeightedCells
-from robocov_app.runs.saved import Saved, roster_of
+from robocov_app.runs.saved_runs import SavedRun, build_roster
 from robocov_app.viewer.launch import Launcher
 from robocov_app.viewer.session.recorded import LostController, control_dt, replayed_session
 from robocov_app.viewer.session.scenario import ControllerChoice
@@ -23,8 +23,8 @@ from robocov_app.viewer.session.session import Session
 STEPS = 60
 
 
-def saved(record: Record, history: CostHistory | None = None, name: str = "saved") -> Saved:
-    return Saved(Path(name), record, history)
+def saved(record: Record, history: CostHistory | None = None, name: str = "saved") -> SavedRun:
+    return SavedRun(Path(name), record, history)
 
 
 def replayed(*records: Record, controllers: tuple[str, ...] = ()) -> Session:
@@ -434,7 +434,7 @@ def test_runs_of_any_origin_can_be_looked_at() -> None:
     """Robots that walk through walls end where no simulation can begin; there they are pushed out."""
     record = run_of(HALL, 3, steps=20)
     record = replace(record, team=Team.homogeneous(3))
-    assert roster_of(record).numbers == (1, 2, 3)
+    assert build_roster(record).numbers == (1, 2, 3)
     session = replayed(record)
     session.look_at(1.0)
     np.testing.assert_array_equal(session.positions(session.panes[0]), record.positions[10])

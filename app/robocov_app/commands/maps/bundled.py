@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from robocov.mapfile import list_bundled_maps, load_map
+from robocov_app.commands.options import JsonOption
 from robocov_app.render.density import density_kind
-from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.output import BOLD, print_table, tell
 
 

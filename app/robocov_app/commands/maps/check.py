@@ -13,7 +13,7 @@ from rich.console import Console
 from robocov.errors import InputError, MapError, format_path
 from robocov.mapfile import find_map_file, load_map
 from robocov.mapfile.check import MapReport, check_map
-from robocov_app.runs.options import JsonOption
+from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.output import console, echo, tell
 from robocov_app.terminal.watch import changes
 

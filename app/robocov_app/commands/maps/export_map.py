@@ -8,8 +8,8 @@ import tyro
 
 from robocov.errors import InputError, to_one_line
 from robocov.mapfile import load_map
+from robocov_app.commands.options import JsonOption
 from robocov_app.formats import EXPORTERS, WriteOptions, export_map, exporter
-from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.output import echo, require_fresh, tell
 
 

@@ -21,7 +21,7 @@ from robocov.errors import (
 from robocov.files.writing import resolve_target
 from robocov.mapfile import dump_map, list_bundled_maps, load_map, save_map
 from robocov.mapfile.check import check_map
-from robocov_app.runs.options import PlotOptions
+from robocov_app.commands.options import FigureOptions
 from robocov_app.terminal.output import echo, require_fresh, tell
 from robocov_app.terminal.progress import progress
 
@@ -33,12 +33,12 @@ _SETTLED = ("kind", "seed", "obstacles", "area", "gap", "side", "width", "height
 
 
 @dataclass
-class Arguments(PlotOptions):
+class Arguments(FigureOptions):
     """Make random maps, by a seed: the same words give the same map.
 
     The kinds are polygons (scattered obstacles), blocks (a town), rooms (a building), mazes and caves. The
     free space of each is one piece, no passage of it is narrower than the gap, and it has the starts
-    corner, centre and uniform. Without --out the map is printed.
+    corner, center and uniform. Without --out the map is printed.
 
     With --count the maps of as many seeds, one after the other, go to a folder.
     With --study the maps go there that robocov paper draws by chance, with its starts.

@@ -9,9 +9,9 @@ import tyro
 
 from robocov.errors import InputError, to_one_line
 from robocov.mapfile import save_map
+from robocov_app.commands.options import JsonOption
 from robocov_app.figures.files import check_figure_path
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, import_map
-from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.output import require_fresh, tell
 from robocov_app.terminal.progress import progress
 

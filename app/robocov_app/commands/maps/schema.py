@@ -6,7 +6,7 @@ from typing import Literal
 
 import tyro
 
-from robocov_app.runs.options import JsonOption
+from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.output import echo
 
 

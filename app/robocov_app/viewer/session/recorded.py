@@ -16,7 +16,7 @@ from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.record import Record
 from robocov.team import Team
-from robocov_app.runs.saved import Saved, roster_of
+from robocov_app.runs.saved_runs import SavedRun, build_roster
 from robocov_app.viewer.session.moments import MOST_BYTES, History, Moment, PaneSetup, State
 from robocov_app.viewer.session.pane import SENSED_EVERY, Pane, resumed
 from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Scenario, TeamSpec
@@ -56,7 +56,7 @@ class LostController(ControllerChoice):
         raise AssertionError
 
 
-def replayed_session(saved: Sequence[Saved], controllers: Sequence[str] = ()) -> Session:
+def replayed_session(saved: Sequence[SavedRun], controllers: Sequence[str] = ()) -> Session:
     """Return a session whose past is a saved run, or the runs of a comparison side by side.
 
     Its beginning is looked at, and it plays. `controllers`: those that may be loaded beside the built-in
@@ -66,7 +66,7 @@ def replayed_session(saved: Sequence[Saved], controllers: Sequence[str] = ()) ->
     saved = [each._replace(record=_paced(each.record)) for each in saved]
     records = [each.record for each in saved]
     _check(saved)
-    rosters = [roster_of(record) for record in records]
+    rosters = [build_roster(record) for record in records]
     first, dt = records[0], control_dt(records[0])
     limits, environment = TeamSpec.of(first.team, rosters[0].numbers), rosters[0].environment
     laws = [law_of(record, controllers) for record in records]
@@ -127,7 +127,7 @@ def law_of(record: Record, controllers: Sequence[str] = ()) -> ControllerChoice:
         return LostController(record.controller, gains, record.label, str(error))
 
 
-def _check(saved: Sequence[Saved]) -> None:
+def _check(saved: Sequence[SavedRun]) -> None:
     if not 1 <= len(saved) <= MOST_PANES:
         known = f"{len(saved)} runs, but the window has room for {MOST_PANES}; --frames and --video show all"
         raise InputError(f"{saved[0].folder.parent}: {known}")
@@ -141,7 +141,7 @@ def _check(saved: Sequence[Saved]) -> None:
             ("dt_s", record.dt, first.dt),
             ("moments", len(record), len(first)),
             ("team", record.team.to_dict(), first.team.to_dict()),
-            ("robots", roster_of(record).numbers, roster_of(first).numbers),
+            ("robots", build_roster(record).numbers, build_roster(first).numbers),
             ("conditions", record.conditions, first.conditions),
         ):
             if mine != others:
@@ -201,7 +201,7 @@ def _memories_of(record: Record, law: ControllerChoice) -> list[Any]:
     return found + [None] * (len(record) - len(found))
 
 
-def _put(pane: Pane, saved: Saved, history: History) -> None:
+def _put(pane: Pane, saved: SavedRun, history: History) -> None:
     record, last = saved.record, history.last
     state = last.states[pane.number]
     standing = replace(state.setup, law=_standing(state.setup.law))

@@ -14,7 +14,7 @@ from typing import Any
 
 from robocov.controllers import CONTROLLERS
 from robocov.errors import OutputError
-from robocov_app.runs.saved import folder_names
+from robocov_app.runs.saved_runs import name_folders
 from robocov_app.terminal.output import echo, free_name
 from robocov_app.toolkit import autosave
 from robocov_app.viewer.session.changes import Restart, SetController
@@ -111,7 +111,7 @@ class RunSaver:
         session.require_document()
         named = map_name.replace("\\", "/").rpartition("/")[2].removesuffix(".json")
         laws = [pane.law.name for pane in session.panes]
-        what = folder_names(laws)[0] if len(laws) == 1 else "comparison"
+        what = name_folders(laws)[0] if len(laws) == 1 else "comparison"
         stem = re.sub(r"[^\w.-]+", "-", named or session.environment.name).strip(".-")[:64] or "map"
         target = _made(folder, f"{stem}-{what}")
         temporary = tempfile.TemporaryDirectory(prefix="robocov-")

@@ -10,7 +10,7 @@ from robocov.errors import ParameterError
 from robocov.record import Record
 from robocov.simulation import Simulation
 from robocov_app.cli import main
-from robocov_app.runs.options import ConditionOptions
+from robocov_app.commands.options import ConditionOptions
 
 
 def test_nothing_said_is_no_conditions() -> None:

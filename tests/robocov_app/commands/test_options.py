@@ -6,15 +6,15 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov_app.commands import cost, demo, optimum
-from robocov_app.runs.options import FilmOptions, RunOptions
-from robocov_app.terminal.arguments import parsed_gains
+from robocov_app.commands.options import RunOptions, VideoOptions
+from robocov_app.terminal.arguments import parse_gains
 from robocov_app.viewer.costs import Costs
 
 SQUARE = Environment("square", ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)))
 
 
 def test_gains_are_json_values() -> None:
-    assert parsed_gains(("k_rep=0.3", "attraction_limit=null", "n=2")) == {
+    assert parse_gains(("k_rep=0.3", "attraction_limit=null", "n=2")) == {
         "k_rep": 0.3,
         "attraction_limit": None,
         "n": 2,
@@ -24,7 +24,7 @@ def test_gains_are_json_values() -> None:
 @given(st.lists(st.text(max_size=12), max_size=3))
 def test_any_texts_are_gains_or_refused_in_one_line(texts: list[str]) -> None:
     try:
-        parsed_gains(tuple(texts))
+        parse_gains(tuple(texts))
     except ParameterError as error:
         assert str(error).startswith("--set")
         assert "\n" not in str(error)
@@ -32,9 +32,9 @@ def test_any_texts_are_gains_or_refused_in_one_line(texts: list[str]) -> None:
 
 @pytest.mark.parametrize(("text", "size"), [("640x480", (640, 480)), ("800X600", (800, 600)), (None, None)])
 def test_picture_sizes(text: str | None, size: tuple[int, int] | None) -> None:
-    options = FilmOptions(size=text)  # type: ignore[arg-type]
-    assert options.picture_size() == size
-    assert options.film_size() == (size or (1280, 720))
+    options = VideoOptions(size=text)  # type: ignore[arg-type]
+    assert options.parse_size() == size
+    assert options.build_settings().video_size == (size or (1280, 720))
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_values_out_of_range_are_refused(wrong: dict[str, object]) -> None:
 )
 def test_films_out_of_range_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(ParameterError, match=r"wanted|expected"):
-        FilmOptions(**wrong)  # type: ignore[arg-type]
+        VideoOptions(**wrong)  # type: ignore[arg-type]
 
 
 def test_options_have_the_defaults_of_the_library() -> None:
@@ -67,7 +67,7 @@ def test_options_have_the_defaults_of_the_library() -> None:
     from robocov_app.commands.run import Arguments as Run
 
     assert Run().controller == Compare().controllers[0] == RECOMMENDED_CONTROLLER
-    assert RunOptions().made_team().to_dict() == Team.homogeneous(6).to_dict()
+    assert RunOptions().build_team().to_dict() == Team.homogeneous(6).to_dict()
 
 
 def test_every_cost_is_evaluated_on_the_same_lattice_unless_told() -> None:

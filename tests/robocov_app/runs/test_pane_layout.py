@@ -7,8 +7,10 @@ from drawn_run import CORRIDOR, ROOMS, SHAFT, run_of
 from robocov.metrics import CostHistory
 from robocov_app.render.picture import pane_layers
 from robocov_app.render.theme import DARK, LIGHT
-from robocov_app.runs.film import comparison_frames, frame_rows, iter_frames, pane_layout, tiled
-from robocov_app.runs.options import FilmOptions
+from robocov_app.runs.frames import draw_frames, select_frame_rows
+from robocov_app.runs.pane_layout import build_pane_layout, tile_frames
+from robocov_app.runs.settings import VideoSettings
+from robocov_app.runs.video import draw_comparison_frames
 
 
 def known(record):
@@ -17,15 +19,15 @@ def known(record):
 
 
 def film(records, theme="light", colours="robots", size=None, speed=4.0):
-    style = FilmOptions(theme=theme, colours=colours, fps=5, film_speed=speed)
-    layout = pane_layout(records, style, size)
+    style = VideoSettings(theme=theme, colours=colours, fps=5, speed=speed)
+    layout = build_pane_layout(records, style, size)
     costs = [known(record) for record in records]
-    return layout, comparison_frames(records, costs, layout, style)
+    return layout, draw_comparison_frames(records, costs, layout, style)
 
 
 def test_frames_stand_in_rows_and_a_place_may_be_free():
     greys = [np.full((48, 64, 3), 20 * k, dtype=np.uint8) for k in range(1, 6)]
-    frame = tiled(greys, 3, gap=2, line=(99, 98, 97), blank=(1, 2, 3))
+    frame = tile_frames(greys, 3, gap=2, line=(99, 98, 97), blank=(1, 2, 3))
     assert frame.shape == (2 * 48 + 2, 3 * 64 + 2 * 2, 3)
     for k in range(5):
         row, column = divmod(k, 3)
@@ -41,7 +43,7 @@ class TestLayout:
         [(ROOMS, 1, 1), (ROOMS, 2, 2), (ROOMS, 3, 3), (ROOMS, 4, 2), (CORRIDOR, 3, 1), (SHAFT, 4, 4)],
     )
     def test_wide_maps_stand_below_each_other(self, environment, count, columns):
-        layout = pane_layout([run_of(environment, 3)] * count, FilmOptions())
+        layout = build_pane_layout([run_of(environment, 3)] * count, VideoSettings())
         assert layout.columns == columns
         assert layout.size[0] <= 1920 and layout.size[1] <= 1090
         assert layout.size[0] % 2 == layout.size[1] % 2 == 0
@@ -74,16 +76,16 @@ class TestFrames:
     def test_the_longest_run_ends_it(self):
         short, long = run_of(ROOMS, 2, steps=11), run_of(ROOMS, 2, steps=41)
         _, frames = film([short, long], size=(640, 300), speed=1.0)
-        assert sum(1 for _ in frames) == len(frame_rows(long.time, 5))
+        assert sum(1 for _ in frames) == len(select_frame_rows(long.time, 5))
 
     def test_each_pane_is_the_film_of_its_own_run(self):
         first = run_of(ROOMS, 3, steps=21)
         second = replace(first, positions=first.positions[:, ::-1] + 0.4)
         for records in ([first, second], [second, first]):
             layout, frames = film(records, size=(1280, 640))
-            style, layers = FilmOptions(fps=5), pane_layers("robots")
+            style, layers = VideoSettings(fps=5), pane_layers("robots")
             cost = known(records[1])
-            alone = iter_frames(
+            alone = draw_frames(
                 records[1], style, layers=layers, cost=cost, size=layout.pane, scale=layout.scale
             )
             for frame, wanted in zip(frames, alone, strict=True):
@@ -93,12 +95,12 @@ class TestFrames:
     def test_one_legend_explains_what_any_of_them_shows(self):
         without = run_of(ROOMS, 3, controller="rpf")
         with_goals = replace(without, goals=without.positions + 0.1)
-        plain_header = pane_layout([without, without], FilmOptions()).header
-        both = pane_layout([without, with_goals], FilmOptions()).header
+        plain_header = build_pane_layout([without, without], VideoSettings()).header
+        both = build_pane_layout([without, with_goals], VideoSettings()).header
         assert plain_header.shape == both.shape
         ink = [int((header != 255).any(axis=2).sum()) for header in (plain_header, both)]
         assert ink[1] > ink[0] + 100  # the cell centroid
-        twice = pane_layout([with_goals, with_goals], FilmOptions()).header
+        twice = build_pane_layout([with_goals, with_goals], VideoSettings()).header
         assert (twice == both).all()
 
     @pytest.mark.slow

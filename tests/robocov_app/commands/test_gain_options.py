@@ -1,19 +1,19 @@
 import pytest
 
 from robocov.errors import ParameterError
-from robocov_app.runs.artifacts import gains_for
+from robocov_app.commands.gain_options import select_gains
 
 NAMES = ("rapf", "rpf", "lloyd")
 
 
 def test_a_gain_goes_to_every_controller_that_has_it() -> None:
-    assert gains_for(NAMES, {"k_rep": 1, "k_att": 3}) == [{"k_rep": 1, "k_att": 3}, {"k_rep": 1}, {}]
+    assert select_gains(NAMES, {"k_rep": 1, "k_att": 3}) == [{"k_rep": 1, "k_att": 3}, {"k_rep": 1}, {}]
 
 
 @pytest.mark.parametrize("order", [("k_rep", "rpf.k_rep"), ("rpf.k_rep", "k_rep")])
 def test_what_is_said_of_one_counts_for_more(order: tuple[str, str]) -> None:
     given = {key: {"k_rep": 1, "rpf.k_rep": 2}[key] for key in order}
-    assert gains_for(NAMES, given) == [{"k_rep": 1}, {"k_rep": 2}, {}]
+    assert select_gains(NAMES, given) == [{"k_rep": 1}, {"k_rep": 2}, {}]
 
 
 @pytest.mark.parametrize(
@@ -26,4 +26,4 @@ def test_what_is_said_of_one_counts_for_more(order: tuple[str, str]) -> None:
 )
 def test_a_gain_of_nobody_is_refused(key: str, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        gains_for(NAMES, {key: 1})
+        select_gains(NAMES, {key: 1})

@@ -1,0 +1,45 @@
+"""Gains of several controllers from the option ``--set``."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from robocov.controllers import get_gains, load_controller_class
+from robocov.errors import ParameterError, describe_unknown_name
+
+
+def select_gains(controllers: Sequence[str], gains: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Select the gains of each controller.
+
+    Parameters
+    ----------
+    controllers : sequence of str
+        Names of the controllers.
+    gains : mapping of str to object
+        A key such as ``k_rep`` applies to all controllers that have the gain; ``rapf.k_rep`` applies to one,
+        and takes precedence.
+
+    Returns
+    -------
+    list of dict
+        The gains of each controller.
+
+    Raises
+    ------
+    ParameterError
+        If no controller has a gain, or a key names an unknown controller.
+    """
+    known = {name: get_gains(load_controller_class(name)) for name in controllers}
+    selected: list[dict[str, Any]] = [{} for _ in controllers]
+    # Keys of one controller come last, and overwrite those of all.
+    for key, value in sorted(gains.items(), key=lambda item: "." in item[0]):
+        owner, _, gain = key.rpartition(".")
+        if owner and owner not in known:
+            raise ParameterError(f"--set {key}: {describe_unknown_name('controller', owner, known)}")
+        candidates = [owner] if owner else controllers
+        if not any(gain in known[name] for name in candidates):
+            all_gains = {gain for name in candidates for gain in known[name]}
+            raise ParameterError(f"--set {key}: {describe_unknown_name('gain', gain, all_gains)}")
+        for name, values in zip(controllers, selected, strict=True):
+            if name in candidates and gain in known[name]:
+                values[gain] = value
+    return selected

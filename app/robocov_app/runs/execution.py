@@ -1,0 +1,173 @@
+"""Execution of one scenario: simulate, evaluate, and save the numbers."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, nullcontext, redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from robocov.cost import CoverageCost
+from robocov.files.result_folder import ResultFolder
+from robocov.metrics import CostHistory, compute_cost_history, select_sampled_moments, summarize
+from robocov.metrics.cost_history import DEFAULT_RATE_HZ
+from robocov.record import Record
+from robocov.scenario import Scenario
+from robocov_app.runs.settings import OutputSettings
+from robocov_app.terminal.interruption import Interruption
+from robocov_app.terminal.output import finite, write_csv
+from robocov_app.terminal.progress import counting, progress
+
+MAX_SAMPLES_AFTER_INTERRUPTION = 200
+"""Maximum number of samples of the coverage cost of a run that was interrupted."""
+_STEPS_PER_PROGRESS_UPDATE = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A finished or interrupted run with its evaluation.
+
+    Attributes
+    ----------
+    record : Record
+    history : CostHistory
+    summary : dict
+        See `robocov.metrics.summarize`.
+    """
+
+    record: Record
+    history: CostHistory
+    summary: dict[str, Any]
+
+    @property
+    def final_time(self) -> float | None:
+        """Mean time until the first robot arrives, at the end of the run, s; None if speeds are equal."""
+        return None if self.history.mean_time is None else float(self.history.mean_time[-1])
+
+
+def execute_scenario(
+    scenario: Scenario,
+    cost: CoverageCost,
+    result: ResultFolder,
+    subfolder: str,
+    settings: OutputSettings,
+    interruption: Interruption,
+) -> Run:
+    """Simulate a scenario, evaluate the run, and save its numbers.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    cost : CoverageCost
+        Cost of the scenario's map.
+    result : ResultFolder
+    subfolder : str
+        Name of the folder in the result; empty for the result itself.
+    settings : OutputSettings
+    interruption : Interruption
+        The run ends early if it is requested.
+
+    Returns
+    -------
+    Run
+    """
+    record = _simulate(scenario, settings, interruption)
+    record.save(result.staging / subfolder)
+    # The record took the longest. It is safe before the evaluation begins.
+    result.save_progress()
+    run = evaluate_record(record, cost, interruption, quiet=settings.quiet)
+    save_numbers(run, result.staging / subfolder, settings.lattice)
+    result.save_progress()
+    return run
+
+
+def _simulate(scenario: Scenario, settings: OutputSettings, interruption: Interruption) -> Record:
+    """Simulate a scenario to its end, or until it is interrupted."""
+    simulation = scenario.build_simulation()
+    redirected: AbstractContextManager[Any] = nullcontext()
+    if settings.quiet:
+        # What a user's controller prints must not be mixed with the JSON answer.
+        redirected = redirect_stdout(sys.stderr)
+    title = f"simulating {simulation.controller.label}"
+    with redirected, progress(title, scenario.steps, quiet=settings.quiet) as update:
+
+        def report_step(step: int) -> bool:
+            is_due = step % _STEPS_PER_PROGRESS_UPDATE == 0
+            if is_due or step == scenario.steps or interruption.requested:
+                update(step)
+            return interruption.requested
+
+        return scenario.run(simulation, every=settings.record_every, should_stop=report_step)
+
+
+def evaluate_record(record: Record, cost: CoverageCost, interruption: Interruption, *, quiet: bool) -> Run:
+    """Compute the coverage cost along a record, and its summary.
+
+    Parameters
+    ----------
+    record : Record
+    cost : CoverageCost
+        Cost of the record's map.
+    interruption : Interruption
+        After an interruption, fewer moments are evaluated.
+    quiet : bool
+        Whether progress is not shown.
+
+    Returns
+    -------
+    Run
+    """
+    rate = DEFAULT_RATE_HZ
+    end = float(record.time[-1])
+    if interruption.requested and end > 0:
+        rate = min(rate, MAX_SAMPLES_AFTER_INTERRUPTION / end)
+    samples = len(select_sampled_moments(record, rate))
+    with progress("coverage cost", samples, quiet=quiet) as update:
+        history = compute_cost_history(record, cost, rate, counting(update))
+    return Run(record, history, summarize(record, history))
+
+
+def save_numbers(run: Run, folder: Path, lattice: int) -> None:
+    """Write ``record.npz``, ``run.json`` and ``cost.csv``.
+
+    Parameters
+    ----------
+    run : Run
+    folder : Path
+    lattice : int
+        Lattice on which the cost was computed.
+
+    Raises
+    ------
+    OutputError
+        If a file cannot be written.
+    """
+    run.record.save(folder, finite(run.summary), lattice=lattice)
+    write_csv(folder / "cost.csv", *build_cost_table(run.history))
+
+
+def build_cost_table(history: CostHistory) -> tuple[str, Iterator[tuple[float, ...]]]:
+    """Build the content of ``cost.csv``.
+
+    Parameters
+    ----------
+    history : CostHistory
+
+    Returns
+    -------
+    header : str
+        It contains a column of times only if some robots are faster than others.
+    rows : iterator of tuple of float
+    """
+    columns = {
+        "time_s": history.time,
+        "mean_distance_m": history.mean_distance,
+        "cost_m3": history.cost,
+        "uncovered_area_m2": history.uncovered_area,
+    }
+    if history.mean_time is not None:
+        columns["mean_time_s"] = history.mean_time
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return ",".join(columns), rows

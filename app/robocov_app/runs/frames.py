@@ -1,0 +1,135 @@
+"""Frames of recorded runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+import numpy as np
+
+from robocov.arrays import Array, IntArray
+from robocov.metrics import CostHistory
+from robocov.record import Record
+from robocov_app.render.density import cost_label, mean_label
+from robocov_app.render.distance_field import Fields
+from robocov_app.render.layers import Layer
+from robocov_app.render.picture import Painter, standard_layers
+from robocov_app.render.scene import record_scene
+from robocov_app.runs.encoding import Frame
+from robocov_app.runs.settings import VideoSettings
+
+_TIME_TOLERANCE_S = 5e-7
+"""Times are sums of steps; this covers their rounding errors."""
+
+
+def select_frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
+    """Select the moment of a run that each frame of a video shows.
+
+    Parameters
+    ----------
+    time : (T,) array, s
+        Ascending times of the moments.
+    fps : float
+        Frames per second of the video.
+    speed : float
+        Simulated seconds per second of the video.
+    hold : float, s
+        Duration for which the video shows the last moment.
+
+    Returns
+    -------
+    (k,) int array
+        Numbers of the moments.
+    """
+    duration = float(time[-1] - time[0])
+    count = int(np.ceil(duration / speed * fps - 1e-9)) + 1
+    frame_times = time[0] + np.arange(count + round(hold * fps)) * (speed / fps)
+    rows = np.searchsorted(time, frame_times + _TIME_TOLERANCE_S, side="right") - 1
+    return np.asarray(np.clip(rows, 0, len(time) - 1), dtype=np.intp)
+
+
+def draw_frames(
+    record: Record,
+    settings: VideoSettings,
+    *,
+    size: tuple[int, int] = (1280, 720),
+    layers: Sequence[Layer] | None = None,
+    scale: float | None = None,
+    cost: CostHistory | None = None,
+    rows: IntArray | None = None,
+    fields: Fields | None = None,
+) -> Iterator[Frame]:
+    """Draw the frames of a recorded run.
+
+    Parameters
+    ----------
+    record : Record
+    settings : VideoSettings
+    size : (width, height), px
+    layers : sequence of Layer or None
+        The standard layers by default.
+    scale : float or None
+        Scale of texts and lines; by default one that suits the size.
+    cost : CostHistory or None
+        The coverage cost along the run. Each frame shows the latest value.
+    rows : (k,) int array or None
+        Numbers of the moments that the frames show; those of `select_frame_rows` by default.
+    fields : Fields or None
+        Distances to the nearest robot, if a layer shows them.
+
+    Yields
+    ------
+    Frame
+    """
+    painter = build_painter(record, settings, size, layers or standard_layers(settings.colours), scale)
+    if rows is None:
+        rows = select_frame_rows(record.time, settings.fps, settings.speed)
+    for row, repetitions in groupby(rows.tolist()):
+        scene = record_scene(
+            record,
+            row,
+            cost=_describe_cost(record, cost, float(record.time[row])),
+            fields=fields if painter.needs_field else None,
+        )
+        frame = painter.frame(scene)
+        for _ in repetitions:
+            yield frame
+
+
+def build_painter(
+    record: Record,
+    settings: VideoSettings,
+    size: tuple[int, int],
+    layers: Sequence[Layer],
+    scale: float | None,
+) -> Painter:
+    """Build the painter of a record's map.
+
+    Parameters
+    ----------
+    record : Record
+    settings : VideoSettings
+    size : (width, height), px
+    layers : sequence of Layer
+    scale : float or None
+        Scale of texts and lines; by default one that suits the size.
+
+    Returns
+    -------
+    Painter
+    """
+    painter = Painter(record.environment, size, settings.colour_theme, layers, scale)
+    painter.change(settings.shown_layers, settings.hidden_layers)
+    return painter
+
+
+def _describe_cost(record: Record, cost: CostHistory | None, time: float) -> str:
+    """Return a text with the latest known cost at a time; empty if there is none."""
+    if cost is None:
+        return ""
+    known_count = int(np.searchsorted(cost.time, time + _TIME_TOLERANCE_S, side="right"))
+    if known_count == 0:
+        return ""
+    latest = known_count - 1
+    mean_time = None if cost.mean_time is None else cost.mean_time[latest]
+    return cost_label(mean_label(record.environment), cost.mean_distance[latest], mean_time)

@@ -1,0 +1,222 @@
+"""Layout of videos of several runs side by side, under a legend that they share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from robocov.record import Record
+from robocov_app.render.annotations import LEGEND_ROW, MARGIN, STRIP, legend_picture
+from robocov_app.render.canvas import LegendEntry
+from robocov_app.render.distance_field import Fields
+from robocov_app.render.layout import columns_for, united
+from robocov_app.render.picture import Painter, pane_layers, scale_for
+from robocov_app.render.scene import Scene, record_scene
+from robocov_app.render.theme import Colour, Theme
+from robocov_app.runs.encoding import Frame
+from robocov_app.runs.frames import build_painter
+from robocov_app.runs.settings import VideoSettings
+
+MAX_DEFAULT_SIZE_PX = (1920, 1080)
+"""Maximum size of a video of several panes whose size is not given."""
+PANE_GAP_PX = 2
+"""Width of the line between two panes."""
+_MIN_PANE_WIDTH_PX = 360
+"""Minimum width of a pane at scale 1, in which its caption fits."""
+_MIN_PANE_HEIGHT_PX = 40
+_MIN_SCALE = 0.75
+_HEADER_PADDING_PX = 6
+_PANE_PADDING_PX = 4
+
+
+class PaneLayout(NamedTuple):
+    """Layout of a video of several panes.
+
+    Attributes
+    ----------
+    columns : int
+        Number of panes in a row.
+    pane : (width, height), px
+        Size of each pane.
+    scale : float
+        Scale of texts and lines.
+    header : Frame
+        The legend, as wide as the video.
+    size : (width, height), px
+        Size of the video.
+    """
+
+    columns: int
+    pane: tuple[int, int]
+    scale: float
+    header: Frame
+    size: tuple[int, int]
+
+    def compose_page(self, panes: Sequence[Frame], theme: Theme) -> Frame:
+        """Compose a frame of the video from the frames of its panes.
+
+        Parameters
+        ----------
+        panes : sequence of Frame
+            One for each pane.
+        theme : Theme
+
+        Returns
+        -------
+        Frame
+        """
+        width, height = self.size
+        page = np.full((height, width, 3), theme.background, dtype=np.uint8)
+        header_height, header_width = self.header.shape[:2]
+        page[:header_height, :header_width] = self.header
+        body = tile_frames(panes, self.columns, PANE_GAP_PX, theme.grid, theme.background)
+        target = page[header_height:][: body.shape[0], : body.shape[1]]
+        target[:] = body[: target.shape[0], : target.shape[1]]
+        return page
+
+
+class _PaneSpace(NamedTuple):
+    """Space around the map of a pane, px."""
+
+    horizontal: float
+    vertical: float
+
+
+def build_pane_layout(
+    records: Sequence[Record],
+    settings: VideoSettings,
+    size: tuple[int, int] | None = None,
+    fields: Fields | None = None,
+    legend_scenes: Sequence[Scene] | None = None,
+) -> PaneLayout:
+    """Lay out panes so that the maps are as large as possible: wide maps one below the other.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        One for each pane.
+    settings : VideoSettings
+    size : (width, height) or None, px
+        Size of the video. By default one that suits the map, up to `MAX_DEFAULT_SIZE_PX`.
+    fields : Fields or None
+        Distances to the nearest robot, if a layer shows them.
+    legend_scenes : sequence of Scene or None
+        The scenes that the legend explains. By default the first moments of the records, and the last ones
+        of those in which robots fail.
+
+    Returns
+    -------
+    PaneLayout
+    """
+    aspect = max(_compute_aspect(record) for record in records)
+    width, height = size or MAX_DEFAULT_SIZE_PX
+    columns = _count_columns(len(records), aspect, (width, height))
+    rows = -(-len(records) // columns)
+    scale = scale_for((width, height))
+    scale = max(min(scale, width / columns / _MIN_PANE_WIDTH_PX), _MIN_SCALE)
+    pane_width = (width - (columns - 1) * PANE_GAP_PX) // columns
+    pane_height = 0
+    if size is None:
+        max_height = (height - (_HEADER_PADDING_PX + LEGEND_ROW) * scale) / rows - PANE_GAP_PX
+        pane_width, pane_height = _fit_pane(aspect, pane_width, max_height, scale)
+        width = columns * pane_width + (columns - 1) * PANE_GAP_PX
+    header = _draw_legend(records, settings, width, scale, fields, legend_scenes)
+    gaps = (rows - 1) * PANE_GAP_PX
+    if size is None:
+        height = len(header) + rows * pane_height + gaps
+        # Video encoders need even sizes.
+        width += width % 2
+        height += height % 2
+    else:
+        pane_height = (height - len(header) - gaps) // rows
+    pane = (pane_width, max(pane_height, _MIN_PANE_HEIGHT_PX))
+    return PaneLayout(columns=columns, pane=pane, scale=scale, header=header, size=(width, height))
+
+
+def _compute_aspect(record: Record) -> float:
+    """Return the width of a record's map divided by its height."""
+    low_x, low_y, high_x, high_y = record.environment.region.bounds
+    return (high_x - low_x) / (high_y - low_y)
+
+
+def _count_columns(panes: int, aspect: float, size: tuple[int, int]) -> int:
+    width, height = size
+    scale = scale_for(size)
+    caption_height = (_HEADER_PADDING_PX + LEGEND_ROW + _HEADER_PADDING_PX + STRIP) * scale
+    return columns_for(panes, aspect, (width, height - LEGEND_ROW * scale), caption_height)
+
+
+def _fit_pane(aspect: float, max_width: int, max_height: float, scale: float) -> tuple[int, int]:
+    """Return the width and height of a pane that suit the map, px."""
+    space = _PaneSpace(
+        horizontal=(2 * MARGIN + _PANE_PADDING_PX) * scale,
+        vertical=(_HEADER_PADDING_PX + LEGEND_ROW + _HEADER_PADDING_PX + STRIP + _PANE_PADDING_PX) * scale,
+    )
+    height = round(min((max_width - space.horizontal) / aspect + space.vertical, max_height))
+    needed_width = round((height - space.vertical) * aspect + space.horizontal)
+    width = min(max_width, max(needed_width, round(_MIN_PANE_WIDTH_PX * scale)))
+    return width, height
+
+
+def _draw_legend(
+    records: Sequence[Record],
+    settings: VideoSettings,
+    width: int,
+    scale: float,
+    fields: Fields | None,
+    scenes: Sequence[Scene] | None,
+) -> Frame:
+    """Draw the legend of everything that the panes show."""
+    painter = build_painter(records[0], settings, (64, 64), pane_layers(settings.colours), scale)
+    if scenes is None:
+        scenes = _select_legend_scenes(records, fields, painter)
+    entries = [painter.legend_entries(scene) for scene in scenes]
+    # The order of the longest legend is kept, because it mostly contains all entries.
+    entries.sort(key=len)
+    entries.reverse()
+    merged = united(entries, LegendEntry.key)
+    return legend_picture(merged, width, settings.colour_theme, scale, settings.shown_layers)
+
+
+def _select_legend_scenes(records: Sequence[Record], fields: Fields | None, painter: Painter) -> list[Scene]:
+    shown_fields = fields if painter.needs_field else None
+    scenes = []
+    for record in records:
+        scenes.append(record_scene(record, 0, fields=shown_fields))
+        if record.conditions and len(record) > 1:
+            scenes.append(record_scene(record, len(record) - 1, fields=shown_fields))
+    return scenes
+
+
+def tile_frames(frames: Sequence[Frame], columns: int, gap: int, line: Colour, background: Colour) -> Frame:
+    """Join frames of one size in rows.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+    columns : int
+        Number of frames in a row.
+    gap : int, px
+        Width of the lines between frames.
+    line, background : Colour
+        Colours of these lines, and of places without a frame.
+
+    Returns
+    -------
+    Frame
+    """
+    height, width, _ = frames[0].shape
+    rows = -(-len(frames) // columns)
+    columns = min(columns, len(frames))
+    shape = (rows * (height + gap) - gap, columns * (width + gap) - gap, 3)
+    page = np.full(shape, background, dtype=np.uint8)
+    for k, frame in enumerate(frames):
+        row, column = divmod(k, columns)
+        x = column * (width + gap)
+        y = row * (height + gap)
+        page[y : y + height, x : x + width] = frame
+        page[y : y + height, max(x - gap, 0) : x] = line
+        page[max(y - gap, 0) : y] = line
+    return page

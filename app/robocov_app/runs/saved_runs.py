@@ -1,0 +1,183 @@
+"""Saved runs and comparisons, read back; names of their folders."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import Field
+
+from robocov.environment import CircleObstacle, Environment
+from robocov.errors import InputError
+from robocov.files.documents import Document, expect, read_document
+from robocov.files.result_folder import complete_commit
+from robocov.metrics import CostHistory
+from robocov.metrics.results import read_history
+from robocov.record import Record
+
+_MAX_FOLDER_NAME_CHARS = 64
+
+
+class ComparisonDocument(Document):
+    """The content of ``comparison.json``. It has no `runs` until the comparison has ended."""
+
+    folders: list[Annotated[str, Field(pattern=r"^[^./\\\x00][^/\\\x00]*$"), expect("the name of a folder")]]
+    runs: list[dict[str, Any]] = Field([])
+
+
+class SavedRun(NamedTuple):
+    """A run that was read from its folder.
+
+    Attributes
+    ----------
+    folder : Path
+    record : Record
+    history : CostHistory or None
+        The content of ``cost.csv``, if it exists.
+    """
+
+    folder: Path
+    record: Record
+    history: CostHistory | None
+
+
+class Roster(NamedTuple):
+    """The robots of a record from the window, in which robots fail and keep their numbers.
+
+    Attributes
+    ----------
+    environment : Environment
+        The map without the robots that failed.
+    numbers : tuple of int
+        Numbers of the robots of the record.
+    failed : dict of int to (x, y), m
+        Positions of the robots that failed, by number.
+    """
+
+    environment: Environment
+    numbers: tuple[int, ...]
+    failed: dict[int, tuple[float, float]]
+
+
+def load_saved_runs(path: Path) -> list[SavedRun]:
+    """Load a run, or the runs of a comparison.
+
+    Parameters
+    ----------
+    path : Path
+        The folder, or its ``run.json`` or ``comparison.json``.
+
+    Returns
+    -------
+    list of SavedRun
+        If a comparison was killed, the runs that were saved before.
+
+    Raises
+    ------
+    InputError
+        If it is not the folder of a run or a comparison, or a file in it cannot be used.
+    """
+    is_file = path.name in ("run.json", "comparison.json") and not path.is_dir()
+    folder = path.parent if is_file else path
+    complete_commit(folder)
+    comparison_path = folder / "comparison.json"
+    if comparison_path.is_file():
+        return _load_comparison(comparison_path)
+    if not (folder / "run.json").is_file():
+        raise InputError(
+            f"{folder}: not the folder of a run or a comparison (there is no run.json and no comparison.json)"
+        )
+    return [_load_run(folder)]
+
+
+def _load_comparison(path: Path) -> list[SavedRun]:
+    """Load the runs of a comparison, which must have the same map."""
+    content = read_document(path, ComparisonDocument, "robocov-comparison", 1)
+    folders = [path.parent / name for name in content.folders]
+    for folder in folders:
+        if folder.is_symlink():
+            raise InputError(f"{folder}: expected a folder in that of the comparison, got a link")
+    is_complete = bool(content.runs)
+    saved = [_load_run(folder) for folder in folders if is_complete or (folder / "run.json").is_file()]
+    if not saved:
+        raise InputError(f"{path}: expected at least one run, got none")
+    first = build_roster(saved[0].record).environment
+    for run in saved[1:]:
+        environment = build_roster(run.record).environment
+        if (environment.boundary, environment.obstacles) != (first.boundary, first.obstacles):
+            raise InputError(f"{run.folder / 'run.json'}: expected the same map as in {saved[0].folder}")
+    return saved
+
+
+def build_roster(record: Record) -> Roster:
+    """Find the numbers of the robots in a record, and the robots that failed.
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    Roster
+        Unless the record is part of a session in the window, robots are numbered from 1 and none has failed.
+    """
+    environment = record.environment
+    default_numbers = tuple(range(1, len(record.team) + 1))
+    numbers = tuple(record.session.get("robots", default_numbers))
+    failed = {int(number): (x, y) for number, (x, y) in record.session.get("failed", {}).items()}
+    failed_names = {name_failed_robot(number) for number in failed}
+    remaining = tuple(
+        obstacle
+        for obstacle in environment.obstacles
+        if not isinstance(obstacle, CircleObstacle) or obstacle.name not in failed_names
+    )
+    is_consistent = (
+        len(numbers) == len(default_numbers)
+        and len({*numbers, *failed}) == len(numbers) + len(failed)
+        and len(environment.obstacles) - len(remaining) == len(failed)
+    )
+    if not is_consistent:
+        return Roster(environment, default_numbers, {})
+    return Roster(replace(environment, obstacles=remaining), numbers, failed)
+
+
+def name_failed_robot(number: int) -> str:
+    """Return the name of the obstacle that stands for a failed robot."""
+    return f"failed robot {number}"
+
+
+def name_folders(controllers: Sequence[str]) -> list[str]:
+    """Choose a folder name for each controller.
+
+    Parameters
+    ----------
+    controllers : sequence of str
+        Names of controllers.
+
+    Returns
+    -------
+    list of str
+        Different names that are valid for folders.
+
+    Examples
+    --------
+    >>> name_folders(["rapf", "mine.py:Mine", "other/mine.py:Mine"])
+    ['rapf', 'Mine', 'Mine-2']
+    """
+    folders: list[str] = []
+    for controller in controllers:
+        name = controller.rpartition(":")[2]
+        stem = re.sub(r"[^\w.-]+", "-", name).strip(".-")[:_MAX_FOLDER_NAME_CHARS] or "controller"
+        same_stem = re.compile(re.escape(stem) + r"(-\d+)?")
+        number = 1 + sum(same_stem.fullmatch(folder) is not None for folder in folders)
+        folders.append(stem if number == 1 else f"{stem}-{number}")
+    return folders
+
+
+def _load_run(folder: Path) -> SavedRun:
+    history_path = folder / "cost.csv"
+    history = read_history(history_path) if history_path.exists() else None
+    return SavedRun(folder, Record.load(folder), history)

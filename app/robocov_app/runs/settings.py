@@ -1,0 +1,97 @@
+"""Settings of what is computed and drawn of runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from robocov.defaults import DEFAULT_LATTICE
+
+if TYPE_CHECKING:
+    from robocov_app.render.theme import Theme
+
+TrajectoryColours: TypeAlias = Literal["paper", "robots"]
+DEFAULT_VIDEO_SIZE_PX = (1280, 720)
+
+
+@dataclass(frozen=True)
+class VideoSettings:
+    """Frames and videos, and the look of figures.
+
+    Attributes
+    ----------
+    frames, video : bool
+        Whether frames are saved as PNG files, and whether a video is saved.
+    fps : float
+        Frames per second of the video.
+    speed : float
+        Simulated seconds per second of the video.
+    theme : str
+        Name of the colour theme, ``light`` or ``dark``.
+    colours : {"paper", "robots"}
+        Trajectories in the paper's red, or in a colour for each robot.
+    size : (width, height) or None, px
+        By default, a size that suits the content.
+    shown_layers, hidden_layers : frozenset of str
+        Layers that are shown in addition to the standard ones, and standard ones that are not shown.
+    """
+
+    frames: bool = False
+    video: bool = False
+    fps: float = 30
+    speed: float = 4.0
+    theme: str = "light"
+    colours: TrajectoryColours = "paper"
+    size: tuple[int, int] | None = None
+    shown_layers: frozenset[str] = frozenset()
+    hidden_layers: frozenset[str] = frozenset()
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether there is anything to save."""
+        return self.frames or self.video
+
+    @property
+    def video_size(self) -> tuple[int, int]:
+        """Size of the video of a single run, px."""
+        return self.size or DEFAULT_VIDEO_SIZE_PX
+
+    @property
+    def colour_theme(self) -> Theme:
+        """The colour theme.
+
+        Raises
+        ------
+        ParameterError
+            If there is none of this name.
+        """
+        from robocov_app.render.theme import theme_named
+
+        return theme_named(self.theme)
+
+
+@dataclass(frozen=True)
+class OutputSettings:
+    """Settings of the evaluation of runs and of their files.
+
+    Attributes
+    ----------
+    lattice : int
+        The coverage cost is computed on this number of sites along each side of the map.
+    record_every : int
+        The record contains one step in `record_every`.
+    overwrite : bool
+        Whether an earlier result in the folder is replaced.
+    figures : bool
+        Whether figures are saved.
+    quiet : bool
+        Whether progress is not shown, because the output is read by a program.
+    video : VideoSettings
+    """
+
+    lattice: int = DEFAULT_LATTICE
+    record_every: int = 1
+    overwrite: bool = False
+    figures: bool = True
+    quiet: bool = False
+    video: VideoSettings = field(default_factory=VideoSettings)

@@ -1,0 +1,197 @@
+"""Videos of runs: of one by itself, or of several side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import zip_longest
+from pathlib import Path
+
+import numpy as np
+
+from robocov.cost import CoverageCost, TimeVaryingCost
+from robocov.metrics import CostHistory
+from robocov.record import Record
+from robocov_app.render.distance_field import Fields, round_limit
+from robocov_app.render.picture import pane_layers
+from robocov_app.runs.cost import MIN_VIDEO_LATTICE, build_cost, refine_cost_for_figures
+from robocov_app.runs.encoding import Frame, save_frames_and_video
+from robocov_app.runs.execution import Run
+from robocov_app.runs.frames import draw_frames, select_frame_rows
+from robocov_app.runs.pane_layout import PaneLayout, build_pane_layout
+from robocov_app.runs.settings import VideoSettings
+from robocov_app.terminal.interruption import Interruption
+from robocov_app.terminal.progress import progress
+
+RUN_VIDEO = "run.mp4"
+COMPARISON_VIDEO = "comparison.mp4"
+VIDEO_HOLD_S = 1.0
+"""Duration for which a video shows its last moment."""
+_COLOUR_SCALE_FACTOR = 1.3
+"""Upper end of the colour scale of a video divided by the largest distance at its end."""
+
+
+def get_video_name(runs: int) -> str:
+    """Return the file name of the video of a number of runs."""
+    return COMPARISON_VIDEO if runs > 1 else RUN_VIDEO
+
+
+def draw_comparison_frames(
+    records: Sequence[Record],
+    costs: Sequence[CostHistory],
+    layout: PaneLayout,
+    settings: VideoSettings,
+    *,
+    hold: float = 0.0,
+    fields: Fields | None = None,
+) -> Iterator[Frame]:
+    """Draw the frames of several runs side by side.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        One for each pane. Panes of shorter runs stay at their last moment.
+    costs : sequence of CostHistory
+        Their costs.
+    layout : PaneLayout
+    settings : VideoSettings
+    hold : float, s
+        Duration for which the last moment is shown.
+    fields : Fields or None
+        Distances to the nearest robot, if a layer shows them.
+
+    Yields
+    ------
+    Frame
+    """
+    pane_videos = [
+        draw_frames(
+            record,
+            settings,
+            # Layers keep what they have drawn, so each pane needs its own.
+            layers=pane_layers(settings.colours),
+            cost=cost,
+            rows=select_frame_rows(record.time, settings.fps, settings.speed, hold),
+            size=layout.pane,
+            scale=layout.scale,
+            fields=fields,
+        )
+        for record, cost in zip(records, costs, strict=True)
+    ]
+    panes: list[Frame] = []
+    for new_panes in zip_longest(*pane_videos):
+        panes = [old if new is None else new for new, old in zip_longest(new_panes, panes)]
+        yield layout.compose_page(panes, settings.colour_theme)
+
+
+def save_videos(
+    runs: Sequence[Run],
+    cost: CoverageCost | None,
+    folder: Path,
+    settings: VideoSettings,
+    interruption: Interruption,
+    *,
+    quiet: bool,
+    runs_on_one_map: Sequence[Run] | None = None,
+) -> None:
+    """Write frames and a video of runs to a folder.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        More than one are shown side by side.
+    cost : CoverageCost or None
+        Cost of their map, if it is known.
+    folder : Path
+    settings : VideoSettings
+    interruption : Interruption
+        Both end early if it is requested.
+    quiet : bool
+        Whether progress is not shown.
+    runs_on_one_map : sequence of Run or None
+        The runs on a map without the robots that failed, if these are part of the maps of `runs`. They are
+        used for distances.
+
+    Raises
+    ------
+    OutputError
+        If a file cannot be written, or there is no encoder.
+    """
+    fields = _build_fields(runs_on_one_map or runs, cost, settings, quiet=quiet)
+    records = [run.record for run in runs]
+    costs = [run.history for run in runs]
+    longest = max(records, key=len)
+    rows = select_frame_rows(longest.time, settings.fps, settings.speed, VIDEO_HOLD_S)
+    if len(runs) == 1:
+        frames = draw_frames(
+            records[0], settings, size=settings.video_size, cost=costs[0], rows=rows, fields=fields
+        )
+    else:
+        layout = build_pane_layout(records, settings, settings.size, fields)
+        frames = draw_comparison_frames(records, costs, layout, settings, hold=VIDEO_HOLD_S, fields=fields)
+    path = folder / get_video_name(len(runs))
+    write_frames_and_video(frames, len(rows), path, settings, interruption, quiet=quiet)
+
+
+def _build_fields(
+    runs: Sequence[Run], cost: CoverageCost | None, settings: VideoSettings, *, quiet: bool
+) -> Fields | None:
+    """Return the distances that videos show, on one scale of colours; None if no layer shows any."""
+    if not settings.shown_layers & {"distances", "geodesic_cells"}:
+        return None
+    environment = runs[0].record.environment
+    if cost is None:
+        cost = build_cost(environment, MIN_VIDEO_LATTICE, quiet=quiet)
+    cost = refine_cost_for_figures(environment, cost, MIN_VIDEO_LATTICE)
+    varying_cost = TimeVaryingCost(cost)
+    largest_distance = 0.0
+    for run in runs:
+        record = run.record
+        result = varying_cost(float(record.time[-1]), record.positions[-1], record.working[-1])
+        if result is not None:
+            finite_distances = result.distances[np.isfinite(result.distances)]
+            largest_distance = max(largest_distance, float(finite_distances.max(initial=0.0)))
+    return Fields(cost, round_limit(_COLOUR_SCALE_FACTOR * largest_distance))
+
+
+def write_frames_and_video(
+    frames: Iterator[Frame],
+    total: int,
+    path: Path,
+    settings: VideoSettings,
+    interruption: Interruption,
+    *,
+    quiet: bool,
+) -> None:
+    """Write frames as a video, and as PNG files in the folder ``frames`` next to it.
+
+    Parameters
+    ----------
+    frames : iterator of Frame
+    total : int
+        Expected number of frames, for progress.
+    path : Path
+        File of the video.
+    settings : VideoSettings
+        Which of the two are written.
+    interruption : Interruption
+        Both end early if it is requested.
+    quiet : bool
+        Whether progress is not shown.
+
+    Raises
+    ------
+    OutputError
+        If a file cannot be written, or there is no encoder.
+    """
+    with progress("video" if settings.video else "frames", total, quiet=quiet) as update:
+
+        def report_frames() -> Iterator[Frame]:
+            for count, frame in enumerate(frames, start=1):
+                yield frame
+                update(count)
+                if interruption.requested:
+                    return
+
+        frame_folder = path.parent / "frames" if settings.frames else None
+        video_path = path if settings.video else None
+        save_frames_and_video(report_frames(), frame_folder, video_path, settings.fps)
