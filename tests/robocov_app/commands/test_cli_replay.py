@@ -73,7 +73,7 @@ def test_frames_of_a_run_are_those_of_run(made: Path, tmp_path: Path, capsys) ->
     assert main(["replay", str(made / "run"), "--frames", "--video", *SMALL, "--out", str(out)]) == 0
     said = capsys.readouterr()
     assert said.out == f"saved in {out}/: frames, replay.json, run.mp4\n"
-    assert "film: 21 of 21" in said.err
+    assert "video: 21 of 21" in said.err
     frames = pictures(out)
     assert len(frames) == 11 + 10
     assert frames[0].shape == (320, 480, 3)
@@ -299,7 +299,7 @@ def test_a_spoilt_run_is_refused_in_one_line(run: Path, capsys, spoil, message: 
         ),
         (
             lambda both: edited(both / "comparison.json", folders=["gone"]),
-            "{both}/comparison.json: there is no run in it",
+            "{both}/comparison.json: expected at least one run, got none",
         ),
         (
             lambda both: edited(both / "comparison.json", folders=["gone"], runs=[{}]),
@@ -307,7 +307,7 @@ def test_a_spoilt_run_is_refused_in_one_line(run: Path, capsys, spoil, message: 
         ),
         (
             lambda both: records_of(stepped(begun(RAPF, environment=EMPTY), 60))[0].save(both / "lloyd"),
-            "{both}/lloyd/run.json: another map than in {both}/rpf",
+            "{both}/lloyd/run.json: expected the same map as in {both}/rpf",
         ),
     ],
 )

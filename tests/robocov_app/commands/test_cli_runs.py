@@ -9,7 +9,7 @@ from called import SHORT, answer, complaint
 from robocov.controllers import CONTROLLERS, get_gains
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.runs import options
+from robocov_app.commands import options
 
 FILES = "run.json record.npz cost.csv trajectories.png trajectories.svg cost.png cost.svg".split()
 
@@ -285,7 +285,7 @@ def test_records_of_large_teams_are_thinned(
     assert "the record" not in capsys.readouterr().out
     assert main([*words, "--record-hz", "20", "--out", str(tmp_path / "some")]) == 0
     assert "the record, and what is counted in it, is of one step in 3" in capsys.readouterr().out
-    monkeypatch.setattr(options, "USUAL_ROWS", 30.0)
+    monkeypatch.setattr(options, "MAX_DEFAULT_RECORD_ROWS", 30.0)
     assert main([*words, "--out", str(tmp_path / "few")]) == 0
     whole, some, few = (Record.load(tmp_path / name) for name in ("all", "some", "few"))
     assert [len(each.time) for each in (whole, some, few)] == [31, 11, 11]

@@ -81,7 +81,7 @@ def test_the_cost_of_places_in_seconds(tmp_path: Path, capsys: pytest.CaptureFix
 
 def test_teams_that_are_none(tmp_path: Path, team: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = complaint(capsys, "run", "rooms", "--team", str(team), "--robots", "5")
-    assert said == f"--robots: 5, but the team of {team} has 3"
+    assert said == f"--robots: expected 3 as in {team}, got 5"
     bad = tmp_path / "bad.toml"
     bad.write_text("[[group]]\ncount = 1\nspeed = 3\n")
     for words in (("run", "rooms"), ("compare", "rooms"), ("demo", "rooms")):

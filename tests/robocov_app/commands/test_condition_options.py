@@ -14,13 +14,13 @@ from robocov_app.commands.options import ConditionOptions
 
 
 def test_nothing_said_is_no_conditions() -> None:
-    assert ConditionOptions().conditions(3, 6) is None
-    assert ConditionOptions(forget_after=1.0).conditions(3, 6) is None
+    assert ConditionOptions().build_conditions(3, 6) is None
+    assert ConditionOptions(forget_after=1.0).build_conditions(3, 6) is None
 
 
 def test_what_is_said_becomes_conditions() -> None:
     options = ConditionOptions(loss=0.2, delay=0.3, fail=("3@20",), join=("5@30:2.5,1", "6@4"))
-    assert options.conditions(7, 6) == Conditions(
+    assert options.build_conditions(7, 6) == Conditions(
         loss=0.2, delay=0.3, failures=((3, 20.0),), joins=((5, 30.0, (2.5, 1.0)), (6, 4.0)), seed=7
     )
 
@@ -36,7 +36,7 @@ def test_what_is_said_becomes_conditions() -> None:
 )
 def test_what_cannot_be_is_named(options: ConditionOptions, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        options.conditions(0, 6)
+        options.build_conditions(0, 6)
 
 
 @pytest.mark.slow

@@ -220,14 +220,14 @@ class TestSaveFilm:
         ],
         ids=["at once", "at the end"],
     )
-    @pytest.mark.skipif(os.name == "nt", reason="a shell script stands for the find_encoder")
+    @pytest.mark.skipif(os.name == "nt", reason="a shell script stands for the encoder")
     def test_a_failing_encoder_leaves_nothing_and_is_quoted(self, tmp_path, monkeypatch, script):
         fake = tmp_path / "ffmpeg"
         fake.write_text(f"#!/bin/sh\n{script}\n")
         fake.chmod(fake.stat().st_mode | stat.S_IXUSR)
         monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(fake))
         folder = tmp_path / "out"
-        with pytest.raises(OutputError, match=r"run\.mp4: the film's find_encoder failed .*No space left"):
+        with pytest.raises(OutputError, match=r"run\.mp4: the video encoder failed .*No space left"):
             save_video(folder / "run.mp4", plain(200, width=320, height=240))
         assert list(folder.iterdir()) == []
 
@@ -241,7 +241,7 @@ class TestSaveFilm:
             save_video(tmp_path / "run.mp4", plain(2))
         assert list(tmp_path.iterdir()) == []
         # before a run that would be in vain
-        with pytest.raises(OutputError, match="no ffmpeg"):
+        with pytest.raises(OutputError, match="ffmpeg was not found"):
             VideoOptions(video=True)
         (tmp_path / "ffmpeg").write_text("")
         (tmp_path / "ffmpeg").chmod(0o755)

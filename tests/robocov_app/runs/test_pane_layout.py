@@ -27,7 +27,7 @@ def film(records, theme="light", colours="robots", size=None, speed=4.0):
 
 def test_frames_stand_in_rows_and_a_place_may_be_free():
     greys = [np.full((48, 64, 3), 20 * k, dtype=np.uint8) for k in range(1, 6)]
-    frame = tile_frames(greys, 3, gap=2, line=(99, 98, 97), blank=(1, 2, 3))
+    frame = tile_frames(greys, 3, gap=2, line=(99, 98, 97), background=(1, 2, 3))
     assert frame.shape == (2 * 48 + 2, 3 * 64 + 2 * 2, 3)
     for k in range(5):
         row, column = divmod(k, 3)

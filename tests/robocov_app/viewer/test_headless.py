@@ -158,7 +158,7 @@ def test_replay_shows_a_story_from_its_beginning(tmp_path: Path, monkeypatch: py
     from robocov_app.commands import replay
 
     path, seen = saved(played(), tmp_path), []
-    monkeypatch.setattr(replay, "open_window", lambda _, session, file: seen.append((session, file)) or 0)
+    monkeypatch.setattr(replay, "_open_window", lambda _, session, file: seen.append((session, file)) or 0)
     assert main(["replay", path]) == 0
     ((session, file),) = seen
     assert str(file) == path and session.time == 0.0 and session.playing
