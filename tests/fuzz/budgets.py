@@ -212,7 +212,7 @@ def read(place: Path, seconds: float) -> Cost:
     import resource
 
     from robocov.errors import RobocovError
-    from robocov_app.formats import ReadOptions, Shaping, detect, import_map, shaped
+    from robocov_app.formats import ReadOptions, Shaping, build_environment, detect, import_map
 
     # what imports need is the fault of no file
     options = {"wkt": ReadOptions(), "pgm": ReadOptions(cell=1.0), "dxf": ReadOptions(scale=1.0)}
@@ -232,7 +232,7 @@ def read(place: Path, seconds: float) -> Cost:
     try:
         foreign = kind.read(place, given)
         good = True
-        said = f"{shaped(foreign, Shaping(), place.name)[1].vertices_kept} vertices"
+        said = f"{build_environment(foreign, Shaping(), place.name)[1].vertices_kept} vertices"
     except RobocovError as error:
         said = f"refused: {str(error).partition(': ')[2]}"
         good = good or (kind.name == "dxf" and " shapes" in said)  # layers are known once ezdxf read it

@@ -36,14 +36,28 @@ from robocov_app.formats.base import (
     ReadOptions,
     WriteOptions,
 )
-from robocov_app.formats.geometry.conversion import Shaping, shaped
+from robocov_app.formats.geometry.conversion import Shaping, build_environment
 from robocov_app.formats.svg import drawing as svg
 from robocov_app.formats.unreadable import described, named_kind
 
 __all__ = [
-    "EXPORTERS", "IMPORTERS", "ExportReport", "Exporter", "ForeignMap", "ImportReport", "Importer",
-    "ReadOptions", "Shaping", "WriteOptions", "detect", "export_map", "exporter", "import_map", "importer",
-    "read_map", "shaped",
+    "EXPORTERS",
+    "IMPORTERS",
+    "ExportReport",
+    "Exporter",
+    "ForeignMap",
+    "ImportReport",
+    "Importer",
+    "ReadOptions",
+    "Shaping",
+    "WriteOptions",
+    "build_environment",
+    "detect",
+    "export_map",
+    "exporter",
+    "import_map",
+    "importer",
+    "read_map",
 ]  # fmt: skip
 # options of drawings
 _DRAWN = ("thickness", "pillar", "outlines", "boundary", "around", "snap", "only", "skip")
@@ -146,7 +160,7 @@ def import_map(
     driven in; ParameterError when the format is unknown, or does not have an option that is given.
     """
     foreign = read_map(path, format=format, options=options)
-    environment, report = shaped(foreign, shaping, to_one_line(path))
+    environment, report = build_environment(foreign, shaping, to_one_line(path))
     return environment, report, foreign
 
 

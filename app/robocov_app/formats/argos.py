@@ -19,7 +19,7 @@ from robocov.arrays import Array
 from robocov.errors import quote, to_one_line
 from robocov.mapfile.models import MAX_SIZE_M
 from robocov_app.formats.base import ForeignMap, ReadOptions
-from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
+from robocov_app.formats.geometry.frames import UNIT_SQUARE, build_frame, transform_points
 from robocov_app.formats.geometry.shapes import Shapes
 from robocov_app.formats.xml_tree import Element, read_xml_tree
 
@@ -86,8 +86,8 @@ def _place(element: Element, position: Array, turn: Array, shapes: Shapes) -> No
         shapes.leave_out(tag, "that is tilted")
     elif tag == "box":
         ring = UNIT_SQUARE * _lengths(element, "size")[:2]
-        place = frame(position[0], position[1], math.radians(turn[0]))
-        shapes.add_outline([moved(place, ring)], labels, at=f"line {element.line}")
+        place = build_frame(position[0], position[1], math.radians(turn[0]))
+        shapes.add_outline([transform_points(place, ring)], labels, at=f"line {element.line}")
     else:
         radius = float(_lengths(element, "radius", count=1)[0])
         shapes.add_circle(position[:2], radius, labels, at=f"line {element.line}")

@@ -25,8 +25,8 @@ from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov.optional_imports import import_optional
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
-from robocov_app.formats.geometry.curves import MOST_POINTS, TOLERANCE, sampled
-from robocov_app.formats.geometry.shapes import Line, Shapes
+from robocov_app.formats.geometry.curves import CURVE_TOLERANCE_M, MAX_POINTS, sample_curve
+from robocov_app.formats.geometry.shapes import Shapes, WallLine
 
 MOST_LINES = 8_000_000  # of text: a line of the drawing takes about 24, a vertex 4
 MOST_ENTITIES = 50_000  # in the file, on any layer: ezdxf takes an eighth of a millisecond and 5 kB for each
@@ -51,13 +51,13 @@ def polyline(points: Array, bulges: Array, tolerance: float) -> Array:
     """Return points of a polyline, (k, 2); the bulge of an edge after one is tan(angle / 4), to the left."""
     arcs = import_optional("ezdxf.math", "dxf")
     drawn = [points[:1]]
-    left = float(MOST_POINTS)
+    left = float(MAX_POINTS)
     for (a, b), bulge in zip(pairwise(points), bulges[:-1].tolist(), strict=True):
         if abs(bulge) > _BULGE and (a != b).any():
             centre, begin, end, radius = arcs.bulge_to_arc(a, b, bulge)
             left -= 4 * math.atan(abs(bulge)) * math.sqrt(radius / tolerance / 8)
             if not left > 0.0:
-                raise ValueError(f"expected at most {MOST_POINTS} points, got more")
+                raise ValueError(f"expected at most {MAX_POINTS} points, got more")
             arc = arcs.ConstructionArc(centre, radius, *np.degrees([begin, end]))
             curve = flat(list(arc.flattening(min(tolerance, radius / 8))))
             drawn.append((curve if bulge > 0.0 else curve[::-1])[1:-1])
@@ -82,7 +82,7 @@ def spline(entity: Any, tolerance: float) -> Array:
         found = rational(t)
         return np.asarray(found[:, :2] / found[:, 2:])
 
-    return sampled(curve, np.unique(knots[degree : len(control) + 1]), tolerance)
+    return sample_curve(curve, np.unique(knots[degree : len(control) + 1]), tolerance)
 
 
 def flat(points: Sequence[Any]) -> Array:
@@ -95,7 +95,7 @@ class DxfDrawing:
 
     def __init__(self, document: Any, shapes: Shapes, scale: float) -> None:
         self.document, self.where, self.shapes, self.scale = document, shapes.where, shapes, scale
-        self.tolerance = TOLERANCE / scale
+        self.tolerance = CURVE_TOLERANCE_M / scale
         self.drawn = 0
         self.curved = False
         hidden = (layer for layer in document.layers if layer.is_off() or layer.is_frozen())
@@ -106,7 +106,7 @@ class DxfDrawing:
         self._require_few(space)
         self._draw(space, "0", ())
         if self.curved:
-            self.shapes.notes.append(f"curves flattened to within {1000 * TOLERANCE:g} mm")
+            self.shapes.notes.append(f"curves flattened to within {1000 * CURVE_TOLERANCE_M:g} mm")
 
     def _require_few(self, space: Iterable[Any]) -> None:
         """Count what will be drawn, blocks and all, without drawing it: a few kB may stand for billions."""
@@ -232,7 +232,7 @@ class DxfDrawing:
             points = np.concatenate([points[:-1], points[:1]])
         given = self.shapes.options.thickness
         drawn = width * self.scale if width > 0.0 and given is None else self.shapes.thickness
-        self.shapes.add_line(Line(points, drawn, labels), at=at)
+        self.shapes.add_line(WallLine(points, drawn, labels), at=at)
 
     def _polyline(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
         """Add a polyline with its bulges: columns are x, y, bulge and the widths at both ends of an edge."""

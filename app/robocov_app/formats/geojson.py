@@ -31,9 +31,9 @@ from robocov.optional_imports import import_optional
 from robocov_app.formats import files
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import JsonFile, is_number
-from robocov_app.formats.geometry.polygons import DIGITS, free_area, on_grid
-from robocov_app.formats.geometry.rasterize import not_held
-from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes
+from robocov_app.formats.geometry.polygons import DEFAULT_DIGITS, compute_free_area, snap_to_grid
+from robocov_app.formats.geometry.rasterize import describe_unsupported
+from robocov_app.formats.geometry.shapes import BOUNDARY, Shapes, SourceGeometry
 from robocov_app.formats.georeference import LocalPlane, in_metres
 
 _PLURAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
@@ -120,7 +120,7 @@ class FigureCollector:
     def __init__(self, file: JsonFile, shapes: Shapes) -> None:
         self.file = file
         self.shapes = shapes
-        self.figures: list[Figure] = []
+        self.figures: list[SourceGeometry] = []
         self.crs: str | None = None
 
     def collect(self, *, is_sequence: bool = False) -> None:
@@ -193,9 +193,13 @@ class FigureCollector:
         elif value == []:
             self.shapes.leave_out("geometry", "without coordinates")
         elif kind == "Point":
-            self.figures.append(Figure("point", (self._points([value], at, 1),), labels, format_path(at)))
+            self.figures.append(
+                SourceGeometry("point", (self._points([value], at, 1),), labels, format_path(at))
+            )
         elif kind == "LineString":
-            self.figures.append(Figure("line", (self._points(value, at, 2),), labels, format_path(at)))
+            self.figures.append(
+                SourceGeometry("line", (self._points(value, at, 2),), labels, format_path(at))
+            )
         elif not isinstance(value, list):
             raise self.file.refused(at, value, "a list of rings")
         else:
@@ -221,7 +225,7 @@ class FigureCollector:
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     origin, boundary = options.origin, environment.boundary_polygon
-    digits = DIGITS + (_FINER if origin else 0) if options.digits is None else options.digits
+    digits = DEFAULT_DIGITS + (_FINER if origin else 0) if options.digits is None else options.digits
     head: dict[str, Any] = {"type": "FeatureCollection", "name": environment.name}
     if environment.description:
         head["description"] = environment.description
@@ -237,9 +241,11 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     for kind, name, shape in [("boundary", None, boundary), *shapes]:
         # rounded in metres first, as a reader finds it: what touches there still touches
         exact = (
-            shape if plane is None else shapely.transform(MultiPolygon(on_grid(shape, DIGITS)), plane.degrees)
+            shape
+            if plane is None
+            else shapely.transform(MultiPolygon(snap_to_grid(shape, DEFAULT_DIGITS)), plane.degrees)
         )
-        parts = on_grid(exact, digits)
+        parts = snap_to_grid(exact, digits)
         area = MultiPolygon(parts)
         areas.append(area if plane is None else shapely.transform(area, plane.metres))
         across |= plane is not None and any(max(map(abs, part.bounds[::2])) > 180.0 for part in parts)
@@ -256,8 +262,8 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     members, lines = json.dumps(head, ensure_ascii=False, indent=1).removesuffix("\n}"), ",\n".join(features)
     with replace_file(path) as part:
         part.write_text(f'{members},\n "features": [\n{lines}\n]}}\n', encoding="utf-8")
-    kept = free_area(areas[0], areas[1:])
-    dropped = not_held(environment, names=False)
+    kept = compute_free_area(areas[0], areas[1:])
+    dropped = describe_unsupported(environment, names=False)
     return ExportReport("geojson", (path,), environment.free_area, kept, dropped, tuple(notes))
 
 

@@ -15,7 +15,7 @@ from robocov.errors import MapError, RobocovError, quote
 from robocov.mapfile.models import MAX_SIZE_M
 from robocov.optional_imports import import_optional
 from robocov_app.formats.files import require_shapes
-from robocov_app.formats.geometry.shapes import Figure, Shapes
+from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry
 
 DEGREES = "OGC:CRS84"  # longitude and latitude on WGS 84, as of all GeoJSON (RFC 7946, section 4)
 _IN_DEGREES = (DEGREES, "EPSG:4326")
@@ -28,8 +28,12 @@ _EARTH = 6_371_000.0  # mean radius in metres, to tell degrees from metres; noth
 
 
 def in_metres(
-    figures: list[Figure], shapes: Shapes, crs: str | None, globe: bool = False, origin: Point | None = None
-) -> list[Figure]:
+    figures: list[SourceGeometry],
+    shapes: Shapes,
+    crs: str | None,
+    globe: bool = False,
+    origin: Point | None = None,
+) -> list[SourceGeometry]:
     """Return figures with coordinates in metres; the notes of `shapes` say what was done to them.
 
     Options: ``units`` overrules the file; ``scale`` is metres a unit where it says nothing. `crs`: as
@@ -51,16 +55,16 @@ def in_metres(
     return _with_points(figures, _points(figures) * (1.0 if scale is None else scale))
 
 
-def _points(figures: Sequence[Figure]) -> Array:
+def _points(figures: Sequence[SourceGeometry]) -> Array:
     return np.concatenate([ring for figure in figures for ring in figure.rings])
 
 
-def _with_points(figures: Sequence[Figure], points: Array) -> list[Figure]:
+def _with_points(figures: Sequence[SourceGeometry], points: Array) -> list[SourceGeometry]:
     rings = iter(np.split(points, np.cumsum([len(ring) for figure in figures for ring in figure.rings])[:-1]))
     return [replace(figure, rings=tuple(islice(rings, len(figure.rings)))) for figure in figures]
 
 
-def _on_globe(figures: Sequence[Figure], possible: bool) -> bool:
+def _on_globe(figures: Sequence[SourceGeometry], possible: bool) -> bool:
     """Return whether coordinates are degrees of a place, not metres of a plan: a plan is metres wide."""
     points = _points(figures)
     if not possible or not (np.abs(points) <= [360.0, 90.0]).all():  # some go on beyond the antimeridian
@@ -84,7 +88,9 @@ def _authority(crs: str, where: str) -> str:
     return f"{match[1].upper()}:{match[2].upper()}"
 
 
-def _projected(figures: Sequence[Figure], name: str, shapes: Shapes, origin: Point | None) -> list[Figure]:
+def _projected(
+    figures: Sequence[SourceGeometry], name: str, shapes: Shapes, origin: Point | None
+) -> list[SourceGeometry]:
     """Return figures in metres east and north of a place, by the azimuthal equidistant projection."""
     where, system = shapes.where, "degrees" if name in _IN_DEGREES else name
     try:

@@ -17,7 +17,7 @@ from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.files import JsonFile, is_number
 from robocov_app.formats.geojson import FigureCollector
-from robocov_app.formats.geometry.shapes import Figure, Shapes
+from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry
 from robocov_app.formats.georeference import DEGREES, in_metres
 from robocov_app.formats.indoor import IndoorFigure, Role, build_floor, choose_floor, list_floors
 
@@ -88,7 +88,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     floor = _choose_floor(archive, levels, options.level, shapes)
     on_floor = {number for number, level in levels.items() if level.ordinal == floor}
     roles: list[Role] = []
-    figures: list[Figure] = []
+    figures: list[SourceGeometry] = []
     without_floor = 0
     for name in ("unit", "fixture", "kiosk", "opening"):
         for k, feature in enumerate(archive.features(name)):
@@ -236,7 +236,7 @@ def _unit_role(category: str) -> Role:
     return "open" if category in _OPEN else "walled"
 
 
-def _collect(file: JsonFile, k: int, feature: dict[str, Any], shapes: Shapes) -> list[Figure]:
+def _collect(file: JsonFile, k: int, feature: dict[str, Any], shapes: Shapes) -> list[SourceGeometry]:
     """Return the geometries of a feature, with its names and its category as labels."""
     properties = feature["properties"]
     category = properties.get("category")
@@ -252,7 +252,7 @@ def _collect(file: JsonFile, k: int, feature: dict[str, Any], shapes: Shapes) ->
     return collector.figures
 
 
-def _straighten(figure: Figure) -> Figure:
+def _straighten(figure: SourceGeometry) -> SourceGeometry:
     """Return the line from the first point of an opening to its last one."""
     line = figure.rings[0]
-    return Figure("line", (line[[0, -1]],), figure.labels, figure.at)
+    return SourceGeometry("line", (line[[0, -1]],), figure.labels, figure.at)

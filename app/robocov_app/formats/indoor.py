@@ -19,9 +19,9 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array
 from robocov.errors import MapError, ParameterError, format_count, quote
 from robocov_app.formats.base import ForeignMap
-from robocov_app.formats.geometry.polygons import Crossings, enclosed, polygons_of, united
-from robocov_app.formats.geometry.shapes import Figure, Line, Shapes
-from robocov_app.formats.geometry.snapping import close_gaps, default_snap
+from robocov_app.formats.geometry.polygons import CrossingCounter, find_enclosed_area, to_multipolygon, unite
+from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry, WallLine
+from robocov_app.formats.geometry.snapping import close_gaps, compute_default_snap
 
 Role: TypeAlias = Literal["open", "walled", "solid", "wall", "opening", "post"]
 DOOR_WIDTH_M = 0.9  # of a door without a width
@@ -45,7 +45,7 @@ class IndoorFigure:
     """
 
     role: Role
-    figure: Figure
+    figure: SourceGeometry
 
 
 def choose_floor(floors: dict[float, float], asked: str | None, where: str) -> float:
@@ -117,14 +117,14 @@ def build_floor(shapes: Shapes, figures: Sequence[IndoorFigure], name: str, text
         shapes.notes.append(f"no door or opening on this level: {is_one} open to what adjoins")
         outlines = []
     edges = [*(edge for space in spaces for edge in shapely.get_rings(shapely.get_parts(space))), *outlines]
-    Crossings(shapes.where).add(edges)
+    CrossingCounter(shapes.where).add(edges)
     gaps = [_opening_area(figure) for figure in openings]
-    snap = default_snap(spaces) if shapes.options.snap is None else shapes.options.snap
+    snap = compute_default_snap(spaces) if shapes.options.snap is None else shapes.options.snap
     joined = close_gaps(spaces, snap)
     floor = _join(joined.area, gaps, shapes)
     outer_walls = [wall.figure.rings[0] for wall in wanted if wall.role == "wall"]
     for line in _cut_walls([*outlines, *map(shapely.LineString, filter(_has_length, outer_walls))], gaps):
-        shapes.add_line(Line(line, shapes.thickness, ("wall",)))
+        shapes.add_line(WallLine(line, shapes.thickness, ("wall",)))
     shapes.join_lines()
     _add_obstacles(shapes, wanted, floor)
     shapes.notes.append(f"{format_count(len(spaces), 'space')}, {format_count(len(openings), 'opening')}")
@@ -134,10 +134,10 @@ def build_floor(shapes: Shapes, figures: Sequence[IndoorFigure], name: str, text
     return foreign
 
 
-def _area(figure: Figure, shapes: Shapes) -> MultiPolygon:
+def _area(figure: SourceGeometry, shapes: Shapes) -> MultiPolygon:
     shapes.count(sum(map(len, figure.rings)))
     rings = [np.round(ring, 6) for ring in figure.rings]
-    area, _, _ = enclosed(rings, figure.rule, Crossings(shapes.where))
+    area, _, _ = find_enclosed_area(rings, figure.rule, CrossingCounter(shapes.where))
     return area
 
 
@@ -145,7 +145,7 @@ def _has_length(line: Array) -> bool:
     return bool((line[1:] != line[:-1]).any())
 
 
-def _opening_area(figure: Figure) -> BaseGeometry:
+def _opening_area(figure: SourceGeometry) -> BaseGeometry:
     """Return the rectangle around an opening within which it cuts walls; empty for one without a width."""
     line = figure.rings[0]
     if not _has_length(line):
@@ -162,12 +162,12 @@ def _join(floor: MultiPolygon, gaps: list[BaseGeometry], shapes: Shapes) -> Mult
         if not parts:
             shapes.leave_out("opening", "that adjoins no space")
             continue
-        inside = polygons_of(shapely.intersection(shapely.MultiPolygon(parts), gap))
+        inside = to_multipolygon(shapely.intersection(shapely.MultiPolygon(parts), gap))
         if len(inside.geoms) > 1:
             passages.append(gap)
     if not passages:
         return floor
-    return polygons_of(united([*floor.geoms, *passages]))
+    return to_multipolygon(unite([*floor.geoms, *passages]))
 
 
 def _cut_walls(walls: list[BaseGeometry], gaps: list[BaseGeometry]) -> list[Array]:

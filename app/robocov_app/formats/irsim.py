@@ -26,9 +26,9 @@ from robocov.errors import MapError, format_count, quote, to_one_line
 from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
-from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
-from robocov_app.formats.geometry.shapes import Line, Shapes
-from robocov_app.formats.geometry.vectorize import free_area, vertices_of
+from robocov_app.formats.geometry.frames import UNIT_SQUARE, build_frame, transform_points
+from robocov_app.formats.geometry.shapes import Shapes, WallLine
+from robocov_app.formats.geometry.vectorize import count_polygon_vertices, outline_free_cells
 from robocov_app.formats.picture import describe_transparency, read_picture
 
 MOST_OBJECTS = 4_000  # robots and obstacles of a world
@@ -51,9 +51,9 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     if world["obstacle_map"].given:
         light = _picture(world, path, shapes)
         width, height = (size / light.shape[::-1]).tolist()
-        free = free_area(light, (width, height), (float(corner[0]), float(corner[1])), where)
+        free = outline_free_cells(light, (width, height), (float(corner[0]), float(corner[1])), where)
         shapes.cell = max(width, height)
-        shapes.count(vertices_of(free))
+        shapes.count(count_polygon_vertices(free))
     drawer = _ShapeDrawer(shapes)
     count = moving = 0
     for kind in ("robot", "obstacle"):
@@ -79,7 +79,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
                         continue
                     moving += group["kinematics"].given
                     figures = group["shape"].items(one=True) or [group["shape"]]
-                    drawer.draw(figures[min(k, len(figures) - 1)], frame(x, y, turn), labels)
+                    drawer.draw(figures[min(k, len(figures) - 1)], build_frame(x, y, turn), labels)
     if moving:
         words = "with kinematics taken as standing where the file has them"
         shapes.notes.append(f"{format_count(moving, 'obstacle')} {words}")
@@ -174,16 +174,16 @@ class _ShapeDrawer:
         elif name == "circle":
             centre = shape["center"].numbers([0.0, 0.0])[:2] + shift
             radius = shape["radius"].length(0.2)
-            self.shapes.add_circle(moved(around, centre[None])[0], radius, labels, at=at)
+            self.shapes.add_circle(transform_points(around, centre[None])[0], radius, labels, at=at)
         elif name == "rectangle":
             size = np.array([shape["length"].length(1.0), shape["width"].length(1.0)])
-            self.shapes.add_outline([moved(around, UNIT_SQUARE * size + shift)], labels, at=at)
+            self.shapes.add_outline([transform_points(around, UNIT_SQUARE * size + shift)], labels, at=at)
         elif name in ("polygon", "linestring"):
             self._draw_points(shape, around, labels, at)
         elif name == "compound":
             for part in shape["parts"].items():
                 pose = part["pose"].numbers([0.0, 0.0, 0.0])[:3]
-                self.draw(part, around @ frame(*pose), labels)
+                self.draw(part, around @ build_frame(*pose), labels)
         else:
             shape["name"].refuse("circle, rectangle, polygon, linestring or compound")
 
@@ -192,9 +192,9 @@ class _ShapeDrawer:
         points = [point.numbers([0.0, 0.0])[:2] for point in shape["vertices"].items()]
         if len(points) < (2 if is_line else 3):
             shape["vertices"].refuse("a list of points [x, y]")
-        places = moved(around, np.array(points))
+        places = transform_points(around, np.array(points))
         if is_line:
-            self.shapes.add_line(Line(places, self.shapes.thickness, labels), at=at)
+            self.shapes.add_line(WallLine(places, self.shapes.thickness, labels), at=at)
         else:
             self.shapes.add_outline([places], labels, at=at, thing="polygon")
 

@@ -17,8 +17,8 @@ from robocov.errors import MapError, quote, to_one_line
 from robocov.files.writing import replace_file
 from robocov_app.formats import files
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
-from robocov_app.formats.geometry.rasterize import free_cells, grid_over, grid_report
-from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, foreign_map
+from robocov_app.formats.geometry.rasterize import build_grid, build_grid_report, find_free_cells
+from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, build_grid_map
 
 CELL = 1.0  # side of a cell in metres where none is given: the format has no unit
 _PASSABLE, _SOLID = b".GS", b"@O"
@@ -58,7 +58,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     cell = CELL if options.cell is None else options.cell
     notes = () if options.cell is not None else (f"no cell size was given: {CELL:g} m taken",)
     text = f"A grid of {cell:g} m a cell, imported from Moving AI's format."
-    return foreign_map(cells, where, path.stem, text, cell, notes=notes)
+    return build_grid_map(cells, where, path.stem, text, cell, notes=notes)
 
 
 def _header(data: bytes, where: str) -> tuple[int, int, bytes, int]:
@@ -93,8 +93,8 @@ def _header(data: bytes, where: str) -> tuple[int, int, bytes, int]:
 
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
-    grid = grid_over(environment, options.cell)
-    free = free_cells(environment, grid)
+    grid = build_grid(environment, options.cell)
+    free = find_free_cells(environment, grid)
     letters = np.full((grid.rows, grid.columns + 1), ord("@"), np.uint8)
     letters[:, :-1][free[::-1]] = ord(".")
     letters[:, -1] = ord("\n")
@@ -103,5 +103,5 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
         part.write_bytes(head.encode("ascii") + letters.tobytes())
     x, y = grid.origin
     place = f"the cell size, {grid.cell:g} m, and the lower left corner, [{x:g}, {y:g}]"
-    report = grid_report("movingai", (path,), environment, grid, free)
+    report = build_grid_report("movingai", (path,), environment, grid, free)
     return replace(report, dropped=(place, *report.dropped))

@@ -21,7 +21,7 @@ from robocov.arrays import Array
 from robocov.errors import ParameterError, format_count, quote
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
-from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes
+from robocov_app.formats.geometry.shapes import BOUNDARY, Shapes, SourceGeometry
 from robocov_app.formats.georeference import DEGREES, in_metres
 from robocov_app.formats.indoor import (
     DOOR_WIDTH_M,
@@ -80,7 +80,7 @@ def _read_outdoors(data: OsmData, shapes: Shapes, name: str) -> ForeignMap:
         east, north = bounds.max(axis=0)[2:].tolist()
         origin = ((west + east) / 2, (south + north) / 2)
         corners = np.array([[west, south], [east, south], [east, north], [west, north]])
-        figures.append(Figure("polygon", (corners,), (BOUNDARY,), "bounds"))
+        figures.append(SourceGeometry("polygon", (corners,), (BOUNDARY,), "bounds"))
     shapes.add_all(in_metres(figures, shapes, DEGREES, origin=origin))
     gates = sum(node.tags.get("barrier") in _GATES for node in data.nodes.values())
     if gates:
@@ -88,7 +88,7 @@ def _read_outdoors(data: OsmData, shapes: Shapes, name: str) -> ForeignMap:
     return shapes.foreign_map(name, _TEXT, solid=True)
 
 
-def _find_outdoors(data: OsmData, shapes: Shapes) -> Iterator[Figure]:
+def _find_outdoors(data: OsmData, shapes: Shapes) -> Iterator[SourceGeometry]:
     """Yield what stands on the ground, in degrees; tell `shapes` what is left out."""
     for element in data.elements:
         tags = element.tags
@@ -102,7 +102,7 @@ def _find_outdoors(data: OsmData, shapes: Shapes) -> Iterator[Figure]:
         if _is_below_ground(tags):
             shapes.leave_out("thing", "below the ground")
         elif is_post:
-            yield Figure("point", (data.point(element)[None],), element.labels, element.place)
+            yield SourceGeometry("point", (data.point(element)[None],), element.labels, element.place)
         elif element.kind != "node":
             is_line = is_wall and not is_building and element.kind == "way" and tags.get("area") != "yes"
             figure = _to_line(data, element, shapes) if is_line else _to_polygon(data, element, shapes)
@@ -115,15 +115,15 @@ def _is_below_ground(tags: dict[str, str]) -> bool:
     return is_under or tags.get("tunnel", "no") != "no"
 
 
-def _to_line(data: OsmData, way: OsmElement, shapes: Shapes) -> Figure | None:
+def _to_line(data: OsmData, way: OsmElement, shapes: Shapes) -> SourceGeometry | None:
     lines = data.lines(way)
     if lines is None:
         shapes.leave_out("way", "of which the file does not have all")
         return None
-    return Figure("line", (lines[0],), way.labels, way.place, width=_width(way.tags))
+    return SourceGeometry("line", (lines[0],), way.labels, way.place, width=_width(way.tags))
 
 
-def _to_polygon(data: OsmData, element: OsmElement, shapes: Shapes) -> Figure | None:
+def _to_polygon(data: OsmData, element: OsmElement, shapes: Shapes) -> SourceGeometry | None:
     """Return the area of a way or of the ways of a relation; None, and say why, where there is none."""
     lines = data.lines(element)
     if lines is None:
@@ -137,7 +137,7 @@ def _to_polygon(data: OsmData, element: OsmElement, shapes: Shapes) -> Figure | 
     if not all((ring[0] == ring[-1]).all() for ring in rings):
         shapes.leave_out(element.kind, "that does not close")
         return None
-    return Figure("polygon", tuple(rings), element.labels, element.place, rule="evenodd")
+    return SourceGeometry("polygon", tuple(rings), element.labels, element.place, rule="evenodd")
 
 
 def _width(tags: dict[str, str]) -> float | None:
@@ -217,7 +217,7 @@ def _is_indoor(data: OsmData, floors: dict[float, float]) -> bool:
 def _place_floor(data: OsmData, floor: float, shapes: Shapes) -> list[IndoorFigure]:
     """Return the parts of a level, in metres."""
     roles: list[Role] = []
-    figures: list[Figure] = []
+    figures: list[SourceGeometry] = []
     doors: list[OsmElement] = []
     walls: list[OsmElement] = []
     stairs = 0
@@ -231,7 +231,7 @@ def _place_floor(data: OsmData, floor: float, shapes: Shapes) -> list[IndoorFigu
         if role in ("walled", "wall"):
             walls.append(element)
         if role == "post":
-            figure: Figure | None = Figure(
+            figure: SourceGeometry | None = SourceGeometry(
                 "point", (data.point(element)[None],), element.labels, element.place
             )
         elif role == "wall":
@@ -252,7 +252,7 @@ def _place_floor(data: OsmData, floor: float, shapes: Shapes) -> list[IndoorFigu
     return floor_figures + [IndoorFigure("opening", _span_door(figure)) for figure in placed[len(figures) :]]
 
 
-def _find_doors(data: OsmData, doors: list[OsmElement], walls: list[OsmElement]) -> list[Figure]:
+def _find_doors(data: OsmData, doors: list[OsmElement], walls: list[OsmElement]) -> list[SourceGeometry]:
     """Return doors as lines of three points, in degrees: the node before in its wall, its own, the next."""
     wanted = {door.number for door in doors}
     beside: dict[int, tuple[int, int]] = {}
@@ -273,14 +273,14 @@ def _find_doors(data: OsmData, doors: list[OsmElement], walls: list[OsmElement])
         before, after = beside[door.number]
         line = data.lines(OsmElement("way", door.number, members=[before, door.number, after]))
         if line is not None:
-            lines.append(Figure("line", (line[0],), ("door",), door.place, width=_width(door.tags)))
+            lines.append(SourceGeometry("line", (line[0],), ("door",), door.place, width=_width(door.tags)))
     return lines
 
 
-def _span_door(figure: Figure) -> Figure:
+def _span_door(figure: SourceGeometry) -> SourceGeometry:
     """Return the line across an opening, in metres, of a door as of `_find_doors`."""
     before, middle, after = figure.rings[0]
     along = after - before if (after != before).any() else after - middle
     length = float(np.hypot(*along))
     half: Array = along * ((figure.width or DOOR_WIDTH_M) / 2 / max(length, 1e-9))
-    return Figure("line", (np.array([middle - half, middle + half]),), figure.labels, figure.at)
+    return SourceGeometry("line", (np.array([middle - half, middle + half]),), figure.labels, figure.at)

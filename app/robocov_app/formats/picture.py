@@ -37,9 +37,9 @@ from robocov_app.formats.base import (
     square_metres,
 )
 from robocov_app.formats.colours import NO_ROLE, PICTURE_TOLERANCE, ROLES, ColourKey
-from robocov_app.formats.geometry.rasterize import free_cells, grid_over, grid_report
+from robocov_app.formats.geometry.rasterize import build_grid, build_grid_report, find_free_cells
 from robocov_app.formats.geometry.strokes import MAX_STROKE_PIXELS, remove_thin_strokes
-from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, UNKNOWN, Cells, foreign_map
+from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, UNKNOWN, Cells, build_grid_map
 
 _PIECE = 1 << 20  # bytes that are unpacked at a time
 _STRIP = 512  # rows that are converted at a time, which bounds the memory
@@ -347,7 +347,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         notes.append("nothing but dark paint on a transparent ground, so what is transparent is free")
     dropped = _drop_strokes(cells, options, cell, where) if options.min_stroke is not None else ()
     _require_both(cells, unknown, picture, options, where, notes)
-    foreign = foreign_map(
+    foreign = build_grid_map(
         cells,
         where,
         picture.texts.get(TITLE, "").strip() or path.stem,
@@ -520,11 +520,11 @@ def _place(picture: Brightness) -> tuple[float | None, tuple[float, float]]:
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     from PIL import Image, PngImagePlugin
 
-    grid = grid_over(environment, options.cell)
-    free = free_cells(environment, grid)
+    grid = build_grid(environment, options.cell)
+    free = find_free_cells(environment, grid)
     texts = PngImagePlugin.PngInfo()
     texts.add_text(TITLE, environment.name)
     texts.add_text(CHUNK, json.dumps({"cell_m": grid.cell, "origin_m": list(grid.origin)}))
     with replace_file(path) as part:
         Image.fromarray(free[::-1]).save(part, format="PNG", pnginfo=texts)
-    return grid_report("picture", (path,), environment, grid, free)
+    return build_grid_report("picture", (path,), environment, grid, free)

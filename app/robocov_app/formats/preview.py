@@ -22,7 +22,7 @@ from robocov_app.figures.arena import draw_map, map_handles
 from robocov_app.figures.files import check_figure_path, plain_style, save_figure
 from robocov_app.figures.page import HEADING, SMALL, TITLE, Box, Page, tone
 from robocov_app.formats.base import ForeignMap, ImportReport
-from robocov_app.formats.geometry.conversion import Comparison, compare
+from robocov_app.formats.geometry.conversion import ImportComparison, compare_maps
 from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import LIGHT, Colour, Theme, theme_named
 
@@ -50,7 +50,7 @@ def plot_import(
     narrowest passage.
     """
     theme = theme_named(theme)
-    compared = compare(foreign, environment, report)
+    compared = compare_maps(foreign, environment, report)
     captions = (
         ("as read", f"{_number(report.vertices_read)} vertices, {_number(compared.before.area)} m² free"),
         ("as imported", f"{_number(report.vertices_kept)} vertices, {_number(compared.after.area)} m² free"),
@@ -153,7 +153,7 @@ def _number(value: float) -> str:
     return f"{value:.4g}" if abs(value) < 9999.5 else f"{value:,.0f}".replace(",", "\u202f")
 
 
-def _handles(environment: Environment, theme: Theme, compared: Comparison) -> list[Artist]:
+def _handles(environment: Environment, theme: Theme, compared: ImportComparison) -> list[Artist]:
     handles = map_handles(environment, theme)
     for area, words, colour in (
         (compared.lost, "left out: {} m² were free", theme.trajectory),

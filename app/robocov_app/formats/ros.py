@@ -31,8 +31,8 @@ from robocov.errors import MapError, OutputError, ParameterError, quote, to_one_
 from robocov.files.writing import replace_file
 from robocov_app.formats import files
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
-from robocov_app.formats.geometry.rasterize import free_cells, grid_over, grid_report
-from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, UNKNOWN, Cells, foreign_map
+from robocov_app.formats.geometry.rasterize import build_grid, build_grid_report, find_free_cells
+from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, UNKNOWN, Cells, build_grid_map
 from robocov_app.formats.picture import Brightness, describe_transparency, read_picture
 
 _OCCUPIED, _FREE = 0.65, 0.196
@@ -98,7 +98,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
             raise MapError(f"{where}: no cell is free: {transparency}")
     turn = math.remainder(yaw, 2 * math.pi)
     notes += _describe_yaw(yaw, turn)
-    return foreign_map(
+    return build_grid_map(
         cells,
         where,
         path.stem,
@@ -216,8 +216,8 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
         raise OutputError(f"{to_one_line(path)}: {quote(image.name)}: no name that UTF-8 can hold") from None
     plain = re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", image.name)
     text_name = image.name if plain else json.dumps(image.name)
-    grid = grid_over(environment, options.cell)
-    free = free_cells(environment, grid)
+    grid = build_grid(environment, options.cell)
+    free = find_free_cells(environment, grid)
     walled = ndimage.binary_dilation(free, np.ones((3, 3), bool))  # by one cell all around what is free
     unknown = ~(grid.covered(environment.boundary_polygon) | walled)
     solid = None
@@ -259,4 +259,4 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
             f"negate: 0\noccupied_thresh: {_OCCUPIED}\nfree_thresh: {_FREE}\n",
             encoding="utf-8",
         )
-    return replace(grid_report("ros", (path, image), environment, grid, free), notes=notes)
+    return replace(build_grid_report("ros", (path, image), environment, grid, free), notes=notes)

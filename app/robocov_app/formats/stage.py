@@ -30,10 +30,10 @@ from robocov.errors import MapError, quote, to_one_line
 from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
-from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
-from robocov_app.formats.geometry.polygons import polygons_of
-from robocov_app.formats.geometry.shapes import Outline, Shapes
-from robocov_app.formats.geometry.vectorize import free_area, vertices_of
+from robocov_app.formats.geometry.frames import UNIT_SQUARE, build_frame, transform_points
+from robocov_app.formats.geometry.polygons import to_multipolygon
+from robocov_app.formats.geometry.shapes import ClosedOutline, Shapes
+from robocov_app.formats.geometry.vectorize import count_polygon_vertices, outline_free_cells
 from robocov_app.formats.picture import describe_transparency, read_picture
 
 MAX_BYTES = 5_000_000  # largest file of a world, and of all that it includes together, in bytes
@@ -100,9 +100,11 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     places += [*(room.box.centroid for room in rooms), *map(shapely.Point, shapes.robots)]
     main = next((room for room in rooms if shapely.covers(room.box, places).mean() > 0.5), None)
     for room in rooms:
-        dark = polygons_of(shapely.difference(room.box, room.free)) if room is not main else MultiPolygon()
+        dark = (
+            to_multipolygon(shapely.difference(room.box, room.free)) if room is not main else MultiPolygon()
+        )
         if not dark.is_empty:
-            shapes.outlines.append(Outline(dark, room.labels))
+            shapes.outlines.append(ClosedOutline(dark, room.labels))
     free = None if main is None else main.free
     source = ""
     if free is None and shapes.outlines:
@@ -250,7 +252,7 @@ class _World:
         """Return the matrix of a pose [x y z heading], or [x y heading] as Stage 2 has it."""
         x, y, *turns = entity.numbers(name, (0.0, 0.0, 0.0, 0.0)).tolist()
         turn = turns[0 if len(entity.properties.get(name, [])) == 3 else 1]
-        return frame(x * self.metre, y * self.metre, turn * self.turn)
+        return build_frame(x * self.metre, y * self.metre, turn * self.turn)
 
     def _shape(self, entity: _Entity, around: Array, labels: tuple[str, ...]) -> None:
         size = entity.numbers("size", (0.4, 0.4)) * self.metre
@@ -259,7 +261,7 @@ class _World:
 
         def placed(points: Array) -> Array:
             """Return (n, 2) places in a box of side 1 about the origin, in metres in the world."""
-            return np.round(moved(around, points * size), 9) + 0.0
+            return np.round(transform_points(around, points * size), 9) + 0.0
 
         box = Polygon(placed(UNIT_SQUARE))
         rings = _blocks(entity)
@@ -269,7 +271,7 @@ class _World:
         if "bitmap" in entity.properties:
             file = self._named(entity.text("bitmap"), "picture", f"{entity.at}: bitmap")
             free, columns, rows = self._bitmap(file)
-            self.shapes.count(vertices_of(free))
+            self.shapes.count(count_polygon_vertices(free))
             cell = float(max(size[0] / columns, size[1] / rows))
             self.rooms.append(_Room(box, shapely.transform(free, placed), labels, cell))
             if rings:
@@ -307,7 +309,7 @@ class _World:
             light = ~dark[row[0] : row[-1] + 1, column[0] : column[-1] + 1]
             rows, columns = light.shape
             sides = 1 / columns, 1 / rows
-            free = free_area(light, sides, (-0.5, -0.5), where) if light.any() else MultiPolygon()
+            free = outline_free_cells(light, sides, (-0.5, -0.5), where) if light.any() else MultiPolygon()
             self.bitmaps[file] = free, columns, rows
         return self.bitmaps[file]
 

@@ -26,9 +26,9 @@ from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, format_count, quote, summarize_names, to_one_line
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, ReadOptions
-from robocov_app.formats.geometry.frames import frame, moved
-from robocov_app.formats.geometry.shapes import Line, Shapes
-from robocov_app.formats.geometry.vectorize import free_area, vertices_of
+from robocov_app.formats.geometry.frames import build_frame, transform_points
+from robocov_app.formats.geometry.shapes import Shapes, WallLine
+from robocov_app.formats.geometry.vectorize import count_polygon_vertices, outline_free_cells
 from robocov_app.formats.xml_tree import MOST_ELEMENTS, Element, read_xml_tree
 
 MOST_TILES, MOST_READ = 4_000_000, 16_000_000  # of a map, and of all its layers together
@@ -113,8 +113,8 @@ class _Map:
             wanted = f"expected --only LAYER with one of walls: {names or 'there is none'}"
             raise MapError(f"{where}: {nothing}, {wanted}")
         width, height = (self.pixel * self.tile).tolist()
-        world = free_area(~solid, (width, height), (0.0, 0.0), where)
-        shapes.count(vertices_of(world))
+        world = outline_free_cells(~solid, (width, height), (0.0, 0.0), where)
+        shapes.count(count_polygon_vertices(world))
         shapes.cell = max(width, height) if solid.any() else None
         return shapes.foreign_map(self.path.stem, "A map of Tiled, imported.", solid=True, world=world)
 
@@ -158,14 +158,14 @@ class _Map:
                 continue
             names = (*filter(None, map(element.attributes.get, ("name", "class"))), *labels)
             found = shapes.seen(names)
-            moved = offset + [_number(element, key) for key in ("offsetx", "offsety")]
+            shifted = offset + [_number(element, key) for key in ("offsetx", "offsety")]
             says = wall or (_says_solid(element, names) if shapes.only is None else bool(shapes.only & found))
             if shapes.skip & found:
                 shapes.leave_out("layer", "by the names that were asked for")
             elif element.tag == "group":
-                yield from self._layers(element, names, moved, wall=says)
+                yield from self._layers(element, names, shifted, wall=says)
             elif element.tag == "objectgroup" or shapes.only is None or says:
-                yield _Layer(element, names, moved, says)
+                yield _Layer(element, names, shifted, says)
 
     def _grids(self, layers: list[_Layer]) -> list[tuple[_Layer, _IDs]]:
         """Return layers of tiles with global IDs, (rows, columns) of the map, whose corner it finds."""
@@ -285,7 +285,7 @@ class _Map:
         """Add an obstacle of a kind, as of `_figure`, in pixels on the map."""
         shapes, at, points = self.shapes, f"line {element.line}", self._metres(points)
         if kind == "line":
-            shapes.add_line(Line(points, shapes.thickness, labels), at=at)
+            shapes.add_line(WallLine(points, shapes.thickness, labels), at=at)
         elif kind == "circle" and (points[0] != points[1]).any():
             shapes.add_circle(points[0], float(np.hypot(*(points[1] - points[0]))), labels, at=at)
         elif kind == "point":
@@ -344,7 +344,7 @@ def _figure(element: Element) -> tuple[str, Array]:
             if len(flat) % 2 or len(flat) < 2 * least:
                 children[tag].refuse(f"points: expected {least} points, got {len(flat)} numbers")
             kind, points = name, flat.reshape(-1, 2)
-    return kind, moved(frame(x, y, math.radians(turn)), points)
+    return kind, transform_points(build_frame(x, y, math.radians(turn)), points)
 
 
 def _turned(points: Array, gid: int, size: Array) -> Array:

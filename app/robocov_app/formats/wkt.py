@@ -29,16 +29,16 @@ from robocov.files.writing import replace_file
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import MAX_DEPTH, name_of_map, read_text
 from robocov_app.formats.geometry.polygons import (
-    DIGITS,
-    Crossings,
-    decimal,
-    on_grid,
-    polygons_of,
-    rings,
-    united,
+    DEFAULT_DIGITS,
+    CrossingCounter,
+    format_decimal,
+    list_rings,
+    snap_to_grid,
+    to_multipolygon,
+    unite,
 )
-from robocov_app.formats.geometry.rasterize import not_held
-from robocov_app.formats.geometry.shapes import Figure, Shapes
+from robocov_app.formats.geometry.rasterize import describe_unsupported
+from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry
 from robocov_app.formats.georeference import in_metres
 
 KINDS = (  # the geometries that are read
@@ -76,9 +76,9 @@ class WktText:
         self.where, self.shapes = where, shapes
         self.at = 0
         self.srid: int | None = None
-        self._figures: list[Figure] = []
+        self._figures: list[SourceGeometry] = []
 
-    def figures(self) -> list[Figure]:
+    def figures(self) -> list[SourceGeometry]:
         number = 0
         while self._skip_space() < len(self.text):
             if srid := _SRID.match(self.text, self.at):
@@ -110,15 +110,17 @@ class WktText:
                 self._polygon(measured, f"{place}.{number}", whole=place)
         elif kind == "MULTILINESTRING":
             for _ in self._items():
-                add(Figure("line", (self._points(measured, 2),), at=place))
+                add(SourceGeometry("line", (self._points(measured, 2),), at=place))
         elif kind in ("LINESTRING", "LINEARRING"):
-            add(Figure("line", (self._points(measured, 2),), at=place))
+            add(SourceGeometry("line", (self._points(measured, 2),), at=place))
         else:
             several = kind == "MULTIPOINT" and not _POINTS.match(self.text, self.at)
             parts = [self._points(measured, 1) for _ in (self._items() if several else [0])]
             if kind == "POINT" and len(parts[0]) != 1:
                 self._refuse(f"expected one point, got {len(parts[0])}", begin)
-            self._figures += [Figure("point", (point[None],), at=place) for part in parts for point in part]
+            self._figures += [
+                SourceGeometry("point", (point[None],), at=place) for part in parts for point in part
+            ]
 
     def _kind(self) -> tuple[str, bool]:
         """Read the word that begins a geometry; return it, and whether its last coordinate is a measure."""
@@ -229,7 +231,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     return shapes.foreign_map(name_of_map(path), "Imported from WKT.", solid=False, overlap=True)
 
 
-def _exclude_holes(figures: list[Figure], shapes: Shapes) -> list[Figure]:
+def _exclude_holes(figures: list[SourceGeometry], shapes: Shapes) -> list[SourceGeometry]:
     """Return figures whose polygons do not fill the holes of others, unless they lie wholly in one."""
     valid: dict[int, Polygon] = {}
     for k, figure in enumerate(figures):
@@ -241,19 +243,19 @@ def _exclude_holes(figures: list[Figure], shapes: Shapes) -> list[Figure]:
     holes = [Polygon(ring) for polygon in polygons for ring in polygon.interiors]
     if len(polygons) < 2 or not holes:
         return figures
-    Crossings(shapes.where).add([ring for polygon in polygons for ring in shapely.get_rings(polygon)])
+    CrossingCounter(shapes.where).add([ring for polygon in polygons for ring in shapely.get_rings(polygon)])
     taken: dict[int, list[Polygon]] = {}
     for hole, k in _find_overlaps(holes, polygons, shapes.where):
         taken.setdefault(k, []).append(hole)
     if not taken:
         return figures
-    found = {k: polygons_of(shapely.difference(polygons[k], united(some))) for k, some in taken.items()}
+    found = {k: to_multipolygon(shapely.difference(polygons[k], unite(some))) for k, some in taken.items()}
     changed = {number: found[k] for k, number in enumerate(valid) if k in found}
     shapes.notes.append(
         "holes excluded from polygons that overlap them, as in JuPedSim: "
         + format_count(len(changed), "polygon")
     )
-    result: list[Figure] = []
+    result: list[SourceGeometry] = []
     for number, figure in enumerate(figures):
         if number not in changed:
             result.append(figure)
@@ -284,8 +286,8 @@ def _find_overlaps(
 
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
-    digits = DIGITS if options.digits is None else options.digits
-    free = on_grid(environment.free, digits)
+    digits = DEFAULT_DIGITS if options.digits is None else options.digits
+    free = snap_to_grid(environment.free, digits)
     parts = [_text(part, digits) for part in free]
     text = f"POLYGON {parts[0]}" if len(parts) == 1 else f"MULTIPOLYGON ({', '.join(parts)})"
     with replace_file(path) as part:
@@ -293,12 +295,18 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     notes = [f"in metres, {digits} decimals"]
     if len(parts) > 1:
         notes.append(f"the free space has {len(parts)} parts: some programs take one polygon only")
-    dropped = *not_held(environment), "the boundary and the obstacles as such: only what is free is there"
+    dropped = (
+        *describe_unsupported(environment),
+        "the boundary and the obstacles as such: only what is free is there",
+    )
     area = float(MultiPolygon(free).area)
     return ExportReport("wkt", (path,), environment.free_area, area, dropped, tuple(notes))
 
 
 def _text(polygon: Polygon, digits: int) -> str:
-    points = [[f"{decimal(x, digits)} {decimal(y, digits)}" for x, y in ring] for ring in rings(polygon)]
+    points = [
+        [f"{format_decimal(x, digits)} {format_decimal(y, digits)}" for x, y in ring]
+        for ring in list_rings(polygon)
+    ]
     parts = [f"({', '.join(ring)})" for ring in points]
     return f"({', '.join(parts)})"

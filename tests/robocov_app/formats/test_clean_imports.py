@@ -17,11 +17,11 @@ from robocov.environment import MAX_SAGITTA_M, Environment
 from robocov.errors import RobocovError
 from robocov.mapfile import parse_map
 from robocov.mapfile.check import check_map
-from robocov_app.formats import IMPORTERS, ImportReport, ReadOptions, Shaping, import_map, shaped
+from robocov_app.formats import IMPORTERS, ImportReport, ReadOptions, Shaping, build_environment, import_map
 from robocov_app.formats.base import ForeignMap
 from robocov_app.formats.geometry.cleaning import measure_deviation, remove_hairs
-from robocov_app.formats.geometry.polygons import rounded, tidy_ring
-from robocov_app.formats.geometry.snapping import close_gaps, default_snap
+from robocov_app.formats.geometry.polygons import round_polygons, tidy_ring
+from robocov_app.formats.geometry.snapping import close_gaps, compute_default_snap
 
 GRID = 1e-4
 MADE = sorted(STRUCTURES.keys() & IMPORTERS.keys())
@@ -99,7 +99,7 @@ def test_walls_move_by_the_tolerance_at_most(blocks: list[Any], tolerance: float
         "plan", "", MultiPolygon(shapely.get_parts(room).tolist()), boundary=box(0, 0, 10, 10)
     )
     try:
-        environment, report = shaped(foreign, Shaping(simplify=tolerance), "plan")
+        environment, report = build_environment(foreign, Shaping(simplify=tolerance), "plan")
     except RobocovError:
         return
     require_clean(environment, report)
@@ -113,7 +113,7 @@ def test_repeats_and_straight_vertices_go() -> None:
     # what is not straight by a digit stays
     bent = np.array([(0, 0), (1, 0.0001), (2, 0), (2, 2), (0, 2)])
     assert len(tidy_ring(bent, 4)) == 5
-    twice = rounded(box(0, 0, 1, 1) | box(1, 0, 2.00001, 1), 4)
+    twice = round_polygons(box(0, 0, 1, 1) | box(1, 0, 2.00001, 1), 4)
     assert shapely.get_num_coordinates(twice) == 5
 
 
@@ -199,8 +199,8 @@ def test_rooms_of_a_grid_with_gaps_are_one() -> None:
 
 
 def test_the_snapping_tolerance_follows_the_size() -> None:
-    assert default_snap([box(0, 0, 30, 10)]) == 0.01
-    assert default_snap([box(0, 0, 1, 0.5)]) == pytest.approx(0.001)
+    assert compute_default_snap([box(0, 0, 30, 10)]) == 0.01
+    assert compute_default_snap([box(0, 0, 1, 0.5)]) == pytest.approx(0.001)
 
 
 def test_hairs_are_removed_and_counted(tmp_path: Path) -> None:

@@ -13,8 +13,8 @@ from robocov.environment import DiscStart, UniformStart
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
 from robocov_app.formats.base import ForeignMap
-from robocov_app.formats.geometry.conversion import Shaping, roomiest, shaped
-from robocov_app.formats.geometry.polygons import bounded, rounded
+from robocov_app.formats.geometry.conversion import Shaping, build_environment, find_roomiest_point
+from robocov_app.formats.geometry.polygons import build_boundary, round_polygons
 
 ROOM = box(0, 0, 10, 8) - box(4, 3, 6, 5) - box(1, 1, 1.05, 1.05)
 CLOSET = box(20, 0, 23, 3)
@@ -30,7 +30,7 @@ def lines(report: Any) -> str:
 
 
 def test_the_largest_part_and_its_obstacles() -> None:
-    environment, report = shaped(foreign(CLOSET, ROOM), Shaping(), "plan.wkt")
+    environment, report = build_environment(foreign(CLOSET, ROOM), Shaping(), "plan.wkt")
     assert (environment.name, environment.description) == ("plan", "A plan.")
     assert environment.boundary == ((0.0, 0.0), (10.0, 0.0), (10.0, 8.0), (0.0, 8.0))
     assert [shape.polygon.area for shape in environment.obstacles] == pytest.approx([4, 0.0025])
@@ -47,7 +47,7 @@ def test_the_largest_part_and_its_obstacles() -> None:
 def test_the_part_around_a_place() -> None:
     track = box(30, 0, 60, 20) - box(32, 2, 58, 18)
     whole = foreign(ROOM, CLOSET, track, boundary=box(-1, -1, 61, 21), has_named_boundary=True)
-    environment, report = shaped(whole, Shaping(inside=(21.0, 1.0)), "plan")
+    environment, report = build_environment(whole, Shaping(inside=(21.0, 1.0)), "plan")
     # the boundary is around all of the file, and not around this part
     assert environment.boundary_polygon.equals(CLOSET)
     edge, note = report.notes
@@ -57,29 +57,31 @@ def test_the_part_around_a_place() -> None:
     assert len(report.others) == 2
     for x, y in report.others:
         assert f"--inside {x:g} {y:g} (" in note
-        assert shaped(whole, Shaping(inside=(x, y)), "plan")[1].area_kept > 50
+        assert build_environment(whole, Shaping(inside=(x, y)), "plan")[1].area_kept > 50
     wanted = r"plan: inside: 45 10 is solid, .*; 31 \S+ is one in the nearest part, 8 m away"
     with pytest.raises(MapError, match=wanted):
-        shaped(whole, Shaping(inside=(45.0, 10.0)), "plan")
+        build_environment(whole, Shaping(inside=(45.0, 10.0)), "plan")
 
 
 def test_a_word_where_a_considerable_part_is_left_out() -> None:
-    _, report = shaped(foreign(CLOSET, ROOM), Shaping(), "plan")
+    _, report = build_environment(foreign(CLOSET, ROOM), Shaping(), "plan")
     assert report.notes[0].startswith(
         "89 % of the free area stays: --inside 21.5 1.5 (9 m²) keeps another part"
     )
-    assert shaped(foreign(box(20, 0, 22, 3), ROOM), Shaping(), "plan")[1].notes == ()
-    assert "stays" not in lines(shaped(foreign(CLOSET, ROOM), Shaping(keep="all"), "plan")[1])
+    assert build_environment(foreign(box(20, 0, 22, 3), ROOM), Shaping(), "plan")[1].notes == ()
+    assert "stays" not in lines(build_environment(foreign(CLOSET, ROOM), Shaping(keep="all"), "plan")[1])
 
 
 @pytest.mark.parametrize("tiny", [1e-320, -1e-310, 1e-160])
 def test_what_is_all_but_zero_is_zero(tiny: float) -> None:
-    environment, _ = shaped(foreign(Polygon([(0, 0), (6, 7), (0, 7), (0, tiny)])), Shaping(), "plan")
+    environment, _ = build_environment(
+        foreign(Polygon([(0, 0), (6, 7), (0, 7), (0, tiny)])), Shaping(), "plan"
+    )
     assert sorted(environment.boundary) == [(0, 0), (0, 7), (6, 7)]
 
 
 def test_all_parts_lie_in_their_convex_hull() -> None:
-    environment, report = shaped(foreign(CLOSET, ROOM), Shaping(keep="all"), "plan")
+    environment, report = build_environment(foreign(CLOSET, ROOM), Shaping(keep="all"), "plan")
     assert environment.free_area == pytest.approx(ROOM.area + 9)
     assert len(environment.free.geoms) == 2
     assert environment.boundary_polygon.equals(shapely.union(ROOM, CLOSET).convex_hull)
@@ -87,39 +89,39 @@ def test_all_parts_lie_in_their_convex_hull() -> None:
 
 
 def test_specks() -> None:
-    environment, report = shaped(foreign(ROOM), Shaping(specks=0.01), "plan")
+    environment, report = build_environment(foreign(ROOM), Shaping(specks=0.01), "plan")
     assert len(environment.obstacles) == 1
     assert report.dropped == ("1 obstacle smaller than 0.01 m², 0.0025 m² (--specks 0 keeps them)",)
     parts = [box(20 + k, 0, 20.05 + k, 0.05) for k in range(3)]
-    environment, _ = shaped(foreign(ROOM, *parts), Shaping(specks=0.01, keep="all"), "plan")
+    environment, _ = build_environment(foreign(ROOM, *parts), Shaping(specks=0.01, keep="all"), "plan")
     assert len(environment.free.geoms) == 1
     many = ROOM
     for k in range(12):
         many -= box(2 + k / 4, 7, 2.04 + k / 4, 7.04)
-    _, report = shaped(foreign(many), Shaping(), "plan")
+    _, report = build_environment(foreign(many), Shaping(), "plan")
     assert report.notes == ("13 obstacles are smaller than 0.01 m² (--specks 0.01 drops them)",)
     crumb = ROOM - box(7, 7, 7.001, 7.02)
-    environment, report = shaped(foreign(crumb), Shaping(), "plan")
+    environment, report = build_environment(foreign(crumb), Shaping(), "plan")
     assert len(environment.obstacles) == 2
     assert report.dropped == ("1 hole of 2e-05 m², which come of rounding",)
 
 
 def test_what_a_format_takes_for_noise() -> None:
     noisy = foreign(ROOM, specks=0.003)
-    assert len(shaped(noisy, Shaping(), "plan")[0].obstacles) == 1
-    assert len(shaped(noisy, Shaping(specks=0.0), "plan")[0].obstacles) == 2
+    assert len(build_environment(noisy, Shaping(), "plan")[0].obstacles) == 1
+    assert len(build_environment(noisy, Shaping(specks=0.0), "plan")[0].obstacles) == 2
 
 
 def test_hull_and_margin() -> None:
     corner = box(0, 0, 10, 8) - box(5, 4, 10, 8)
-    environment, _ = shaped(foreign(corner), Shaping(hull=True), "plan")
+    environment, _ = build_environment(foreign(corner), Shaping(hull=True), "plan")
     assert environment.boundary_polygon.equals(corner.convex_hull)
     assert environment.free.equals(corner)
-    environment, _ = shaped(foreign(corner), Shaping(margin=0.5), "plan")
+    environment, _ = build_environment(foreign(corner), Shaping(margin=0.5), "plan")
     assert environment.boundary_polygon.bounds == (-0.5, -0.5, 10.5, 8.5)
     assert environment.free.equals(corner)
     assert len(environment.obstacles) == 1
-    environment, _ = shaped(foreign(corner), Shaping(margin=0.25, hull=True), "plan")
+    environment, _ = build_environment(foreign(corner), Shaping(margin=0.25, hull=True), "plan")
     assert environment.free.equals(corner)
     assert environment.region.area == pytest.approx(environment.area)
 
@@ -127,31 +129,33 @@ def test_hull_and_margin() -> None:
 def test_a_boundary_that_is_given() -> None:
     outer = box(-1, -1, 11, 9)
     named = foreign(ROOM, boundary=outer, has_named_boundary=True, boundary_source="what is called 'hall'")
-    environment, report = shaped(named, Shaping(), "plan")
+    environment, report = build_environment(named, Shaping(), "plan")
     assert report.notes == ("the boundary is what is called 'hall'",)
     assert environment.boundary_polygon.equals(outer)
     assert environment.free_area == pytest.approx(ROOM.area)
     assert [len(shape.holes) for shape in environment.obstacles if hasattr(shape, "holes")] == [1, 0, 0]
-    environment, report = shaped(foreign(ROOM, boundary=box(0, 0, 10, 7)), Shaping(), "plan")
+    environment, report = build_environment(foreign(ROOM, boundary=box(0, 0, 10, 7)), Shaping(), "plan")
     assert environment.area == 70
     assert report.dropped == ("10 m² of free space outside the boundary",)
     crossed = Polygon([(-1, -1), (11, -1), (11, 9), (-1, 9), (-1, 3), (-2, 4), (-2, 3), (-1, 4)])
-    environment, report = shaped(foreign(ROOM, boundary=crossed), Shaping(), "plan")
+    environment, report = build_environment(foreign(ROOM, boundary=crossed), Shaping(), "plan")
     assert report.repaired[0].startswith("the boundary met itself: self-intersection at [")
     assert environment.free_area == pytest.approx(ROOM.area)
 
 
 def test_a_boundary_behind_walls_gives_way_to_them() -> None:
     outer = box(-1, -1, 11, 9)
-    environment, report = shaped(foreign(ROOM, boundary=outer), Shaping(), "plan")
+    environment, report = build_environment(foreign(ROOM, boundary=outer), Shaping(), "plan")
     assert environment.boundary_polygon.equals(box(0, 0, 10, 8))
     assert report.notes == ("the boundary is the inner edge of the walls around the free space",)
     # it stays as far as the free space reaches it
     door = ROOM | box(4, 7, 6, 9)
-    environment, report = shaped(foreign(door, boundary=outer), Shaping(), "plan")
+    environment, report = build_environment(foreign(door, boundary=outer), Shaping(), "plan")
     assert environment.boundary_polygon.equals(outer)
     # and where several parts stay, walls are among them
-    environment, _ = shaped(foreign(ROOM, CLOSET, boundary=box(-1, -1, 24, 9)), Shaping(keep="all"), "plan")
+    environment, _ = build_environment(
+        foreign(ROOM, CLOSET, boundary=box(-1, -1, 24, 9)), Shaping(keep="all"), "plan"
+    )
     assert environment.boundary_polygon.equals(box(-1, -1, 24, 9))
 
 
@@ -160,51 +164,51 @@ def test_no_slivers_along_a_boundary_that_the_free_space_touches() -> None:
     wavy = [(x / 10, 0.008 * math.sin(x)) for x in range(101)]
     outer = Polygon([*wavy, (10, 8), (0, 8)])
     room = outer - box(3, -1, 4, 2) - box(5, 5, 6, 6)
-    environment, _ = shaped(foreign(room, boundary=outer), Shaping(), "plan")
+    environment, _ = build_environment(foreign(room, boundary=outer), Shaping(), "plan")
     assert len(environment.obstacles) == 2
     assert environment.free_area == pytest.approx(room.area, abs=0.2)
 
 
 def test_outlines_that_meet_themselves() -> None:
     bow = Polygon([(0, 0), (0, 4), (6, -2), (6, 0)])
-    environment, report = shaped(foreign(bow), Shaping(), "plan")
+    environment, report = build_environment(foreign(bow), Shaping(), "plan")
     assert environment.area == pytest.approx(8.0)
     assert report.repaired == ("outlines met themselves or each other: self-intersection at [4, 0]",)
     assert report.area_read == pytest.approx(10.0)
     overlapping = foreign(box(0, 0, 4, 4), box(3, 3, 6, 6))
-    environment, report = shaped(overlapping, Shaping(), "plan")
+    environment, report = build_environment(overlapping, Shaping(), "plan")
     assert environment.area == pytest.approx(16 + 9 - 1)
     assert len(report.repaired) == 1
 
 
 def test_the_starts() -> None:
-    environment, _ = shaped(foreign(ROOM), Shaping(), "plan")
+    environment, _ = build_environment(foreign(ROOM), Shaping(), "plan")
     assert [type(spec) for spec in environment.starts.values()] == [DiscStart, UniformStart]
     assert len(environment.start().sample(6)) == 6
-    environment, _ = shaped(foreign(ROOM), Shaping(default_start="uniform"), "plan")
+    environment, _ = build_environment(foreign(ROOM), Shaping(default_start="uniform"), "plan")
     assert list(environment.starts) == ["uniform", "room"]
-    narrow, _ = shaped(foreign(box(0, 0, 9, 0.21)), Shaping(), "plan")
+    narrow, _ = build_environment(foreign(box(0, 0, 9, 0.21)), Shaping(), "plan")
     assert list(narrow.starts) == ["uniform"]
 
 
 def test_cells_larger_than_robots() -> None:
-    _, report = shaped(foreign(ROOM, cell=1.0), Shaping(), "plan")
+    _, report = build_environment(foreign(ROOM, cell=1.0), Shaping(), "plan")
     assert report.tolerance == 0.2
     assert (
         "cells are larger than robots: walls move by at most 0.2 m, not by one (--simplify 1)" in report.notes
     )
-    assert shaped(foreign(ROOM, cell=0.05), Shaping(), "plan")[1].tolerance == 0.05
-    assert shaped(foreign(ROOM), Shaping(), "plan")[1].tolerance == 0.02
-    assert shaped(foreign(ROOM), Shaping(simplify=0.0), "plan")[1].tolerance == 0.0
+    assert build_environment(foreign(ROOM, cell=0.05), Shaping(), "plan")[1].tolerance == 0.05
+    assert build_environment(foreign(ROOM), Shaping(), "plan")[1].tolerance == 0.02
+    assert build_environment(foreign(ROOM), Shaping(simplify=0.0), "plan")[1].tolerance == 0.0
 
 
 def test_where_robots_do_not_get() -> None:
     rooms = box(0, 0, 4, 4) | box(4, 1, 5, 1.15) | box(5, 0, 7, 4)
-    _, report = shaped(foreign(rooms), Shaping(), "plan")
+    _, report = build_environment(foreign(rooms), Shaping(), "plan")
     (note,) = report.notes
     assert note.startswith("1 place of 6.8")
     assert note.endswith("m² no robot of radius 0.1 m reaches from the largest one")
-    assert shaped(foreign(rooms), Shaping(radius=0.05), "plan")[1].notes == ()
+    assert build_environment(foreign(rooms), Shaping(radius=0.05), "plan")[1].notes == ()
 
 
 @pytest.mark.parametrize(
@@ -223,7 +227,7 @@ def test_where_robots_do_not_get() -> None:
 )  # fmt: skip
 def test_what_is_refused(parts: tuple[Polygon, ...], shaping: dict[str, Any], wanted: str) -> None:
     with pytest.raises(MapError) as caught:
-        shaped(foreign(*parts), Shaping(**shaping), "plan")
+        build_environment(foreign(*parts), Shaping(**shaping), "plan")
     assert wanted in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -250,15 +254,15 @@ def test_options_out_of_range(options: dict[str, Any], wanted: str) -> None:
 def test_rounding_keeps_polygons_valid() -> None:
     sharp = Polygon([(0, 0), (1, 0.00004), (2, 0), (2, 1), (1, 0.00006), (0, 1)])
     for digits in (4, 3, 2):
-        result = rounded(sharp, digits)
+        result = round_polygons(sharp, digits)
         assert result.is_valid
         assert result.area == pytest.approx(1.0, abs=0.05)
-    assert "-0" not in rounded(box(-1e-9, 0, 1, 1), 4).wkt
+    assert "-0" not in round_polygons(box(-1e-9, 0, 1, 1), 4).wkt
 
 
 def test_a_hole_that_leaves_its_outline_is_rounded_too() -> None:
     crossed = Polygon(box(0, 0, 9, 9).exterior, [[(-1, 4), (5, 4.00001), (5, 5), (-1, 5)]])
-    assert shapely.equals(rounded(crossed, 4), box(0, 0, 9, 9) - box(0, 4, 5, 5))
+    assert shapely.equals(round_polygons(crossed, 4), box(0, 0, 9, 9) - box(0, 4, 5, 5))
 
 
 points = st.tuples(st.integers(0, 40), st.integers(0, 40))
@@ -277,7 +281,7 @@ def test_any_rings_make_a_map_or_one_line(
     outer = box(1, 1, 9, 9) if given else None
     shaping = Shaping(simplify=tolerance, keep=keep, hull=hull, margin=margin)
     try:
-        environment, report = shaped(foreign(*parts, boundary=outer), shaping, "plan")
+        environment, report = build_environment(foreign(*parts, boundary=outer), shaping, "plan")
     except MapError as error:
         assert str(error).startswith("plan: ")
         assert "\n" not in str(error)
@@ -296,10 +300,10 @@ def test_any_rings_make_a_map_or_one_line(
 def test_boundary_and_obstacles_leave_what_was_free(
     ring: list[tuple[int, int]], hull: bool, margin: float
 ) -> None:
-    free = rounded(shapely.make_valid(Polygon(ring)), 4)
+    free = round_polygons(shapely.make_valid(Polygon(ring)), 4)
     if free.is_empty:
         return
-    boundary, solid = bounded(free, None, hull=hull, margin=margin, digits=4)
+    boundary, solid = build_boundary(free, None, hull=hull, margin=margin, digits=4)
     left = shapely.difference(boundary, shapely.union_all(solid))
     assert shapely.symmetric_difference(left, free).area < 1e-3 * (1 + free.area)
 
@@ -307,7 +311,7 @@ def test_boundary_and_obstacles_leave_what_was_free(
 def test_by_how_much_walls_moved() -> None:
     # a bump of 15 mm goes: a triangle of 30 cm² changes sides
     bumpy = Polygon([(0, 0), (4.8, 0), (5, 0.015), (5.2, 0), (10, 0), (10, 8), (0, 8)])
-    _, report = shaped(foreign(bumpy), Shaping(), "plan")
+    _, report = build_environment(foreign(bumpy), Shaping(), "plan")
     assert (report.moved, report.moved_area) == (pytest.approx(0.015), pytest.approx(0.003))
     assert report.changed == (
         "walls moved by at most 0.015 m; 0.003 m² changed sides, 0.0038 % of the free area",
@@ -316,19 +320,19 @@ def test_by_how_much_walls_moved() -> None:
         report.moved,
         report.moved_area,
     )
-    _, report = shaped(foreign(bumpy), Shaping(simplify=0.0), "plan")
+    _, report = build_environment(foreign(bumpy), Shaping(simplify=0.0), "plan")
     assert (report.changed, report.moved, report.moved_area) == ((), 0.0, 0.0)
 
 
 def test_a_map_of_many_vertices_says_what_that_means() -> None:
     angle = [k * math.tau / 6000 for k in range(6000)]
     round_room = Polygon([(400 * math.cos(a), 400 * math.sin(a)) for a in angle])
-    _, report = shaped(foreign(round_room), Shaping(simplify=0.0), "plan")
+    _, report = build_environment(foreign(round_room), Shaping(simplify=0.0), "plan")
     assert report.vertices_kept > 5900  # after rounding, some are on the line between their neighbours
     assert report.notes[-1].startswith(
         f"{report.vertices_kept} vertices are many: computing the distances between them takes about"
     )
-    assert "many" not in lines(shaped(foreign(round_room), Shaping(), "plan")[1])
+    assert "many" not in lines(build_environment(foreign(round_room), Shaping(), "plan")[1])
 
 
 @pytest.mark.parametrize(("most", "wanted"), [("MAX_OBSTACLES", "obstacles"), ("MAX_KEPT", "vertices")])
@@ -337,7 +341,7 @@ def test_a_map_that_takes_too_long_is_refused(
 ) -> None:
     monkeypatch.setattr(f"robocov_app.formats.geometry.conversion.{most}", 0)
     with pytest.raises(MapError, match=rf"plan: expected at most 0, got \d+ {wanted}: --specks AREA"):
-        shaped(foreign(ROOM), Shaping(), "plan")
+        build_environment(foreign(ROOM), Shaping(), "plan")
 
 
 _RECTANGLES = st.tuples(*[st.integers(0, 10)] * 2, *[st.integers(1, 5)] * 2)
@@ -348,8 +352,8 @@ _RECTANGLES = st.tuples(*[st.integers(0, 10)] * 2, *[st.integers(1, 5)] * 2)
 def test_the_roomiest_place(blocks: list[tuple[int, int, int, int]]) -> None:
     solid = shapely.union_all([box(x, y, x + width, y + height) for x, y, width, height in blocks])
     room = max(shapely.get_parts(box(-1, -1, 16, 16) - solid), key=lambda part: part.area)
-    (x, y), away = roomiest(room, 0.01)
+    (x, y), away = find_roomiest_point(room, 0.01)
     assert room.contains(shapely.Point(x, y))
     assert away == pytest.approx(room.boundary.distance(shapely.Point(x, y)))
     assert away >= shapely.maximum_inscribed_circle(room, tolerance=0.001).length - 0.0101
-    assert roomiest(room, 0.01, enough=0.5)[1] >= min(0.5, away - 0.01)
+    assert find_roomiest_point(room, 0.01, enough=0.5)[1] >= min(0.5, away - 0.01)

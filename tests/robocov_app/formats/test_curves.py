@@ -8,7 +8,13 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.formats.geometry.curves import MOST_POINTS, arc, arcs, beziers, sampled
+from robocov_app.formats.geometry.curves import (
+    MAX_POINTS,
+    flatten_arc,
+    flatten_arcs,
+    flatten_beziers,
+    sample_curve,
+)
 
 _FINE = np.linspace(0.0, 1.0, 2001)[:, None]
 _NUMBER = st.integers(-5000, 5000).map(lambda number: number / 100)
@@ -22,7 +28,7 @@ def farthest(exact: np.ndarray, drawn: np.ndarray) -> float:
 
 
 def alone(control: np.ndarray, tolerance: float) -> np.ndarray:
-    return beziers(control[None], tolerance)[0]
+    return flatten_beziers(control[None], tolerance)[0]
 
 
 @given(st.lists(_POINT, min_size=4, max_size=4), st.sampled_from([1e-3, 0.1, 5.0]))
@@ -56,14 +62,16 @@ def test_arcs_stay_within_the_tolerance(
     c, p, q = np.array(centre), np.array(u), np.array(v)
     angle = begin + sweep * _FINE
     exact = c + np.cos(angle) * p + np.sin(angle) * q
-    drawn = np.concatenate([exact[:1], arc(c, p, q, begin, sweep, tolerance)])
+    drawn = np.concatenate([exact[:1], flatten_arc(c, p, q, begin, sweep, tolerance)])
     assert farthest(exact, drawn) <= tolerance * (1 + 1e-6) + 1e-9
     assert np.allclose(drawn[-1], exact[-1])
 
 
 def test_no_more_points_than_a_circle_needs() -> None:
     for radius in (0.5, 5.0, 500.0):
-        drawn = arc(np.zeros(2), np.array([radius, 0.0]), np.array([0.0, radius]), 0.0, math.tau, 1e-3)
+        drawn = flatten_arc(
+            np.zeros(2), np.array([radius, 0.0]), np.array([0.0, radius]), 0.0, math.tau, 1e-3
+        )
         needed = math.pi / math.acos(1.0 - 1e-3 / radius)
         assert needed <= len(drawn) <= needed + 1
     straight = alone(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]), 1e-3)
@@ -72,25 +80,27 @@ def test_no_more_points_than_a_circle_needs() -> None:
 
 def test_many_at_once_are_each_one_alone() -> None:
     curves = np.random.default_rng(2).random((7, 4, 2)) * 10
-    points, count = beziers(curves, 1e-2)
+    points, count = flatten_beziers(curves, 1e-2)
     assert len(set(count.tolist())) > 2
     for k, part in enumerate(np.split(points, np.cumsum(count)[:-1])):
         assert (part == alone(curves[k], 1e-2)).all()
     centre, u, v = np.random.default_rng(3).random((3, 7, 2)) * 10
     angle, sweep = np.random.default_rng(4).random((2, 7)) * 6 - 3
-    points, count = arcs(centre, u, v, angle, sweep, 1e-2)
+    points, count = flatten_arcs(centre, u, v, angle, sweep, 1e-2)
     for k, part in enumerate(np.split(points, np.cumsum(count)[:-1])):
-        assert (part == arc(centre[k], u[k], v[k], angle[k], sweep[k], 1e-2)).all()
+        assert (part == flatten_arc(centre[k], u[k], v[k], angle[k], sweep[k], 1e-2)).all()
 
 
 @pytest.mark.parametrize("radius", [1e8, 1e12, 1e30, math.nan])
 def test_what_is_huge_is_refused(radius: float) -> None:
-    with pytest.raises(ValueError, match=f"expected at most {MOST_POINTS} points, got more"):
-        arc(np.zeros(2), np.array([radius, 0.0]), np.array([0.0, radius]), 0.0, math.tau, 1e-3)
+    with pytest.raises(ValueError, match=f"expected at most {MAX_POINTS} points, got more"):
+        flatten_arc(np.zeros(2), np.array([radius, 0.0]), np.array([0.0, radius]), 0.0, math.tau, 1e-3)
     with pytest.raises(ValueError, match="expected at most 250000 points"):
         alone(np.array([[0.0, 0.0], [1e5 * radius, 1.0], [0.0, 2.0], [0.0, 0.0]]), 1e-3)
     if radius < 1e40:
-        part = arc(np.zeros(2), np.array([radius, 0.0]), np.array([0.0, radius]), 0.0, 1 / radius, 1e-3)
+        part = flatten_arc(
+            np.zeros(2), np.array([radius, 0.0]), np.array([0.0, radius]), 0.0, 1 / radius, 1e-3
+        )
         assert len(part) == 1
 
 
@@ -98,7 +108,7 @@ def test_a_sampled_curve_stays_within_the_tolerance() -> None:
     def wave(t: np.ndarray) -> np.ndarray:
         return np.column_stack([t, np.sin(3 * t) + np.maximum(t - 2, 0)])
 
-    drawn = sampled(wave, np.array([0.0, 2.0, 5.0]), 1e-3)
+    drawn = sample_curve(wave, np.array([0.0, 2.0, 5.0]), 1e-3)
     assert farthest(wave(np.linspace(0, 5, 5001)), drawn) <= 1e-3
     assert len(drawn) < 200
-    assert len(sampled(lambda t: np.column_stack([t, 0 * t]), np.array([0.0, 1.0]), 1e-3)) == 9
+    assert len(sample_curve(lambda t: np.column_stack([t, 0 * t]), np.array([0.0, 1.0]), 1e-3)) == 9

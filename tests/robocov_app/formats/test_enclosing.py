@@ -14,7 +14,7 @@ from vector_files import square
 from robocov.errors import MapError, ParameterError
 from robocov_app.formats import ForeignMap, ReadOptions
 from robocov_app.formats.files import MAX_VERTICES
-from robocov_app.formats.geometry.shapes import Figure, Line, Shapes
+from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry, WallLine
 
 HALL = square(0, 0, 20, 10)
 
@@ -23,9 +23,9 @@ def shapes(*areas: Any, lines: Any = (), points: Any = (), **options: Any) -> Sh
     """Return shapes; an area or a line may be a pair of it and its name."""
     found = Shapes("plan", ReadOptions(**options))
 
-    def figure(kind: str, given: Any) -> Figure:
+    def figure(kind: str, given: Any) -> SourceGeometry:
         ring, name = given if isinstance(given, tuple) else (given, None)
-        return Figure(kind, (np.array(ring, dtype=float),), (name,) if name else ())  # type: ignore[arg-type]
+        return SourceGeometry(kind, (np.array(ring, dtype=float),), (name,) if name else ())  # type: ignore[arg-type]
 
     for area in areas:
         found.add(figure("polygon", area))
@@ -223,7 +223,7 @@ def test_shapes_thinner_than_the_grid_are_no_walls() -> None:
 def test_too_many_vertices_are_refused() -> None:
     found = Shapes("plan", ReadOptions())
     with pytest.raises(MapError, match=r"plan: expected at most"):
-        found.add_line(Line(np.zeros((MAX_VERTICES + 1, 2)), 0.1))
+        found.add_line(WallLine(np.zeros((MAX_VERTICES + 1, 2)), 0.1))
 
 
 def test_a_tangle_of_lines_is_refused() -> None:

@@ -25,7 +25,7 @@ from robocov_app.formats import (
     exporter,
     import_map,
 )
-from robocov_app.formats.geometry.conversion import rooms
+from robocov_app.formats.geometry.conversion import find_rooms
 
 ROOM = Environment("room", ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)))
 
@@ -169,7 +169,7 @@ def test_maps_go_out_and_in(tmp_path: Path, name: str, way: str) -> None:
     back, _, _ = import_map(path, options=read)
     assert back.free.is_valid
     assert back.free_area == pytest.approx(environment.free_area, rel=0.005)
-    assert len(rooms(back.free, DEFAULT_RADIUS_M)) == len(rooms(environment.free, DEFAULT_RADIUS_M))
+    assert len(find_rooms(back.free, DEFAULT_RADIUS_M)) == len(find_rooms(environment.free, DEFAULT_RADIUS_M))
     drawn = [back.boundary_polygon, *(shape.polygon for shape in back.obstacles), *back.free.geoms]
     for ring in shapely.get_rings(drawn):
         assert np.hypot(*np.diff(shapely.get_coordinates(ring), axis=0).T).min() >= 1e-3

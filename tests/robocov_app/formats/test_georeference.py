@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from robocov.errors import MapError
 from robocov_app.formats import ReadOptions
-from robocov_app.formats.geometry.shapes import Figure, Shapes
+from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry
 from robocov_app.formats.georeference import in_metres
 
 PLAIN = ReadOptions()
@@ -21,7 +21,7 @@ _GLOBE = pyproj.Geod(ellps="WGS84")
 def moved(points: Any, options: ReadOptions = PLAIN, **given: Any) -> tuple[np.ndarray, list[str]]:
     shapes = Shapes("plan", options)
     given = {"crs": None, **given}
-    (figure,) = in_metres([Figure("line", (np.array(points, dtype=float),))], shapes, **given)
+    (figure,) = in_metres([SourceGeometry("line", (np.array(points, dtype=float),))], shapes, **given)
     return figure.rings[0], shapes.notes
 
 
@@ -109,8 +109,8 @@ def test_without_pyproj_there_is_one_line_with_the_way_to_get_it(monkeypatch: py
 
 def test_figures_keep_their_rings() -> None:
     figures = [
-        Figure("polygon", (np.zeros((4, 2)), np.ones((3, 2))), ("hall",), "geometry 1"),
-        Figure("point", (np.full((1, 2), 5.0),)),
+        SourceGeometry("polygon", (np.zeros((4, 2)), np.ones((3, 2))), ("hall",), "geometry 1"),
+        SourceGeometry("point", (np.full((1, 2), 5.0),)),
     ]
     scaled = in_metres(figures, Shapes("plan", ReadOptions(scale=2.0)), None)
     assert [[len(ring) for ring in figure.rings] for figure in scaled] == [[4, 3], [1]]

@@ -15,7 +15,7 @@ from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, load_map, save_map, to_json
 from robocov_app.formats import Shaping, detect, import_map
 from robocov_app.formats.base import ImportReport
-from robocov_app.formats.geometry.simplify import sharpened
+from robocov_app.formats.geometry.simplify import sharpen_corners
 
 # two rooms of 4 m x 3 m and a door of 0.9 m in a wall of 0.1 m, with corners cut by 1 cm as in such plans
 PLAN = [
@@ -136,15 +136,15 @@ def test_what_is_no_plan_is_refused_in_one_line(tmp_path: Path, document: Any, w
 
 def test_corners_are_made_whole_and_nothing_else() -> None:
     cut = Polygon([(0, 0.02), (0.02, 0), (6, 0), (6, 3), (0, 3)])
-    assert sharpened(cut, 0.02).symmetric_difference(box(0, 0, 6, 3)).area < 1e-12
-    assert sharpened(cut, 0.0).equals(cut)
+    assert sharpen_corners(cut, 0.02).symmetric_difference(box(0, 0, 6, 3)).area < 1e-12
+    assert sharpen_corners(cut, 0.0).equals(cut)
     # a bevel of 10 cm is no cut corner, and lines that hardly turn meet nowhere in particular
     bevel = Polygon([(0.1, 0), (6, 0), (6, 3), (0, 3), (0, 0.1)])
-    assert sharpened(bevel, 0.02).equals(bevel)
+    assert sharpen_corners(bevel, 0.02).equals(bevel)
     bent = Polygon([(0, 0), (3, 0), (3.02, 0.001), (6, 0.2), (6, 3), (0, 3)])
-    assert sharpened(bent, 0.02).equals(bent)
+    assert sharpen_corners(bent, 0.02).equals(bent)
     holed = Polygon(box(0, 0, 6, 3).exterior, [[(1, 1.01), (1.01, 1), (2, 1), (2, 2), (1, 2)]])
-    assert sharpened(holed, 0.02).area == pytest.approx(17.0)
+    assert sharpen_corners(holed, 0.02).area == pytest.approx(17.0)
 
 
 def test_options_out_of_range(tmp_path: Path) -> None:

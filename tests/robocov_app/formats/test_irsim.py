@@ -187,9 +187,9 @@ def test_a_world_is_not_taken_for_a_map_of_ros(tmp_path: Path) -> None:
 
 
 def test_turns_are_in_radians() -> None:
-    from robocov_app.formats.geometry.frames import frame
+    from robocov_app.formats.geometry.frames import build_frame
 
-    assert frame(1.0, 2.0, math.pi / 2) == pytest.approx(np.array([[0, -1, 1], [1, 0, 2], [0, 0, 1]]))
+    assert build_frame(1.0, 2.0, math.pi / 2) == pytest.approx(np.array([[0, -1, 1], [1, 0, 2], [0, 0, 1]]))
 
 
 def test_anchors_and_aliases_repeat_shapes(tmp_path: Path) -> None:

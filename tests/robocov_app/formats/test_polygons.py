@@ -12,12 +12,12 @@ from shapely import Polygon, box
 from robocov.errors import MapError
 from robocov_app.formats.geometry.polygons import (
     MAX_CROSSINGS,
-    Crossings,
-    edges_of,
-    enclosed,
-    polygons_of,
-    sides_of,
-    united,
+    CrossingCounter,
+    extract_edges,
+    extract_sides,
+    find_enclosed_area,
+    to_multipolygon,
+    unite,
 )
 
 _RING = st.lists(st.tuples(st.integers(0, 12), st.integers(0, 12)), min_size=3, max_size=9)
@@ -34,7 +34,7 @@ def windings(ring: np.ndarray, x: float, y: float) -> float:
 @given(st.lists(_RING, min_size=1, max_size=3), st.sampled_from(["evenodd", "nonzero"]))
 def test_fills_are_what_angles_say(rings: list[list[tuple[int, int]]], rule: str) -> None:
     arrays = [np.array(ring, dtype=float) for ring in rings]
-    area, reason, _ = enclosed(arrays, rule)  # type: ignore[arg-type]
+    area, reason, _ = find_enclosed_area(arrays, rule)  # type: ignore[arg-type]
     assert area.is_valid
     assert reason is None
     # irrational places are on no edge
@@ -50,9 +50,9 @@ def test_fills_are_what_angles_say(rings: list[list[tuple[int, int]]], rule: str
 @given(st.lists(_RING, min_size=1, max_size=3))
 def test_holes_are_taken_out_of_the_outline(rings: list[list[tuple[int, int]]]) -> None:
     arrays = [np.array(ring, dtype=float) for ring in rings]
-    area, reason, lost = enclosed(arrays)
+    area, reason, lost = find_enclosed_area(arrays)
     assert area.is_valid
-    outer = enclosed(arrays[:1])[0]
+    outer = find_enclosed_area(arrays[:1])[0]
     assert area.difference(outer).area < 1e-9
     for hole in arrays[1:]:
         if Polygon(hole).is_valid:
@@ -64,23 +64,23 @@ def test_holes_are_taken_out_of_the_outline(rings: list[list[tuple[int, int]]]) 
 
 
 def test_a_bow_tie_is_both_of_its_halves() -> None:
-    area, reason, _ = enclosed([np.array([[0, 0], [4, 4], [4, 0], [0, 4]], dtype=float)])
+    area, reason, _ = find_enclosed_area([np.array([[0, 0], [4, 4], [4, 0], [0, 4]], dtype=float)])
     assert reason == "Self-intersection[2 2]"
     assert area.area == 8.0
 
 
 def test_halves_that_share_an_edge_are_one() -> None:
     ring = np.array([[1, 0], [2, 2], [2, 0], [1, 0], [2, 2], [0, 0]], dtype=float)
-    area, _, _ = enclosed([ring])
+    area, _, _ = find_enclosed_area([ring])
     assert area.is_valid and len(area.geoms) == 1
 
 
 def test_what_has_no_area_is_empty() -> None:
     line = np.array([[0, 0], [4, 0], [0, 0]], dtype=float)
     for rule in ("holes", "evenodd", "nonzero"):
-        assert enclosed([line], rule)[0].is_empty
-        assert enclosed([np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])], rule)[0].is_empty
-        assert enclosed([], rule)[0].is_empty
+        assert find_enclosed_area([line], rule)[0].is_empty
+        assert find_enclosed_area([np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])], rule)[0].is_empty
+        assert find_enclosed_area([], rule)[0].is_empty
 
 
 @pytest.mark.slow
@@ -88,10 +88,10 @@ def test_a_ring_may_touch_itself_as_often_as_it_likes() -> None:
     count = 2000
     angle = np.arange(count) * math.tau / count
     star = np.column_stack([np.cos(angle), np.sin(angle)]) * np.where(np.arange(count) % 2, 1.0, 3.0)[:, None]
-    Crossings("star").add([shapely.LinearRing(star)])
+    CrossingCounter("star").add([shapely.LinearRing(star)])
     x = np.arange(count, dtype=float)
     parallel = np.stack([np.column_stack([x, 0 * x]), np.column_stack([x + 900, 0 * x + 900])], axis=1)
-    Crossings("hatch").add(shapely.linestrings(parallel))
+    CrossingCounter("hatch").add(shapely.linestrings(parallel))
 
 
 @pytest.mark.slow
@@ -99,20 +99,20 @@ def test_a_ring_may_touch_itself_as_often_as_it_likes() -> None:
 def test_a_tangle_is_refused_before_it_is_unravelled(count: int) -> None:
     ring = np.random.default_rng(1).random((count, 2))
     with pytest.raises(MapError, match=f"knot: expected at most {MAX_CROSSINGS} crossings of lines"):
-        Crossings("knot").add([shapely.LinearRing(ring)])
-    Crossings("loose").add([shapely.LinearRing(ring[:200])])
+        CrossingCounter("knot").add([shapely.LinearRing(ring)])
+    CrossingCounter("loose").add([shapely.LinearRing(ring[:200])])
 
 
 @pytest.mark.slow
 def test_crossings_are_those_of_all_shapes_together() -> None:
     angle = np.arange(151) * 75 * math.tau / 151
     star = np.column_stack([np.cos(angle), np.sin(angle)])
-    crossings = Crossings("stars")
-    enclosed([star], "nonzero", crossings)
+    crossings = CrossingCounter("stars")
+    find_enclosed_area([star], "nonzero", crossings)
     assert crossings.count == pytest.approx(151 * (75 - 1), rel=0.01)
-    enclosed([star + 5], "evenodd", crossings)
+    find_enclosed_area([star + 5], "evenodd", crossings)
     with pytest.raises(MapError, match=r"stars: expected at most"):
-        enclosed([star + 9], "holes", crossings)
+        find_enclosed_area([star + 9], "holes", crossings)
 
 
 def test_holes_that_take_nothing_out_are_counted() -> None:
@@ -124,30 +124,30 @@ def test_holes_that_take_nothing_out_are_counted() -> None:
         [(20, 0), (21, 0), (21, 1)],
     ]
     rings = [np.array(ring) for ring in (outer.coords, hole.coords, *nothing)]
-    area, _, lost = enclosed(rings)
+    area, _, lost = find_enclosed_area(rings)
     assert area.area == 80
     assert lost == {"of fewer than three points": 2, "without an area": 1, "outside of their outline": 1}
-    assert enclosed(rings[:4])[2] == {"of fewer than three points": 2}
+    assert find_enclosed_area(rings[:4])[2] == {"of fewer than three points": 2}
 
 
 def test_edges_and_parts() -> None:
     ring = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
-    assert edges_of([shapely.LinearRing(ring)] * 2).shape == (6, 2, 2)
-    assert edges_of([shapely.LineString(ring)]).tolist() == [[[0, 0], [1, 0]], [[1, 0], [1, 1]]]
-    assert edges_of([]).shape == (0, 2, 2)
-    assert sides_of(shapely.box(0, 0, 1, 1) - shapely.box(0.2, 0.2, 0.5, 0.5)).shape == (8, 2, 2)
+    assert extract_edges([shapely.LinearRing(ring)] * 2).shape == (6, 2, 2)
+    assert extract_edges([shapely.LineString(ring)]).tolist() == [[[0, 0], [1, 0]], [[1, 0], [1, 1]]]
+    assert extract_edges([]).shape == (0, 2, 2)
+    assert extract_sides(shapely.box(0, 0, 1, 1) - shapely.box(0.2, 0.2, 0.5, 0.5)).shape == (8, 2, 2)
     nested = shapely.GeometryCollection(
         [shapely.Point(0, 0), shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(5, 5, 9, 9)])]
     )
-    assert [part.area for part in polygons_of(nested).geoms] == [16.0, 1.0]
+    assert [part.area for part in to_multipolygon(nested).geoms] == [16.0, 1.0]
 
 
 def test_no_part_is_lost_where_edges_are_almost_on_each_other() -> None:
     # without a grid GEOS 3.14 loses the triangle on the right
     slim = Polygon([(0, 0), (1, 0), (-40, 764)])
-    bow, reason, _ = enclosed([np.array([(0, 0), (1, 161), (1, 0), (-40, 764)], dtype=float)])
+    bow, reason, _ = find_enclosed_area([np.array([(0, 0), (1, 161), (1, 0), (-40, 764)], dtype=float)])
     assert reason is not None
-    both = united([slim, bow])
+    both = unite([slim, bow])
     assert shapely.distance(both, shapely.Point(1, 161)) < 1e-5
     overlap = shapely.intersection(slim, bow, grid_size=1e-9).area
     assert both.area == pytest.approx(slim.area + bow.area - overlap, rel=1e-5)
@@ -156,8 +156,8 @@ def test_no_part_is_lost_where_edges_are_almost_on_each_other() -> None:
 @settings(max_examples=60, deadline=None)
 @given(st.lists(_RING, min_size=1, max_size=5))
 def test_a_union_covers_what_it_is_of(rings: list[list[tuple[int, int]]]) -> None:
-    areas = [enclosed([np.array(ring, dtype=float)], "nonzero")[0] for ring in rings]
-    both = united(areas)
+    areas = [find_enclosed_area([np.array(ring, dtype=float)], "nonzero")[0] for ring in rings]
+    both = unite(areas)
     assert both.area >= max(area.area for area in areas) - 1e-6
     for area in areas:
         assert shapely.difference(area, both.buffer(1e-5)).area < 1e-9

@@ -15,7 +15,7 @@ from shapely import MultiPolygon, Polygon, box
 
 from robocov.errors import OutputError, ParameterError
 from robocov_app.figures.page import tone
-from robocov_app.formats import ForeignMap, Shaping, shaped
+from robocov_app.formats import ForeignMap, Shaping, build_environment
 from robocov_app.formats.preview import plot_import, preview
 from robocov_app.render.theme import DARK, LIGHT
 
@@ -31,7 +31,7 @@ def foreign(free: Any, **given: Any) -> ForeignMap:
 
 def plotted(free: Any, shaping: Shaping = Shaping(specks=0.05), theme: str = "light", **given: Any) -> Any:  # noqa: B008
     read = foreign(free, **given)
-    return plot_import(read, *shaped(read, shaping, "plan.svg"), theme=theme)
+    return plot_import(read, *build_environment(read, shaping, "plan.svg"), theme=theme)
 
 
 def marked(axes: Any, colour: tuple[int, int, int]) -> list[Any]:
@@ -106,7 +106,7 @@ def test_free_space_that_is_not_valid_is_drawn_all_the_same() -> None:
 @pytest.mark.slow
 def test_files_are_the_same_every_time(tmp_path: Path) -> None:
     read = foreign(HALL - PILLARS)
-    environment, report = shaped(read, Shaping(), "plan.svg")
+    environment, report = build_environment(read, Shaping(), "plan.svg")
     for name in ("plan.png", "plan.svg", "plan.pdf"):
         preview(read, environment, report, tmp_path / name)
         first = (tmp_path / name).read_bytes()

@@ -14,7 +14,7 @@ from shapely import MultiPolygon, Polygon, box
 from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, WallObstacle
 from robocov_app.formats import ReadOptions, import_map
 from robocov_app.formats.base import ForeignMap
-from robocov_app.formats.geometry.conversion import Shaping, shaped
+from robocov_app.formats.geometry.conversion import Shaping, build_environment
 
 ROOM = box(0, 0, 20, 16)
 ARC = tuple((10 + 4 * math.cos(k / 100), 5 + 4 * math.sin(k / 100)) for k in range(314))
@@ -39,7 +39,7 @@ def drawn(primitives: list[Any], blocks: list[Polygon]) -> ForeignMap:
 
 
 def made(primitives: list[Any], *blocks: Polygon, **shaping: Any) -> Environment:
-    return shaped(drawn(primitives, list(blocks)), Shaping(**shaping), "plan")[0]
+    return build_environment(drawn(primitives, list(blocks)), Shaping(**shaping), "plan")[0]
 
 
 @settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.too_slow])
@@ -56,7 +56,7 @@ def test_free_space_stays(
     parts = sorted(foreign.free.geoms, key=lambda part: -part.area)
     if not parts or not shapely.maximum_inscribed_circle(parts[0], tolerance=0.01).length > 0.5:
         return
-    environment, report = shaped(foreign, Shaping(simplify=tolerance), "plan")
+    environment, report = build_environment(foreign, Shaping(simplify=tolerance), "plan")
     apart = shapely.symmetric_difference(environment.free, parts[0])
     # twice: what was drawn may have moved, and so may the primitives from where it was drawn
     assert apart.area <= 2 * (tolerance + 2e-4) * parts[0].length

@@ -15,7 +15,13 @@ from robocov.environment import CircleObstacle, Environment, PolygonObstacle, Un
 from robocov.errors import ParameterError
 from robocov_app.formats import ReadOptions, Shaping, WriteOptions, export_map, import_map
 from robocov_app.formats.geometry import rasterize
-from robocov_app.formats.geometry.rasterize import Grid, free_cells, grid_over, lost_passages, not_held
+from robocov_app.formats.geometry.rasterize import (
+    CellGrid,
+    build_grid,
+    describe_lost_passages,
+    describe_unsupported,
+    find_free_cells,
+)
 
 points = st.tuples(*[st.integers(-64, 448).map(lambda k: k / 64)] * 2)
 
@@ -28,7 +34,7 @@ def test_a_cell_is_covered_where_its_centre_is(
     ring: list[tuple[float, float]], cell: float, finer: int
 ) -> None:
     shape = shapely.make_valid(Polygon(ring), method="structure", keep_collapsed=False)
-    grid = Grid(7, 9, cell, (-0.3, -0.2))
+    grid = CellGrid(7, 9, cell, (-0.3, -0.2))
     covered = grid.covered(MultiPolygon(shapely.get_parts(shape).tolist()), finer)
     step = cell / finer
     x, y = np.meshgrid(-0.3 + (np.arange(9 * finer) + 0.5) * step, -0.2 + (np.arange(7 * finer) + 0.5) * step)
@@ -38,7 +44,7 @@ def test_a_cell_is_covered_where_its_centre_is(
 
 def test_rooms_that_share_a_wall_share_no_cell() -> None:
     # centres lie on the common edge: each belongs to just one
-    grid = Grid(4, 4, 1.0, (0.0, 0.0))
+    grid = CellGrid(4, 4, 1.0, (0.0, 0.0))
     left, right = shapely.box(0, 0, 1.5, 4), shapely.box(1.5, 0, 4, 4)
     assert (grid.covered(left).astype(int) + grid.covered(right)).tolist() == [[1] * 4] * 4
     slanted = Polygon([(0, 0), (4, 0), (4, 4)]), Polygon([(0, 0), (4, 4), (0, 4)])
@@ -51,26 +57,26 @@ def room(**others: object) -> Environment:
 
 
 def test_the_grid_has_a_cell_to_spare_on_each_side() -> None:
-    grid = grid_over(room(), 0.25)
+    grid = build_grid(room(), 0.25)
     assert (grid.rows, grid.columns, grid.cell, grid.origin) == (14, 22, 0.25, (0.75, 1.75))
-    free = free_cells(room(), grid)
-    assert lost_passages(room(), grid, free) == ()
+    free = find_free_cells(room(), grid)
+    assert describe_lost_passages(room(), grid, free) == ()
     assert free.sum() * 0.25**2 == 15
     assert not free[[0, -1]].any() and not free[:, [0, -1]].any()
-    assert grid_over(room(), None).cell == 0.05
+    assert build_grid(room(), None).cell == 0.05
     # a side that is no whole number of cells has one more
-    assert grid_over(room(), 0.7).columns == 8 + 2
+    assert build_grid(room(), 0.7).columns == 8 + 2
 
 
 def test_cells_that_are_too_small_or_too_large() -> None:
     with pytest.raises(ParameterError, match=r"cell: expected at most 64 million"):
-        grid_over(room(), 1e-4)
+        build_grid(room(), 1e-4)
     blocks = tuple(
         PolygonObstacle(((x, 2.0), (x + 0.4, 2.0), (x + 0.4, 5.0), (x, 5.0)))
         for x in (1.0, 1.5, 2.0, 2.5, 3.0)
     )
     with pytest.raises(ParameterError, match="cell: no cell of 20 m is free, expected a smaller size"):
-        free_cells(room(obstacles=blocks), grid_over(room(obstacles=blocks), 20.0))
+        find_free_cells(room(obstacles=blocks), build_grid(room(obstacles=blocks), 20.0))
 
 
 _places = st.tuples(st.floats(0.8, 6.2), st.floats(1.8, 5.2))
@@ -86,8 +92,8 @@ _thin = st.one_of(
 @given(st.lists(_thin, min_size=1, max_size=6), st.floats(0.04, 0.25))
 def test_no_obstacle_vanishes_or_splits_and_no_rooms_merge(things: list[Any], cell: float) -> None:
     environment = room(obstacles=tuple(things))
-    grid = grid_over(environment, cell)
-    free = free_cells(environment, grid)
+    grid = build_grid(environment, cell)
+    free = find_free_cells(environment, grid)
     low = np.array(grid.origin)
     boxes = [shapely.box(*(low + [c * cell, r * cell]), *(low + [(c + 1) * cell, (r + 1) * cell]))
              for r, c in np.argwhere(~free)]  # fmt: skip
@@ -127,26 +133,26 @@ def test_gaps_that_cells_close_are_told_with_cells_that_keep_them() -> None:
     environment = room(obstacles=(wall,), starts={"all": UniformStart()})
 
     def warnings(cell: float) -> tuple[str, ...]:
-        grid = grid_over(environment, cell)
-        return lost_passages(environment, grid, free_cells(environment, grid))
+        grid = build_grid(environment, cell)
+        return describe_lost_passages(environment, grid, find_free_cells(environment, grid))
 
     (warning,) = warnings(0.25)
     assert warning == (
         "gaps close: the free space falls into 2 parts, not 1; cells of 0.1 m keep it (--cell 0.1)"
     )
     assert warnings(0.1) == ()
-    assert not_held(environment) == ("starts: all", "names of obstacles")
-    assert not_held(room()) == ()
+    assert describe_unsupported(environment) == ("starts: all", "names of obstacles")
+    assert describe_unsupported(room()) == ()
 
 
 def test_rooms_that_cells_lose_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     walls = (WallObstacle(((1.0, 2.2), (6.0, 2.2)), 0.01), WallObstacle(((1.0, 2.35), (6.0, 2.35)), 0.01))
     environment = room(obstacles=walls)
-    grid = grid_over(environment, 0.4)
-    (warning,) = lost_passages(environment, grid, free_cells(environment, grid))
+    grid = build_grid(environment, 0.4)
+    (warning,) = describe_lost_passages(environment, grid, find_free_cells(environment, grid))
     assert warning.startswith("2 separate parts of the free space are lost; cells of 0.05 m keep it")
     monkeypatch.setattr(rasterize, "_MOST_TRIED", 1_000_000)
     hair = room(obstacles=(PolygonObstacle(((3.0, 2.0), (3.5, 2.0), (3.5, 4.9995), (3.0, 4.9995))),))
-    grid = grid_over(hair, 0.4)
-    (warning,) = lost_passages(hair, grid, free_cells(hair, grid))
+    grid = build_grid(hair, 0.4)
+    (warning,) = describe_lost_passages(hair, grid, find_free_cells(hair, grid))
     assert warning.endswith("not 1; no cells of which there are at most 1 million keep it")

@@ -7,14 +7,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import MultiPolygon, Polygon, affinity
 
-from robocov_app.formats.geometry.conversion import rooms
+from robocov_app.formats.geometry.conversion import find_rooms
 from robocov_app.formats.geometry.simplify import (
     KEPT_OUTLINE,
-    Outline,
-    closed_gaps,
-    simplified,
+    OriginalOutline,
+    find_closed_gaps,
+    simplify_free_space,
 )
-from robocov_app.formats.geometry.vectorize import traced
+from robocov_app.formats.geometry.vectorize import trace_outline
 
 CELL = 0.05
 
@@ -26,7 +26,7 @@ def cells_of(shape: shapely.Geometry, cell: float = CELL, rim: int = 2) -> Multi
     x, y = np.meshgrid(
         low_x + (np.arange(columns) - rim + 0.5) * cell, low_y + (np.arange(rows) - rim + 0.5) * cell
     )
-    outline = traced(shapely.contains_xy(shape, x, y), "grid")
+    outline = trace_outline(shapely.contains_xy(shape, x, y), "grid")
     return affinity.affine_transform(outline, [cell, 0, 0, cell, low_x - rim * cell, low_y - rim * cell])
 
 
@@ -40,7 +40,7 @@ def vertices(shape: shapely.Geometry) -> int:
 def test_walls_at_any_angle_are_straight(angle: float, shift: float) -> None:
     room = affinity.rotate(shapely.box(0, 0, 6, 4), angle, origin=(shift, shift))
     stairs = cells_of(room)
-    result = simplified(stairs, CELL, CELL, 0.1)
+    result = simplify_free_space(stairs, CELL, CELL, 0.1)
     assert result.changed == ()
     # four walls; at a sharp tip of cells a corner may stay cut
     assert vertices(result.free) <= 8
@@ -62,14 +62,16 @@ def test_walls_at_any_angle_are_straight(angle: float, shift: float) -> None:
 def test_straight_walls_stay_where_they_are() -> None:
     room = shapely.box(0, 0, 6, 4) - shapely.box(2, 1, 2.1, 3) - shapely.box(4, 2, 5, 4)
     stairs = cells_of(room)
-    result = simplified(stairs, CELL, CELL, 0.1)
+    result = simplify_free_space(stairs, CELL, CELL, 0.1)
     assert shapely.equals_exact(result.free.normalize(), MultiPolygon([room]).normalize(), 1e-9)
 
 
 def test_a_bump_of_a_cell_in_a_wall_goes() -> None:
     free = np.ones((40, 60), dtype=bool)
     free[0, 20:23] = free[39, 10] = free[7, 0] = False
-    result = simplified(affinity.scale(traced(free, "grid"), CELL, CELL, origin=(0, 0)), CELL, CELL, 0.1)
+    result = simplify_free_space(
+        affinity.scale(trace_outline(free, "grid"), CELL, CELL, origin=(0, 0)), CELL, CELL, 0.1
+    )
     assert vertices(result.free) == 4
     assert shapely.equals_exact(
         result.free.normalize(), MultiPolygon([shapely.box(0, 0, 3, 2)]).normalize(), 1e-9
@@ -80,7 +82,7 @@ def test_round_things_keep_their_size() -> None:
     for radius in (0.16, 0.2, 0.35, 1.0):
         pillar = shapely.Point(2.013, 1.987).buffer(radius, quad_segs=64)
         stairs = cells_of(shapely.box(0, 0, 4, 4) - pillar)
-        result = simplified(stairs, CELL, CELL, 0.1)
+        result = simplify_free_space(stairs, CELL, CELL, 0.1)
         (hole,) = result.free.geoms[0].interiors
         was = Polygon(stairs.geoms[0].interiors[0]).area
         assert Polygon(hole).area == pytest.approx(was, rel=KEPT_OUTLINE)
@@ -94,9 +96,9 @@ def test_a_wall_of_one_cell_keeps_its_shape(length: int, turned: bool) -> None:
     free = np.ones((30, 40), dtype=bool)
     free[:length, 19] = False
     free[20, 10 : 10 + length] = False
-    cells = traced(free.T if turned else free, "grid")
+    cells = trace_outline(free.T if turned else free, "grid")
     outline = affinity.scale(cells, CELL, CELL, origin=(0, 0))
-    result = simplified(outline, CELL, CELL, 0.1)
+    result = simplify_free_space(outline, CELL, CELL, 0.1)
     assert result.free.symmetric_difference(outline).area < 1e-9
     assert vertices(result.free) == 12
 
@@ -106,20 +108,20 @@ def test_a_thin_wall_at_an_angle_keeps_its_area(angle: float) -> None:
     wall = affinity.rotate(shapely.box(1, 1.95, 4, 2.05), angle)
     stairs = cells_of(shapely.box(0, 0, 5, 4) - wall)
     solid = shapely.box(*stairs.bounds) - stairs
-    result = simplified(stairs, CELL, CELL, 0.1)
+    result = simplify_free_space(stairs, CELL, CELL, 0.1)
     assert (shapely.box(*stairs.bounds) - result.free).area == pytest.approx(solid.area, rel=KEPT_OUTLINE)
 
 
 @pytest.mark.parametrize("thickness", [0.012, 0.02, 0.028])
 def test_a_thin_wall_of_a_drawing_keeps_its_shape(thickness: float) -> None:
     room = shapely.box(0, 0, 6, 4) - shapely.box(3, 2, 3 + thickness, 4)
-    result = simplified(MultiPolygon([room]), 0.02, None, 0.1)
+    result = simplify_free_space(MultiPolygon([room]), 0.02, None, 0.1)
     assert shapely.equals_exact(result.free.normalize(), MultiPolygon([room]).normalize(), 1e-9)
 
 
 def test_a_narrow_alcove_keeps_its_shape() -> None:
     room = shapely.box(0, 0, 6, 4) | shapely.box(3, 4, 3.02, 5)
-    result = simplified(MultiPolygon([room]), 0.02, None, 0.1)
+    result = simplify_free_space(MultiPolygon([room]), 0.02, None, 0.1)
     assert shapely.equals_exact(result.free.normalize(), MultiPolygon([room]).normalize(), 1e-9)
 
 
@@ -129,11 +131,11 @@ def test_a_door_as_wide_as_a_robot_stays_open() -> None:
     free[:, 38:42] = False
     free[28:33, 38:42] = True
     free[33, 38:40] = free[27, 40:42] = True
-    outline = affinity.scale(traced(free, "grid"), CELL, CELL, origin=(0, 0))
+    outline = affinity.scale(trace_outline(free, "grid"), CELL, CELL, origin=(0, 0))
     for tolerance in (CELL, 2 * CELL, 4 * CELL):
-        result = simplified(outline, tolerance, CELL, 0.124)
-        assert len(rooms(result.free, 0.124)) == 1, tolerance
-    assert len(rooms(outline, 0.126)) == 2
+        result = simplify_free_space(outline, tolerance, CELL, 0.124)
+        assert len(find_rooms(result.free, 0.124)) == 1, tolerance
+    assert len(find_rooms(outline, 0.126)) == 2
 
 
 def test_what_is_done_less_is_said() -> None:
@@ -143,15 +145,15 @@ def test_what_is_done_less_is_said() -> None:
     for column in range(40, 160):
         low = int(28 + 4 * np.sin((column - 40) / 40 * np.pi))
         free[low : low + 6, column] = True
-    outline = affinity.scale(traced(free, "grid"), CELL, CELL, origin=(0, 0))
-    assert len(rooms(outline, 0.115)) == 1
-    result = simplified(outline, 3 * CELL, CELL, 0.115)
-    assert len(rooms(result.free, 0.115)) == 1
+    outline = affinity.scale(trace_outline(free, "grid"), CELL, CELL, origin=(0, 0))
+    assert len(find_rooms(outline, 0.115)) == 1
+    result = simplify_free_space(outline, 3 * CELL, CELL, 0.115)
+    assert len(find_rooms(result.free, 0.115)) == 1
     (line,) = [line for line in result.changed if "narrow" in line]
     assert line.endswith("so that a robot of radius 0.115 m passes where it passed")
     assert vertices(result.free) < vertices(outline) / 2
     # a smaller robot leaves more to simplify
-    assert simplified(outline, 3 * CELL, CELL, 0.05).changed == ()
+    assert simplify_free_space(outline, 3 * CELL, CELL, 0.05).changed == ()
 
 
 ragged = st.tuples(
@@ -174,9 +176,9 @@ def blobs(seed: int, share: float, smooth: int, rows: int = 40, columns: int = 5
 @given(ragged)
 def test_in_any_cave_walls_stay_near_and_robots_pass(cave: tuple[int, float, int, float]) -> None:
     seed, share, smooth, tolerance = cave
-    outline = affinity.scale(traced(blobs(seed, share, smooth), "grid"), CELL, CELL, origin=(0, 0))
+    outline = affinity.scale(trace_outline(blobs(seed, share, smooth), "grid"), CELL, CELL, origin=(0, 0))
     radius = 0.1
-    result = simplified(outline, tolerance, CELL, radius).free
+    result = simplify_free_space(outline, tolerance, CELL, radius).free
     assert result.is_valid
     assert len(result.geoms) == len(outline.geoms)
     # every corner of the cells is within the tolerance of a wall
@@ -187,7 +189,7 @@ def test_in_any_cave_walls_stay_near_and_robots_pass(cave: tuple[int, float, int
     assert shapely.distance(outline.boundary, corners).max() <= tolerance * (1 + 1e-6) + CELL / 16
     assert abs(result.area - outline.area) <= 0.02 * outline.area + 1e-9
     # two places that a robot of just this size goes between are connected afterwards
-    before, after = rooms(outline, radius * 1.0001), shapely.union_all(rooms(result, radius * 0.99))
+    before, after = find_rooms(outline, radius * 1.0001), shapely.union_all(find_rooms(result, radius * 0.99))
     parts = shapely.get_parts(after)
     for room in before:
         if room.area < 4 * radius * radius:
@@ -201,8 +203,8 @@ def test_in_any_cave_walls_stay_near_and_robots_pass(cave: tuple[int, float, int
 @given(ragged)
 def test_the_parts_of_it_are_what_they_say(cave: tuple[int, float, int, float]) -> None:
     seed, share, smooth, _ = cave
-    cells = traced(blobs(seed, share, smooth), "grid")
-    outline = Outline(list(cells.geoms), 1.0)
+    cells = trace_outline(blobs(seed, share, smooth), "grid")
+    outline = OriginalOutline(list(cells.geoms), 1.0)
     assert outline.areas.sum() == pytest.approx(cells.area, abs=0.01 * outline.neck.sum() + 1e-9)
     everything = np.zeros(len(outline.points))
     nothing = np.zeros(len(outline.points), dtype=bool)
@@ -213,7 +215,7 @@ def test_the_parts_of_it_are_what_they_say(cave: tuple[int, float, int, float]) 
 
 def test_what_must_stay_does() -> None:
     angle = np.linspace(0, 2 * np.pi, 100, endpoint=False)
-    outline = Outline([Polygon(np.column_stack([np.cos(angle), np.sin(angle)]))], None)
+    outline = OriginalOutline([Polygon(np.column_stack([np.cos(angle), np.sin(angle)]))], None)
     fixed = np.zeros(100, dtype=bool)
     fixed[[7, 33, 90]] = True
     source = set(outline.drawn(np.full(100, 0.5), fixed).source)
@@ -236,13 +238,13 @@ def test_a_gap_that_has_closed_is_found() -> None:
         shapely.LineString([(2.1, 2.12), (1.9, 2.15)]),
         shapely.LineString([(0, 0), (0, 4)]),
     ])  # fmt: skip
-    pairs, places = closed_gaps(sides, wide, room, 0.2, 0.05)
+    pairs, places = find_closed_gaps(sides, wide, room, 0.2, 0.05)
     assert pairs.tolist() == [[0, 1]]
     assert places[0, 1] == pytest.approx(1.995)
-    assert len(closed_gaps(sides, shapely.linestrings(sides), room, 0.2, 0.05)[0]) == 0
+    assert len(find_closed_gaps(sides, shapely.linestrings(sides), room, 0.2, 0.05)[0]) == 0
     # what faces each other through a wall is no gap
     solid = MultiPolygon([shapely.box(0, 0, 4, 1.9), shapely.box(0, 2.09, 4, 4)])
-    assert len(closed_gaps(sides, wide, solid, 0.2, 0.05)[0]) == 0
+    assert len(find_closed_gaps(sides, wide, solid, 0.2, 0.05)[0]) == 0
 
 
 @pytest.mark.slow
@@ -252,18 +254,18 @@ def test_a_comb_of_many_teeth_does_not_exhaust_the_stack() -> None:
     x = np.arange(2 * teeth) / 2.0
     y = np.where(np.arange(2 * teeth) % 2 == 0, 5.0, 5.4)
     shape = Polygon([*zip(x, y, strict=True), (x[-1], 0.0), (0.0, 0.0)])
-    result = simplified(MultiPolygon([shape]), 0.02, None, 0.1)
+    result = simplify_free_space(MultiPolygon([shape]), 0.02, None, 0.1)
     assert vertices(result.free) == vertices(shape)
 
 
 def test_drawings_are_simplified_too() -> None:
     angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     round_room = Polygon(np.column_stack([np.cos(angle), np.sin(angle)]) * 3)
-    result = simplified(MultiPolygon([round_room]), 0.02, None, 0.1)
+    result = simplify_free_space(MultiPolygon([round_room]), 0.02, None, 0.1)
     assert 15 < vertices(result.free) < 60
     assert shapely.hausdorff_distance(result.free.boundary, round_room.boundary) <= 0.02
-    assert simplified(MultiPolygon([round_room]), 0.0, None, 0.1).free.geoms[0] is not None
-    assert vertices(simplified(MultiPolygon([round_room]), 0.0, None, 0.1).free) == 400
+    assert simplify_free_space(MultiPolygon([round_room]), 0.0, None, 0.1).free.geoms[0] is not None
+    assert vertices(simplify_free_space(MultiPolygon([round_room]), 0.0, None, 0.1).free) == 400
 
 
 @pytest.mark.parametrize("sides", [(0.05, 0.08), (0.1, 0.03)])
@@ -271,10 +273,10 @@ def test_cells_need_not_be_square(sides: tuple[float, float]) -> None:
     # two obstacles that touch at a corner: the neck between them becomes that corner, wherever it is
     free = np.ones((12, 12), dtype=bool)
     free[4, 4] = free[5, 5] = False
-    cells = affinity.scale(traced(free, "grid"), *sides, origin=(0, 0))
+    cells = affinity.scale(trace_outline(free, "grid"), *sides, origin=(0, 0))
     turned = affinity.rotate(cells, 20, origin=(0, 0))
     for shape, turn in ((cells, 0), (turned, 20)):
-        outline = Outline(list(shape.geoms), max(sides))
+        outline = OriginalOutline(list(shape.geoms), max(sides))
         wanted = affinity.rotate(shapely.Point(5 * sides[0], 5 * sides[1]), turn, origin=(0, 0))
         assert outline.neck.sum() == 2
         assert outline.points[outline.neck] == pytest.approx(np.repeat([wanted.coords[0]], 2, axis=0))
@@ -282,7 +284,7 @@ def test_cells_need_not_be_square(sides: tuple[float, float]) -> None:
     room = affinity.rotate(shapely.box(0, 0, 6, 4), 20, origin=(0, 0))
     stretched = affinity.scale(room, 1 / sides[0], 1 / sides[1], origin=(0, 0))
     stairs = affinity.scale(cells_of(stretched, 1.0), *sides, origin=(0, 0))
-    result = simplified(stairs, max(sides), max(sides), 0.1)
+    result = simplify_free_space(stairs, max(sides), max(sides), 0.1)
     assert vertices(result.free) <= 8
     assert result.free.area == pytest.approx(24, rel=0.01)
     assert shapely.hausdorff_distance(result.free.boundary, room.boundary) < 2 * max(sides)

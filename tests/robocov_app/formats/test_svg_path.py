@@ -7,21 +7,21 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from robocov_app.formats.geometry.frames import moved
+from robocov_app.formats.geometry.frames import transform_points
 from robocov_app.formats.svg.path import (
-    affine,
-    composed,
-    fitted,
-    length,
-    numbers,
-    stretch,
-    subpaths,
-    transform,
+    build_affine,
+    compose,
+    compute_stretch,
+    fit_view_box,
+    parse_length,
+    parse_numbers,
+    parse_path,
+    parse_transform,
 )
 
 
 def points(text: str, tolerance: float = 1e-3) -> list[list[float]]:
-    [(found, _)], _ = subpaths(text, tolerance, 10_000)
+    [(found, _)], _ = parse_path(text, tolerance, 10_000)
     return [[round(x, 9) + 0.0, round(y, 9) + 0.0] for x, y in found.tolist()]
 
 
@@ -44,15 +44,15 @@ def test_commands(text: str, wanted: list[list[float]]) -> None:
 
 
 def test_subpaths_begin_where_the_last_one_did() -> None:
-    found, draws = subpaths("M1 1h2v2z l1 0 M5 5zh1m1 1", 1e-3, 100)
+    found, draws = parse_path("M1 1h2v2z l1 0 M5 5zh1m1 1", 1e-3, 100)
     assert draws == 7
     assert [(part.tolist(), closed) for part, closed in found] == [
         ([[1, 1], [3, 1], [3, 3]], True),
         ([[1, 1], [2, 1]], False),
         ([[5, 5], [6, 5]], False),
     ]
-    assert subpaths("", 1e-3, 10) == ([], 0)
-    assert subpaths("M1 1", 1e-3, 10) == ([], 1)
+    assert parse_path("", 1e-3, 10) == ([], 0)
+    assert parse_path("M1 1", 1e-3, 10) == ([], 1)
 
 
 def test_smooth_curves_mirror_the_handle_before_them() -> None:
@@ -74,7 +74,7 @@ def test_arcs_obey_the_equation_of_their_ellipse(
 ) -> None:
     assume((x1, y1) != (x2, y2))
     flags = f"{int(large)}{int(clockwise)}"  # compressed, as optimisers write them
-    [(found, _)], _ = subpaths(f"M{x1} {y1}A{rx} {ry} {turn} {flags}{x2} {y2}", 1e-3, 100_000)
+    [(found, _)], _ = parse_path(f"M{x1} {y1}A{rx} {ry} {turn} {flags}{x2} {y2}", 1e-3, 100_000)
     assert found[0].tolist() == [x1, y1]
     assert found[-1].tolist() == [x2, y2]
     # in the plane where the ellipse is a circle of radius 1
@@ -115,12 +115,12 @@ def test_arcs_obey_the_equation_of_their_ellipse(
 )
 def test_what_is_no_path_is_refused_with_its_place(text: str, wanted: str) -> None:
     with pytest.raises(ValueError, match="expected") as caught:
-        subpaths(text, 1e-3, 100)
+        parse_path(text, 1e-3, 100)
     assert wanted in str(caught.value)
 
 
 def test_arcs_whose_ends_meet_are_nothing_and_tiny_radii_are_lines() -> None:
-    assert subpaths("M1 1A5 5 0 1 1 1 1", 1e-3, 100) == ([], 2)
+    assert parse_path("M1 1A5 5 0 1 1 1 1", 1e-3, 100) == ([], 2)
     assert points("M0 0A1e-40 1e-40 0 1 1 3 0") == [[0, 0], [3, 0]]
     huge = points("M0 0A1e25 1e25 0 0 1 3 0")
     assert huge == [[0, 0], [3, 0]]
@@ -145,7 +145,7 @@ def test_arcs_whose_ends_meet_are_nothing_and_tiny_radii_are_lines() -> None:
     ],
 )
 def test_transforms(text: str, point: tuple[float, float], wanted: tuple[float, float]) -> None:
-    assert moved(transform(text), np.array([point], dtype=float))[0] == pytest.approx(wanted)
+    assert transform_points(parse_transform(text), np.array([point], dtype=float))[0] == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize(
@@ -153,21 +153,21 @@ def test_transforms(text: str, point: tuple[float, float], wanted: tuple[float, 
 )
 def test_what_is_no_transform_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="expected"):
-        transform(text)
+        parse_transform(text)
 
 
 def test_transforms_that_grow_without_end_are_refused() -> None:
     with pytest.raises(ValueError, match="beyond 1e"):
-        transform("scale(1e20) scale(1e20)")
+        parse_transform("scale(1e20) scale(1e20)")
     with pytest.raises(ValueError, match="beyond"):
-        composed(affine(1e29, d=1e29), affine(1e29, d=1e29))
+        compose(build_affine(1e29, d=1e29), build_affine(1e29, d=1e29))
 
 
 def test_stretch_is_what_happens_to_a_circle() -> None:
-    matrix = transform("rotate(30) scale(2 5) skewX(20)")
+    matrix = parse_transform("rotate(30) scale(2 5) skewX(20)")
     angle = np.linspace(0, math.tau, 100_000)
-    lengths = np.hypot(*moved(matrix, np.column_stack([np.cos(angle), np.sin(angle)])).T)
-    assert stretch(matrix) == pytest.approx((lengths.min(), lengths.max()), rel=1e-6)
+    lengths = np.hypot(*transform_points(matrix, np.column_stack([np.cos(angle), np.sin(angle)])).T)
+    assert compute_stretch(matrix) == pytest.approx((lengths.min(), lengths.max()), rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -185,22 +185,22 @@ def test_stretch_is_what_happens_to_a_circle() -> None:
     ],
 )
 def test_lengths(text: str, wanted: float) -> None:
-    assert length(text, 80.0) == pytest.approx(wanted)
+    assert parse_length(text, 80.0) == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize("text", ["", "x", "10em", "10 px x", "%", "1e99px", "nan"])
 def test_what_is_no_length_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="expected"):
-        length(text, 80.0)
+        parse_length(text, 80.0)
     with pytest.raises(ValueError, match="expected"):
-        length("50%")
+        parse_length("50%")
 
 
 def test_lists_of_numbers() -> None:
-    assert numbers("1,2 3-4.5.5e1,") == [1, 2, 3, -4.5, 5]
-    assert numbers("") == []
+    assert parse_numbers("1,2 3-4.5.5e1,") == [1, 2, 3, -4.5, 5]
+    assert parse_numbers("") == []
     with pytest.raises(ValueError, match="expected a number"):
-        numbers("1 two")
+        parse_numbers("1 two")
 
 
 @pytest.mark.parametrize(
@@ -216,6 +216,6 @@ def test_lists_of_numbers() -> None:
 def test_view_boxes_fit_as_they_are_told(
     how: str, corner: tuple[float, float], centre: tuple[float, float]
 ) -> None:
-    matrix = fitted((10.0, 10.0, 20.0, 20.0), 100.0, 200.0, how)
-    places = moved(matrix, np.array([[10.0, 10.0], [20.0, 20.0]]))
+    matrix = fit_view_box((10.0, 10.0, 20.0, 20.0), 100.0, 200.0, how)
+    places = transform_points(matrix, np.array([[10.0, 10.0], [20.0, 20.0]]))
     assert places.tolist() == [list(map(float, corner)), list(map(float, centre))]

@@ -5,13 +5,13 @@ import pytest
 from robocov.errors import MapError
 from robocov_app.formats.svg.path import (
     INHERITED,
-    MOST_TEXT,
-    MOST_WORK,
+    MAX_TEXT,
+    MAX_WORK,
     StyleSheet,
-    declarations,
-    inherited,
+    inherit_style,
     is_hidden,
     is_painted,
+    parse_declarations,
 )
 from robocov_app.formats.xml_tree import Element
 
@@ -72,18 +72,18 @@ def test_unfinished_rules_are_left_out() -> None:
 
 
 def test_inheritance() -> None:
-    group = inherited(INHERITED, {"fill": "none", "stroke": "red", "stroke-width": "3"})
-    inner = inherited(group, {"fill": "inherit", "stroke": "unset", "stroke-width": "1"})
+    group = inherit_style(INHERITED, {"fill": "none", "stroke": "red", "stroke-width": "3"})
+    inner = inherit_style(group, {"fill": "inherit", "stroke": "unset", "stroke-width": "1"})
     assert (inner["fill"], inner["stroke"], inner["stroke-width"]) == ("none", "red", "1")
-    assert inherited(group, {"opacity": "0"}).keys() == INHERITED.keys()
+    assert inherit_style(group, {"opacity": "0"}).keys() == INHERITED.keys()
 
 
 @pytest.mark.parametrize("paint", ["none", "transparent", "NONE"])
 def test_what_is_not_painted(paint: str) -> None:
-    assert not is_painted(inherited(INHERITED, {"fill": paint}), "fill")
-    assert not is_painted(inherited(INHERITED, {"fill-opacity": "0"}), "fill")
-    assert not is_painted(inherited(INHERITED, {"fill-opacity": "0%"}), "fill")
-    assert is_painted(inherited(INHERITED, {"fill": "url(#gradient)", "fill-opacity": "x"}), "fill")
+    assert not is_painted(inherit_style(INHERITED, {"fill": paint}), "fill")
+    assert not is_painted(inherit_style(INHERITED, {"fill-opacity": "0"}), "fill")
+    assert not is_painted(inherit_style(INHERITED, {"fill-opacity": "0%"}), "fill")
+    assert is_painted(inherit_style(INHERITED, {"fill": "url(#gradient)", "fill-opacity": "x"}), "fill")
     assert not is_painted(INHERITED, "stroke")
 
 
@@ -94,18 +94,16 @@ def test_what_is_hidden() -> None:
 
 
 def test_declarations() -> None:
-    assert declarations(" Fill : url(a:b) ;; x ; stroke:red") == {"fill": "url(a:b)", "stroke": "red"}
+    assert parse_declarations(" Fill : url(a:b) ;; x ; stroke:red") == {"fill": "url(a:b)", "stroke": "red"}
 
 
 @pytest.mark.slow
 def test_sheets_that_take_for_ever_are_refused() -> None:
-    with pytest.raises(
-        MapError, match=rf"plan\.svg: expected style sheets of at most {MOST_TEXT} characters"
-    ):
-        sheet("*" * (MOST_TEXT + 1))
+    with pytest.raises(MapError, match=rf"plan\.svg: expected style sheets of at most {MAX_TEXT} characters"):
+        sheet("*" * (MAX_TEXT + 1))
     rules = sheet("*{fill:red} " * 9000)
     with pytest.raises(MapError, match=r"plan\.svg: too many rules for too many elements"):
-        for _ in range(MOST_WORK // 9000 + 1):
+        for _ in range(MAX_WORK // 9000 + 1):
             rules.of(element())
     sheet("@" * 500_000)
     sheet("@media{" * 100_000)

@@ -20,12 +20,12 @@ from robocov_app.formats import (
     ReadOptions,
     Shaping,
     WriteOptions,
+    build_environment,
     detect,
     export_map,
     import_map,
-    shaped,
 )
-from robocov_app.formats.geometry.polygons import decimal, on_grid, rings
+from robocov_app.formats.geometry.polygons import format_decimal, list_rings, snap_to_grid
 
 FORMATS = [("svg", {}), ("wkt", {}), ("geojson", {}), ("geojson", {"origin": (180.0, -75.0)})]
 AS_IT_IS = Shaping(simplify=0.0, keep="all")
@@ -50,7 +50,7 @@ def out_and_in(environment: Environment, path: Path, **options: Any) -> ForeignM
 def test_bundled_maps(tmp_path: Path, name: str, kind: str, options: dict[str, Any]) -> None:
     environment = load_map(name)
     foreign = out_and_in(environment, tmp_path / f"{name}.{kind}", **options)
-    again, _ = shaped(foreign, AS_IT_IS, name)
+    again, _ = build_environment(foreign, AS_IT_IS, name)
     # maps that are imported have tenths of millimetres
     assert again.free.symmetric_difference(environment.free).area <= 1e-4 * environment.free.length
     first = (tmp_path / f"{name}.{kind}").read_bytes()
@@ -200,7 +200,7 @@ def test_what_cannot_be_written_is_refused(
 
 @given(st.floats(-1e6, 1e6), st.integers(0, 9))
 def test_decimals_are_as_few_as_say_it(value: float, digits: int) -> None:
-    text = decimal(value, digits)
+    text = format_decimal(value, digits)
     assert float(text) == pytest.approx(round(value, digits), abs=1e-12 + abs(value) * 1e-15)
     assert "e" not in text
     assert text != "-0"
@@ -213,8 +213,8 @@ def test_areas_on_a_grid() -> None:
     area = shapely.union_all(
         [shapely.box(0, 0, 4, 4) - shapely.box(1, 1, 2, 2), shapely.box(9, 9, 9.01, 9.01)]
     )
-    (part,) = on_grid(area, 1)
-    outer, inner = rings(part)
+    (part,) = snap_to_grid(area, 1)
+    outer, inner = list_rings(part)
     assert outer[0] == outer[-1]
     assert part.exterior.is_ccw
     assert not part.interiors[0].is_ccw

@@ -13,7 +13,7 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.errors import MapError
 from robocov_app.formats import files
-from robocov_app.formats.geometry.vectorize import NECK, traced
+from robocov_app.formats.geometry.vectorize import NECK, trace_outline
 
 grids = arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, max_side=9), elements=st.booleans())
 
@@ -41,7 +41,7 @@ def expected(free: np.ndarray) -> shapely.Geometry:
 @given(grids, st.integers(1, 10))
 def test_it_is_the_union_of_the_cells(free: np.ndarray, strip: int) -> None:
     with mock.patch("robocov_app.formats.geometry.vectorize._STRIP", strip):
-        outline = traced(free, "grid")
+        outline = trace_outline(free, "grid")
     assert outline.is_valid
     assert shapely.equals(outline, expected(free)) if free.any() else outline.is_empty
     assert outline.area == free.sum() - len(touching(free)) * NECK**2
@@ -54,7 +54,7 @@ def test_it_is_the_union_of_the_cells(free: np.ndarray, strip: int) -> None:
 @settings(deadline=None, max_examples=100)
 @given(grids)
 def test_rings_are_apart_and_every_vertex_is_a_corner(free: np.ndarray) -> None:
-    rings = shapely.get_rings(list(traced(free, "grid").geoms))
+    rings = shapely.get_rings(list(trace_outline(free, "grid").geoms))
     for k, ring in enumerate(rings):
         assert not shapely.intersects(ring, rings[:k]).any()
         points = shapely.get_coordinates(ring)[:-1]
@@ -63,21 +63,21 @@ def test_rings_are_apart_and_every_vertex_is_a_corner(free: np.ndarray) -> None:
 
 
 def test_free_cells_that_touch_at_a_corner_are_apart_and_obstacles_hang_together() -> None:
-    assert len(traced(np.array([[True, False], [False, True]]), "grid").geoms) == 2
+    assert len(trace_outline(np.array([[True, False], [False, True]]), "grid").geoms) == 2
     walls = np.ones((6, 6), dtype=bool)
     walls[[1, 2, 3, 4], [1, 2, 3, 4]] = False
-    (part,) = traced(walls, "grid").geoms
+    (part,) = trace_outline(walls, "grid").geoms
     assert len(part.interiors) == 1, "a diagonal wall of single cells is one obstacle"
     assert Polygon(part.interiors[0]).area == pytest.approx(4 + 3 * NECK**2)
 
 
 def test_nothing_and_all() -> None:
-    assert traced(np.zeros((3, 4), dtype=bool), "grid") == MultiPolygon()
-    assert shapely.equals(traced(np.ones((3, 4), dtype=bool), "grid"), shapely.box(0, 0, 4, 3))
+    assert trace_outline(np.zeros((3, 4), dtype=bool), "grid") == MultiPolygon()
+    assert shapely.equals(trace_outline(np.ones((3, 4), dtype=bool), "grid"), shapely.box(0, 0, 4, 3))
 
 
 def test_a_grid_that_is_too_rough_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     chess = np.indices((20, 20)).sum(axis=0) % 2 == 0
     monkeypatch.setattr(files, "MAX_VERTICES", 200)
     with pytest.raises(MapError, match=r"^grid: expected at most"):
-        traced(chess, "grid")
+        trace_outline(chess, "grid")

@@ -10,27 +10,31 @@ from shapely import MultiPolygon, Polygon
 
 from robocov_app.formats.base import square_metres
 from robocov_app.formats.files import parse_yaml
-from robocov_app.formats.geometry.curves import beziers
-from robocov_app.formats.geometry.polygons import Rule, bounded, decimal, enclosed
-from robocov_app.formats.geometry.rasterize import _smaller
-from robocov_app.formats.geometry.shapes import _many
-from robocov_app.formats.geometry.simplify import sharpened
-from robocov_app.formats.geometry.vectorize import _share, traced
+from robocov_app.formats.geometry.curves import flatten_beziers
+from robocov_app.formats.geometry.polygons import Rule, build_boundary, find_enclosed_area, format_decimal
+from robocov_app.formats.geometry.rasterize import _iterate_smaller_sizes
+from robocov_app.formats.geometry.shapes import _pluralize
+from robocov_app.formats.geometry.simplify import sharpen_corners
+from robocov_app.formats.geometry.vectorize import _format_share, trace_outline
 from robocov_app.formats.preview import _number
-from robocov_app.formats.svg.path import declarations, subpaths
+from robocov_app.formats.svg.path import parse_declarations, parse_path
 from robocov_app.formats.unreadable import named_kind
 
 
 def test_numbers_are_written_so_that_they_are_read_easily() -> None:
     assert (square_metres(30083.2), square_metres(0.123456)) == ("30083 m²", "0.1235 m²")
-    assert (decimal(1.5, 3), decimal(-0.0001, 3), decimal(1200.0, 0)) == ("1.5", "0", "1200")
-    assert (_share(1, 100_000), _share(500, 1000)) == ("<0.1 %", "50 %")
+    assert (format_decimal(1.5, 3), format_decimal(-0.0001, 3), format_decimal(1200.0, 0)) == (
+        "1.5",
+        "0",
+        "1200",
+    )
+    assert (_format_share(1, 100_000), _format_share(500, 1000)) == ("<0.1 %", "50 %")
     assert (_number(1761234.5), _number(35.2789)) == ("1\u202f761\u202f234", "35.28")
-    assert (_many(2, "empty geometry"), _many(2, "box")) == ("2 empty geometries", "2 boxes")
+    assert (_pluralize(2, "empty geometry"), _pluralize(2, "box")) == ("2 empty geometries", "2 boxes")
 
 
 def test_finer_cells_are_of_round_sizes() -> None:
-    assert list(islice(_smaller(0.15), 4)) == [0.1, 0.05, 0.02, 0.01]
+    assert list(islice(_iterate_smaller_sizes(0.15), 4)) == [0.1, 0.05, 0.02, 0.01]
 
 
 def test_what_is_in_texts() -> None:
@@ -38,8 +42,8 @@ def test_what_is_in_texts() -> None:
         "image": "a.pgm",
         "origin": ["0", "1.5", "0"],
     }
-    assert declarations("fill: none; stroke-width:2px;") == {"fill": "none", "stroke-width": "2px"}
-    ((points, closed),), _ = subpaths("m0 0h4v2z", 0.1, 100)
+    assert parse_declarations("fill: none; stroke-width:2px;") == {"fill": "none", "stroke-width": "2px"}
+    ((points, closed),), _ = parse_path("m0 0h4v2z", 0.1, 100)
     assert points.tolist() == [[0.0, 0.0], [4.0, 0.0], [4.0, 2.0]]
     assert closed
 
@@ -52,25 +56,25 @@ def test_a_file_that_is_not_read_is_named_with_a_way() -> None:
 
 def test_few_points_are_enough_for_a_flat_curve() -> None:
     control = np.array([[[0.0, 0.0], [2.0, 3.0], [4.0, 3.0], [6.0, 0.0]]])
-    assert beziers(control, 0.6)[0].tolist() == [[3.0, 2.25], [6.0, 0.0]]
+    assert flatten_beziers(control, 0.6)[0].tolist() == [[3.0, 2.25], [6.0, 0.0]]
 
 
 @pytest.mark.parametrize(("rule", "area"), [("holes", 12.0), ("evenodd", 12.0), ("nonzero", 16.0)])
 def test_a_square_in_a_square(rule: Rule, area: float) -> None:
     square = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
-    assert enclosed([square, 1 + square / 2], rule)[0].area == area
+    assert find_enclosed_area([square, 1 + square / 2], rule)[0].area == area
 
 
 def test_the_outline_of_a_room_is_its_boundary() -> None:
     room = shapely.box(0, 0, 4, 3) - shapely.box(1, 1, 2, 2)
-    boundary, solid = bounded(MultiPolygon([room]), None, hull=False, margin=0.0, digits=4)
+    boundary, solid = build_boundary(MultiPolygon([room]), None, hull=False, margin=0.0, digits=4)
     assert (boundary.area, [part.area for part in solid]) == (12.0, [1.0])
 
 
 def test_three_cells_have_six_corners() -> None:
-    free = traced(np.array([[True, True], [True, False]]), "grid")
+    free = trace_outline(np.array([[True, True], [True, False]]), "grid")
     assert free.wkt == "MULTIPOLYGON (((0 0, 2 0, 2 1, 1 1, 1 2, 0 2, 0 0)))"
 
 
 def test_a_cut_corner_is_made_whole() -> None:
-    assert sharpened(Polygon([(0, 0), (4, 0), (4, 2.99), (3.99, 3), (0, 3)]), 0.02).area == 12.0
+    assert sharpen_corners(Polygon([(0, 0), (4, 0), (4, 2.99), (3.99, 3), (0, 3)]), 0.02).area == 12.0

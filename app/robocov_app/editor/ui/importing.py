@@ -10,8 +10,16 @@ from typing import Any, Literal, TypeAlias, get_args, get_origin, get_type_hints
 from robocov.environment import Environment
 from robocov.errors import ParameterError, quote, to_one_line
 from robocov_app.editor.ui.import_sheet import Sheet, make_sheet
-from robocov_app.formats import ForeignMap, Importer, ImportReport, ReadOptions, Shaping, read_map, shaped
-from robocov_app.formats.geometry.conversion import Comparison, compare
+from robocov_app.formats import (
+    ForeignMap,
+    Importer,
+    ImportReport,
+    ReadOptions,
+    Shaping,
+    build_environment,
+    read_map,
+)
+from robocov_app.formats.geometry.conversion import ImportComparison, compare_maps
 from robocov_app.toolkit.worker import Line
 
 Kind = Literal["number", "place", "words", "colours", "width", "text", "choice"]
@@ -83,7 +91,7 @@ class Imported:
 
     environment: Environment
     report: ImportReport
-    comparison: Comparison
+    comparison: ImportComparison
     sheet: Sheet | None = None
 
 
@@ -104,8 +112,8 @@ class Importing:
             self._read = key, read_map(path, format=name, options=options)
         foreign = self._read[1]
         sheet = self._make_sheet(path, name, options, foreign)
-        environment, report = shaped(foreign, shaping, to_one_line(path.name))
-        return Imported(environment, report, compare(foreign, environment, report), sheet)
+        environment, report = build_environment(foreign, shaping, to_one_line(path.name))
+        return Imported(environment, report, compare_maps(foreign, environment, report), sheet)
 
     def _make_sheet(self, path: Path, name: str, options: ReadOptions, foreign: ForeignMap) -> Sheet | None:
         """Return the file in its own colours, those included that its options leave out."""

@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import GRID_M
-from robocov_app.formats.geometry.polygons import buffer_with_mitres, polygons_of, sides_of, united
+from robocov_app.formats.geometry.polygons import buffer_with_mitres, extract_sides, to_multipolygon, unite
 
 _DIGITS = 9  # of distances in metres: what is less comes of rounding
 _OVERLAP_M = 2 * GRID_M  # by how much what is filled or cut reaches beyond a hair
@@ -53,9 +53,9 @@ def remove_hairs(free: MultiPolygon, width: float, length: float) -> Cleaned:
     Cleaned
     """
     slits = _select_long(shapely.difference(_close(free, width), free), length)
-    filled = free if not len(slits) else _round(united([free, *_grow(slits)]))
+    filled = free if not len(slits) else _round(unite([free, *_grow(slits)]))
     spurs = _select_long(shapely.difference(filled, _open(filled, width)), length)
-    cleaned = filled if not len(spurs) else _round(shapely.difference(filled, united(_grow(spurs))))
+    cleaned = filled if not len(spurs) else _round(shapely.difference(filled, unite(_grow(spurs))))
     if cleaned.is_empty:
         return Cleaned(free)
     area = float(shapely.area(slits).sum() + shapely.area(spurs).sum())
@@ -76,7 +76,7 @@ def measure_deviation(before: MultiPolygon, after: MultiPolygon) -> Deviation:
     distance = 0.0
     for one, other in ((before, after), (after, before)):
         points = shapely.points(_sample_walls(one))
-        walls = STRtree(shapely.linestrings(sides_of(other)))
+        walls = STRtree(shapely.linestrings(extract_sides(other)))
         _, away = walls.query_nearest(points, return_distance=True, all_matches=False)
         distance = max(distance, float(away.max()))
     area = float(shapely.symmetric_difference(before, after).area)
@@ -94,7 +94,7 @@ def _sample_walls(area: MultiPolygon) -> Array:
 
 def _select_long(geometry: BaseGeometry, length: float) -> Array:
     """Return the polygons of a geometry that are longer than so many metres."""
-    pieces = np.array(polygons_of(geometry).geoms, dtype=object)
+    pieces = np.array(to_multipolygon(geometry).geoms, dtype=object)
     x, y, right, top = shapely.bounds(pieces).reshape(-1, 4).T
     is_rounding = shapely.area(pieces) < 1e-3 * GRID_M * shapely.length(pieces)
     return np.asarray(pieces[(np.hypot(right - x, top - y) > length) & ~is_rounding])
@@ -118,4 +118,4 @@ def _grow(pieces: Array) -> Sequence[BaseGeometry]:
 
 
 def _round(area: BaseGeometry) -> MultiPolygon:
-    return polygons_of(shapely.set_precision(area, GRID_M))
+    return to_multipolygon(shapely.set_precision(area, GRID_M))

@@ -24,18 +24,23 @@ from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.formats.base import ForeignMap, ImportReport, Options, Primitive, square_metres
 from robocov_app.formats.geometry.cleaning import Cleaned, Deviation, measure_deviation, remove_hairs
 from robocov_app.formats.geometry.polygons import (
-    bounded,
     buffer_with_mitres,
-    filled,
-    made_valid,
-    polygons,
-    polygons_of,
-    rounded,
-    sides_of,
+    build_boundary,
+    extract_sides,
+    fill_holes,
+    list_polygons,
+    make_valid,
+    round_polygons,
     tidy_ring,
-    united,
+    to_multipolygon,
+    unite,
 )
-from robocov_app.formats.geometry.simplify import Simplified, rays, sharpened, simplified
+from robocov_app.formats.geometry.simplify import (
+    SimplifiedSpace,
+    count_crossed_sides,
+    sharpen_corners,
+    simplify_free_space,
+)
 
 _CRUMB = 1e-4  # obstacles and parts that are smaller, in m², come of rounding
 DEFAULT_TOLERANCE = 0.02  # by how much walls of vector formats may move, in metres
@@ -53,7 +58,7 @@ _HOLLOW_SHARE = (
 # of maps with more vertices it takes too long to say where robots do not pass, and the narrowest passage
 _SOON, _MOST_VERTICES = 10_000, 20_000
 MAX_OBSTACLES, MAX_KEPT = 8_000, 50_000  # obstacles, vertices of a map: to make as many takes seconds
-MOST_PRIMITIVES = 5_000  # circles and walls that stay such; of more, to compare takes seconds
+MAX_PRIMITIVES = 5_000  # circles and walls that stay such; of more, to compare takes seconds
 _Obstacle = TypeVar("_Obstacle", bound=env.Obstacle)
 _MOST_ROBOTS = 1000  # of a file, so many are looked at
 _ZERO = 1e-100  # coordinates nearer to zero, in metres, are zero; as of map files
@@ -102,7 +107,7 @@ class Shaping(Options):
             raise ParameterError("inside: keeps one part of the free space, but keep is all")
 
 
-def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environment, ImportReport]:
+def build_environment(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environment, ImportReport]:
     """Return the environment that `foreign` stands for, and what was done; MapError where it is no map."""
     return _Shaper(foreign, shaping, where).shaped()
 
@@ -120,7 +125,7 @@ class _Plan(NamedTuple):
         blocked = shapely.union_all(
             [*self.solid, *(primitive.polygon for primitive in self.primitives)], grid_size=env.GRID_M
         )
-        return polygons_of(shapely.difference(self.boundary, blocked, grid_size=env.GRID_M))
+        return to_multipolygon(shapely.difference(self.boundary, blocked, grid_size=env.GRID_M))
 
 
 class _Shaper:
@@ -212,18 +217,18 @@ class _Shaper:
             self.notes.insert(0, f"the boundary is {foreign.boundary_source}")
         return outer
 
-    def _simplify(self, before: MultiPolygon, read: MultiPolygon) -> Simplified:
+    def _simplify(self, before: MultiPolygon, read: MultiPolygon) -> SimplifiedSpace:
         """Return the free space with fewer vertices, rounded; walls moved by the tolerance at most."""
         foreign, tolerance = self.foreign, self._tolerance(report=True)
         sharp = before
         if foreign.cut_corners:
-            sharp = MultiPolygon([sharpened(part, tolerance) for part in before.geoms])
+            sharp = MultiPolygon([sharpen_corners(part, tolerance) for part in before.geoms])
         grid = 10.0**-self.digits
         # where the steps add up to more than is allowed, they do less
         attempts = [(sharp, tolerance), (sharp, tolerance / 2), (before, tolerance / 2), (before, 0.0)]
         for plan, allowed in attempts:
-            simple = simplified(plan, allowed, foreign.cell, self.radius)
-            free = rounded(simple.free, self.digits)
+            simple = simplify_free_space(plan, allowed, foreign.cell, self.radius)
+            free = round_polygons(simple.free, self.digits)
             if free.is_empty:
                 few = f"only {read.area:.3g} m² are free"
                 raise MapError(f"{self.where}: {few}: is the scale right?")
@@ -233,18 +238,22 @@ class _Shaper:
         return simple._replace(free=free)
 
     def _build(
-        self, drawing: Simplified, outer: Polygon | None, before: MultiPolygon, read: MultiPolygon
+        self, drawing: SimplifiedSpace, outer: Polygon | None, before: MultiPolygon, read: MultiPolygon
     ) -> _Plan:
         """Return boundary and obstacles that leave what is free in a drawing."""
         shaping, free = self.shaping, drawing.free
         if outer is not None:
-            simple = simplified(MultiPolygon([outer]), self._tolerance(), self.foreign.cell, self.radius)
-            base = filled(simple.free)
+            simple = simplify_free_space(
+                MultiPolygon([outer]), self._tolerance(), self.foreign.cell, self.radius
+            )
+            base = fill_holes(simple.free)
         elif len(free.geoms) == 1 and self.foreign.primitives:
             base = self._fill_notches(free.geoms[0])
         else:
             base = None
-        boundary, solid = bounded(free, base, hull=shaping.hull, margin=shaping.margin, digits=self.digits)
+        boundary, solid = build_boundary(
+            free, base, hull=shaping.hull, margin=shaping.margin, digits=self.digits
+        )
         if outer is not None:
             solid = _without_slivers(solid, shapely.difference(outer, read), drawing.tolerance)
         plan = _Plan(boundary, solid, [], measure_deviation(before, free))
@@ -265,10 +274,12 @@ class _Shaper:
         reach = max(wall.width for wall in walls) / 2 + 2 * self._tolerance()
         grown = buffer_with_mitres(outline, reach)
         closed = buffer_with_mitres(grown, -reach)
-        notches = np.array(polygons(shapely.difference(closed & outline.convex_hull, outline)), dtype=object)
+        notches = np.array(
+            list_polygons(shapely.difference(closed & outline.convex_hull, outline)), dtype=object
+        )
         covered = shapely.union_all([wall.polygon for wall in walls]).buffer(2 * self._tolerance())
         notches = notches[shapely.covers(covered, notches)]
-        return filled(rounded(united([outline, *notches.tolist()]), self.digits))
+        return fill_holes(round_polygons(unite([outline, *notches.tolist()]), self.digits))
 
     def _to_environment(self, plan: _Plan, free: MultiPolygon) -> Environment:
         environment = Environment(
@@ -291,7 +302,7 @@ class _Shaper:
         """Report which places a robot does not reach from the largest one, where that is soon known."""
         if shapely.get_num_coordinates(environment.free) > _SOON:
             return
-        reached = sorted((place.area for place in rooms(environment.free, self.radius)), reverse=True)
+        reached = sorted((place.area for place in find_rooms(environment.free, self.radius)), reverse=True)
         if len(reached) > 1:
             what = f"{format_count(len(reached) - 1, 'place')} of {square_metres(sum(reached[1:]), 3)}"
             self.notes.append(f"{what} no robot of radius {self.radius:g} m reaches from the largest one")
@@ -303,8 +314,8 @@ class _Shaper:
             return None
         if not given.is_valid:
             self.repaired.append(f"the boundary met itself: {_reason(given)}")
-            given = made_valid(given)
-        valid = [Polygon(part.exterior) for part in polygons(given)]
+            given = make_valid(given)
+        valid = [Polygon(part.exterior) for part in list_polygons(given)]
         return MultiPolygon(valid) if valid else None
 
     def _valid(self, outer: MultiPolygon | None) -> MultiPolygon:
@@ -316,14 +327,14 @@ class _Shaper:
         free: BaseGeometry = shapely.transform(given, lambda xy: np.where(abs(xy) < _ZERO, 0.0, xy))
         if not free.is_valid:
             self.repaired.append(f"outlines met themselves or each other: {_reason(free)}")
-            free = made_valid(free)
+            free = make_valid(free)
         if outer is not None and not shapely.covers(outer, free):
             inside = shapely.intersection(free, outer)
             lost = free.area - inside.area
             if lost > _CRUMB:
                 self.dropped.append(f"{square_metres(lost, 3)} of free space outside the boundary")
             free = inside
-        valid = polygons_of(free)
+        valid = to_multipolygon(free)
         if valid.is_empty:
             raise MapError(f"{self.where}: there is no free space")
         return valid
@@ -445,7 +456,7 @@ class _Shaper:
         widest = 0.0
         for part in parts:
             if math.sqrt(part.area / math.pi) > widest:
-                widest = max(widest, roomiest(part, self.clearance / 50, self.clearance)[1])
+                widest = max(widest, find_roomiest_point(part, self.clearance / 50, self.clearance)[1])
             if widest >= self.clearance:
                 return
         wanted, most = self.clearance / (1 + env.MIN_START_GAP_RADII), widest / (1 + env.MIN_START_GAP_RADII)
@@ -475,7 +486,7 @@ class _Shaper:
         """Return the starts: a disc at the roomiest place, everywhere, and where the file places robots."""
         clearance, robots, part = self.clearance, self.foreign.robots, free.geoms[0]
         # what is finer than this does not move a start by much
-        (x, y), room = roomiest(part, max(0.01, math.sqrt(part.area) / 500))
+        (x, y), room = find_roomiest_point(part, max(0.01, math.sqrt(part.area) / 500))
         # the disc holds centres: one robot's radius stays between it and the walls
         radius = min(room - clearance, 2.0)
         starts: dict[str, env.StartSpec] = {"uniform": env.UniformStart()}
@@ -496,13 +507,13 @@ class _Shaper:
             self.notes.append(f'start "robots": {many} of robots in the file{rest}')
         return starts
 
-    def _with_primitives(self, plan: _Plan, drawing: Simplified, before: MultiPolygon) -> _Plan:
+    def _with_primitives(self, plan: _Plan, drawing: SimplifiedSpace, before: MultiPolygon) -> _Plan:
         """Return a plan with circles and walls in place of the polygons that they make up.
 
         Not where a pocket would be left between one and what is beside it, nor any where walls would have
         moved by more than the tolerance.
         """
-        places = max(len(rooms(space, self.radius)) for space in (before, drawing.free))
+        places = max(len(find_rooms(space, self.radius)) for space in (before, drawing.free))
         unwanted: frozenset[Primitive] = frozenset()
         for _ in range(_MAX_ROUNDS):
             found = self._match_primitives(plan, drawing.tolerance, places, unwanted)
@@ -514,7 +525,7 @@ class _Shaper:
             }
             if not beside:
                 # its vertices where polygons began that are gone
-                boundary = rounded(found.boundary.simplify(0.0), self.digits).geoms[0]
+                boundary = round_polygons(found.boundary.simplify(0.0), self.digits).geoms[0]
                 deviation = measure_deviation(before, found.find_free())
                 # a circle stays within its sagitta, whatever number of sides it is drawn with
                 limit = self._tolerance() + 10.0**-self.digits + env.MAX_SAGITTA_M
@@ -537,11 +548,11 @@ class _Shaper:
         boundary, solid = plan.boundary, plan.solid
         slack = tolerance + 10.0**-self.digits
         rounded_to = {
-            with_numbers(each, lambda value: round(value, self.digits) + 0.0): each
+            transform_numbers(each, lambda value: round(value, self.digits) + 0.0): each
             for each in self.foreign.primitives
         }
         usable = [each for each in rounded_to if _fits(each) and each not in unwanted]
-        if not usable or len(usable) > MOST_PRIMITIVES:
+        if not usable or len(usable) > MAX_PRIMITIVES:
             return plan
         # of another radius, however near, a circle may be drawn with another number of sides
         covered = np.array([rounded_to[primitive].polygon for primitive in usable], dtype=object)
@@ -566,7 +577,7 @@ class _Shaper:
             kept = [usable[k] for k in sorted(set().union(*(own for own in made if len(own) <= most)))]
             rest = [part for part, own in zip(solid, made, strict=True) if not 0 < len(own) <= most]
             found_plan = plan._replace(solid=rest, primitives=kept)
-            if len(rooms(found_plan.find_free(), self.radius)) <= places:
+            if len(find_rooms(found_plan.find_free(), self.radius)) <= places:
                 return found_plan
         return plan
 
@@ -594,7 +605,7 @@ def _has_hollow_obstacle(part: Polygon, area: float) -> bool:
 
 def _length_along(part: Polygon, page: Polygon) -> float:
     """Return how much of the outline of a part runs along the edge of a page, an upright rectangle, m."""
-    sides = sides_of(part)
+    sides = extract_sides(part)
     low_x, low_y, high_x, high_y = page.bounds
     slack = 1e-6 * max(high_x - low_x, high_y - low_y)
     length = np.hypot(*(sides[:, 1] - sides[:, 0]).T)
@@ -627,7 +638,7 @@ def _without_slivers(solid: list[Polygon], before: BaseGeometry, tolerance: floa
     return list(np.delete(parts, np.flatnonzero(thin)[fresh]))
 
 
-def with_numbers(obstacle: _Obstacle, number: Callable[[float], float]) -> _Obstacle:
+def transform_numbers(obstacle: _Obstacle, number: Callable[[float], float]) -> _Obstacle:
     """Return an obstacle with other numbers for all that it has."""
 
     def ring(points: Ring) -> Ring:
@@ -657,7 +668,7 @@ def _fits(primitive: Primitive) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class ImportComparison:
     """Free space as it was read and as it became, m; what is `lost` and `opened`, but for walls that moved.
 
     `region`: convex, around all of it. `gap`: the narrowest passage that is left, if that is soon known.
@@ -676,13 +687,15 @@ class Comparison:
         return x, y, right, top
 
 
-def compare(foreign: ForeignMap, environment: Environment, report: ImportReport) -> Comparison:
+def compare_maps(foreign: ForeignMap, environment: Environment, report: ImportReport) -> ImportComparison:
     before, after = foreign.free, environment.free
-    before = before if before.is_valid else made_valid(before)
+    before = before if before.is_valid else make_valid(before)
     everything = [before, after, environment.region.polygon, foreign.boundary or before]
     lost, opened = _changed(before, after, report.tolerance), _changed(after, before, report.tolerance)
     gap = env.find_narrowest_gap(after) if report.vertices_kept <= _MOST_VERTICES else None
-    return Comparison(before, after, lost, opened, shapely.GeometryCollection(everything).convex_hull, gap)
+    return ImportComparison(
+        before, after, lost, opened, shapely.GeometryCollection(everything).convex_hull, gap
+    )
 
 
 def _changed(first: BaseGeometry, second: BaseGeometry, tolerance: float) -> MultiPolygon:
@@ -694,24 +707,26 @@ def _changed(first: BaseGeometry, second: BaseGeometry, tolerance: float) -> Mul
     return MultiPolygon(parts[width > max(_SLIVER * tolerance, 1e-3) / 2].tolist())
 
 
-def rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
+def find_rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
     """Return where the centre of a robot may be, each place that it cannot leave, but for tiny ones."""
     inner = free.buffer(-radius, quad_segs=4)
     return [part for part in shapely.get_parts(inner).tolist() if part.area > radius * radius / 4]
 
 
-def roomiest(free: Polygon, tolerance: float, enough: float = math.inf) -> tuple[tuple[float, float], float]:
+def find_roomiest_point(
+    free: Polygon, tolerance: float, enough: float = math.inf
+) -> tuple[tuple[float, float], float]:
     """Return the place farthest from the walls, and how far that is, m; or any that is far `enough`.
 
     Squares that may hold one better by `tolerance` are cut into four, the `_SQUARES` most promising of them.
     """
-    sides = shapely.linestrings(sides_of(free))
+    sides = shapely.linestrings(extract_sides(free))
     walls = STRtree(sides)
     shapely.prepare(free)
     low_x, low_y, high_x, high_y = free.bounds
     width, height = high_x - low_x, high_y - low_y
     some = np.linspace(low_y, high_y, _SQUARES)
-    squares = max(min(_SQUARES, _SQUARES * _MOST_RAYS // max(rays(sides, some), 1)), 16)
+    squares = max(min(_SQUARES, _SQUARES * _MOST_RAYS // max(count_crossed_sides(sides, some), 1)), 16)
     side = max(min(width, height), max(width, height) / squares)
     corners = np.meshgrid(np.arange(low_x, high_x, side), np.arange(low_y, high_y, side))
     centres = np.stack(corners, axis=-1).reshape(-1, 2) + side / 2

@@ -9,15 +9,17 @@ import shapely
 from robocov.arrays import Array, IntArray, concatenate_ranges
 from robocov.environment import MAX_SAGITTA_M
 
-TOLERANCE = MAX_SAGITTA_M  # m between a curve and the line that stands for it at most: as of round obstacles
+CURVE_TOLERANCE_M = (
+    MAX_SAGITTA_M  # m between a curve and the line that stands for it at most: as of round obstacles
+)
 # steps between two breaks at first; and what of the tolerance the middle of a step may be away, which need
 # not be where the curve is farthest
 _FIRST, _SAFE = 8, 0.8
 _LEAST = 8  # points of a whole ellipse at least, however small it is
-MOST_POINTS = 250_000  # of one call; a circle of 10 000 km, as far as coordinates go, has 222 thousand
+MAX_POINTS = 250_000  # of one call; a circle of 10 000 km, as far as coordinates go, has 222 thousand
 
 
-def beziers(control: Array, tolerance: float, most: int = MOST_POINTS) -> tuple[Array, IntArray]:
+def flatten_beziers(control: Array, tolerance: float, most: int = MAX_POINTS) -> tuple[Array, IntArray]:
     """Return points, (k, 2), of cubic Bézier curves, (n, 4, 2), without their begins; and how many each has.
 
     The number of equal steps of the parameter is that of Wang's formula: the second differences of the
@@ -35,8 +37,8 @@ def beziers(control: Array, tolerance: float, most: int = MOST_POINTS) -> tuple[
     return points, count
 
 
-def arcs(
-    centre: Array, u: Array, v: Array, begin: Array, sweep: Array, tolerance: float, most: int = MOST_POINTS
+def flatten_arcs(
+    centre: Array, u: Array, v: Array, begin: Array, sweep: Array, tolerance: float, most: int = MAX_POINTS
 ) -> tuple[Array, IntArray]:
     """Return points and counts as `beziers` for arcs centre + u cos(a) + v sin(a), a from `begin` on, rad."""
     # the longer half axis: the greater singular value of [u v]
@@ -52,17 +54,17 @@ def arcs(
     return c + np.cos(angle)[:, None] * p + np.sin(angle)[:, None] * q, count
 
 
-def arc(centre: Array, u: Array, v: Array, begin: float, sweep: float, tolerance: float) -> Array:
+def flatten_arc(centre: Array, u: Array, v: Array, begin: float, sweep: float, tolerance: float) -> Array:
     """Return points of one elliptic arc, without its first, (k, 2); see `arcs`."""
-    return arcs(centre[None], u[None], v[None], np.array([begin]), np.array([sweep]), tolerance)[0]
+    return flatten_arcs(centre[None], u[None], v[None], np.array([begin]), np.array([sweep]), tolerance)[0]
 
 
-def sampled(curve: Callable[[Array], Array], breaks: Array, tolerance: float) -> Array:
+def sample_curve(curve: Callable[[Array], Array], breaks: Array, tolerance: float) -> Array:
     """Return points of a curve, smooth between growing `breaks`: steps are halved until they are near."""
     part = np.arange(_FIRST) / _FIRST
     t = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * part).ravel(), breaks[-1])
     points = curve(t)
-    while len(t) < MOST_POINTS:
+    while len(t) < MAX_POINTS:
         middle = (t[:-1] + t[1:]) / 2
         between = curve(middle)
         chord = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))

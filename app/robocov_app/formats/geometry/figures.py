@@ -15,7 +15,7 @@ from robocov.environment import CircleObstacle, WallObstacle
 from robocov.errors import to_one_line
 from robocov.mapfile.models import MAX_LABEL_CHARACTERS
 from robocov_app.formats.colours import Colour, Role
-from robocov_app.formats.geometry.painting import Coat
+from robocov_app.formats.geometry.painting import PaintLayer
 from robocov_app.formats.geometry.polygons import Rule
 
 Kind: TypeAlias = Literal["polygon", "line", "point"]
@@ -23,7 +23,7 @@ BOUNDARY = "boundary"  # a shape of this name, id, class or layer is the boundar
 
 
 @dataclass(frozen=True, eq=False)
-class Figure:
+class SourceGeometry:
     """A geometry of a file, before it is known what its coordinates are.
 
     Attributes
@@ -51,7 +51,7 @@ class Figure:
 
 
 @dataclass(frozen=True, eq=False)
-class Outline:
+class ClosedOutline:
     """A closed outline.
 
     Attributes
@@ -81,11 +81,11 @@ class Outline:
     colour: Colour | None = None
     role: Role | None = None
     order: int = 0
-    edges: tuple["Line", ...] = ()
+    edges: tuple["WallLine", ...] = ()
 
     @property
-    def coat(self) -> Coat:
-        return Coat(self.area, self.order, self.colour)
+    def coat(self) -> PaintLayer:
+        return PaintLayer(self.area, self.order, self.colour)
 
     @property
     def filled_area(self) -> float:
@@ -94,7 +94,7 @@ class Outline:
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class WallLine:
     """A line, open or closed, that is a wall.
 
     Attributes
@@ -135,8 +135,8 @@ class Line:
         return shapely.transform(solid, lambda places: places @ matrix[:2, :2].T + matrix[:2, 2])
 
     @property
-    def coat(self) -> Coat:
-        return Coat(self.solid, self.order, self.colour)
+    def coat(self) -> PaintLayer:
+        return PaintLayer(self.solid, self.order, self.colour)
 
     @property
     def wall(self) -> WallObstacle | None:
@@ -147,7 +147,9 @@ class Line:
         for end, inner in ((0, 1), (-1, -2)) if self.cap == "square" else ():
             along = points[end] - self.points[inner]
             points[end] += along / max(np.hypot(*along), 1e-300) * self.width / 2
-        return WallObstacle(tuple((x, y) for x, y in points.tolist()), self.width, name_of(self.labels))
+        return WallObstacle(
+            tuple((x, y) for x, y in points.tolist()), self.width, get_obstacle_name(self.labels)
+        )
 
     def measure_widths(self) -> tuple[float, float]:
         """Return the least and the greatest width across the segments of the line, m.
@@ -169,7 +171,7 @@ class Line:
         return float(widths.min()), float(widths.max())
 
 
-def name_of(labels: Sequence[str]) -> str | None:
+def get_obstacle_name(labels: Sequence[str]) -> str | None:
     """Return what an obstacle with these labels is called in a map; layer 0 of a drawing is no name."""
     names = (to_one_line(label)[:MAX_LABEL_CHARACTERS].strip() for label in labels[:1] if label != "0")
     return next(names, None) or None

@@ -38,26 +38,26 @@ from robocov.errors import MapError, format_count, quote
 from robocov.mapfile.models import MAX_SIZE_M
 from robocov_app.formats.base import Primitive, ReadOptions, square_metres
 from robocov_app.formats.colours import WHITE, count_colours
-from robocov_app.formats.geometry.figures import BOUNDARY, Line, Outline
+from robocov_app.formats.geometry.figures import BOUNDARY, ClosedOutline, WallLine
 from robocov_app.formats.geometry.painting import (
-    Coat,
+    PaintLayer,
     alternate,
     find_evident_floors,
     is_dark,
     is_pale,
     uncover,
 )
-from robocov_app.formats.geometry.polygons import Crossings, polygons_of, united
+from robocov_app.formats.geometry.polygons import CrossingCounter, to_multipolygon, unite
 from robocov_app.formats.geometry.snapping import (
     are_edge_to_edge,
     close_gaps,
-    default_snap,
+    compute_default_snap,
     join_line_ends,
     union_on_grid,
 )
 
 DEFAULT_AROUND_M = 1.0  # distance from the shapes to the rectangle around them
-MOST = 0.5  # a boundary holds more of the other shapes; walls that are one leave so much of it open
+MAJORITY = 0.5  # a boundary holds more of the other shapes; walls that are one leave so much of it open
 _SAME = 0.999  # of two outlines one of which lies in the other: ratio of areas from which on they are one
 _BACKGROUND_SHARE = 0.98  # of the page, which its background covers at least
 _MAX_APART_M = 10.0 * MAX_SIZE_M  # shapes farther from each other are of no map: unions take seconds
@@ -85,8 +85,8 @@ class Boundary:
 
     area: MultiPolygon
     source: str = ""
-    outlines: frozenset[Outline] = frozenset()
-    lines: frozenset[Line] = frozenset()
+    outlines: frozenset[ClosedOutline] = frozenset()
+    lines: frozenset[WallLine] = frozenset()
     is_named: bool = False
     gaps: str = ""
     is_guess: bool = False
@@ -110,8 +110,8 @@ class Drawing:
     """
 
     where: str
-    outlines: Sequence[Outline]
-    lines: Sequence[Line]
+    outlines: Sequence[ClosedOutline]
+    lines: Sequence[WallLine]
     pillars: Sequence[CircleObstacle]
     options: ReadOptions
     world: MultiPolygon | None = None
@@ -130,7 +130,7 @@ class Drawing:
         """The snapping tolerance, m."""
         if self.options.snap is not None:
             return self.options.snap
-        return default_snap([*self.areas, *self.paths])
+        return compute_default_snap([*self.areas, *self.paths])
 
 
 @dataclass(eq=False)
@@ -202,7 +202,7 @@ def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation
     require_size(region.geoms[0].bounds, drawing.where)
     if nested is not None:
         obstacles = _find_obstacles(drawing, boundary, region, floors, are_solid=False)
-        ground: Coat | None = nested.solid
+        ground: PaintLayer | None = nested.solid
     else:
         obstacles = _find_obstacles(drawing, boundary, region, floors, are_solid=are_solid)
         ground = _find_ground(boundary, region, floors)
@@ -238,7 +238,7 @@ def _require_measurable(drawing: Drawing) -> None:
     # one of many parts may be a map, if they are not all too far from each other
     require_size(shapely.total_bounds(everything), drawing.where, _MAX_APART_M)
     rings = shapely.get_rings(shapely.get_parts(drawing.areas))
-    Crossings(drawing.where).add([*rings, *drawing.paths])
+    CrossingCounter(drawing.where).add([*rings, *drawing.paths])
 
 
 # --- the boundary ---------------------------------------------------------------------------------------
@@ -283,7 +283,7 @@ def _find_largest(drawing: Drawing, *, with_walls: bool) -> Boundary | None:
     """Return the largest outline, and what continues it, if most other shapes lie in it."""
     largest = max(drawing.outlines, key=lambda outline: outline.filled_area)
     # walls as one shape have rooms as holes
-    if with_walls and largest.area.area < MOST * largest.filled_area:
+    if with_walls and largest.area.area < MAJORITY * largest.filled_area:
         return None
     members = _find_continuation(drawing, largest)
     inner = [outline.area for outline in drawing.outlines if outline not in members]
@@ -295,7 +295,7 @@ def _find_largest(drawing: Drawing, *, with_walls: bool) -> Boundary | None:
     return boundary if not inner or _holds(boundary.area, inner) else None
 
 
-def _find_continuation(drawing: Drawing, largest: Outline) -> set[Outline]:
+def _find_continuation(drawing: Drawing, largest: ClosedOutline) -> set[ClosedOutline]:
     """Return the largest outline, the parts of its geometry, and outlines beside it that hold others."""
     outlines = np.array(drawing.outlines, dtype=object)
     areas = np.array(drawing.areas, dtype=object)
@@ -307,7 +307,7 @@ def _find_continuation(drawing: Drawing, largest: Outline) -> set[Outline]:
         current = fresh.pop()
         near = np.sort(tree.query(current.area, "dwithin", distance=drawing.snap))
         for k in near.tolist():
-            other: Outline = outlines[k]
+            other: ClosedOutline = outlines[k]
             belongs = k in holders or (other.whole != "" and other.whole == largest.whole)
             if other in members or not belongs:
                 continue
@@ -330,7 +330,7 @@ def _find_nested(areas: Array, tree: STRtree) -> tuple[Array, Array]:
     smaller = size[inner] < _SAME * size[outer]
     inner, outer = inner[smaller], outer[smaller]
     shared = shapely.area(shapely.intersection(areas[inner], areas[outer]))
-    is_nested = shared > MOST * size[inner]
+    is_nested = shared > MAJORITY * size[inner]
     return inner[is_nested], outer[is_nested]
 
 
@@ -359,7 +359,7 @@ def _find_outermost(drawing: Drawing) -> Boundary | None:
     return _join_outlines(drawing, largest, members)
 
 
-def _join_outlines(drawing: Drawing, largest: Outline, members: set[Outline]) -> Boundary:
+def _join_outlines(drawing: Drawing, largest: ClosedOutline, members: set[ClosedOutline]) -> Boundary:
     """Return a boundary of several outlines, one of which is the largest, or of that one alone."""
     if len(members) == 1:
         called = f", {quote(largest.labels[0])}," if largest.labels else ""
@@ -375,7 +375,7 @@ def _join_outlines(drawing: Drawing, largest: Outline, members: set[Outline]) ->
     return Boundary(joined.area, source, frozenset(members), gaps=gaps)
 
 
-def find_surrounding(drawing: Drawing, floors: frozenset[Outline] = frozenset()) -> Boundary:
+def find_surrounding(drawing: Drawing, floors: frozenset[ClosedOutline] = frozenset()) -> Boundary:
     """Return what the shapes except for floors enclose as walls, else a rectangle around everything."""
     everything = [*drawing.areas, *(line.solid for line in drawing.lines)]
     edges = [edge for outline in drawing.outlines if outline in floors for edge in outline.edges]
@@ -386,7 +386,7 @@ def find_surrounding(drawing: Drawing, floors: frozenset[Outline] = frozenset())
     if fills:  # else what there is is thinner than the grid
         k = int(np.argmax([fill.area for fill in fills]))
         fill = fills[k]
-        is_open = solid.geoms[k].area <= (1.0 - MOST) * fill.area
+        is_open = solid.geoms[k].area <= (1.0 - MAJORITY) * fill.area
         if is_open and _holds(fill, list(solid.geoms)):
             return Boundary(MultiPolygon([fill]), f"the outer edge of the walls, around {fill.area:.4g} m²")
     around = DEFAULT_AROUND_M if drawing.options.around is None else drawing.options.around
@@ -399,14 +399,14 @@ def find_surrounding(drawing: Drawing, floors: frozenset[Outline] = frozenset())
 def _holds(outer: BaseGeometry, inner: Sequence[BaseGeometry]) -> bool:
     """Return whether most of the inner shapes lie in the outer one, each by a place on it."""
     shapely.prepare(outer)
-    return bool(shapely.covers(outer, shapely.point_on_surface(inner)).mean() > MOST)
+    return bool(shapely.covers(outer, shapely.point_on_surface(inner)).mean() > MAJORITY)
 
 
 def _unite(areas: Sequence[BaseGeometry]) -> MultiPolygon:
     """Return areas as one; a single one stays exactly as it is."""
     areas = [area for area in areas if not area.is_empty]
     if len(areas) == 1:
-        return polygons_of(areas[0])
+        return to_multipolygon(areas[0])
     return union_on_grid(areas)
 
 
@@ -444,8 +444,8 @@ class _Floors:
     `is_slab`: whether the boundary is solid itself, except for the floors on it.
     """
 
-    outlines: frozenset[Outline]
-    coats: Sequence[Coat]
+    outlines: frozenset[ClosedOutline]
+    coats: Sequence[PaintLayer]
     is_slab: bool = False
 
 
@@ -478,18 +478,18 @@ def _is_slab(drawing: Drawing, boundary: Boundary) -> bool:
 def _find_pale_floors(
     drawing: Drawing,
     boundary: Boundary | None,
-    outlines: Sequence[Outline],
+    outlines: Sequence[ClosedOutline],
     report: "_Report",
     *,
     is_slab: bool,
-) -> set[Outline]:
+) -> set[ClosedOutline]:
     """Return the outlines that are floors by their colour, and report all that is pale."""
     undecided = [outline for outline in outlines if outline.role is None and outline.colour is not None]
     chosen = [outline for outline in undecided if is_slab and is_pale(outline.colour)]
     if not is_slab:
         marks = [outline.coat for outline in outlines]
         lines = [*drawing.lines, *(edge for outline in outlines for edge in outline.edges)]
-        marks += [Coat(LineString(line.points), line.order, line.colour) for line in lines]
+        marks += [PaintLayer(LineString(line.points), line.order, line.colour) for line in lines]
         evident = find_evident_floors([outline.coat for outline in undecided], marks)
         chosen = [outline for outline, is_floor in zip(undecided, evident, strict=True) if is_floor]
         chosen += [each for each in undecided if each not in chosen and _is_unseen(each, boundary)]
@@ -508,20 +508,20 @@ def _find_pale_floors(
     return set(chosen)
 
 
-def _is_unseen(outline: Outline, boundary: Boundary | None) -> bool:
+def _is_unseen(outline: ClosedOutline, boundary: Boundary | None) -> bool:
     """Return whether an outline has the pale colour of the ground and no stroke: it only covers others."""
     ground = [] if boundary is None else [each.colour for each in boundary.outlines]
     return is_pale(outline.colour) and not outline.edges and outline.colour in (ground or [WHITE])
 
 
-def _find_ground(boundary: Boundary | None, region: MultiPolygon, floors: _Floors) -> Coat | None:
+def _find_ground(boundary: Boundary | None, region: MultiPolygon, floors: _Floors) -> PaintLayer | None:
     """Return the region as paint where only what is painted as a floor is free."""
     if boundary is None:
         return None
     has_declared = any(outline.role == "free" for outline in floors.outlines)
     if floors.is_slab or (boundary.is_guess and has_declared):
         order = min((outline.order for outline in boundary.outlines), default=-1)
-        return Coat(region, order)
+        return PaintLayer(region, order)
     return None
 
 
@@ -540,7 +540,7 @@ class _Nested:
     """A boundary in which outlines are free and solid by turns, and what is solid in it."""
 
     boundary: Boundary
-    solid: Coat
+    solid: PaintLayer
 
 
 def _find_nested_areas(drawing: Drawing, boundary: Boundary | None, report: "_Report") -> _Nested | None:
@@ -552,14 +552,14 @@ def _find_nested_areas(drawing: Drawing, boundary: Boundary | None, report: "_Re
     odd, even = alternate(areas)
     if boundary is not None:
         report.notes.append("what lies in an odd number of outlines within the boundary is solid")
-        return _Nested(boundary, Coat(odd, -1))
+        return _Nested(boundary, PaintLayer(odd, -1))
     is_odd_free = odd.area >= even.area
     free, solid = (odd, even) if is_odd_free else (even, odd)
-    whole = polygons_of(united([Polygon(part.exterior) for part in (*odd.geoms, *even.geoms)]))
+    whole = to_multipolygon(unite([Polygon(part.exterior) for part in (*odd.geoms, *even.geoms)]))
     number = "an odd number" if is_odd_free else "an even number"
     size = square_metres(free.area, 3)
     report.notes.append(f"what lies in {number} of outlines is free, {size}, as the larger area")
-    return _Nested(Boundary(whole, "the outermost outlines"), Coat(solid, -1))
+    return _Nested(Boundary(whole, "the outermost outlines"), PaintLayer(solid, -1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -569,10 +569,10 @@ class _Obstacles:
     `outside`: number of shapes that do not meet the region, and of outlines around all of it.
     """
 
-    outlines: Sequence[Outline]
-    walls: Sequence[Line]
+    outlines: Sequence[ClosedOutline]
+    walls: Sequence[WallLine]
     pillars: Sequence[CircleObstacle]
-    coats: Sequence[Coat]
+    coats: Sequence[PaintLayer]
     count: int
     outside: int
 
@@ -600,7 +600,7 @@ def _find_obstacles(
     coats = [outline.coat for outline, frames in zip(outlines, is_frame, strict=True) if not frames]
     coats += [line.coat for line in walls]
     # pillars are drawn by no paint that could be covered
-    coats += [Coat(pillar.polygon, np.inf) for pillar in drawing.pillars]
+    coats += [PaintLayer(pillar.polygon, np.inf) for pillar in drawing.pillars]
     outside = int((~shapely.intersects(region, [coat.area for coat in coats])).sum() + is_frame.sum())
     count = int((~is_frame).sum())
     return _Obstacles(outlines, walls, drawing.pillars, coats, count, outside)
@@ -609,7 +609,7 @@ def _find_obstacles(
 def _subtract(region: MultiPolygon, solids: Sequence[BaseGeometry]) -> MultiPolygon:
     if not solids:
         return region
-    return polygons_of(shapely.difference(region, united(solids), grid_size=GRID_M))
+    return to_multipolygon(shapely.difference(region, unite(solids), grid_size=GRID_M))
 
 
 def _choose_outer(

@@ -11,13 +11,13 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import GRID_M
 from robocov_app.formats.colours import DARK, PALE, Colour, luminance
-from robocov_app.formats.geometry.polygons import enclosed, polygons_of, united
+from robocov_app.formats.geometry.polygons import find_enclosed_area, to_multipolygon, unite
 
 _ROOM_SHARE = 0.5  # of the smallest fill with something on it: the size of a room
 
 
 @dataclass(frozen=True, eq=False)
-class Coat:
+class PaintLayer:
     """Something that is painted.
 
     Attributes
@@ -42,7 +42,7 @@ def is_pale(colour: Colour | None) -> bool:
     return colour is not None and luminance(colour) >= PALE
 
 
-def find_evident_floors(fills: Sequence[Coat], marks: Sequence[Coat]) -> list[bool]:
+def find_evident_floors(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> list[bool]:
     """Return which filled shapes are floors by what is painted on them.
 
     Nobody paints furniture and walls onto a pale obstacle. So where one pale fill has something darker on it,
@@ -67,7 +67,7 @@ def find_evident_floors(fills: Sequence[Coat], marks: Sequence[Coat]) -> list[bo
     ]
 
 
-def _find_marked(fills: Sequence[Coat], marks: Sequence[Coat]) -> NDArray[np.bool_]:
+def _find_marked(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> NDArray[np.bool_]:
     """Return which fills are pale and have something on them that is not."""
     found = np.zeros(len(fills), dtype=bool)
     darker = [mark for mark in marks if mark.colour is not None and not is_pale(mark.colour)]
@@ -82,7 +82,7 @@ def _find_marked(fills: Sequence[Coat], marks: Sequence[Coat]) -> NDArray[np.boo
     return found
 
 
-def uncover(solids: Sequence[Coat], floors: Sequence[Coat]) -> list[BaseGeometry]:
+def uncover(solids: Sequence[PaintLayer], floors: Sequence[PaintLayer]) -> list[BaseGeometry]:
     """Return solids without the floors that are painted above them."""
     if not floors:
         return [solid.area for solid in solids]
@@ -94,7 +94,7 @@ def uncover(solids: Sequence[Coat], floors: Sequence[Coat]) -> list[BaseGeometry
         above = above[order[above] > solid.order]
         area = solid.area
         if len(above):
-            covers = united([floors[k].area for k in above])
+            covers = unite([floors[k].area for k in above])
             area = shapely.difference(area, covers, grid_size=GRID_M)
         if not area.is_empty:
             left.append(area)
@@ -105,6 +105,6 @@ def alternate(areas: Sequence[BaseGeometry]) -> tuple[MultiPolygon, MultiPolygon
     """Return what lies in an odd number of areas, and what lies in some of them, but an even number."""
     parts = shapely.get_parts(shapely.get_parts(areas))
     rings = [shapely.get_coordinates(ring)[:-1] for ring in shapely.get_rings(parts)]
-    odd, _, _ = enclosed(rings, "evenodd")
-    whole = united([Polygon(part.exterior) for part in parts])
-    return odd, polygons_of(shapely.difference(whole, odd, grid_size=GRID_M))
+    odd, _, _ = find_enclosed_area(rings, "evenodd")
+    whole = unite([Polygon(part.exterior) for part in parts])
+    return odd, to_multipolygon(shapely.difference(whole, odd, grid_size=GRID_M))

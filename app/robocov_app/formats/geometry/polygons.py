@@ -16,7 +16,7 @@ from robocov.errors import MapError
 
 Rule: TypeAlias = Literal["holes", "evenodd", "nonzero"]  # holes in the first ring, or SVG's ``fill-rule``
 _MITRE_LIMIT = 5.0  # sharper corners are cut when an area is grown or shrunk
-DIGITS = 6  # decimals of metres by default: the free space is known to a micrometre
+DEFAULT_DIGITS = 6  # decimals of metres by default: the free space is known to a micrometre
 # edges may cross each other so often in a file, those of all its shapes together. A ring of some kB can cross
 # itself millions of times, and to find all of these places takes minutes and gigabytes.
 MAX_CROSSINGS = 30_000
@@ -28,7 +28,7 @@ _SAMPLES, _TOGETHER, _WORK, _CERTAIN = 500, 20, 400_000, 50
 
 
 @dataclass
-class Crossings:
+class CrossingCounter:
     """Count of edge crossings in the file `where`, of all its shapes; an estimate where edges are many."""
 
     where: str = "rings"
@@ -36,7 +36,7 @@ class Crossings:
 
     def add(self, lines: Iterable[BaseGeometry]) -> None:
         """Count how often edges cross, not how they meet; MapError at more than `MAX_CROSSINGS`."""
-        edges = shapely.linestrings(edges_of(lines))
+        edges = shapely.linestrings(extract_edges(lines))
         n = len(edges)
         estimate = 0.0
         if n <= _FEW:
@@ -60,26 +60,26 @@ class Crossings:
             raise MapError(f"{self.where}: expected at most {MAX_CROSSINGS} crossings of lines, got {got}")
 
 
-def edges_of(lines: Iterable[BaseGeometry]) -> Array:
+def extract_edges(lines: Iterable[BaseGeometry]) -> Array:
     """Return the (n, 2, 2) edges of lines and rings: start and end of each."""
     points, line = shapely.get_coordinates(lines, return_index=True)
     along = line[1:] == line[:-1]
     return np.stack([points[:-1][along], points[1:][along]], axis=1)
 
 
-def sides_of(area: BaseGeometry) -> Array:
-    return edges_of(shapely.get_rings(shapely.get_parts(area)))
+def extract_sides(area: BaseGeometry) -> Array:
+    return extract_edges(shapely.get_rings(shapely.get_parts(area)))
 
 
-def enclosed(
-    rings: Sequence[Array], rule: Rule = "holes", crossings: Crossings | None = None
+def find_enclosed_area(
+    rings: Sequence[Array], rule: Rule = "holes", crossings: CrossingCounter | None = None
 ) -> tuple[MultiPolygon, str | None, dict[str, int]]:
     """Return the valid area that rings, (k, 2) m, closed or not, enclose, the largest part first.
 
     Also where rings of a polygon with holes meet, in words, and how many holes take nothing out of it, by the
     reason. `crossings`: of the file so far; MapError when they are too many.
     """
-    crossings = Crossings() if crossings is None else crossings
+    crossings = CrossingCounter() if crossings is None else crossings
     good = [_has_three(ring) for ring in rings]
     lost = Counter({"of fewer than three points": good[1:].count(False)} if rule == "holes" else {})
     if not any(good) or (rule == "holes" and not good[0]):
@@ -87,23 +87,23 @@ def enclosed(
     rings = [ring for ring, whole in zip(rings, good, strict=True) if whole]
     plain = Polygon(rings[0], rings[1:])
     if (rule == "holes" or len(rings) == 1) and plain.is_valid:
-        return polygons_of(plain), None, +lost
+        return to_multipolygon(plain), None, +lost
     lines = [shapely.linearrings(ring) for ring in rings]
     crossings.add(lines)
     if rule != "holes":
         return _filled(lines, rule), None, {}
-    areas = [made_valid(Polygon(ring)) for ring in rings]
+    areas = [make_valid(Polygon(ring)) for ring in rings]
     # of rings that run along themselves the parts may share an edge
     areas = [area if area.is_valid else shapely.union_all([area]) for area in areas]
-    outer, holes = areas[0], [area for area in map(polygons_of, areas[1:]) if not area.is_empty]
+    outer, holes = areas[0], [area for area in map(to_multipolygon, areas[1:]) if not area.is_empty]
     lost["without an area"] += len(areas) - 1 - len(holes)
     shapely.prepare(outer)
     lost["outside of their outline"] += int((~shapely.intersects(outer, holes)).sum())
-    area = polygons_of(shapely.difference(outer, united(holes)) if holes else outer)
+    area = to_multipolygon(shapely.difference(outer, unite(holes)) if holes else outer)
     return area, None if area.is_empty else shapely.is_valid_reason(plain), +lost
 
 
-def united(areas: Sequence[BaseGeometry]) -> BaseGeometry:
+def unite(areas: Sequence[BaseGeometry]) -> BaseGeometry:
     """Return the union of areas, m.
 
     GEOS unites without a grid ten times as fast as on one, but may lose a part, without a word, where edges
@@ -148,15 +148,15 @@ def _filled(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
     if not len(faces):
         return MultiPolygon()
     inside = shapely.get_coordinates(shapely.point_on_surface(faces))
-    edges = edges_of(lines)
+    edges = extract_edges(lines)
     tree = shapely.STRtree(shapely.box(*edges.min(axis=1).T, *edges.max(axis=1).T))
     most = max(_RAYS // len(edges), 1)
     chosen = [_is_filled(inside[k : k + most], edges, tree, rule) for k in range(0, len(inside), most)]
     faces = faces[np.concatenate(chosen)]
     try:
-        return polygons_of(shapely.coverage_union_all(faces))
+        return to_multipolygon(shapely.coverage_union_all(faces))
     except shapely.GEOSException:  # faces so thin that rounding has folded them over others
-        return polygons_of(shapely.union_all(faces, grid_size=GRID_M))
+        return to_multipolygon(shapely.union_all(faces, grid_size=GRID_M))
 
 
 def _is_filled(points: Array, edges: Array, tree: shapely.STRtree, rule: Rule) -> BoolArray:
@@ -172,27 +172,27 @@ def _is_filled(points: Array, edges: Array, tree: shapely.STRtree, rule: Rule) -
     return np.asarray(turns % 2 == 1 if rule == "evenodd" else turns != 0)
 
 
-def made_valid(area: BaseGeometry) -> BaseGeometry:
+def make_valid(area: BaseGeometry) -> BaseGeometry:
     made: BaseGeometry = shapely.make_valid(area, method="structure", keep_collapsed=False)
     return made
 
 
-def polygons(geometry: BaseGeometry) -> list[Polygon]:
+def list_polygons(geometry: BaseGeometry) -> list[Polygon]:
     """Return the polygons in `geometry`, counter-clockwise, the largest first; lines and points go."""
     flat = shapely.get_parts(shapely.get_parts(geometry))
     parts = [part for part in flat if isinstance(part, Polygon) and part.area > 0.0]
     return [shapely.orient_polygons(part) for part in sorted(parts, key=lambda p: (-p.area, p.bounds))]
 
 
-def polygons_of(geometry: BaseGeometry) -> MultiPolygon:
-    return MultiPolygon(polygons(geometry))
+def to_multipolygon(geometry: BaseGeometry) -> MultiPolygon:
+    return MultiPolygon(list_polygons(geometry))
 
 
-def filled(geometry: BaseGeometry) -> Polygon:
-    return Polygon(polygons(geometry)[0].exterior)
+def fill_holes(geometry: BaseGeometry) -> Polygon:
+    return Polygon(list_polygons(geometry)[0].exterior)
 
 
-def rounded(geometry: BaseGeometry, digits: int) -> MultiPolygon:
+def round_polygons(geometry: BaseGeometry, digits: int) -> MultiPolygon:
     """Return the polygons of `geometry` with coordinates of so many decimals, valid; the largest first.
 
     Vertices that are the same after rounding, or on the line between their neighbours, are left out.
@@ -204,12 +204,12 @@ def rounded(geometry: BaseGeometry, digits: int) -> MultiPolygon:
     plain = shapely.transform(geometry, decimals)
     if not plain.is_valid:
         # simplified walls may cross a boundary that was simplified beside them, which GEOS refuses to round
-        plain = shapely.transform(shapely.set_precision(made_valid(geometry), 10.0**-digits), decimals)
-    parts = polygons(plain)
+        plain = shapely.transform(shapely.set_precision(make_valid(geometry), 10.0**-digits), decimals)
+    parts = list_polygons(plain)
     tidy = [_tidy_polygon(part, digits) for part in parts]
     if not all(part.is_valid for part in tidy):  # rings that touched where a vertex was
         tidy = parts
-    return polygons_of(MultiPolygon(tidy))
+    return to_multipolygon(MultiPolygon(tidy))
 
 
 def _tidy_polygon(polygon: Polygon, digits: int) -> Polygon:
@@ -259,7 +259,7 @@ def _is_straight(a: tuple[int, int], b: tuple[int, int], c: tuple[int, int]) -> 
     return (b[0] - a[0]) * (c[1] - b[1]) == (b[1] - a[1]) * (c[0] - b[0])
 
 
-def bounded(
+def build_boundary(
     free: MultiPolygon, given: Polygon | None, *, hull: bool, margin: float, digits: int
 ) -> tuple[Polygon, list[Polygon]]:
     """Return a boundary around `free`, with coordinates of so many `digits`, and what is solid in it.
@@ -270,28 +270,30 @@ def bounded(
     parts = list(free.geoms)
     if given is not None:
         # rounded first: where the two run along each other they do so afterwards, too
-        base = filled(rounded(shapely.union(filled(rounded(given, digits)), free), digits))
+        base = fill_holes(
+            round_polygons(shapely.union(fill_holes(round_polygons(given, digits)), free), digits)
+        )
     else:
         base = free.convex_hull if len(parts) > 1 else Polygon(parts[0].exterior)
     if hull:
         base = base.convex_hull
     if margin > 0.0:
-        base = filled(base.buffer(margin, join_style="mitre", mitre_limit=2.0))
+        base = fill_holes(base.buffer(margin, join_style="mitre", mitre_limit=2.0))
     if given is None and not hull and margin == 0.0 and len(parts) == 1:
         return base, [Polygon(hole) for hole in parts[0].interiors]
-    base = filled(rounded(base, digits))
+    base = fill_holes(round_polygons(base, digits))
     if not shapely.covers(base, free):  # by a rounded hair
-        base = filled(rounded(shapely.union(base, free), digits))
-    return base, polygons(rounded(shapely.difference(base, free), digits))
+        base = fill_holes(round_polygons(shapely.union(base, free), digits))
+    return base, list_polygons(round_polygons(shapely.difference(base, free), digits))
 
 
-def on_grid(geometry: BaseGeometry, digits: int) -> list[Polygon]:
+def snap_to_grid(geometry: BaseGeometry, digits: int) -> list[Polygon]:
     """Return the `polygons` of a valid geometry with coordinates of so many decimals, still valid."""
     near = shapely.set_precision(geometry, 10.0**-digits)
-    return polygons(shapely.transform(near, lambda points: np.round(points, digits)))
+    return list_polygons(shapely.transform(near, lambda points: np.round(points, digits)))
 
 
-def decimal(value: float, digits: int) -> str:
+def format_decimal(value: float, digits: int) -> str:
     """Return a number with at most so many decimals, and none that say nothing."""
     text = f"{value:.{digits}f}"
     if "." in text:
@@ -299,12 +301,12 @@ def decimal(value: float, digits: int) -> str:
     return "0" if text == "-0" else text
 
 
-def rings(polygon: Polygon) -> list[list[tuple[float, float]]]:
+def list_rings(polygon: Polygon) -> list[list[tuple[float, float]]]:
     """Return the rings of a polygon, the outer one first; their last point is the first."""
     return [[(x, y) for x, y in ring.coords] for ring in (polygon.exterior, *polygon.interiors)]
 
 
-def free_area(boundary: BaseGeometry, obstacles: Iterable[BaseGeometry]) -> float:
+def compute_free_area(boundary: BaseGeometry, obstacles: Iterable[BaseGeometry]) -> float:
     """Return the area inside of a boundary and outside of obstacles, as `Environment.free` has it, m²."""
     blocked = shapely.union_all(list(obstacles), grid_size=GRID_M)
     return float(shapely.difference(boundary, blocked, grid_size=GRID_M).area)

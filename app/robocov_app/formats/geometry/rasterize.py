@@ -17,16 +17,16 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, format_count
 from robocov_app.formats.base import ExportReport
 from robocov_app.formats.files import MAX_CELLS
-from robocov_app.formats.geometry.polygons import sides_of
+from robocov_app.formats.geometry.polygons import extract_sides
 
-CELL = 0.05  # side of a cell in metres where none is given: what maps of robots mostly have
+DEFAULT_CELL_M = 0.05  # side of a cell in metres where none is given: what maps of robots mostly have
 _LEAST = math.pi * DEFAULT_RADIUS_M**2  # parts of the free space without room for a robot do not count, m²
 _MOST_TRIED = 16_000_000  # cells of grids that are tried for whether they keep what others lose
 _DIGITS = 6  # decimals of a grid's corner: a micrometre
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class CellGrid:
     """A grid over a map, one cell to spare on each side; `origin`, m, is its lower left corner."""
 
     rows: int
@@ -68,7 +68,7 @@ class Grid:
 
     def _crossings(self, area: BaseGeometry, finer: int = 1, across: bool = False) -> tuple[IntArray, Array]:
         """Return where sides cross lines of centres, rows or columns: which one, and where on it."""
-        sides = (sides_of(area) - self.origin) / (self.cell / finer) - 0.5
+        sides = (extract_sides(area) - self.origin) / (self.cell / finer) - 0.5
         if across:
             sides = sides[..., ::-1]
         (x0, y0), (x1, y1) = sides[:, 0].T, sides[:, 1].T
@@ -81,9 +81,9 @@ class Grid:
         return line, x0[side] + (line - y0[side]) * slope[side]
 
 
-def grid_over(environment: Environment, cell: float | None, most: int = MAX_CELLS) -> Grid:
+def build_grid(environment: Environment, cell: float | None, most: int = MAX_CELLS) -> CellGrid:
     """Return a grid over the boundary, which meets the cells that it was made of; at `most` so many cells."""
-    cell = CELL if cell is None else cell
+    cell = DEFAULT_CELL_M if cell is None else cell
     low_x, low_y, high_x, high_y = environment.boundary_polygon.bounds
     # to a thousandth of a cell, so that a wall on the last line of cells needs no more of them
     columns = math.ceil((high_x - low_x) / cell - 1e-3) + 2
@@ -91,10 +91,10 @@ def grid_over(environment: Environment, cell: float | None, most: int = MAX_CELL
     if rows * columns > most:
         few = f"expected at most {most // 1_000_000} million"
         raise ParameterError(f"cell: {few} cells, got {columns} x {rows} of {cell:g} m")
-    return Grid(rows, columns, cell, (round(low_x - cell, _DIGITS), round(low_y - cell, _DIGITS)))
+    return CellGrid(rows, columns, cell, (round(low_x - cell, _DIGITS), round(low_y - cell, _DIGITS)))
 
 
-def free_cells(environment: Environment, grid: Grid) -> BoolArray:
+def find_free_cells(environment: Environment, grid: CellGrid) -> BoolArray:
     """Return which cells of `grid` are free, (rows, columns), the lowest row first; ParameterError if none.
 
     A cell is free if its centre is, and nothing solid is lost: no wall is too thin, and no pillar too small,
@@ -113,23 +113,23 @@ def free_cells(environment: Environment, grid: Grid) -> BoolArray:
     return free
 
 
-def lost_passages(environment: Environment, grid: Grid, free: BoolArray) -> tuple[str, ...]:
+def describe_lost_passages(environment: Environment, grid: CellGrid, free: BoolArray) -> tuple[str, ...]:
     """Return what free space is lost in cells, or falls apart, and which cells would keep it."""
     lost = _lost(environment, grid, free)
     if not lost:
         return ()
-    for cell in _smaller(grid.cell):
+    for cell in _iterate_smaller_sizes(grid.cell):
         try:
-            finer = grid_over(environment, cell, _MOST_TRIED)
+            finer = build_grid(environment, cell, _MOST_TRIED)
         except ParameterError:
             most = f"at most {_MOST_TRIED // 1_000_000} million"
             return (f"{lost}; no cells of which there are {most} keep it",)
-        if not _lost(environment, finer, free_cells(environment, finer)):
+        if not _lost(environment, finer, find_free_cells(environment, finer)):
             return (f"{lost}; cells of {cell:g} m keep it (--cell {cell:g})",)
     return ()
 
 
-def _lost(environment: Environment, grid: Grid, free: BoolArray) -> str:
+def _lost(environment: Environment, grid: CellGrid, free: BoolArray) -> str:
     parts = np.array(environment.free.geoms)
     parts = parts[shapely.area(parts) >= _LEAST]
     islands, _ = ndimage.label(free)
@@ -152,7 +152,7 @@ def _lost(environment: Environment, grid: Grid, free: BoolArray) -> str:
     return "; ".join(words)
 
 
-def _smaller(cell: float) -> Iterator[float]:
+def _iterate_smaller_sizes(cell: float) -> Iterator[float]:
     """Return round sizes below that of a cell, the largest first."""
     for power in itertools.count(math.floor(-math.log10(cell))):
         for digit in (5, 2, 1):
@@ -160,7 +160,7 @@ def _smaller(cell: float) -> Iterator[float]:
                 yield size
 
 
-def not_held(environment: Environment, *, names: bool = True) -> tuple[str, ...]:
+def describe_unsupported(environment: Environment, *, names: bool = True) -> tuple[str, ...]:
     """Return what of `environment` a format has no place for, in words; most have none for `names`."""
     lost = [f"starts: {', '.join(environment.starts)}"] if environment.starts else []
     if names and any(obstacle.name for obstacle in environment.obstacles):
@@ -168,9 +168,9 @@ def not_held(environment: Environment, *, names: bool = True) -> tuple[str, ...]
     return tuple(lost)
 
 
-def grid_report(
-    name: str, files: tuple[Path, ...], environment: Environment, grid: Grid, free: BoolArray
+def build_grid_report(
+    name: str, files: tuple[Path, ...], environment: Environment, grid: CellGrid, free: BoolArray
 ) -> ExportReport:
     area = float(np.count_nonzero(free)) * grid.cell**2
-    report = ExportReport(name, files, environment.free_area, area, not_held(environment))
-    return replace(report, warnings=lost_passages(environment, grid, free))
+    report = ExportReport(name, files, environment.free_area, area, describe_unsupported(environment))
+    return replace(report, warnings=describe_lost_passages(environment, grid, free))

@@ -16,11 +16,17 @@ from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, Painted, ReadOptions
 from robocov_app.formats.colours import UNPAINTED, ColourKey, Paint, count_colours, name_colour
-from robocov_app.formats.geometry.figures import BOUNDARY, Figure, Line, Outline, name_of
+from robocov_app.formats.geometry.figures import (
+    BOUNDARY,
+    ClosedOutline,
+    SourceGeometry,
+    WallLine,
+    get_obstacle_name,
+)
 from robocov_app.formats.geometry.interpretation import Boundary, Drawing, find_surrounding, interpret
-from robocov_app.formats.geometry.polygons import Crossings, Rule, enclosed
+from robocov_app.formats.geometry.polygons import CrossingCounter, Rule, find_enclosed_area
 
-__all__ = ["BOUNDARY", "Figure", "Line", "Outline", "Shapes"]
+__all__ = ["BOUNDARY", "ClosedOutline", "Shapes", "SourceGeometry", "WallLine"]
 THICKNESS = 0.1  # width of walls that are drawn as lines without one, in metres
 _EVEN = 1e-6  # relative width by which a shape may be thinner by rounding
 _SHOWN = 20  # names that are listed where one is wrong
@@ -37,8 +43,8 @@ class Shapes:
 
     def __init__(self, where: str, options: ReadOptions) -> None:
         self.where, self.options = where, options
-        self.outlines: list[Outline] = []
-        self.lines: list[Line] = []
+        self.outlines: list[ClosedOutline] = []
+        self.lines: list[WallLine] = []
         self.pillars: list[CircleObstacle] = []
         self.vertices = 0
         self.left_out: Counter[tuple[str, str]] = Counter()
@@ -53,7 +59,7 @@ class Shapes:
         self.thickness = THICKNESS if options.thickness is None else options.thickness
         self._heights: list[Array] = []
         self._met: list[str] = []
-        self._crossings = Crossings(where)
+        self._crossings = CrossingCounter(where)
 
     def wants(self, labels: Iterable[str]) -> bool:
         """Return whether something with these labels is asked for; what is not is counted."""
@@ -69,12 +75,12 @@ class Shapes:
         self.labels |= found
         return set(found)
 
-    def add_all(self, figures: Iterable[Figure]) -> None:
+    def add_all(self, figures: Iterable[SourceGeometry]) -> None:
         for figure in figures:
             self.add(figure)
         self.join_lines()
 
-    def add(self, figure: Figure) -> None:
+    def add(self, figure: SourceGeometry) -> None:
         """Add a geometry whose coordinates are metres; MapError where one is out of range."""
         if not self.wants(figure.labels):
             return
@@ -82,7 +88,7 @@ class Shapes:
             self.add_point(figure.rings[0][0], figure.labels, at=figure.at)
         elif figure.kind == "line":
             width = figure.width if figure.width and self.options.thickness is None else self.thickness
-            self.add_line(Line(figure.rings[0], width, figure.labels), at=figure.at)
+            self.add_line(WallLine(figure.rings[0], width, figure.labels), at=figure.at)
         else:
             self.add_outline(figure.rings, figure.labels, rule=figure.rule, at=figure.at, whole=figure.whole)
 
@@ -92,22 +98,22 @@ class Shapes:
     ) -> bool:  # fmt: skip
         """Add the area of rings, (k, 2) m; without one the `thing`, if it has a name, is counted."""
         rings = self._checked(rings, at)
-        area, reason, lost = enclosed(rings, rule, self._crossings)
+        area, reason, lost = find_enclosed_area(rings, rule, self._crossings)
         for why, count in lost.items():
             self.leave_out("hole", why, count)
         if reason is not None:
             self._met.append(f"{at}: {reason}" if at else reason)
         if not area.is_empty:
-            self._keep_outline(Outline(area, tuple(labels), whole=whole), paint)
+            self._keep_outline(ClosedOutline(area, tuple(labels), whole=whole), paint)
         elif thing:
             self.leave_out(thing, "without an area")
         return not area.is_empty
 
-    def _keep_outline(self, outline: Outline, paint: Paint) -> None:
+    def _keep_outline(self, outline: ClosedOutline, paint: Paint) -> None:
         order = len(self.outlines) + len(self.lines)
         self.outlines.append(replace(outline, colour=paint.colour, role=paint.role, order=order))
 
-    def add_edges(self, lines: Sequence[Line]) -> None:
+    def add_edges(self, lines: Sequence[WallLine]) -> None:
         """Keep the stroke of the outline that was added last; it counts only if the outline is free."""
         last = self.outlines[-1]
         self.outlines[-1] = replace(last, edges=tuple(replace(line, order=last.order) for line in lines))
@@ -124,7 +130,7 @@ class Shapes:
 
     def note_colours(self, key: ColourKey) -> None:
         """Note how often colours with a declared role occur, and which ones there are where none does."""
-        painted: list[Outline | Line] = [*self.outlines, *self.lines]
+        painted: list[ClosedOutline | WallLine] = [*self.outlines, *self.lines]
         painted += [edge for outline in self.outlines for edge in outline.edges]
         for role in ("free", "solid"):
             declared = [colour for colour, its in key.entries if its == role]
@@ -138,7 +144,7 @@ class Shapes:
                 names = ", ".join(map(name_colour, declared))
                 self.notes.append(f"nothing is painted {names} (--{role}-colour){there}")
 
-    def add_line(self, line: Line, *, at: str = "") -> None:
+    def add_line(self, line: WallLine, *, at: str = "") -> None:
         (points,) = self._checked([line.points], at)
         width = max(line.width, 0.0)
         files.require_length(width, ": ".join(filter(None, (self.where, at, "width"))), 0.0)
@@ -157,7 +163,7 @@ class Shapes:
         for line in self.lines:
             alike.setdefault((line.width, line.labels), []).append(LineString(line.points))
         self.lines = [
-            Line(np.asarray(joined.coords), width, labels)
+            WallLine(np.asarray(joined.coords), width, labels)
             for (width, labels), lines in alike.items()
             for joined in shapely.get_parts(shapely.line_merge(shapely.MultiLineString(lines)))
         ]
@@ -172,23 +178,25 @@ class Shapes:
         paint: Paint = UNPAINTED,
     ) -> None:
         self._checked([centre + np.array([[-radius, -radius], [radius, radius]])], at)
-        circle = CircleObstacle((float(centre[0]), float(centre[1])), radius, name_of(labels))
+        circle = CircleObstacle((float(centre[0]), float(centre[1])), radius, get_obstacle_name(labels))
         (ring,) = self._checked([np.asarray(circle.polygon.exterior.coords)[:-1]], at)
-        self._keep_outline(Outline(MultiPolygon([Polygon(ring)]), tuple(labels), circle), paint)
+        self._keep_outline(ClosedOutline(MultiPolygon([Polygon(ring)]), tuple(labels), circle), paint)
 
     def add_point(self, point: Array, labels: Sequence[str] = (), *, at: str = "") -> None:
         ((x, y),) = self._checked([point[None]], at)[0].tolist()
         if self.options.pillar is None:
             self.leave_out("point", "(--pillar RADIUS makes pillars of them)")
         else:
-            self.pillars.append(CircleObstacle((x, y), self.options.pillar, name_of(labels)))
+            self.pillars.append(CircleObstacle((x, y), self.options.pillar, get_obstacle_name(labels)))
 
-    def polygon(self, rings: Iterable[Array], labels: tuple[str, ...], at: str, whole: str = "") -> Figure:
+    def polygon(
+        self, rings: Iterable[Array], labels: tuple[str, ...], at: str, whole: str = ""
+    ) -> SourceGeometry:
         """Return a polygon of a format that closes rings; those that are not closed are counted."""
         rings = tuple(rings)
         if unclosed := sum(bool((ring[0] != ring[-1]).any()) for ring in rings):
             self.mended["ring", "closed: the last point was not the first"] += unclosed
-        return Figure("polygon", rings, labels, at, whole=whole)
+        return SourceGeometry("polygon", rings, labels, at, whole=whole)
 
     def flat(self, points: Array) -> Array:
         """Return (k, 2) of points, whose third coordinates are counted."""
@@ -224,7 +232,7 @@ class Shapes:
     @property
     def dropped(self) -> tuple[str, ...]:
         left = sorted(self.left_out.items())
-        told = [f"{_many(count, thing)} {why}".strip() for (thing, why), count in left]
+        told = [f"{_pluralize(count, thing)} {why}".strip() for (thing, why), count in left]
         heights = np.concatenate([*self._heights, np.empty(0)])
         if len(heights):
             span = f"z from {heights.min():.4g} to {heights.max():.4g}"
@@ -334,7 +342,7 @@ class Shapes:
         )
 
 
-def _many(count: int, thing: str) -> str:
+def _pluralize(count: int, thing: str) -> str:
     """Return how many things there are, also of nouns in y and x."""
     if count != 1 and thing.endswith(("y", "x")):
         return f"{count} {thing[:-1]}ies" if thing[-1] == "y" else f"{count} {thing}es"

@@ -60,7 +60,7 @@ _MAX_THIN_VERTICES = (
 _LONGEST = 1024  # most vertices between two that must stay: the algorithm's depth may grow with their number
 
 
-class Simplified(NamedTuple):
+class SimplifiedSpace(NamedTuple):
     """A free space, m, whose walls may have moved by `tolerance`; `changed`: where less was done, and why."""
 
     free: MultiPolygon
@@ -79,7 +79,7 @@ class ThinParts(NamedTuple):
     part: IntArray
 
 
-class Rings:
+class RingVertices:
     """The k vertices, `points` (k, 2) m, of the rings of polygons, ring after ring, no first one repeated.
 
     `begin`, `size`, (r,): where each ring begins, and its vertices; none is empty. `source`, (k,): the vertex
@@ -158,7 +158,7 @@ class Rings:
         return kept, np.searchsorted(self.ring[kept], np.arange(len(begin)))
 
 
-class Outline(Rings):
+class OriginalOutline(RingVertices):
     """All vertices of polygons; `owner`, (r,): the polygon of each ring, whose outer one comes first.
 
     `cell`, m: the longer side of the cells that it is the outline of, if any: then without their necks, and
@@ -174,7 +174,7 @@ class Outline(Rings):
         neck = np.zeros(len(points), dtype=bool)
         if cell is not None:
             # the two ends of a neck, a short side between two at right angles, become the corner between them
-            rings = Rings(points, begin, source)
+            rings = RingVertices(points, begin, source)
             before, length = rings.before, rings.lengths
             along = rings.sides[before] / np.maximum(length[before], 1e-300)[:, None]
             neck = np.abs(_dot(along, along[rings.after[rings.after]])) < _RIGHT
@@ -187,7 +187,7 @@ class Outline(Rings):
         super().__init__(points, begin, source)
         self.owner, self.neck, self.cell = owner, neck, cell
 
-    def drawn(self, tolerance: Array, fixed: BoolArray) -> Rings:
+    def drawn(self, tolerance: Array, fixed: BoolArray) -> RingVertices:
         """Return the outline with what is within the tolerance of each vertex, (k,) m, left out.
 
         Where that is 0 vertices stay, and where they are `fixed`, (k,), or the middles that stand for them.
@@ -199,10 +199,10 @@ class Outline(Rings):
         # small things have few corners to lose
         finest = 0.0 if self.cell is None else _FINEST * self.cell
         kept, begin = path._kept(allowed, stays, np.maximum(np.sqrt(np.abs(self.areas)) / _SIZES, finest))
-        drawing = Rings(path.points[kept], begin, path.source[kept])
+        drawing = RingVertices(path.points[kept], begin, path.source[kept])
         return drawing if self.cell is None else _fitted(path, kept, drawing, allowed[kept])
 
-    def _without_stairs(self, tolerance: Array) -> Rings:
+    def _without_stairs(self, tolerance: Array) -> RingVertices:
         """Return the vertices, stairs drawn by the middles of their short sides."""
         points, after, cell = self.points, self.after, self.cell
         if cell is None:
@@ -214,13 +214,13 @@ class Outline(Rings):
         short = self.lengths <= cell * (1 + 1e-6)
         step = short & (turn * turn[after] < 0) & wide & wide[after]
         keep = np.column_stack([~(step | step[self.before]), step]).ravel()
-        return Rings(
+        return RingVertices(
             np.stack([points, (points + points[after]) / 2], axis=1).reshape(-1, 2)[keep],
             np.append(0, np.cumsum(keep))[2 * self.begin],
             np.column_stack([self.source, self.source + 0.5]).ravel()[keep],
         )
 
-    def balanced(self, drawing: Rings, tolerance: Array) -> Rings:
+    def balanced(self, drawing: RingVertices, tolerance: Array) -> RingVertices:
         """Return `drawing` with rings of the area that they had, where they lost or won much of it.
 
         All sides of one move by the same distance, of at most half the tolerance. Small round things need it:
@@ -239,28 +239,28 @@ class Outline(Rings):
         both = normal + normal[drawing.before]
         # a corner moves further than its sides, a sharp one up to twice as far
         part = distance / np.maximum(_dot(both, both) / 2, 0.5)
-        return Rings(points + part[:, None] * both, drawing.begin, drawing.source)
+        return RingVertices(points + part[:, None] * both, drawing.begin, drawing.source)
 
-    def with_necks(self, drawing: Rings) -> Rings:
+    def with_necks(self, drawing: RingVertices) -> RingVertices:
         """Return `drawing` with the self's necks again; the source of each vertex is its vertex."""
         points = drawing.points
         neck = self.neck[drawing.vertex] & (drawing.source == drawing.vertex)
         if self.cell is None or not neck.any():
-            return Rings(points, drawing.begin, np.arange(len(points), dtype=float))
+            return RingVertices(points, drawing.begin, np.arange(len(points), dtype=float))
         twice = np.arange(len(points)).repeat(1 + neck)
         second = np.append(False, twice[1:] == twice[:-1])
         way = points[np.where(second, drawing.after[twice], drawing.before[twice])] - points[twice]
         length = np.maximum(np.hypot(*way.T), 1e-300)
         part = np.where(neck[twice], np.minimum(NECK * self.cell / length, 0.4), 0.0)
         begin = np.searchsorted(twice, drawing.begin)
-        return Rings(points[twice] + part[:, None] * way, begin, twice.astype(float))
+        return RingVertices(points[twice] + part[:, None] * way, begin, twice.astype(float))
 
     @cached_property
     def walls(self) -> STRtree:
         """The sides of all rings."""
         return STRtree(shapely.linestrings(self.ends))
 
-    def restrain(self, drawing: Rings, tolerance: Array) -> Rings:
+    def restrain(self, drawing: RingVertices, tolerance: Array) -> RingVertices:
         """Return `drawing` with vertices that are farther from all walls than the tolerance put back."""
         vertex = drawing.vertex
         # where each vertex comes from: a vertex of the outline, or the middle of the side after it
@@ -272,7 +272,7 @@ class Outline(Rings):
         too_far = moved[distance > tolerance[vertex[moved]]]
         points = drawing.points.copy()
         points[too_far] = origin[too_far]
-        return Rings(points, drawing.begin, drawing.source)
+        return RingVertices(points, drawing.begin, drawing.source)
 
     def find_thin_parts(self, free: MultiPolygon, tolerance: float) -> ThinParts:
         """Return the thin parts of the free space that this is the outline of, and of what is solid."""
@@ -291,19 +291,21 @@ class Outline(Rings):
         part, vertex = STRtree(shapely.points(self.points)).query(pieces, "dwithin", distance=reach)
         return ThinParts(np.asarray(shapely.area(pieces)), vertex, part)
 
-    def polygons(self, drawing: Rings) -> MultiPolygon:
+    def polygons(self, drawing: RingVertices) -> MultiPolygon:
         rings = shapely.linearrings(drawing.points, indices=drawing.ring)
         return MultiPolygon(list(shapely.polygons(rings, indices=self.owner)))
 
 
-def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius: float) -> Simplified:
+def simplify_free_space(
+    free: MultiPolygon, tolerance: float, cell: float | None, radius: float
+) -> SimplifiedSpace:
     """Return `free`, m, valid, with fewer vertices; walls move by the tolerance, m, at most.
 
     `cell`, m: side of the cells that it is the outline of. `radius`, m: robots pass wherever they passed.
     """
     if tolerance == 0.0 or free.is_empty:
-        return Simplified(free, 0.0)
-    outline = Outline(list(free.geoms), cell)
+        return SimplifiedSpace(free, 0.0)
+    outline = OriginalOutline(list(free.geoms), cell)
     allowed = np.full(len(outline.points), tolerance)
     if cell is not None:
         allowed[(np.abs(outline.areas) < _BLOCKS * cell * cell)[outline.ring]] = 0.0
@@ -329,11 +331,11 @@ def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius:
             continue
         narrow = check.narrowed(parts)
         if narrow is None:
-            return Simplified(free, 0.0, ("not simplified: too many gaps that a robot may pass or not",))
+            return SimplifiedSpace(free, 0.0, ("not simplified: too many gaps that a robot may pass or not",))
         if not narrow.any():
-            return Simplified(parts, tolerance, _told(found, radius))
+            return SimplifiedSpace(parts, tolerance, _told(found, radius))
         allowed[narrow] = 0.0
-    return Simplified(free, 0.0, ("not simplified: walls would have met, or closed passages",))
+    return SimplifiedSpace(free, 0.0, ("not simplified: walls would have met, or closed passages",))
 
 
 def _told(found: Counter[str], radius: float) -> tuple[str, ...]:
@@ -357,7 +359,13 @@ class _Check:
     """
 
     def __init__(
-        self, outline: Outline, drawing: Rings, allowed: Array, most: float, width: float, found: Counter[str]
+        self,
+        outline: OriginalOutline,
+        drawing: RingVertices,
+        allowed: Array,
+        most: float,
+        width: float,
+        found: Counter[str],
     ) -> None:
         self.outline, self.drawing, self.allowed = outline, drawing, allowed
         self.tolerance, self.width, self.found = most, width, found
@@ -457,7 +465,7 @@ class _Check:
         count = (last - first - 1) % size + 2
         at = begin.repeat(count) + (concatenate_ranges(first - begin, count)) % size.repeat(count)
         runs = shapely.linestrings(outline.points[at], indices=np.arange(len(count)).repeat(count))
-        closed = closed_gaps(drawing.ends, runs, parts, self.width, 3 * self.tolerance)
+        closed = find_closed_gaps(drawing.ends, runs, parts, self.width, 3 * self.tolerance)
         if closed is None:
             return None
         wrong = np.zeros(len(outline.points), dtype=bool)
@@ -472,7 +480,7 @@ class _Check:
         return wrong
 
 
-def _fitted(path: Rings, kept: IntArray, drawing: Rings, allowed: Array) -> Rings:
+def _fitted(path: RingVertices, kept: IntArray, drawing: RingVertices, allowed: Array) -> RingVertices:
     """Return `drawing` with corners whole, and sides that stand for stairs in the middle of these.
 
     Such a side becomes the line of least squares of the middles that it stands for; it ends where that meets
@@ -501,10 +509,10 @@ def _fitted(path: Rings, kept: IntArray, drawing: Rings, allowed: Array) -> Ring
     move[cut] = corner[cut] - points[cut]
     stays = ~cut[before]
     begin = np.searchsorted(drawing.ring[stays], np.arange(len(drawing.begin)))
-    return Rings((points + move)[stays], begin, drawing.source[stays])
+    return RingVertices((points + move)[stays], begin, drawing.source[stays])
 
 
-def _stairs(path: Rings, kept: IntArray, drawing: Rings) -> tuple[BoolArray, Array, Array]:
+def _stairs(path: RingVertices, kept: IntArray, drawing: RingVertices) -> tuple[BoolArray, Array, Array]:
     """Return which sides stand for stairs, and the lines of these: a point and a direction, (m, 2) each."""
     count, first = path.size[drawing.ring], path.begin[drawing.ring]
     # what lies between each vertex that stays and the next one, round the ring
@@ -552,7 +560,7 @@ def _dot(a: Array, b: Array) -> Array:
     return np.asarray(np.einsum("kd,kd->k", a, b))
 
 
-def sharpened(plan: Polygon, tolerance: float) -> Polygon:
+def sharpen_corners(plan: Polygon, tolerance: float) -> Polygon:
     """Return `plan`, m, with its cut corners made whole, or as it is where that would break it.
 
     A run of short edges becomes the point where the long edges before and after it meet, if all of the run is
@@ -580,14 +588,14 @@ def _sharpened(ring: Array, tolerance: float) -> Array:
     return np.concatenate(runs)
 
 
-def rays(sides: Array, y: Array) -> int:
+def count_crossed_sides(sides: Array, y: Array) -> int:
     """Return how many sides horizontal lines at `y` cross, together: the cost of telling what is inside."""
     bounds = shapely.bounds(sides)
     low, high = np.sort(bounds[:, 1]), np.sort(bounds[:, 3])
     return int((np.searchsorted(low, y, side="right") - np.searchsorted(high, y)).sum())
 
 
-def closed_gaps(
+def find_closed_gaps(
     sides: Array, paths: Array, free: MultiPolygon, width: float, moved: float
 ) -> tuple[IntArray, Array] | None:
     """Return the (p, 2) sides and the middles of gaps that are too narrow now; None if they are too many.
@@ -613,7 +621,7 @@ def closed_gaps(
             return None
     ends = shapely.get_coordinates(shapely.shortest_line(lines[pairs[:, 0]], lines[pairs[:, 1]]))
     places = ends.reshape(-1, 2, 2).mean(axis=1)
-    if rays(lines, places[:, 1]) > _MOST_RAYS:
+    if count_crossed_sides(lines, places[:, 1]) > _MOST_RAYS:
         return None
     shapely.prepare(free)
     across = shapely.contains_xy(free, *places.T)

@@ -23,7 +23,7 @@ from robocov.arrays import Array
 from robocov.environment import GRID_M
 from robocov.errors import format_count
 from robocov.mapfile.models import MIN_SIZE_M
-from robocov_app.formats.geometry.polygons import buffer_with_mitres, polygons_of, united
+from robocov_app.formats.geometry.polygons import buffer_with_mitres, to_multipolygon, unite
 
 DEFAULT_SNAP_M = 0.01  # thinner than any wall of a building
 MAX_DEFAULT_SNAP = 1e-3  # as a fraction of the larger side of a drawing: a table-top arena has thin walls
@@ -47,7 +47,7 @@ class ClosedGaps(NamedTuple):
         return f"{format_count(self.number, 'gap')} between outlines closed, {size} (--snap 0 keeps them)"
 
 
-def default_snap(areas: Sequence[BaseGeometry]) -> float:
+def compute_default_snap(areas: Sequence[BaseGeometry]) -> float:
     """Return the snapping tolerance, m, for areas where the user gives none."""
     if not len(areas):
         return DEFAULT_SNAP_M
@@ -72,7 +72,7 @@ def close_gaps(areas: Sequence[BaseGeometry], snap: float) -> ClosedGaps:
     if not len(outlines):
         return ClosedGaps(MultiPolygon())
     if len(outlines) == 1:
-        return ClosedGaps(polygons_of(outlines[0]))
+        return ClosedGaps(to_multipolygon(outlines[0]))
     area = union_on_grid(outlines)
     if snap <= 0.0 or not _are_close(outlines, snap):
         return ClosedGaps(area)
@@ -95,7 +95,7 @@ class _Gaps(NamedTuple):
 def union_on_grid(areas: Sequence[BaseGeometry]) -> MultiPolygon:
     """Return the union of areas, m, to the micrometre."""
     # to unite first and round then takes a tenth of the time
-    return polygons_of(shapely.set_precision(united(areas), GRID_M))
+    return to_multipolygon(shapely.set_precision(unite(areas), GRID_M))
 
 
 def are_edge_to_edge(one: BaseGeometry, other: BaseGeometry, tolerance: float) -> bool:

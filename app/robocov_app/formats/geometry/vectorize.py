@@ -29,7 +29,7 @@ _STRIP = 512  # rows that are looked at together
 _TOUCHING = np.ones((3, 3), dtype=bool)  # known cells that touch at a corner belong together
 
 
-def foreign_map(
+def build_grid_map(
     cells: Cells,
     where: str,
     name: str,
@@ -59,7 +59,7 @@ def foreign_map(
     for value in placed(np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]], float)).ravel().tolist():
         require_coordinate(value, f"{where}: a corner of the grid")
     number = [int(np.count_nonzero(cells == kind)) for kind in (FREE, BLOCKED, UNKNOWN)]
-    share = [_share(each, cells.size) for each in number]
+    share = [_format_share(each, cells.size) for each in number]
     told = f"{columns} x {rows} cells of {cell:.6g} m: {share[FREE]} free, {share[BLOCKED]} blocked"
     if number[UNKNOWN]:
         taken = {"obstacle": "taken as obstacles", "free": "taken as free", "cut": "cut away"}[unknown]
@@ -89,7 +89,7 @@ def foreign_map(
         description=description,
         free=outline,
         boundary=boundary,
-        vertices_read=vertices_of(outline),
+        vertices_read=count_polygon_vertices(outline),
         cell=cell,
         specks=noise * cell * cell,
         repaired=repaired,
@@ -98,14 +98,14 @@ def foreign_map(
     )
 
 
-def free_area(free: BoolArray, cell: Point, origin: Point, where: str) -> MultiPolygon:
+def outline_free_cells(free: BoolArray, cell: Point, origin: Point, where: str) -> MultiPolygon:
     """Return free cells, (rows, columns), the top row first, as polygons, m; MapError where none is."""
     if not free.any():
         raise MapError(f"{where}: no cell is free")
     return _traced(free[::-1], where, lambda points: _placed(points, cell, origin))
 
 
-def vertices_of(area: MultiPolygon) -> int:
+def count_polygon_vertices(area: MultiPolygon) -> int:
     return int(shapely.get_num_coordinates(area)) - sum(1 + len(part.interiors) for part in area.geoms)
 
 
@@ -121,12 +121,12 @@ def _traced(cells: BoolArray, where: str, placed: Callable[[Array], Array]) -> M
     """Return the outline of the cells, placed; only the part of the grid that they fill is looked at."""
     row, column = np.flatnonzero(cells.any(axis=1)), np.flatnonzero(cells.any(axis=0))
     corner = np.array([column[0], row[0]], float)
-    part = traced(cells[row[0] : row[-1] + 1, column[0] : column[-1] + 1], where)
+    part = trace_outline(cells[row[0] : row[-1] + 1, column[0] : column[-1] + 1], where)
     outline: MultiPolygon = shapely.transform(part, lambda points: placed(points + corner))
     return outline
 
 
-def _share(number: int, total: int) -> str:
+def _format_share(number: int, total: int) -> str:
     """Return a part of the cells in per cent, never rounded to none or all."""
     share = 100 * number / total
     if 0.0 < share < 0.1:
@@ -134,7 +134,7 @@ def _share(number: int, total: int) -> str:
     return ">99.9 %" if 99.9 < share < 100.0 else f"{share:.3g} %"
 
 
-def traced(free: BoolArray, where: str) -> MultiPolygon:
+def trace_outline(free: BoolArray, where: str) -> MultiPolygon:
     """Return the union of the free cells, (rows, columns), one polygon for each of their connected parts.
 
     Cell ``free[row, column]`` is the unit square from (column, row) on. Every vertex is a true corner, and no

@@ -31,14 +31,14 @@ from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.colours import Paint, read_colour
 from robocov_app.formats.files import MAX_VERTICES, name_of_map, require_shapes
-from robocov_app.formats.geometry.conversion import with_numbers
-from robocov_app.formats.geometry.curves import TOLERANCE, arc
-from robocov_app.formats.geometry.frames import moved
-from robocov_app.formats.geometry.polygons import Rule, decimal, free_area
-from robocov_app.formats.geometry.rasterize import not_held
-from robocov_app.formats.geometry.shapes import Line, Shapes
+from robocov_app.formats.geometry.conversion import transform_numbers
+from robocov_app.formats.geometry.curves import CURVE_TOLERANCE_M, flatten_arc
+from robocov_app.formats.geometry.frames import transform_points
+from robocov_app.formats.geometry.polygons import Rule, compute_free_area, format_decimal
+from robocov_app.formats.geometry.rasterize import describe_unsupported
+from robocov_app.formats.geometry.shapes import Shapes, WallLine
 from robocov_app.formats.svg import path as paths
-from robocov_app.formats.svg.path import affine, composed, length, numbers, stretch
+from robocov_app.formats.svg.path import build_affine, compose, compute_stretch, parse_length, parse_numbers
 from robocov_app.formats.xml_tree import DEEPEST, MOST_ELEMENTS, Element, read_xml_tree
 from robocov_app.render.theme import DARK, LIGHT, Theme
 
@@ -65,7 +65,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         root.refuse(str(error))
     left, top, *_ = _view_box(root.attributes) or (0.0, 0.0, width, height)
     corners = np.array([[left, top], [left + width, top + height]])
-    (x0, y0), (x1, y1) = moved(matrix, corners).tolist()
+    (x0, y0), (x1, y1) = transform_points(matrix, corners).tolist()
     shapes.page = shapely.box(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
     drawing.pixel = paths.PIXEL if options.scale is None else options.scale
     drawing.draw(matrix, width, height)
@@ -92,26 +92,29 @@ def _page(given: dict[str, str], scale: float | None) -> tuple[Array, float, flo
     box = _view_box(given)
     whole = {"width": box[2] if box else 300.0, "height": box[3] if box else 150.0}
     sizes = {name: given.get(name, "100%").strip() for name in whole}
-    width, height = (length("100%" if sizes[k] == "auto" else sizes[k], whole[k]) for k in whole)
+    width, height = (parse_length("100%" if sizes[k] == "auto" else sizes[k], whole[k]) for k in whole)
     box = box or (0.0, 0.0, width, height)
     if width <= 0.0 or height <= 0.0:
         raise ValueError(f"expected a size, got {width:g} x {height:g} px")
     if scale is None:
-        inside = paths.fitted(box, width, height, given.get("preserveAspectRatio", ""))
-        fit, bottom = composed(affine(paths.PIXEL, d=paths.PIXEL), inside), paths.PIXEL * height
+        inside = paths.fit_view_box(box, width, height, given.get("preserveAspectRatio", ""))
+        fit, bottom = compose(build_affine(paths.PIXEL, d=paths.PIXEL), inside), paths.PIXEL * height
     else:
-        fit, bottom = composed(affine(scale, d=scale), affine(e=-box[0], f=-box[1])), scale * box[3]
-    origin = numbers(given.get("data-origin", "0 0"))
+        fit, bottom = (
+            compose(build_affine(scale, d=scale), build_affine(e=-box[0], f=-box[1])),
+            scale * box[3],
+        )
+    origin = parse_numbers(given.get("data-origin", "0 0"))
     if len(origin) != 2:
         raise ValueError(f"expected two numbers, got data-origin {given['data-origin'][:30]!r}")
-    return composed(affine(d=-1.0, e=origin[0], f=origin[1] + bottom), fit), box[2], box[3]
+    return compose(build_affine(d=-1.0, e=origin[0], f=origin[1] + bottom), fit), box[2], box[3]
 
 
 def _view_box(given: dict[str, str]) -> tuple[float, float, float, float] | None:
     """Return the ``viewBox`` among attributes, None where there is none of positive size."""
     if "viewBox" not in given:
         return None
-    values = numbers(given["viewBox"])
+    values = parse_numbers(given["viewBox"])
     if len(values) != 4:
         raise ValueError(f"expected four numbers, got viewBox {given['viewBox'][:30]!r}")
     x, y, width, height = values
@@ -146,7 +149,7 @@ class _Place:
         return math.hypot(self.width, self.height) / math.sqrt(2.0)
 
     def radius(self, element: Element) -> float:
-        return length(element.attributes.get("r", "0"), self.diagonal)
+        return parse_length(element.attributes.get("r", "0"), self.diagonal)
 
     def lengths(self, element: Element, *names: str) -> list[float]:
         """Return lengths along x or y; what is missing is 0."""
@@ -154,7 +157,7 @@ class _Place:
         for name in names:
             text = element.attributes.get(name, "0").strip()
             whole = self.width if name[0] in "xw" or name in ("cx", "rx") else self.height
-            found.append(0.0 if text == "auto" else length(text, whole))
+            found.append(0.0 if text == "auto" else parse_length(text, whole))
         return found
 
 
@@ -165,7 +168,7 @@ class _Drawing:
         self.root, self.shapes = root, shapes
         self.sheet = paths.StyleSheet(root.where)
         self.named: dict[str, Element] = {}
-        self.draws = paths.MOST_DRAWS
+        self.draws = paths.MAX_DRAWS
         self.pixel = paths.PIXEL  # metres a unit of the root
         self.key = shapes.options.colour_key()
         self.dashed = self.clipped = 0
@@ -178,7 +181,7 @@ class _Drawing:
 
     def draw(self, matrix: Array, width: float, height: float) -> None:
         self._require_few()
-        style = paths.inherited(paths.INHERITED, self.sheet.of(self.root))
+        style = paths.inherit_style(paths.INHERITED, self.sheet.of(self.root))
         for child in self.root.children:
             self._draw(child, _Place(matrix, style, _labels(self.root), width, height))
 
@@ -188,7 +191,9 @@ class _Drawing:
             "clip paths and masks not applied": self.clipped,
             "style rules of other kinds than tag, .class and #id not applied": self.sheet.strange,
         }
-        curves = [f"curves flattened to within {1000 * TOLERANCE:g} mm"] if self.shapes.vertices else []
+        curves = (
+            [f"curves flattened to within {1000 * CURVE_TOLERANCE_M:g} mm"] if self.shapes.vertices else []
+        )
         return curves + [f"{count} {words}" for words, count in counts.items() if count]
 
     def _require_few(self) -> None:
@@ -237,11 +242,11 @@ class _Drawing:
         try:
             place = replace(
                 outer,
-                matrix=composed(outer.matrix, paths.transform(own.get("transform", ""))),
-                style=paths.inherited(outer.style, own),
+                matrix=compose(outer.matrix, paths.parse_transform(own.get("transform", ""))),
+                style=paths.inherit_style(outer.style, own),
                 labels=_labels(element, outer=outer.labels),
                 depth=outer.depth + 1,
-                opacity=outer.opacity * paths.opacity_of(own.get("opacity", "1")),
+                opacity=outer.opacity * paths.parse_opacity(own.get("opacity", "1")),
             )
             if element.tag in _SHAPES:
                 self._shape(element, place)
@@ -256,24 +261,26 @@ class _Drawing:
         given, target = element.attributes, self._target(element)
         if element.tag in ("use", "svg"):
             x, y = place.lengths(element, "x", "y")
-            place = replace(place, matrix=composed(place.matrix, affine(e=x, f=y)))
+            place = replace(place, matrix=compose(place.matrix, build_affine(e=x, f=y)))
         if element.tag == "use":
             if target is None:
                 self.shapes.leave_out("use", "of what is not in the file")
                 return [], place
             if target.tag not in ("symbol", "svg"):
                 return [target], place
-            style = paths.inherited(place.style, self.sheet.of(target))
+            style = paths.inherit_style(place.style, self.sheet.of(target))
             place = replace(place, style=style, labels=_labels(target, inner=place.labels))
             size = {name: text for name, text in given.items() if name in ("width", "height")}
             element, given = target, target.attributes | size
         elif element.tag != "svg":
             return element.children, place
-        width = length(given.get("width", "100%").replace("auto", "100%"), place.width)
-        height = length(given.get("height", "100%").replace("auto", "100%"), place.height)
+        width = parse_length(given.get("width", "100%").replace("auto", "100%"), place.width)
+        height = parse_length(given.get("height", "100%").replace("auto", "100%"), place.height)
         matrix, box = place.matrix, _view_box(given)
         if box is not None:
-            matrix = composed(matrix, paths.fitted(box, width, height, given.get("preserveAspectRatio", "")))
+            matrix = compose(
+                matrix, paths.fit_view_box(box, width, height, given.get("preserveAspectRatio", ""))
+            )
             _, _, width, height = box
         return element.children, replace(place, matrix=matrix, width=width, height=height)
 
@@ -307,7 +314,7 @@ class _Drawing:
 
     def _paint(self, place: _Place, what: str) -> Paint:
         """Return the colour of a fill or a stroke; the first of a gradient's colours for all of it."""
-        seen = paths.seen_colour(place.style, what, place.opacity, self._gradient_colour)
+        seen = paths.compute_visible_colour(place.style, what, place.opacity, self._gradient_colour)
         written = read_colour(place.style[what])
         return Paint(seen, self.key.find_role(written) or self.key.find_role(seen))
 
@@ -326,14 +333,14 @@ class _Drawing:
 
     def _fill(self, element: Element, place: _Place, paint: Paint, at: str) -> bool:
         """Add the area of a filled shape; return whether it has one that counts."""
-        least, most = stretch(place.matrix)
+        least, most = compute_stretch(place.matrix)
         if element.tag == "circle" and most - least <= 1e-9 * most:
-            (centre,) = moved(place.matrix, np.array([place.lengths(element, "cx", "cy")]))
+            (centre,) = transform_points(place.matrix, np.array([place.lengths(element, "cx", "cy")]))
             radius = place.radius(element) * most
             if radius > 0.0:
                 self.shapes.add_circle(centre, radius, place.labels, at=at, paint=paint)
                 return True
-        rings = [moved(place.matrix, points) for points, _ in self._points(element, place)]
+        rings = [transform_points(place.matrix, points) for points, _ in self._points(element, place)]
         rule: Rule = "evenodd" if place.style["fill-rule"].lower() == "evenodd" else "nonzero"
         if not rings:
             return False
@@ -362,21 +369,21 @@ class _Drawing:
         for line in lines:
             self.shapes.add_line(line, at=at)
 
-    def _lines(self, parts: list[tuple[Array, bool]], place: _Place, paint: Paint) -> list[Line]:
+    def _lines(self, parts: list[tuple[Array, bool]], place: _Place, paint: Paint) -> list[WallLine]:
         """Return the lines of a stroke, none where it has no width."""
         style, given = place.style, self.shapes.options.thickness
-        least, most = stretch(place.matrix)
-        own = length(style["stroke-width"], place.diagonal)
+        least, most = compute_stretch(place.matrix)
+        own = parse_length(style["stroke-width"], place.diagonal)
         width = own * math.sqrt(least * most) if given is None else given
         if not width > 0.0:
             return []
-        limit = numbers(style["stroke-miterlimit"])
+        limit = parse_numbers(style["stroke-miterlimit"])
         is_stretched = given is None and most > _EVEN * least
         lines = []
         for points, closed in parts:
             path = np.concatenate([points, points[:1]]) if closed else points
-            line = Line(
-                moved(place.matrix, path),
+            line = WallLine(
+                transform_points(place.matrix, path),
                 width,
                 place.labels,
                 cap=_CAPS.get(style["stroke-linecap"].lower(), "flat"),
@@ -398,19 +405,19 @@ class _Drawing:
         return last[2]
 
     def _compute_points(self, element: Element, place: _Place) -> list[tuple[Array, bool]]:
-        most = stretch(place.matrix)[1]
-        tolerance = TOLERANCE / most if most > 0.0 else np.inf
+        most = compute_stretch(place.matrix)[1]
+        tolerance = CURVE_TOLERANCE_M / most if most > 0.0 else np.inf
         given = element.attributes
         match element.tag:
             case "path":
                 data = given.get("d", "")
                 if data.strip() == "none":
                     return []
-                parts, draws = paths.subpaths(data, tolerance, MAX_VERTICES, self.draws)
+                parts, draws = paths.parse_path(data, tolerance, MAX_VERTICES, self.draws)
                 self.draws -= draws
                 return parts
             case "polyline" | "polygon":
-                values = numbers(given.get("points", ""))
+                values = parse_numbers(given.get("points", ""))
                 points = np.array(values[: len(values) // 2 * 2]).reshape(-1, 2)
                 return [(points, element.tag == "polygon")] if len(points) > 1 else []
             case "line":
@@ -425,7 +432,7 @@ class _Drawing:
         if min(radii) <= 0.0:
             return []
         centre, (u, v) = np.array(place.lengths(element, "cx", "cy")), np.diag(radii)
-        return [(arc(centre, u, v, 0.0, 2 * np.pi, tolerance), True)]
+        return [(flatten_arc(centre, u, v, 0.0, 2 * np.pi, tolerance), True)]
 
 
 def _rectangle(element: Element, place: _Place, tolerance: float) -> list[Array]:
@@ -444,7 +451,7 @@ def _rectangle(element: Element, place: _Place, tolerance: float) -> list[Array]
     for k, centre in enumerate(corners + inward):
         begin = np.pi + k * np.pi / 2
         first = centre + u * np.cos(begin) + v * np.sin(begin)
-        parts += [first[None], arc(centre, u, v, begin, np.pi / 2, tolerance)]
+        parts += [first[None], flatten_arc(centre, u, v, begin, np.pi / 2, tolerance)]
     return [np.concatenate(parts)]
 
 
@@ -456,7 +463,7 @@ class _Pen:
     digits: int
 
     def length(self, metres: float) -> str:
-        return decimal(metres / self.scale, self.digits)
+        return format_decimal(metres / self.scale, self.digits)
 
     def rounded(self, metres: float) -> float:
         return round(metres / self.scale, self.digits) * self.scale
@@ -501,11 +508,13 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     )
     with replace_file(path) as part:
         part.write_text(page, encoding="utf-8")
-    obstacles = [with_numbers(obstacle, pen.rounded).polygon for obstacle in environment.obstacles]
-    area = free_area(Polygon([(pen.rounded(x), pen.rounded(y)) for x, y in environment.boundary]), obstacles)
+    obstacles = [transform_numbers(obstacle, pen.rounded).polygon for obstacle in environment.obstacles]
+    area = compute_free_area(
+        Polygon([(pen.rounded(x), pen.rounded(y)) for x, y in environment.boundary]), obstacles
+    )
     notes = [f"1 mm is {scale:g} m: {(high - low)[0] / scale:.6g} x {(high - low)[1] / scale:.6g} mm"]
     notes += [] if options.scale is None else [f"to import it again: --scale {scale:g}"]
-    dropped = not_held(environment, names=False)
+    dropped = describe_unsupported(environment, names=False)
     return ExportReport("svg", (path,), environment.free_area, area, dropped, tuple(notes))
 
 

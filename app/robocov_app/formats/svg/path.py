@@ -12,8 +12,8 @@ import numpy as np
 from robocov.arrays import Array, concatenate_ranges
 from robocov.errors import MapError
 from robocov_app.formats.colours import Colour, mix_with_white, read_paint
-from robocov_app.formats.geometry.curves import arcs, beziers
-from robocov_app.formats.geometry.frames import frame
+from robocov_app.formats.geometry.curves import flatten_arcs, flatten_beziers
+from robocov_app.formats.geometry.frames import build_frame
 from robocov_app.formats.xml_tree import Element
 
 # nothing is given back once it is taken (++, *+): else a million digits before a wrong letter take for ever
@@ -21,62 +21,62 @@ _DECIMAL = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?"
 NUMBER = re.compile(rf"[\s,]*+({_DECIMAL})", re.ASCII)
 _LENGTH = re.compile(rf"\s*+({_DECIMAL})\s*+([A-Za-z]*+|%)\s*+", re.ASCII)
 _FUNCTION = re.compile(r"[\s,]*([A-Za-z]+)\s*\(([^()]*)\)")
-_LARGEST = 1e30
+_MAX_NUMBER = 1e30
 _PIXELS = {  # user units in a unit of length (CSS Values 4, section 6.2)
     "": 1.0, "px": 1.0, "in": 96.0, "cm": 96 / 2.54, "mm": 96 / 25.4, "q": 96 / 101.6, "pt": 4 / 3, "pc": 16.0
 }  # fmt: skip
 PIXEL = 0.0254 / 96  # a user unit in metres, where nothing says otherwise
-MOST_DRAWS = 150_000  # commands of all paths, with or without their letter; vertices of polylines are none
+MAX_DRAWS = 150_000  # commands of all paths, with or without their letter; vertices of polylines are none
 _REFERENCE = re.compile(r"""\s*url\(\s*["']?#([^"')]*)["']?\s*\)""")
 _COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])", re.ASCII)
 _FLAG = re.compile(r"[\s,]*([01])")
 _ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 
 
-def number(text: str) -> float:
+def parse_number(text: str) -> float:
     value = float(text)
-    if not abs(value) <= _LARGEST:
-        raise ValueError(f"expected a number up to {_LARGEST:g}, got {text[:20]}")
-    return 0.0 if abs(value) < 1.0 / _LARGEST else value
+    if not abs(value) <= _MAX_NUMBER:
+        raise ValueError(f"expected a number up to {_MAX_NUMBER:g}, got {text[:20]}")
+    return 0.0 if abs(value) < 1.0 / _MAX_NUMBER else value
 
 
-def numbers(text: str) -> list[float]:
+def parse_numbers(text: str) -> list[float]:
     """Return the numbers of a list as that of ``points``; ValueError when something else is in it."""
     found, at = [], 0
     while match := NUMBER.match(text, at):
-        found.append(number(match[1]))
+        found.append(parse_number(match[1]))
         at = match.end()
     if text[at:].strip(" \t\r\n\f,"):
         raise ValueError(f"expected a number, got {text[at : at + 20].strip()!r}")
     return found
 
 
-def length(text: str, whole: float | None = None) -> float:
+def parse_length(text: str, whole: float | None = None) -> float:
     """Return a length in user units; `whole`: what a percentage is of. ValueError when it is none."""
     match = _LENGTH.fullmatch(text)
     unit = match[2].lower() if match else ""
     if match is None or not (unit in _PIXELS or (unit == "%" and whole is not None)):
         raise ValueError(f"expected a length in px, mm, cm, in, pt, pc or %, got {text[:30]!r}")
-    value = number(match[1])
+    value = parse_number(match[1])
     return value * whole / 100.0 if unit == "%" and whole is not None else value * _PIXELS[unit]
 
 
-def affine(
+def build_affine(
     a: float = 1.0, b: float = 0.0, c: float = 0.0, d: float = 1.0, e: float = 0.0, f: float = 0.0
 ) -> Array:
     """Return the (3, 3) matrix that takes (x, y, 1) to (a x + c y + e, b x + d y + f, 1)."""
     return np.array([[a, c, e], [b, d, f], [0.0, 0.0, 1.0]])
 
 
-def composed(outer: Array, inner: Array) -> Array:
+def compose(outer: Array, inner: Array) -> Array:
     """Return the matrix of both, the inner one first; ValueError when it makes things too large."""
     both = outer @ inner
-    if not (np.abs(both) <= _LARGEST).all():
-        raise ValueError(f"a transform to coordinates beyond {_LARGEST:g}")
+    if not (np.abs(both) <= _MAX_NUMBER).all():
+        raise ValueError(f"a transform to coordinates beyond {_MAX_NUMBER:g}")
     return np.asarray(both)
 
 
-def stretch(matrix: Array) -> tuple[float, float]:
+def compute_stretch(matrix: Array) -> tuple[float, float]:
     """Return by how much a matrix makes lengths longer, at least and at most: its singular values."""
     (a, c), (b, d) = matrix[:2, :2].tolist()
     # by hand: a decomposition by LAPACK, for each shape, takes as long as all else that is read of it
@@ -84,16 +84,16 @@ def stretch(matrix: Array) -> tuple[float, float]:
     return abs(half - turned), half + turned
 
 
-def transform(text: str) -> Array:
+def parse_transform(text: str) -> Array:
     """Return the matrix of a ``transform``, whose last function comes first; ValueError on anything else."""
-    matrix, at = affine(), 0
+    matrix, at = build_affine(), 0
     while match := _FUNCTION.match(text, at):
         function = _FUNCTIONS.get(match[1].lower())
         # CSS writes units where attributes have none
-        values = numbers(re.sub(r"(?<=[\d.])(?:px|deg)\b", "", match[2]))
+        values = parse_numbers(re.sub(r"(?<=[\d.])(?:px|deg)\b", "", match[2]))
         if function is None or len(values) not in function[0]:
             raise ValueError(f"expected a transform, got {match[0].strip()[:40]!r}")
-        matrix = composed(matrix, function[1](*values))
+        matrix = compose(matrix, function[1](*values))
         at = match.end()
     if text[at:].strip(" \t\r\n,") not in ("", "none"):
         raise ValueError(f"expected a transform, got {text[at:].strip()[:40]!r}")
@@ -101,20 +101,23 @@ def transform(text: str) -> Array:
 
 
 _FUNCTIONS: dict[str, tuple[tuple[int, ...], Callable[..., Array]]] = {  # counts of numbers, and matrix
-    "matrix": ((6,), affine),
-    "translate": ((1, 2), lambda x, y=0.0: affine(e=x, f=y)),
-    "translatex": ((1,), lambda x: affine(e=x)),
-    "translatey": ((1,), lambda y: affine(f=y)),
-    "scale": ((1, 2), lambda x, y=None: affine(x, d=x if y is None else y)),
-    "scalex": ((1,), lambda x: affine(a=x)),
-    "scaley": ((1,), lambda y: affine(d=y)),
-    "rotate": ((1, 3), lambda turn, x=0.0, y=0.0: frame(x, y, math.radians(turn)) @ affine(e=-x, f=-y)),
-    "skewx": ((1,), lambda angle: affine(c=math.tan(math.radians(angle)))),
-    "skewy": ((1,), lambda angle: affine(b=math.tan(math.radians(angle)))),
+    "matrix": ((6,), build_affine),
+    "translate": ((1, 2), lambda x, y=0.0: build_affine(e=x, f=y)),
+    "translatex": ((1,), lambda x: build_affine(e=x)),
+    "translatey": ((1,), lambda y: build_affine(f=y)),
+    "scale": ((1, 2), lambda x, y=None: build_affine(x, d=x if y is None else y)),
+    "scalex": ((1,), lambda x: build_affine(a=x)),
+    "scaley": ((1,), lambda y: build_affine(d=y)),
+    "rotate": (
+        (1, 3),
+        lambda turn, x=0.0, y=0.0: build_frame(x, y, math.radians(turn)) @ build_affine(e=-x, f=-y),
+    ),
+    "skewx": ((1,), lambda angle: build_affine(c=math.tan(math.radians(angle)))),
+    "skewy": ((1,), lambda angle: build_affine(b=math.tan(math.radians(angle)))),
 }
 
 
-def fitted(box: tuple[float, float, float, float], width: float, height: float, how: str = "") -> Array:
+def fit_view_box(box: tuple[float, float, float, float], width: float, height: float, how: str = "") -> Array:
     """Return the matrix that fits a ``viewBox`` into a viewport from [0, 0] on (SVG 2, section 8.2).
 
     `how`: ``preserveAspectRatio``; empty is the default, ``xMidYMid meet``.
@@ -122,17 +125,17 @@ def fitted(box: tuple[float, float, float, float], width: float, height: float, 
     align, _, rule = how.strip().partition(" ")
     x, y = width / box[2], height / box[3]
     if align.lower() == "none":
-        return affine(x, d=y) @ affine(e=-box[0], f=-box[1])
+        return build_affine(x, d=y) @ build_affine(e=-box[0], f=-box[1])
     scale = max(x, y) if rule.strip() == "slice" else min(x, y)
     align = align or "xMidYMid"
     parts = {"xmin": 0.0, "xmid": 0.5, "xmax": 1.0, "ymin": 0.0, "ymid": 0.5, "ymax": 1.0}
     left = (width - scale * box[2]) * parts.get(align[:4].lower(), 0.5)
     top = (height - scale * box[3]) * parts.get(align[4:].lower(), 0.5)
-    return affine(scale, d=scale, e=left, f=top) @ affine(e=-box[0], f=-box[1])
+    return build_affine(scale, d=scale, e=left, f=top) @ build_affine(e=-box[0], f=-box[1])
 
 
-def subpaths(
-    text: str, tolerance: float, most: int, draws: int = MOST_DRAWS
+def parse_path(
+    text: str, tolerance: float, most: int, draws: int = MAX_DRAWS
 ) -> tuple[list[tuple[Array, bool]], int]:
     """Return the subpaths of path data, (k, 2) points and whether they were closed; and how many commands.
 
@@ -184,7 +187,7 @@ class _Pen:
         points, commands = most - len(self.vertices), draws - self.draws
         room = count * (points if kind in "ML" else min(points, commands))
         while match := (_FLAG if len(values) % count in flags else NUMBER).match(text, at):
-            values.append(number(match[1]))
+            values.append(parse_number(match[1]))
             at = match.end()
             if len(values) > room:
                 many = f"{most} points" if room == count * points else f"{draws} commands"
@@ -233,12 +236,12 @@ class _Pen:
         curves = []
         if self._beziers:
             rows = np.array(self._beziers)
-            flat = beziers(rows[:, 1:].copy().view(float).reshape(-1, 4, 2), tolerance, most)
+            flat = flatten_beziers(rows[:, 1:].copy().view(float).reshape(-1, 4, 2), tolerance, most)
             curves.append((rows[:, 0].real.astype(np.intp), *flat))
         if self._arcs:
             rows = np.array(self._arcs)
             centre, u, v = (rows[:, k : k + 1].copy().view(float) for k in (1, 2, 3))
-            flat = arcs(centre, u, v, rows[:, 4].real, rows[:, 5].real, tolerance, most)
+            flat = flatten_arcs(centre, u, v, rows[:, 4].real, rows[:, 5].real, tolerance, most)
             curves.append((rows[:, 0].real.astype(np.intp), *flat))
         for index, _, steps in curves:
             count[index] = steps
@@ -305,7 +308,7 @@ _IMPORTANT = re.compile(r"!\s*important\s*$", re.IGNORECASE)
 _HARMLESS = re.compile(r"@(?:charset|font-face|keyframes|media|namespace|page)\b", re.IGNORECASE)
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _AT_RULE_PARTS = re.compile(r"[{};]")
-MOST_TEXT, MOST_RULES, MOST_WORK = 1_000_000, 10_000, 500_000  # letters, rules, rules looked at
+MAX_TEXT, MAX_RULES, MAX_WORK = 1_000_000, 10_000, 500_000  # letters, rules, rules looked at
 
 
 class _Rule(NamedTuple):
@@ -327,8 +330,8 @@ class StyleSheet:
     def add(self, text: str) -> None:
         """Add the rules of a text. Raises MapError when there are too many."""
         self._size += len(text)
-        if self._size > MOST_TEXT:
-            raise MapError(f"{self.where}: expected style sheets of at most {MOST_TEXT} characters, got more")
+        if self._size > MAX_TEXT:
+            raise MapError(f"{self.where}: expected style sheets of at most {MAX_TEXT} characters, got more")
         text = text.replace("<!--", " ").replace("-->", " ")
         # up to the last end of a comment: to look for one that is not there takes for ever
         commented, end, text = text.rpartition("*/")
@@ -337,7 +340,7 @@ class StyleSheet:
             before, brace, body = rule.rpartition("{")
             if not brace:
                 continue
-            properties = _by_importance(declarations(body))
+            properties = _by_importance(parse_declarations(body))
             for selector in before.rpartition("{")[2].split(","):
                 self._add(selector.strip(), properties)
 
@@ -349,11 +352,11 @@ class StyleSheet:
         marks |= {f".{name}" for name in attributes.get("class", "").split()}
         looked_at = [rule for key in ("", *marks) for rule in self._keyed.get(key, ())]
         self._work += len(looked_at)
-        if self._work > MOST_WORK:
+        if self._work > MAX_WORK:
             raise MapError(f"{self.where}: too many rules for too many elements")
         rules = [rule for rule in looked_at if rule.marks <= marks]
         chosen = [rule.properties for rule in sorted(rules, key=lambda rule: rule.weight)]
-        chosen.append(_by_importance(declarations(attributes.get("style", ""))))
+        chosen.append(_by_importance(parse_declarations(attributes.get("style", ""))))
         for k in (0, 1):
             for properties in chosen:
                 found |= properties[k]
@@ -376,7 +379,7 @@ class StyleSheet:
 
     def _add(self, selector: str, properties: tuple[dict[str, str], dict[str, str]]) -> None:
         match = _SELECTOR.fullmatch(selector)
-        if match is None or not selector or self._count >= MOST_RULES:
+        if match is None or not selector or self._count >= MAX_RULES:
             self.strange += 1
             return
         tag = [match[1]] if match[1] not in (None, "*") else []
@@ -388,7 +391,7 @@ class StyleSheet:
         self._keyed.setdefault(key, []).append(_Rule(frozenset([*tag, *marks]), weight, properties))
 
 
-def declarations(text: str) -> dict[str, str]:
+def parse_declarations(text: str) -> dict[str, str]:
     pairs = (part.partition(":") for part in text.split(";") if ":" in part)
     return {name.strip().lower(): value.strip() for name, _, value in pairs}
 
@@ -400,7 +403,7 @@ def _by_importance(properties: dict[str, str]) -> tuple[dict[str, str], dict[str
     return plain, {name: _IMPORTANT.sub("", value).rstrip() for name, value in important.items()}
 
 
-def inherited(parent: Style, own: Style) -> dict[str, str]:
+def inherit_style(parent: Style, own: Style) -> dict[str, str]:
     return {
         name: parent[name] if (value := own.get(name, "inherit")) in ("inherit", "unset") else value
         for name in INHERITED
@@ -415,7 +418,7 @@ def is_painted(style: Style, what: str) -> bool:
     return paint is None or paint[1] > 0.0
 
 
-def seen_colour(
+def compute_visible_colour(
     style: Style, what: str, opacity: float, gradient_colour: Callable[[str], str | None]
 ) -> Colour | None:
     """Return the colour of a fill or a stroke, mixed with white where it is translucent.
@@ -444,10 +447,10 @@ def seen_colour(
     if paint is None:
         return None
     colour, alpha = paint
-    return mix_with_white(colour, alpha * opacity * opacity_of(style[f"{what}-opacity"]))
+    return mix_with_white(colour, alpha * opacity * parse_opacity(style[f"{what}-opacity"]))
 
 
-def opacity_of(text: str) -> float:
+def parse_opacity(text: str) -> float:
     """Return an opacity from 0 to 1; what is no number is 1."""
     text = text.strip()
     try:
