@@ -178,7 +178,7 @@ def find_site_paths(
 
 @kernel
 def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covered: BoolArray) -> bool:
-    """Find the paths from robots at (n, 2); return whether the index had enough entries."""
+    """Find the paths from robots at (n, 2) positions; return whether the index had enough entries."""
     tiles = cost_map.tiles
     _find_nearest_robots(tiles, search, robots)
     used = 0
@@ -259,7 +259,7 @@ def _find_nearest_robots_of_tile(tiles: Tiles, search: Search, robots: Array, ti
         i = search.tile_robots[k]
         x = robots[i, 0]
         y = robots[i, 1]
-        # There are no branches, so that the compiler can vectorize the loop. The lengths are still squared.
+        # The loop has no branches, so that the compiler can vectorize it. The lengths are squared up to here.
         for slot in range(SLOTS):
             dx = tiles.x[tile, slot] - x
             dy = tiles.y[tile, slot] - y

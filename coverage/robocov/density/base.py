@@ -79,8 +79,8 @@ class Density(ABC):
             See `compute_moments`.
         area : (n,) array, m²
         centroid : (n, 2) array, m
-            Centroids for density 1. They are also the centroids of cells without area, or without mass: for
-            a mean density below 1e-9 of the largest density, mass is added up to that, spread evenly.
+            Centroids for density 1. Cells without area or mass keep them. Where the mean density of a cell
+            is below 1e-9 of the maximum, uniform mass is added to make up the difference.
 
         Returns
         -------

@@ -67,7 +67,7 @@ def compute_square_means(density: Density, centers: Array, side: float) -> Array
         end = np.tile(next_corners, (len(batch), 1))
         edges = _build_edges(start, end, np.repeat(np.arange(len(batch)), 4))
         masses[first : first + len(batch)] = density.compute_moments(edges, batch)[:, 0]
-    # Rounding must not lead to a density that the map does not have, such as a negative one.
+    # Rounding must not produce values outside the range of the density, such as negative ones.
     return np.clip(masses / (side * side), density.min_value, density.max_value)
 
 

@@ -129,7 +129,7 @@ class _Candidates(NamedTuple):
     width: Array
 
     def select(self, rows: IntArray | BoolArray) -> _Candidates:
-        """Return the pairs of some rows."""
+        """Return the pairs in the given rows."""
         return _Candidates(
             corner=self.corner[rows],
             edge=self.edge[rows],
@@ -186,7 +186,7 @@ class _PassageSearch:
             is_empty = self._has_empty_disc(batch)
             for k in np.flatnonzero(is_empty).tolist():
                 width = float(batch.width[k])
-                if self._leads_somewhere(batch.corner[k], batch.edge[k], batch.q[k], width):
+                if self._is_passage(batch.corner[k], batch.edge[k], batch.q[k], width):
                     # Adding zero turns minus zero into zero.
                     ends = np.round([batch.p[k], batch.q[k]], _DIGITS) + 0.0
                     first, second = sorted((x, y) for x, y in ends.tolist())
@@ -225,7 +225,7 @@ class _PassageSearch:
         is_empty[is_empty] = shapely.contains_properly(self.free, middles[is_empty])
         return is_empty
 
-    def _leads_somewhere(self, corner: int, edge: int, q: Array, width: float) -> bool:
+    def _is_passage(self, corner: int, edge: int, q: Array, width: float) -> bool:
         """Return whether the gap from a corner to the point q of an edge leads to more than a pocket.
 
         A cut along the gap separates part of the free space only if it joins two points of the same ring.

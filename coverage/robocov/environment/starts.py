@@ -127,7 +127,7 @@ class Start:
         return points
 
     def estimate_capacity(self, radius: float = DEFAULT_RADIUS_M) -> int:
-        """Estimate how many robots of a radius fit.
+        """Estimate how many robots of a given radius fit.
 
         The result depends only on the start and the radius: it is the number of robots in the densest packing
         that is found, with the same gaps as in `sample`. `sample` finds positions for that many robots with

@@ -265,18 +265,20 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, use
     # The last bin is covered only in part; the walls that follow this one may cover the rest.
     k = covered_end & (bins - 1)
     if covered_first <= covered_end < first_bin + bins and far2 < index.horizon2[source, k]:
-        chain_far2 = _find_chain_end(walls, wall, x, y, stop, (covered_end + 1) / scale, far2)
+        chain_far2 = _compute_chain_far2(walls, wall, x, y, stop, (covered_end + 1) / scale, far2)
         index.horizon2[source, k] = min(index.horizon2[source, k], chain_far2)
     return used
 
 
 @kernel
-def _find_chain_end(
+def _compute_chain_far2(
     walls: Walls, wall: int, x: float, y: float, angle: float, last_angle: float, far2: float
 ) -> float:
-    """Follow walls that face (x, y) from one pseudo-angle to another; return their largest squared distance.
+    """Return the largest squared distance from (x, y) to a chain of walls up to a pseudo-angle.
 
-    The result is inf if the walls do not reach the last angle. `far2` is the distance of the wall so far.
+    The chain consists of the walls that follow `wall`, as long as they face (x, y). `far2` is the largest
+    squared distance to `wall` itself, which ends at `angle`. The result is inf if the chain does not reach
+    the last angle.
     """
     for _ in range(_MAX_CHAIN):
         ax = walls.ends[wall, 2] - x

@@ -98,10 +98,10 @@ def build_walls(free: MultiPolygon) -> Walls:
     sector_walls = np.hstack([incoming, outgoing])
     is_corner = _find_corners(sectors.vertex, incoming, outgoing)
     corners = vertices[sectors.vertex][is_corner]
-    order = _compute_neighbor_order(corners)
+    order = _compute_spatial_order(corners)
     corners = corners[order]
 
-    segments = _sort_neighbors_together(segments)
+    segments = _sort_spatially(segments)
     ends = np.hstack([vertices[segments.start], vertices[segments.end]])
     low = np.minimum(ends[:, :2], ends[:, 2:])
     high = np.maximum(ends[:, :2], ends[:, 2:])
@@ -137,10 +137,10 @@ def _list_segments(free: MultiPolygon) -> _Segments:
     return _Segments(vertices, start[has_length], end[has_length], component[has_length])
 
 
-def _sort_neighbors_together(segments: _Segments) -> _Segments:
+def _sort_spatially(segments: _Segments) -> _Segments:
     """Sort walls so that nearby ones have nearby indices."""
     middles = (segments.vertices[segments.start] + segments.vertices[segments.end]) / 2.0
-    order = _compute_neighbor_order(middles)
+    order = _compute_spatial_order(middles)
     return _Segments(
         vertices=segments.vertices,
         start=segments.start[order],
@@ -149,7 +149,7 @@ def _sort_neighbors_together(segments: _Segments) -> _Segments:
     )
 
 
-def _compute_neighbor_order(points: Array) -> IntArray:
+def _compute_spatial_order(points: Array) -> IntArray:
     """Return the indices that sort (n, 2) points along a Z-curve."""
     cells = (points * 2.0 ** (16 - GRID_BITS)).clip(0, 65535).astype(np.int64)
     return np.argsort(compute_z_order(cells[:, 0], cells[:, 1]), kind="stable")

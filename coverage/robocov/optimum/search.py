@@ -329,17 +329,23 @@ def _spread_points(area: BaseGeometry, spacing: float) -> Array:
     points = np.column_stack([x, y])
     is_inside = shapely.contains_xy(area, x, y)
     is_on_grid = is_inside & (row % _STEPS_PER_SPACING == 0) & (column % _STEPS_PER_SPACING == 0)
-    chosen = points[is_on_grid].tolist()
-    remaining = points[is_inside & ~is_on_grid]
-    if not chosen:
+    chosen = points[is_on_grid]
+    if len(chosen) == 0:
         point = area.representative_point()
-        chosen = [[point.x, point.y]]
-    if len(remaining):
-        distance = np.asarray(cKDTree(chosen).query(remaining)[0])
+        chosen = np.array([[point.x, point.y]])
+    return _fill_gaps(chosen, points[is_inside & ~is_on_grid], _STEPS_PER_SPACING * step)
+
+
+def _fill_gaps(points: Array, candidates: Array, spacing: float) -> Array:
+    """Add the candidate that is farthest from all points, again and again, while it is `spacing` away."""
+    if len(candidates) == 0:
+        return points
+    distance = np.asarray(cKDTree(points).query(candidates)[0])
+    farthest = int(distance.argmax())
+    added = []
+    while distance[farthest] >= spacing:
+        added.append(candidates[farthest])
+        offset = candidates - candidates[farthest]
+        distance = np.minimum(distance, compute_lengths(offset))
         farthest = int(distance.argmax())
-        while distance[farthest] >= _STEPS_PER_SPACING * step:
-            chosen.append(remaining[farthest].tolist())
-            offset = remaining - remaining[farthest]
-            distance = np.minimum(distance, compute_lengths(offset))
-            farthest = int(distance.argmax())
-    return np.array(chosen)
+    return np.vstack([points, *added])

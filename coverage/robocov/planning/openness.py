@@ -14,7 +14,7 @@ from robocov.planning.discovered_map import FREE, UNKNOWN
 PRIOR_OPENNESS = 0.8
 """Openness of cells that are far from all known cells."""
 WALK_LENGTH_BLOCKS = 30.0
-"""Typical distance that a random walk gets from its start before it ends by itself."""
+"""Typical distance of a random walk from its start when it is cut off."""
 MAX_BLOCKS = 1000
 """Default maximum number of blocks into which a map is divided."""
 
@@ -66,8 +66,8 @@ def compute_openness(state: NDArray[np.uint8], is_outside: BoolArray, max_blocks
 
     The inside of an obstacle is surrounded by walls, so its openness is low. The shadow behind an obstacle
     borders on free cells, so its openness is high. The rock around a cave is connected to all other unknown
-    cells, but its openness is low behind the walls. Very long walks end by themselves with the value
-    `PRIOR_OPENNESS`, the free fraction of a typical region: far from all known cells, it is the best guess.
+    cells, but its openness is low behind the walls. Very long walks are cut off and count as
+    `PRIOR_OPENNESS`, the free fraction of a typical region: the best guess far from all known cells.
 
     Examples
     --------

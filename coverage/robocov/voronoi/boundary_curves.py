@@ -185,7 +185,7 @@ def _compute_reach(pairs: Array, edges: Array) -> float:
 
 @kernel
 def _write_lines(curves: Array, pairs: Array, edges: Array, sides: Array, point: Array) -> None:
-    """Write the edges of a cell as lines between their ends."""
+    """Write the edges of a cell as straight curves that begin and end at their vertices."""
     for e in range(len(edges)):
         if edges[e, _EDGE_BEYOND] >= 0.0:
             _write_bisector(curves[e], pairs, edges[e, _EDGE_BEYOND])
@@ -349,7 +349,7 @@ def _add_parts(curve: Array, crossings: Array, pieces: Array, used: int) -> int:
 
 @kernel
 def _add_pieces(curve: Array, start: float, end: float, pieces: Array, used: int) -> int:
-    """Add a part of a curve, cut at t = 0 so that no piece exceeds half a circle; return the number."""
+    """Add a part of a curve, cut at t = 0 so that no piece exceeds half a circle; return the new `used`."""
     k = 2.0 * curve[_COEFFICIENT]
     while start < end:
         stop = 0.0 if start < 0.0 < end and k != 0.0 else end

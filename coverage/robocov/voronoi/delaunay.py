@@ -77,7 +77,7 @@ def get_next(h: int) -> int:
 
 @inlined_kernel
 def get_previous(h: int) -> int:
-    """Return the half-edge of the same triangle that ends where another one begins.
+    """Return the half-edge that precedes another one in its triangle.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ class WeightedCells(Cells):
         """The outlines of the cells, (k, 2) m each, and the cell of each; arcs are replaced by chords.
 
         Outlines run counter-clockwise around a component of a cell, clockwise around a hole. The cells of
-        fast robots come first: painted one over the other without regard for holes, they show the partition.
+        fast robots come first, so that painting the outlines in order shows the partition even without holes.
         """
         outlines = []
         cells = []
