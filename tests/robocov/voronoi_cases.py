@@ -39,7 +39,7 @@ seeds = st.integers(0, 2**32 - 1)
 names = st.sampled_from(sorted(REGIONS))
 
 
-def performance(f: Performance, r: Array) -> Array:
+def evaluate_performance(f: Performance, r: Array) -> Array:
     """Return f(r) of the locational cost (4)."""
     if isinstance(f, Sensing):
         return 1.0 / (r**2 + f.height**2)
@@ -135,9 +135,9 @@ def assert_exact(cells: VoronoiPartition, region: Region) -> None:
         area, mx, my, polar = map(float, compute_exact_cell(robot, cells.generators, region))
         assert cells.mass[robot] == pytest.approx(area, rel=1e-8, abs=ROUNDING * region.area)
         moment = cells.mass[robot] * (cells.centroid[robot] - p)
-        assert moment == pytest.approx([mx, my], abs=ROUNDING * region.area * reach(cells, region))
+        assert moment == pytest.approx([mx, my], abs=ROUNDING * region.area * estimate_size(cells, region))
         assert cells.polar_moment[robot] == pytest.approx(
-            polar, abs=ROUNDING * region.area * reach(cells, region) ** 2
+            polar, abs=ROUNDING * region.area * estimate_size(cells, region) ** 2
         )
 
 
@@ -147,7 +147,7 @@ def compute_moment_about_centroid(cells: Cells) -> Array:
     return cells.polar_moment - cells.mass * (lever[:, 0] ** 2 + lever[:, 1] ** 2)
 
 
-def reach(cells: VoronoiPartition, region: Region) -> float:
+def estimate_size(cells: VoronoiPartition, region: Region) -> float:
     """Return a length that no difference of a generator and a point of the region exceeds by much."""
     outside = float(np.abs(cells.generators - region.centroid).max()) if len(cells.generators) else 0.0
     # Coordinates far from the origin have larger rounding errors.

@@ -31,13 +31,13 @@ SQUARE = Region(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]]))
 ROW = [[1.0, 1.0], [7.0, 2.0], [6.0, 6.0], [3.5, 4.0], [4.0, 7.0], [2.0, 3.0]]
 
 
-def cells_of(density, points=ROW, region=SHAPE):
+def build_cells(density, points=ROW, region=SHAPE):
     return partition(np.array(points), region, density=density)
 
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
 def test_mass_centroid_and_polar_moment_are_those_of_quadrature(density):
-    cells = cells_of(density)
+    cells = build_cells(density)
     for k, ring in enumerate(cells.polygons):
         mass, centroid, polar = integrate_on_fine_lattice(density, ring, cells.generators[k])
         smooth = isinstance(density, Uniform | Gaussians)
@@ -53,7 +53,7 @@ def test_mass_centroid_and_polar_moment_are_those_of_quadrature(density):
 def test_cells_share_the_whole_among_them(density, seed, count):
     """Masses, first and polar moments about one point add up to those of the region in one piece."""
     points = np.random.default_rng(seed).uniform((0.0, 0.0), (8.0, 8.0), (count, 2))
-    cells, whole = cells_of(density, points, SQUARE), cells_of(density, [[4.0, 4.0]], SQUARE)
+    cells, whole = build_cells(density, points, SQUARE), build_cells(density, [[4.0, 4.0]], SQUARE)
     assert cells.mass.sum() == pytest.approx(whole.mass[0], rel=1e-11)
     assert_allclose(cells.mass @ cells.centroid, whole.mass[0] * whole.centroid[0], rtol=1e-10)
     lever = np.square(cells.centroid - [4.0, 4.0]).sum(axis=1)
@@ -67,9 +67,9 @@ def test_cells_share_the_whole_among_them(density, seed, count):
 def test_the_parallel_axis_identity(density, seed):
     """Equation (3), with the moment about the centroid from cells that have it as their generator."""
     points = np.random.default_rng(seed).uniform(1.0, 7.0, (4, 2))
-    cells = cells_of(density, points, SQUARE)
+    cells = build_cells(density, points, SQUARE)
     for k, ring in enumerate(cells.polygons):
-        alone = cells_of(density, cells.centroid[[k]], Region(ring))
+        alone = build_cells(density, cells.centroid[[k]], Region(ring))
         assert compute_moment_about_centroid(cells)[k] == pytest.approx(alone.polar_moment[0], rel=1e-9)
 
 
@@ -80,14 +80,14 @@ def test_the_gradient_of_the_locational_cost(density, seed):
     """(13) with φ: the sum of the polar moments falls by 2 M (p - C) as a robot moves."""
     rng = np.random.default_rng(seed)
     points, i = rng.uniform(1.0, 7.0, (5, 2)), int(rng.integers(5))
-    cells, step = cells_of(density, points, SQUARE), 1e-5
+    cells, step = build_cells(density, points, SQUARE), 1e-5
     slope = 2.0 * cells.mass[i] * (points[i] - cells.centroid[i])
     for axis in (0, 1):
         ends = []
         for sign in (1.0, -1.0):
             moved = points.copy()
             moved[i, axis] += sign * step
-            ends.append(cells_of(density, moved, SQUARE).polar_moment.sum())
+            ends.append(build_cells(density, moved, SQUARE).polar_moment.sum())
         assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(slope[axis], abs=1e-4 * cells.mass.sum())
 
 
@@ -95,10 +95,10 @@ def test_the_gradient_of_the_locational_cost(density, seed):
 def test_voronoi_cells_are_the_best_partition(density):
     """(5): with any other assignment of places the locational cost is larger."""
     points = np.array(ROW)
-    best = cells_of(density, points, SQUARE).polar_moment.sum()
+    best = build_cells(density, points, SQUARE).polar_moment.sum()
     rng = np.random.default_rng(1)
     for _ in range(5):
-        other = cells_of(density, points + rng.normal(0.0, 0.3, points.shape), SQUARE)
+        other = build_cells(density, points + rng.normal(0.0, 0.3, points.shape), SQUARE)
         off = np.square(points - other.centroid).sum(axis=1)
         assert (compute_moment_about_centroid(other) + other.mass * off).sum() > best
 
@@ -106,13 +106,13 @@ def test_voronoi_cells_are_the_best_partition(density):
 @pytest.mark.parametrize("count", [5, 30])
 def test_one_everywhere_is_as_no_density_to_the_last_bit(count):
     points = np.random.default_rng(3).uniform(1.0, 6.0, (count, 2))
-    plain, one = cells_of(None, points), cells_of(Uniform(), points)
+    plain, one = build_cells(None, points), build_cells(Uniform(), points)
     assert np.array_equal(plain.mass, one.mass)
     assert np.array_equal(plain.centroid, one.centroid)
     assert np.array_equal(plain.polar_moment, one.polar_moment)
-    assert_allclose(cells_of(Uniform(3.0), points).mass, 3.0 * plain.mass, rtol=1e-15)
-    assert np.array_equal(cells_of(Uniform(3.0), points).centroid, plain.centroid)
-    assert np.array_equal(cells_of(Gaussians((), 2.0), points).centroid, plain.centroid)
+    assert_allclose(build_cells(Uniform(3.0), points).mass, 3.0 * plain.mass, rtol=1e-15)
+    assert np.array_equal(build_cells(Uniform(3.0), points).centroid, plain.centroid)
+    assert np.array_equal(build_cells(Gaussians((), 2.0), points).centroid, plain.centroid)
 
 
 def test_values_of_all_kinds():
@@ -151,8 +151,8 @@ def test_sampled_keeps_what_is_linear():
 def test_where_nothing_counts_the_centroid_is_that_of_the_area():
     corner = WeightedArea(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)), 1.0)
     points = [[0.5, 0.5], [6.0, 6.0], [7.0, 1.0]]
-    cells = cells_of(WeightedPolygons((corner,), 0.0), points, SQUARE)
-    plain = cells_of(None, points, SQUARE)
+    cells = build_cells(WeightedPolygons((corner,), 0.0), points, SQUARE)
+    plain = build_cells(None, points, SQUARE)
     assert cells.mass.tolist() == pytest.approx([1.0, 0.0, 0.0], abs=1e-13)
     assert_allclose(cells.centroid[0], [0.5, 0.5], atol=1e-6)
     assert_allclose(cells.centroid[1:], plain.centroid[1:], atol=1e-6)
@@ -164,7 +164,7 @@ def test_far_from_a_hot_spot_the_centroid_goes_over_smoothly(x):
     """Where the closed form has lost all its digits, targets neither jump nor leave their cells."""
     peak = Gaussians((Gaussian((0.0, 0.0), 1.0, sigma=1.0),))
     cell = Region(np.array([[x, -0.5], [x + 1.0, -0.5], [x + 1.0, 0.5], [x, 0.5]]))
-    near, far = (cells_of(peak, [[x + 0.5, 0.1 + shift]], cell) for shift in (0.0, 1e-9))
+    near, far = (build_cells(peak, [[x + 0.5, 0.1 + shift]], cell) for shift in (0.0, 1e-9))
     assert (cell.contains(near.centroid, 1e-6)).all()
     assert_allclose(near.centroid, far.centroid, atol=1e-3)
 
@@ -174,11 +174,11 @@ def test_cells_that_touch_and_coincide_with_areas():
     halves = [[2.0, 4.0], [6.0, 4.0]]
     for shift in (0.0, 1e-16, 1e-15, -1e-13, 1e-9):
         area = WeightedArea(((4.0 + shift, 0.0), (8.0, 0.0), (8.0, 8.0), (4.0 + shift, 8.0)), 3.0)
-        cells = cells_of(WeightedPolygons((area,), 0.0), halves, SQUARE)
+        cells = build_cells(WeightedPolygons((area,), 0.0), halves, SQUARE)
         assert_allclose(cells.mass, [0.0, 96.0], atol=1e-6)
     ring = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
     hole = ((2.0, 2.0), (2.0, 6.0), (6.0, 6.0), (6.0, 2.0))
-    cells = cells_of(WeightedPolygons((WeightedArea(ring, 2.0, (hole,)),), 1.0), halves, SQUARE)
+    cells = build_cells(WeightedPolygons((WeightedArea(ring, 2.0, (hole,)),), 1.0), halves, SQUARE)
     assert_allclose(cells.mass, [32.0 + 24.0] * 2, rtol=1e-14)
 
 
@@ -192,7 +192,7 @@ def test_weighted_polygons_are_what_shapely_cuts_out(seed):
         ring = shapely.MultiPoint(rng.uniform(-1.0, 9.0, (7, 2))).convex_hull.exterior.coords[:-1]
         areas.append(WeightedArea(tuple(ring), float(rng.uniform(0.0, 5.0))))
     density = WeightedPolygons(tuple(areas), 0.5)
-    cells = cells_of(density, rng.uniform(0.5, 7.5, (5, 2)), SQUARE)
+    cells = build_cells(density, rng.uniform(0.5, 7.5, (5, 2)), SQUARE)
     rings = [shapely.Polygon(ring) for ring in cells.polygons]
     mass = np.zeros(len(rings))
     for area in reversed(areas):
@@ -216,8 +216,8 @@ def test_a_raster_of_cells_is_that_many_polygons(seed, rows, columns):
     ]
     inner = Region(np.array([[1.0, 0.0], [7.0, 0.0], [7.0, 8.0], [1.0, 8.0]]))
     points = rng.uniform((1.0, 0.0), (7.0, 8.0), (6, 2))
-    raster = cells_of(Raster(values, (1.0, 0.0, 7.0, 8.0), "cells"), points, inner)
-    polygons = cells_of(WeightedPolygons(tuple(areas), 0.0), points, inner)
+    raster = build_cells(Raster(values, (1.0, 0.0, 7.0, 8.0), "cells"), points, inner)
+    polygons = build_cells(WeightedPolygons(tuple(areas), 0.0), points, inner)
     assert_allclose(raster.mass, polygons.mass, rtol=1e-9, atol=1e-12)
     assert_allclose(raster.polar_moment, polygons.polar_moment, rtol=1e-9, atol=1e-12)
 
@@ -229,7 +229,7 @@ def test_a_cell_depends_on_nothing_but_what_its_robot_hears(density):
     points = rng.uniform(0.5, 7.5, (40, 2))
     ranges = np.full(len(points), 1.6)
 
-    def row(places, i):
+    def list_cell_values(places, i):
         heard = Neighbors.from_ranges(places, ranges[: len(places)])
         cells = partition(places, SQUARE, heard, density=density)
         return cells.mass[i], *cells.centroid[i], cells.polar_moment[i]
@@ -239,9 +239,9 @@ def test_a_cell_depends_on_nothing_but_what_its_robot_hears(density):
     moved[away] = rng.uniform(0.5, 7.5, (len(away), 2))
     still_away = np.hypot(*(moved[away] - points[0]).T) > 1.7
     moved[away[~still_away]] = points[away[~still_away]]
-    assert row(points, 0) == row(moved, 0)
+    assert list_cell_values(points, 0) == list_cell_values(moved, 0)
     near = np.flatnonzero(np.hypot(*(points - points[0]).T) <= 1.6)
-    assert row(points, 0) == row(points[near], 0)
+    assert list_cell_values(points, 0) == list_cell_values(points[near], 0)
 
 
 def test_densities_are_values():

@@ -53,17 +53,17 @@ def test_it_never_goes_faster_than_its_speed_and_comes_back(
     # it is on its line
     at = path.compute_displacement(time) + points[0]
     ends = [*points, points[0]] if repeat == "loop" else points
-    nearest = min(_distance(at, np.array(a), np.array(b)) for a, b in pairwise(ends))
+    nearest = min(compute_distance_to_segment(at, np.array(a), np.array(b)) for a, b in pairwise(ends))
     assert nearest < 1e-8
 
 
-def _distance(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
+def compute_distance_to_segment(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
     along = b - a
     part = np.clip(((point - a) @ along) / max(float(along @ along), 1e-300), 0, 1)
     return float(np.hypot(*(point - a - part * along)))
 
 
-def moving() -> Environment:
+def build_moving_hall() -> Environment:
     path = ObstaclePath(((2, 1), (8, 1)), 0.5, "back-and-forth")
     return Environment(
         "hall",
@@ -78,7 +78,7 @@ def moving() -> Environment:
 
 
 def test_the_map_at_a_time_has_all_obstacles_standing_where_they_are() -> None:
-    environment = moving()
+    environment = build_moving_hall()
     assert environment.has_moving_obstacles
     now = environment.at(4.0)
     assert not now.has_moving_obstacles
@@ -117,7 +117,7 @@ def test_where_nothing_moves_the_map_is_always_itself() -> None:
 
 
 def test_a_file_keeps_it() -> None:
-    environment = moving()
+    environment = build_moving_hall()
     assert parse_map(dump_map(environment), "m.json") == environment
     assert to_json(environment)["obstacles"][1]["path"] == {
         "points": [[2, 1], [8, 1]],
@@ -166,7 +166,7 @@ def test_mistakes_in_a_path_are_reported(path: object, message: str) -> None:
 def test_the_schema_knows_paths() -> None:
     jsonschema = pytest.importorskip("jsonschema")
     schema = jsonschema.Draft202012Validator(build_map_schema())
-    document = to_json(moving())
+    document = to_json(build_moving_hall())
     schema.validate(document)
     document["obstacles"][1]["path"]["speed"] = 0
     assert not schema.is_valid(document)

@@ -1,4 +1,4 @@
-"""The narrowest gap: exact cases, symmetry, and erosion as an independent judge."""
+"""The narrowest gap: exact cases, symmetry, and erosion as an independent check."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.environment import find_narrow_gaps, find_narrowest_gap
 
 
-def free(*parts: BaseGeometry) -> MultiPolygon:
+def build_free_space(*parts: BaseGeometry) -> MultiPolygon:
     polygons = [polygon for part in parts for polygon in shapely.get_parts(part)]
     return MultiPolygon([shapely.orient_polygons(polygon) for polygon in polygons])
 
@@ -44,7 +44,7 @@ SLANTED_SLIT = Polygon([(0, 0), (10, 0), (10, 6), (0, 6)]) - Polygon([(3, 0), (4
     ],
 )
 def test_exact_widths(space: BaseGeometry, width: float) -> None:
-    gap = find_narrowest_gap(free(space))
+    gap = find_narrowest_gap(build_free_space(space))
     assert gap is not None
     assert gap.width == pytest.approx(width, abs=2e-6)
     first, second = gap.between
@@ -67,7 +67,7 @@ def test_exact_widths(space: BaseGeometry, width: float) -> None:
     ],
 )
 def test_no_passage(space: BaseGeometry) -> None:
-    assert find_narrowest_gap(free(space)) is None
+    assert find_narrowest_gap(build_free_space(space)) is None
 
 
 def test_no_free_space() -> None:
@@ -77,12 +77,12 @@ def test_no_free_space() -> None:
 def test_many_vertices_along_a_wall_are_no_passage() -> None:
     angle = np.linspace(0, 2 * np.pi, 40_001)[:-1]
     round_room = Polygon(np.column_stack([np.cos(angle), np.sin(angle)]).round(9) * 50)
-    assert find_narrowest_gap(free(round_room)) is None
+    assert find_narrowest_gap(build_free_space(round_room)) is None
 
 
 def test_the_narrowest_of_several_components() -> None:
     elsewhere = affine_transform(ROOM - box(4, 2, 6, 5.8), [1, 0, 0, 1, 20, 0])
-    gap = find_narrowest_gap(free(TWO_ROOMS, elsewhere))
+    gap = find_narrowest_gap(build_free_space(TWO_ROOMS, elsewhere))
     assert gap is not None
     assert gap.width == pytest.approx(0.2)
     assert min(x for x, _ in gap.between) >= 20
@@ -107,8 +107,8 @@ def rooms_with_blocks(draw: st.DrawFn) -> Polygon:
     return box(0, 0, 10, 8) - shapely.union_all(used)
 
 
-def topology(space: BaseGeometry, radius: float) -> tuple[int, int]:
-    """Return the numbers of parts and holes of the places for the center of a disc of some radius."""
+def count_parts_and_holes(space: BaseGeometry, radius: float) -> tuple[int, int]:
+    """Count the components and holes of the area for the center of a disc."""
     parts = shapely.get_parts(space.buffer(-radius, quad_segs=64))
     parts = parts[shapely.area(parts) > 0]
     return len(parts), int(sum(len(part.interiors) for part in parts))
@@ -117,27 +117,27 @@ def topology(space: BaseGeometry, radius: float) -> tuple[int, int]:
 @settings(deadline=None, max_examples=150)
 @given(rooms_with_blocks())
 def test_erosion_changes_at_the_gap_and_not_before(space: Polygon) -> None:
-    gap = find_narrowest_gap(free(space))
+    gap = find_narrowest_gap(build_free_space(space))
     untouched = (1, len(space.interiors))
     if gap is None:
         assert untouched == (1, 0)
         return
     for part in (0.2, 0.6, 0.998):
-        assert topology(space, part * gap.width / 2) == untouched
-    assert topology(space, 1.002 * gap.width / 2) != untouched
+        assert count_parts_and_holes(space, part * gap.width / 2) == untouched
+    assert count_parts_and_holes(space, 1.002 * gap.width / 2) != untouched
 
 
 @settings(deadline=None, max_examples=60)
 @given(rooms_with_blocks(), st.integers(0, 30), st.floats(0, 6.3), st.booleans())
 def test_the_gap_moves_with_the_map(space: Polygon, first: int, turn: float, mirrored: bool) -> None:
-    gap = find_narrowest_gap(free(space))
+    gap = find_narrowest_gap(build_free_space(space))
     c, s = math.cos(turn), math.sin(turn)
     flip = -1 if mirrored else 1
     moved = affine_transform(space, [c * flip, -s, s * flip, c, 3.0, -7.0])
     rings = [
         np.roll(np.asarray(ring.coords)[:-1], first, axis=0) for ring in (moved.exterior, *moved.interiors)
     ]
-    again = find_narrowest_gap(free(Polygon(rings[0], rings[1:])))
+    again = find_narrowest_gap(build_free_space(Polygon(rings[0], rings[1:])))
     assert (gap is None) == (again is None)
     if gap is not None and again is not None:
         assert again.width == pytest.approx(gap.width, abs=2e-6)
@@ -147,7 +147,7 @@ def test_the_gap_moves_with_the_map(space: Polygon, first: int, turn: float, mir
 @pytest.mark.parametrize("depth", [0.5, 1.5])
 def test_a_niche_counts_when_deeper_than_wide_wherever_its_ring_begins(first: int, depth: float) -> None:
     ring = np.asarray((ROOM | box(10, 2, 10 + depth, 3)).exterior.coords)[:-1]
-    gap = find_narrowest_gap(free(Polygon(np.roll(ring, first % len(ring), axis=0))))
+    gap = find_narrowest_gap(build_free_space(Polygon(np.roll(ring, first % len(ring), axis=0))))
     if depth < 1.0:
         assert gap is None
     else:
@@ -161,13 +161,13 @@ def test_a_niche_counts_when_deeper_than_wide_wherever_its_ring_begins(first: in
 def test_all_gaps_below_a_width_are_found() -> None:
     walls = ROOM - box(2, 0, 2.2, 2) - box(2, 2.5, 2.2, 6) - box(7, 0, 7.2, 4) - box(7, 4.9, 7.2, 6)
     for width, doors in [(0.4, set()), (0.6, {0.5}), (1.0, {0.5, 0.9})]:
-        found = find_narrow_gaps(free(walls), width)
+        found = find_narrow_gaps(build_free_space(walls), width)
         assert {gap.width for gap in found} == doors
         assert [gap.width for gap in found] == sorted(gap.width for gap in found)
         for gap in found:
             x = (gap.between[0][0] + gap.between[1][0]) / 2
             assert abs(x - (2.1 if gap.width == 0.5 else 7.1)) <= 0.1 + 1e-9
-    assert find_narrow_gaps(free(ROOM), 100.0) == ()
+    assert find_narrow_gaps(build_free_space(ROOM), 100.0) == ()
     assert find_narrow_gaps(MultiPolygon(), 1.0) == ()
 
 
@@ -179,7 +179,7 @@ def test_all_gaps_below_a_width_are_found() -> None:
 )
 def test_the_narrowest_of_all_is_the_narrowest(blocks: list[tuple[int, int, int, int]]) -> None:
     room = ROOM - shapely.union_all([box(x, y, x + u - 0.35, y + v - 0.2) for x, y, u, v in blocks])
-    space = free(room)
+    space = build_free_space(room)
     gap = find_narrowest_gap(space)
     if gap is None:
         assert find_narrow_gaps(space, 20.0) == ()

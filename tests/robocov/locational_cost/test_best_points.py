@@ -7,7 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize, minimize_scalar
-from voronoi_cases import FAMILIES, PENTAGON, REGIONS, Family, families, names, performance, scattered, seeds
+from voronoi_cases import (
+    FAMILIES,
+    PENTAGON,
+    REGIONS,
+    Family,
+    evaluate_performance,
+    families,
+    names,
+    scattered,
+    seeds,
+)
 
 from robocov.density.cell_edges import CellEdges
 from robocov.locational_cost import (
@@ -27,17 +37,17 @@ FUNCTIONS: list[Performance] = [Distance(), Sensing(1e-3), Sensing(0.3), Sensing
 functions = st.sampled_from(FUNCTIONS)
 
 
-def whole(ring: np.ndarray) -> VoronoiPartition:
+def build_single_cell(ring: np.ndarray) -> VoronoiPartition:
     """Return a region as the cell of one robot."""
     region = Region(ring)
     return partition(region.centroid[None], region)
 
 
-def best(ring: np.ndarray, f: Performance) -> np.ndarray:
-    return find_best_points(whole(ring), f)[0]
+def find_best_point(ring: np.ndarray, f: Performance) -> np.ndarray:
+    return find_best_points(build_single_cell(ring), f)[0]
 
 
-def samples(ring: np.ndarray, fine: int) -> tuple[np.ndarray, np.ndarray]:
+def sample_triangles(ring: np.ndarray, fine: int) -> tuple[np.ndarray, np.ndarray]:
     """Return points and weights: three in each of the triangles into which a convex ring is cut."""
     middle = ring.mean(axis=0)
     i, j, u, v = (
@@ -58,14 +68,14 @@ def samples(ring: np.ndarray, fine: int) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("name", ["pentagon", "triangle"])
 def test_nothing_better_is_found_by_brute_force(f: Performance, name: str) -> None:
     ring = REGIONS[name].vertices
-    points, areas = samples(ring, 30)
+    points, areas = sample_triangles(ring, 30)
 
-    def cost(p: np.ndarray) -> float:
-        return float(f.sign * performance(f, np.hypot(*(points - p).T)) @ areas)
+    def compute_cost(p: np.ndarray) -> float:
+        return float(f.sign * evaluate_performance(f, np.hypot(*(points - p).T)) @ areas)
 
     start = scattered(REGIONS[name], 1, np.random.default_rng(1))[0]
-    lowest = minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9})
-    np.testing.assert_allclose(best(ring, f), lowest.x, atol=2e-4)
+    lowest = minimize(compute_cost, start, method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9})
+    np.testing.assert_allclose(find_best_point(ring, f), lowest.x, atol=2e-4)
 
 
 @settings(max_examples=150)
@@ -153,7 +163,7 @@ def test_symmetric_cells_have_it_in_their_middle(f: Performance, scale: float, a
     turns = [np.eye(2), np.array([[0.8, 0.6], [-0.6, 0.8]])]
     for turn in turns if aspect >= 1e-3 else turns[:1]:
         for shift in (0.0, 3.0 * scale):
-            found = best(box @ turn + shift, f)
+            found = find_best_point(box @ turn + shift, f)
             np.testing.assert_allclose(found, [shift, shift], rtol=0, atol=2e-9 * scale)
 
 
@@ -168,7 +178,9 @@ def test_it_turns_and_grows_with_its_cell(
     rotation = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     one, other = (Sensing(h), Sensing(h * scale)) if sensing else (Distance(), Distance())
     np.testing.assert_allclose(
-        best(scale * ring @ rotation, other), scale * best(ring, one) @ rotation, atol=1e-7 * scale
+        find_best_point(scale * ring @ rotation, other),
+        scale * find_best_point(ring, one) @ rotation,
+        atol=1e-7 * scale,
     )
 
 
@@ -176,17 +188,19 @@ def test_it_turns_and_grows_with_its_cell(
 def test_thin_triangles_have_it_where_a_weighted_line_has_it(thin: float) -> None:
     """As the triangle gets thin, its mass lies on a line, and grows along it: the median is 1/√2."""
     wedge = np.array([[0.0, 0.0], [1.0, -thin], [1.0, thin]])
-    assert best(wedge, Distance())[0] == pytest.approx(np.sqrt(0.5), abs=3.0 * thin)
+    assert find_best_point(wedge, Distance())[0] == pytest.approx(np.sqrt(0.5), abs=3.0 * thin)
     h = 0.3
 
-    def missed(p: float) -> float:  # -∫ x/((x-p)²+h²) dx from 0 to 1
+    def compute_negative_sensing(p: float) -> float:  # -∫ x/((x-p)²+h²) dx from 0 to 1
         return -(
             0.5 * np.log(((1 - p) ** 2 + h**2) / (p**2 + h**2))
             + p / h * (np.arctan((1 - p) / h) + np.arctan(p / h))
         )
 
-    expected = minimize_scalar(missed, bounds=(0.4, 1.0), method="bounded", options={"xatol": 1e-10}).x
-    assert best(wedge, Sensing(h))[0] == pytest.approx(expected, abs=3.0 * thin + 1e-7)
+    expected = minimize_scalar(
+        compute_negative_sensing, bounds=(0.4, 1.0), method="bounded", options={"xatol": 1e-10}
+    ).x
+    assert find_best_point(wedge, Sensing(h))[0] == pytest.approx(expected, abs=3.0 * thin + 1e-7)
 
 
 @pytest.mark.parametrize("aspect", [1e-3, 1e-6, 1e-8])
@@ -194,7 +208,7 @@ def test_a_low_sensor_over_a_thin_cell_stays_in_it(aspect: float) -> None:
     """The cost is then flat, but for a ridge: Newton alone would leave the cell."""
     ring = np.array([[0.0, 0.0], [3.0, 0.0], [1.0, aspect]])
     for h in (1e-9, 1e-5, 1e-2):
-        x, y = best(ring, Sensing(h))
+        x, y = find_best_point(ring, Sensing(h))
         assert 0.0 <= y <= aspect * min(x, (3.0 - x) / 2.0)
         assert 0.5 < x < 2.0
 
@@ -266,7 +280,7 @@ def test_cells_that_are_not_convex_have_their_median_too() -> None:
 def test_it_is_found_from_anywhere_in_the_cell(seed: int, thin: float, height: float | None) -> None:
     """Also from where the Hessian is no bowl, and from where Newton's steps alone would run in circles."""
     rng = np.random.default_rng(seed)
-    cells = whole(rng.normal(size=(rng.integers(3, 7), 2)) * [1.0, 10.0**thin])
+    cells = build_single_cell(rng.normal(size=(rng.integers(3, 7), 2)) * [1.0, 10.0**thin])
     ring, centroid = cells.polygons[0], cells.centroid[0]
     start = rng.dirichlet(np.full(len(ring), 0.1)) @ ring
     f = Distance() if height is None else Sensing(10.0**height)

@@ -7,7 +7,7 @@ import pytest
 import shapely
 from density_cases import GAUSSIANS, KINDS, POLYGONS, RASTERS
 from numpy.testing import assert_allclose
-from voronoi_cases import performance
+from voronoi_cases import evaluate_performance
 
 from robocov.density import Gaussian, Gaussians, WeightedArea, WeightedPolygons
 from robocov.locational_cost import Distance, Sensing
@@ -44,9 +44,9 @@ def test_sums_over_a_fine_lattice_find_nothing_better(density, within, f):
         assert np.hypot(*slope) < within * pull.sum()
         if isinstance(f, Sensing) and f.height < 1.0:
             continue  # where the density has several tops, so has what such a sensor sees
-        best = f.sign * float(weights @ performance(f, r))
+        best = f.sign * float(weights @ evaluate_performance(f, r))
         for other in places[:: len(places) // 9]:
-            assert f.sign * float(weights @ performance(f, np.hypot(*(places - other).T))) > best
+            assert f.sign * float(weights @ evaluate_performance(f, np.hypot(*(places - other).T))) > best
 
 
 @pytest.mark.parametrize("f", FUNCTIONS.values(), ids=FUNCTIONS)
@@ -92,10 +92,10 @@ def test_a_target_depends_on_nothing_but_what_its_robot_hears(target):
     points = np.random.default_rng(5).uniform(0.5, 7.5, (30, 2))
     ranges = np.full(len(points), 1.6)
 
-    def row(places):
+    def find_first_target(places):
         neighbors = Neighbors.from_ranges(places, ranges[: len(places)])
         cells = partition(places, SQUARE, neighbors, density=density)
         return find_targets(cells, density, target, 1.0)[0].tolist()
 
     near = np.flatnonzero(np.hypot(*(points - points[0]).T) <= 1.6)
-    assert row(points) == row(points[near])
+    assert find_first_target(points) == find_first_target(points[near])

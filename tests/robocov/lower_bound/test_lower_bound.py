@@ -21,23 +21,23 @@ from robocov.mapfile import load_map
 from robocov.optimum import find_optimum
 
 
-def room(width, height, *obstacles, name="room"):
+def build_room(width, height, *obstacles, name="room"):
     return Environment(name, ((0, 0), (width, 0), (width, height), (0, height)), obstacles)
 
 
-def box(x0, y0, x1, y1):
+def build_box(x0, y0, x1, y1):
     return PolygonObstacle(((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
 
 
-L_ROOM = room(4, 4, box(2, 2, 4, 4), name="L")
-PILLARS = room(5, 4, box(1, 1, 2, 3), box(3, 0.8, 3.6, 2.2), name="pillars")
+L_ROOM = build_room(4, 4, build_box(2, 2, 4, 4), name="L")
+PILLARS = build_room(5, 4, build_box(1, 1, 2, 3), build_box(3, 0.8, 3.6, 2.2), name="pillars")
 
 
 @pytest.mark.slow
 def test_one_robot_in_a_square_is_known_exactly():
-    bound = compute_lower_bound(room(4, 4), [[1.2, 3.1]], precision=2e-4)
+    bound = compute_lower_bound(build_room(4, 4), [[1.2, 3.1]], precision=2e-4)
     # the mean distance in a square from its middle
-    least = CoverageCost(room(4, 4), 64)([[2.0, 2.0]]).mean_distance
+    least = CoverageCost(build_room(4, 4), 64)([[2.0, 2.0]]).mean_distance
     assert least * (1.0 - 4e-4) < bound.mean_distance < least
     assert least == pytest.approx(4 * 0.3825978582, rel=1e-4)
     assert bound.value == pytest.approx(16.0 * bound.mean_distance)
@@ -46,50 +46,50 @@ def test_one_robot_in_a_square_is_known_exactly():
 
 
 def test_two_robots_in_a_corridor():
-    corridor, places = room(20, 0.5), [[5.0, 0.25], [15.0, 0.25]]
+    corridor, places = build_room(20, 0.5), [[5.0, 0.25], [15.0, 0.25]]
     bound = compute_lower_bound(corridor, places, lattice=200)
-    # libraries of linear algebra round the last bit differently
+    # the last bit depends on the linear algebra library
     assert bound.placement_mean_distance == pytest.approx(
         CoverageCost(corridor, 200)(places).mean_distance, rel=1e-14
     )
     assert 0.0 < bound.gap < 0.001
 
 
-@pytest.mark.parametrize("where", [L_ROOM, PILLARS], ids=lambda where: where.name)
+@pytest.mark.parametrize("environment", [L_ROOM, PILLARS], ids=lambda environment: environment.name)
 @pytest.mark.parametrize("robots", [1, 2, 3])
-def test_it_is_below_the_best_of_all_teams_on_sites_and_not_far(where, robots):
-    cost = CoverageCost(where, 9)
+def test_it_is_just_below_the_best_of_all_teams_on_sites(environment, robots):
+    cost = CoverageCost(environment, 9)
     table = cost.geodesics.compute_distances(cost.points, cost.points)
     teams = np.array(list(combinations_with_replacement(range(len(table)), robots)))
     means = np.concatenate([table[some].min(axis=1).mean(axis=1) for some in np.array_split(teams, 60)])
-    bound = compute_lower_bound(where, cost.points[teams[means.argmin()]], lattice=9, radius=1e-3)
+    bound = compute_lower_bound(environment, cost.points[teams[means.argmin()]], lattice=9, radius=1e-3)
     assert bound.placement_mean_distance == pytest.approx(means.min())
-    best = find_optimum(where, robots, lattice=9, radius=0.02)
+    best = find_optimum(environment, robots, lattice=9, radius=0.02)
     assert bound.mean_distance <= min(best.mean_distance, means.min())
-    # what is left is what the dual cannot tell, more on so few sites than on many
+    # the rest is the duality gap, which is larger with so few sites
     assert bound.mean_distance > best.mean_distance * 0.93
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "robots"), [("blocks-a", 5), ("rooms", 8), ("trap", 12)])
 def test_it_is_close_to_the_optimum_on_bundled_maps(name, robots):
-    where = load_map(name)
-    best = find_optimum(where, robots, lattice=32, restarts=8)
-    bound = compute_lower_bound(where, best.positions, lattice=32)
+    environment = load_map(name)
+    best = find_optimum(environment, robots, lattice=32, restarts=8)
+    bound = compute_lower_bound(environment, best.positions, lattice=32)
     assert bound.placement_mean_distance == pytest.approx(best.mean_distance, rel=1e-12)
     assert 0.0 < bound.gap < 0.008
 
 
 @settings(max_examples=30)
 @given(st.sampled_from(sorted(KINDS)), st.integers(0, 2**20), st.integers(1, 7))
-def test_no_place_in_a_triangle_is_worth_more_than_is_proved(kind, seed, halvings):
-    where = build_random_map(kind, 12, seed)
-    if where is None:
+def test_no_point_of_a_triangle_is_worth_more_than_its_bound(kind, seed, halvings):
+    environment = build_random_map(kind, 12, seed)
+    if environment is None:
         return
     rng = np.random.default_rng(seed)
-    cost = CoverageCost(where, 8)
+    cost = CoverageCost(environment, 8)
     dual = _Dual(cost, rng.choice(cost.points, 3), float(rng.choice([1e-6, 0.02])))
-    # with a price for few sites, mistakes about one of them are not lost in the slack of the others
+    # With prices for few sites, an error at one of them is not hidden by the slack of the others.
     some = rng.random(len(dual.sites)) < rng.choice([0.04, 1.0])
     prices = np.where(some, rng.uniform(2.0, 12.0, len(dual.sites)), 0.0)
     triangles = dual._triangles
@@ -110,16 +110,18 @@ def test_no_place_in_a_triangle_is_worth_more_than_is_proved(kind, seed, halving
 @settings(max_examples=8)
 @given(st.sampled_from(sorted(KINDS)), st.integers(0, 2**20), st.integers(1, 9))
 def test_no_team_costs_less(kind, seed, robots):
-    where = build_random_map(kind, 10, seed)
-    if where is None:
+    environment = build_random_map(kind, 10, seed)
+    if environment is None:
         return
     rng = np.random.default_rng(seed)
-    cost = CoverageCost(where, 12)
-    away = shapely.distance(where.free.boundary, shapely.points(cost.points))
-    inside = cost.points[away >= 0.05]
+    cost = CoverageCost(environment, 12)
+    clearance = shapely.distance(environment.free.boundary, shapely.points(cost.points))
+    inside = cost.points[clearance >= 0.05]
     if not len(inside):
         return
-    bound = compute_lower_bound(where, rng.choice(inside, robots), lattice=12, radius=0.05, precision=0.01)
+    bound = compute_lower_bound(
+        environment, rng.choice(inside, robots), lattice=12, radius=0.05, precision=0.01
+    )
     counted = ~np.isnan(bound.prices)
     table = np.ascontiguousarray(cost.geodesics.compute_distances(inside, cost.points[counted]).T)
     teams = [rng.choice(len(inside), robots) for _ in range(200)]
@@ -129,23 +131,25 @@ def test_no_team_costs_less(kind, seed, robots):
 
 
 def test_places_near_walls_count_where_the_robot_fits():
-    """A room is never too small: GEOS buffers are not exact."""
-    where = load_map("cave")
-    cost, radius = CoverageCost(where, 16), 0.3
+    """The triangles cover every valid position, although GEOS buffers are not exact."""
+    environment = load_map("cave")
+    cost, radius = CoverageCost(environment, 16), 0.3
     triangles = _Dual(cost, cost.points[[0]], radius)._triangles
     polygons = shapely.polygons(cost.geodesics.grid.to_meters(triangles))
-    low_x, low_y, high_x, high_y = where.free.bounds
+    low_x, low_y, high_x, high_y = environment.free.bounds
     places = shapely.points(np.random.default_rng(0).uniform((low_x, low_y), (high_x, high_y), (20_000, 2)))
-    fit = shapely.contains(where.free, places) & (shapely.distance(where.free.boundary, places) >= radius)
+    fit = shapely.contains(environment.free, places) & (
+        shapely.distance(environment.free.boundary, places) >= radius
+    )
     assert fit.sum() > 2000
     assert (shapely.STRtree(polygons).query_nearest(places[fit], return_distance=True)[1] < 1e-9).all()
 
 
 @pytest.mark.slow
 def test_a_density_weighs_the_sites():
-    where = L_ROOM.with_density(Gaussians((Gaussian((1.0, 3.0), weight=5.0, sigma=0.4),), floor=0.1))
-    best = find_optimum(where, 2, lattice=32, restarts=4)
-    bound = compute_lower_bound(where, best.positions, lattice=32)
+    environment = L_ROOM.with_density(Gaussians((Gaussian((1.0, 3.0), weight=5.0, sigma=0.4),), floor=0.1))
+    best = find_optimum(environment, 2, lattice=32, restarts=4)
+    bound = compute_lower_bound(environment, best.positions, lattice=32)
     assert bound.placement_mean_distance == pytest.approx(best.mean_distance, rel=1e-12)
     assert bound.value == pytest.approx(bound.mean_distance * best.value / best.mean_distance)
     assert 0.0 < bound.gap < 0.02
@@ -153,7 +157,7 @@ def test_a_density_weighs_the_sites():
 
 @pytest.mark.slow
 def test_several_components_are_bounded_together():
-    halves = room(12, 4, box(7, 0, 7.2, 4), box(9.4, 0, 9.6, 4), name="three")
+    halves = build_room(12, 4, build_box(7, 0, 7.2, 4), build_box(9.4, 0, 9.6, 4), name="three")
     for robots in (1, 2, 3, 4):
         best = find_optimum(halves, robots, lattice=48, restarts=4)
         bound = compute_lower_bound(halves, best.positions, lattice=48, precision=0.003)
@@ -164,7 +168,7 @@ def test_several_components_are_bounded_together():
 
 
 def test_a_robot_on_each_site_costs_nothing():
-    tiny = room(2, 2)
+    tiny = build_room(2, 2)
     bound = compute_lower_bound(tiny, CoverageCost(tiny, 2).points, lattice=2)
     assert (bound.mean_distance, bound.placement_mean_distance, bound.gap) == (0.0, 0.0, 0.0)
 
@@ -192,22 +196,22 @@ def test_the_same_call_gives_the_same_bits():
         ({"positions": []}, InputError, "positions: expected at least one robot, got none"),
     ],
 )
-def test_what_is_wrong_is_named(words, error, message):
+def test_invalid_parameters_are_named(words, error, message):
     with pytest.raises(error) as caught:
         compute_lower_bound(L_ROOM, **{"positions": [[1.0, 1.0]], "lattice": 8, **words})
     assert str(caught.value).startswith(message)
 
 
 @pytest.mark.slow
-def test_progress_goes_from_nothing_to_all_and_may_give_up():
-    parts = []
-    compute_lower_bound(L_ROOM, [[1.0, 1.0], [3.0, 0.5]], lattice=8, progress=parts.append)
-    assert parts == sorted(parts)
-    assert parts[0] < 0.1
-    assert parts[-1] == 1.0
+def test_progress_goes_from_zero_to_one_and_may_stop_the_search():
+    fractions = []
+    compute_lower_bound(L_ROOM, [[1.0, 1.0], [3.0, 0.5]], lattice=8, progress=fractions.append)
+    assert fractions == sorted(fractions)
+    assert fractions[0] < 0.1
+    assert fractions[-1] == 1.0
 
-    def stop(part):
-        if part > 0.3:
+    def stop(fraction):
+        if fraction > 0.3:
             raise InterruptedError
 
     with pytest.raises(InterruptedError):

@@ -30,35 +30,35 @@ ROOM = ConfigurationSpace(OFFICE.free, RADIUS)
 EMPTY = Environment("empty", ((0, 0), (6, 0), (6, 6), (0, 6)))
 
 
-def starts(seed, count):
-    """Return places in the room that are far enough apart."""
+def sample_starts(seed, count):
+    """Return random positions in the room that are far enough apart."""
     rng = np.random.default_rng(seed)
     positions = ROOM.find_nearest(rng.uniform((0, 0), (12, 8), (count, 2)), np.zeros(count, dtype=int))
     assert positions is not None
     return positions
 
 
-def clear(positions, radius, free):
+def are_clear(positions, radius, free):
     distance = shapely.distance(free.boundary, shapely.points(positions))
-    inside = shapely.contains_properly(free, shapely.points(positions))
-    return bool((distance >= radius).all() and inside.all() and (pdist(positions) >= 2 * radius).all())
+    is_inside = shapely.contains_properly(free, shapely.points(positions))
+    return bool((distance >= radius).all() and is_inside.all() and (pdist(positions) >= 2 * radius).all())
 
 
 @settings(max_examples=60)
 @given(st.integers(0, 2**32), st.integers(1, 30))
 def test_robots_are_moved_to_where_they_fit(seed, count):
     rng = np.random.default_rng(seed)
-    # half of them in heaps
+    # about half of them at the same point
     wanted = np.where(rng.random((count, 1)) < 0.5, rng.uniform((-2, -2), (14, 10), (count, 2)), [5.0, 4.0])
     positions = ROOM.find_nearest(wanted, np.zeros(count, dtype=int))
     assert positions is not None
-    assert clear(positions, RADIUS, OFFICE.free)
+    assert are_clear(positions, RADIUS, OFFICE.free)
     # what fits stays
     again = ROOM.find_nearest(positions, np.zeros(count, dtype=int))
     np.testing.assert_array_equal(again, positions)
 
 
-def test_where_robots_do_not_fit_there_is_no_place():
+def test_no_positions_are_found_where_robots_do_not_fit():
     closet = Environment("closet", ((0, 0), (1, 0), (1, 1), (0, 1)))
     room = ConfigurationSpace(closet.free, 0.2)
     middle = np.full((5, 2), 0.5)
@@ -80,13 +80,13 @@ def test_robots_stay_in_their_component():
 @settings(max_examples=25)
 @given(st.integers(0, 2**32), st.integers(1, 12))
 def test_the_end_is_a_local_minimum_that_is_never_above_the_start(seed, count):
-    begin = starts(seed, count)
-    before = COST(begin)
-    result = descend(COST, ROOM, begin, np.zeros(count, dtype=int))
+    start = sample_starts(seed, count)
+    before = COST(start)
+    result = descend(COST, ROOM, start, np.zeros(count, dtype=int))
     assert result.mean_distance <= before.mean_distance
-    assert clear(result.positions, RADIUS, OFFICE.free)
+    assert are_clear(result.positions, RADIUS, OFFICE.free)
     assert COST(result.positions).mean_distance == result.mean_distance
-    # steps around it gain next to nothing
+    # no small step lowers the cost noticeably
     rng = np.random.default_rng(seed)
     for size in (0.2, 0.02, 0.002):
         for _ in range(8):
@@ -104,12 +104,12 @@ def test_one_robot_ends_at_the_geometric_median_whatever_the_start():
     for _ in range(500):
         weight = 1.0 / np.hypot(*(cost.points - median).T)
         median = weight @ cost.points / weight.sum()
-    for begin in ([[0.2, 0.2]], [[5.0, 0.3]], [[1.0, 2.9]]):
-        result = descend(cost, room, np.array(begin), np.zeros(1, dtype=int))
+    for start in ([[0.2, 0.2]], [[5.0, 0.3]], [[1.0, 2.9]]):
+        result = descend(cost, room, np.array(start), np.zeros(1, dtype=int))
         np.testing.assert_allclose(result.positions[0], median, atol=2e-3)
 
 
-def test_giving_up():
+def test_a_heartbeat_may_stop_the_descent():
     steps = []
 
     def heartbeat():
@@ -118,39 +118,39 @@ def test_giving_up():
             raise InterruptedError
 
     with pytest.raises(InterruptedError):
-        descend(COST, ROOM, starts(0, 5), np.zeros(5, dtype=int), heartbeat)
+        descend(COST, ROOM, sample_starts(0, 5), np.zeros(5, dtype=int), heartbeat)
     assert len(steps) == 3
 
 
-def test_where_nothing_can_be_gained_robots_stay():
-    # a component without a site: its robot has no slope
+def test_robots_without_a_gradient_stay():
+    # a component without a site: its robot has no gradient
     closet = Environment("closet", EMPTY.boundary, (WallObstacle(((0.25, 0), (0.25, 6)), 0.02),))
     cost, room = CoverageCost(closet, 6), ConfigurationSpace(closet.free, 0.1)
-    begin = np.array([[0.12, 1.0], [3.0, 3.0]])
-    result = descend(cost, room, begin, np.array([1, 0]))
-    np.testing.assert_array_equal(result.positions[0], begin[0])
-    only = descend(cost, room, begin[:1], np.array([1]))
+    start = np.array([[0.12, 1.0], [3.0, 3.0]])
+    result = descend(cost, room, start, np.array([1, 0]))
+    np.testing.assert_array_equal(result.positions[0], start[0])
+    only = descend(cost, room, start[:1], np.array([1]))
     assert np.isnan(only.mean_distance)
 
 
-def test_what_was_learnt_of_a_quadratic_leads_to_its_minimum():
+def test_curvature_pairs_of_a_quadratic_lead_to_its_minimum():
     rng = np.random.default_rng(4)
     half = rng.normal(size=(4, 4))
     bowl = half @ half.T + np.eye(4)
     steps = np.linalg.eigh(bowl)[1].T.reshape(4, 2, 2)
-    learnt = deque()
+    pairs = deque()
     for step in steps:
-        bend = (bowl @ step.ravel()).reshape(2, 2)
-        learnt.append(_CurvaturePair(step, bend))
-    slope = rng.normal(size=(2, 2))
-    way = _compute_quasi_newton_direction(slope, np.ones((2, 1)), learnt)
-    np.testing.assert_allclose(bowl @ way.ravel(), -slope.ravel(), atol=1e-12)
+        change = (bowl @ step.ravel()).reshape(2, 2)
+        pairs.append(_CurvaturePair(step, change))
+    gradient = rng.normal(size=(2, 2))
+    direction = _compute_quasi_newton_direction(gradient, np.ones((2, 1)), pairs)
+    np.testing.assert_allclose(bowl @ direction.ravel(), -gradient.ravel(), atol=1e-12)
 
 
-def test_some_tens_of_steps_are_enough():
+def test_a_few_dozen_steps_are_enough():
     steps = []
     for seed in range(6):
         before = len(steps)
-        descend(COST, ROOM, starts(seed, 6), np.zeros(6, dtype=int), lambda: steps.append(1))
+        descend(COST, ROOM, sample_starts(seed, 6), np.zeros(6, dtype=int), lambda: steps.append(1))
         assert len(steps) - before < 60
     assert len(steps) / 6 < 35

@@ -11,16 +11,16 @@ from robocov.voronoi.arcs import compute_moments, link_rings, split_into_chords
 seeds = st.integers(0, 2**32 - 1)
 
 
-def circle(
+def build_circle(
     radius: float, pieces: int, *, turns: int = 1, center: tuple[float, float] = (0.0, 0.0)
 ) -> np.ndarray:
     """Return a circle as arcs of cell 0, counter-clockwise or, for `turns` -1, clockwise."""
     turn = turns * np.linspace(0.0, 2.0 * np.pi, pieces + 1)
     ends = np.array(center) + radius * np.column_stack([np.cos(turn), np.sin(turn)])
-    return arcs(ends[:-1], ends[1:], turns * np.pi / pieces)
+    return build_arcs(ends[:-1], ends[1:], turns * np.pi / pieces)
 
 
-def arcs(start: np.ndarray, end: np.ndarray, half_angle: float) -> np.ndarray:
+def build_arcs(start: np.ndarray, end: np.ndarray, half_angle: float) -> np.ndarray:
     return np.column_stack([start, end, np.full(len(start), half_angle), np.zeros(len(start))])
 
 
@@ -38,7 +38,7 @@ def test_moments_of_an_arc_agree_with_quadrature(seed: int, log_size: float, sig
     place = (start + end) / 2 + radius * (np.sin(angle)[:, None] * tangent + rise[:, None] * out)
     speed = radius * (np.cos(angle)[:, None] * tangent - np.sin(angle)[:, None] * out)
     cross = weights * half * (place[:, 0] * speed[:, 1] - place[:, 1] * speed[:, 0])
-    ((area, *first, polar),) = compute_moments(arcs(start[None], end[None], half), 1)
+    ((area, *first, polar),) = compute_moments(build_arcs(start[None], end[None], half), 1)
     size = 1.0 + np.abs(place).max()
     assert area == pytest.approx(cross.sum() / 2, abs=1e-13 * size**2)
     np.testing.assert_allclose(first, cross @ place / 3, atol=1e-13 * size**3)
@@ -47,7 +47,7 @@ def test_moments_of_an_arc_agree_with_quadrature(seed: int, log_size: float, sig
 
 @pytest.mark.parametrize("pieces", [2, 3, 7, 40])
 def test_moments_of_a_whole_circle(pieces: int) -> None:
-    ((area, *first, polar),) = compute_moments(circle(2.0, pieces, center=(5.0, 1.0)), 1)
+    ((area, *first, polar),) = compute_moments(build_circle(2.0, pieces, center=(5.0, 1.0)), 1)
     assert area == pytest.approx(4 * np.pi, rel=1e-14)
     np.testing.assert_allclose(first, 4 * np.pi * np.array([5.0, 1.0]), rtol=1e-13)
     # pi r⁴ / 2 about its own center, and the parallel axis theorem
@@ -58,13 +58,13 @@ def test_almost_straight_arcs_keep_all_digits() -> None:
     """The closed form of the area, r² (x - sin x cos x), has none left there."""
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     half = 1e-9
-    area = compute_moments(arcs(square, np.roll(square, -1, axis=0), half), 1)[0, 0]
+    area = compute_moments(build_arcs(square, np.roll(square, -1, axis=0), half), 1)[0, 0]
     assert area - 1.0 == pytest.approx(4 * half / 6, rel=1e-6)
 
 
 @given(st.floats(0.01, 50.0), st.integers(2, 9), st.floats(1e-4, 0.5))
 def test_chords_deviate_by_at_most_the_allowed_distance(radius: float, pieces: int, sagitta: float) -> None:
-    table = circle(radius, pieces)
+    table = build_circle(radius, pieces)
     for line, row in zip(split_into_chords(table, sagitta), table, strict=True):
         np.testing.assert_array_equal(line[[0, -1]].ravel(), row[:4])
         np.testing.assert_allclose(np.hypot(*line.T), radius, rtol=1e-9)
@@ -73,18 +73,18 @@ def test_chords_deviate_by_at_most_the_allowed_distance(radius: float, pieces: i
 
 
 def test_segments_stay_segments() -> None:
-    line = split_into_chords(arcs(np.zeros((1, 2)), np.ones((1, 2)), 0.0), 1e-9)[0]
+    line = split_into_chords(build_arcs(np.zeros((1, 2)), np.ones((1, 2)), 0.0), 1e-9)[0]
     np.testing.assert_array_equal(line, [[0.0, 0.0], [1.0, 1.0]])
 
 
 def test_rings_are_linked_from_pieces_in_any_order() -> None:
-    outer, hole = circle(3.0, 5), circle(1.0, 3, turns=-1, center=(0.5, 0.5))
+    outer, hole = build_circle(3.0, 5), build_circle(1.0, 3, turns=-1, center=(0.5, 0.5))
     order = np.random.default_rng(0).permutation(8)
     found = link_rings(np.concatenate([outer, hole])[order], 1e-5)
-    areas = [area(ring) for ring in found]
+    areas = [compute_area(ring) for ring in found]
     assert sorted(areas) == pytest.approx([-np.pi, 9 * np.pi], rel=1e-4)
 
 
-def area(ring: np.ndarray) -> float:
+def compute_area(ring: np.ndarray) -> float:
     (x, y), (u, v) = ring.T, np.roll(ring, -1, axis=0).T
     return float((x * v - u * y).sum() / 2)

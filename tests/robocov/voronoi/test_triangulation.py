@@ -49,7 +49,7 @@ def triangulate(points: Array, warm: Mesh | None = None) -> Mesh:
     return mesh
 
 
-def triangles(mesh: Mesh) -> list[tuple[int, int, int]]:
+def list_triangles(mesh: Mesh) -> list[tuple[int, int, int]]:
     """Return the triangles, each from its lowest corner on."""
     found = [row[:3] for row in mesh[0].reshape(-1, 4).tolist()]
     return sorted(tuple(row[row.index(min(row)) :] + row[: row.index(min(row))]) for row in found)
@@ -63,7 +63,7 @@ def assert_delaunay(mesh: Mesh, points: Array) -> None:
             end = corner[h + 1 if h % 4 < 2 else h - 2]
             assert (twin[twin[h]], corner[twin[h]]) == (h, end)
     places = [[Fraction(value) for value in point] for point in np.concatenate([points, CORNERS]).tolist()]
-    for triangle in triangles(mesh):
+    for triangle in list_triangles(mesh):
         for k, (px, py) in enumerate(places):
             if k not in triangle:
                 (a, b, c), (d, e, f), (g, h, i) = (
@@ -81,7 +81,7 @@ def assert_same_cells(warm: VoronoiPartition, cold: VoronoiPartition, region: Re
     assert moments[0] == pytest.approx(moments[1], rel=1e-12, abs=1e-12 * size * region.diameter)
     if warm.triangulation is None or cold.triangulation is None:
         return
-    if triangles(warm.triangulation) == triangles(cold.triangulation):
+    if list_triangles(warm.triangulation) == list_triangles(cold.triangulation):
         assert warm.mass.tobytes() == cold.mass.tobytes()
         assert warm.centroid.tobytes() == cold.centroid.tobytes()
         assert warm.edges.start.tobytes() == cold.edges.start.tobytes()
@@ -205,7 +205,7 @@ def test_the_mesh_of_slow_robots_is_repaired() -> None:
         points = points + 0.004 * velocity
         velocity -= 0.1 * (points - home)
         mesh = triangulate(points, mesh)
-        shapes.add(tuple(triangles(mesh)))
+        shapes.add(tuple(list_triangles(mesh)))
     assert_delaunay(mesh, points)
     assert (mesh != triangulate(points)).any()
     assert len(shapes) > 50
@@ -270,7 +270,7 @@ def test_repairs_stay_correct_for_thousands_of_steps(controller: Controller) -> 
             assert isinstance(cells, VoronoiPartition)
             assert_same_cells(cells, partition(simulation.positions, room.region), room.region)
             assert cells.triangulation is not None
-            shapes.add(tuple(triangles(cells.triangulation)))
+            shapes.add(tuple(list_triangles(cells.triangulation)))
         if step == 700:
             twin = simulation.copy()
         elif step > 700:
