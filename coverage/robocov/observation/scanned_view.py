@@ -138,7 +138,7 @@ def integrate_over_windows(windows: Windows, view: View, depths: Array, weight: 
     -------
     (w, 2) array, m
         The integral of weight * (s - ρ)/ρ along the part of the edge beyond the corner, times t (see
-        `Windows`): the growth per metre of the robot's motion.
+        `Windows`): the growth per meter of the robot's motion.
     """
     edge_depths = depths[windows.robot, windows.ray]
     beyond_corner = np.maximum(edge_depths - windows.corner[:, None], 0.0)
