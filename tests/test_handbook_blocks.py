@@ -17,7 +17,7 @@ from robocov.errors import InputError
 from robocov_app.benchmark import suite
 from robocov_app.cli import COMMANDS, main
 from robocov_app.commands.handbook import sources
-from robocov_app.terminal.arguments import parsed
+from robocov_app.terminal.arguments import parse_options
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / ".readme/package.md", *sorted(sources().glob("*.md"))]
@@ -40,7 +40,9 @@ def words_of(line: str) -> list[str]:
 
 
 def parsed_alone(words: list[str]) -> None:
-    parsed(import_module(f"robocov_app.commands.{COMMANDS[words[0]][0]}").Arguments, words[0], words[1:])
+    parse_options(
+        import_module(f"robocov_app.commands.{COMMANDS[words[0]][0]}").Arguments, words[0], words[1:]
+    )
 
 
 @pytest.fixture

@@ -98,16 +98,16 @@ def _run_command(name: str, rest: list[str]) -> int:
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # stdout belongs to answers
     with _stopping_at_once():
         module = importlib.import_module(f"robocov_app.commands.{COMMANDS[name][0]}")
-        from robocov_app.terminal.arguments import parsed
+        from robocov_app.terminal.arguments import parse_options
 
-        options = parsed(module.Arguments, name, rest)
+        options = parse_options(module.Arguments, name, rest)
     if name in _COMPILING:
-        from robocov_app.terminal.progress import tell_of_compiling
+        from robocov_app.terminal.progress import report_compilation
 
-        tell_of_compiling()
-    from robocov_app.terminal.interruption import noting_interrupts
+        report_compilation()
+    from robocov_app.terminal.interruption import note_interrupts
 
-    with noting_interrupts():
+    with note_interrupts():
         status = module.command(options)
     sys.stdout.flush()
     return int(status or OK)
@@ -131,10 +131,10 @@ def _explain(error: BaseException, name: str) -> int:
     if isinstance(error, ControllerEndedError):
         return _complain(str(error), FAILED)
     if isinstance(error, ParameterError):
-        from robocov_app.terminal.arguments import by_option
+        from robocov_app.terminal.arguments import name_option
 
         module = importlib.import_module(f"robocov_app.commands.{COMMANDS[name][0]}")
-        return _complain(by_option(module.Arguments, str(error)))
+        return _complain(name_option(module.Arguments, str(error)))
     if isinstance(error, RobocovError):
         return _complain(str(error))
     fault = _find_users_fault(error)

@@ -14,7 +14,7 @@ from robocov.team import Team
 from robocov_app.report.results import FIGURES, Entry, Result
 from robocov_app.runs.execution import Run, save_numbers
 from robocov_app.runs.saved_runs import SavedRun
-from robocov_app.terminal.output import finite, write_json
+from robocov_app.terminal.output import replace_non_finite, write_json
 
 HOSTILE = "</script><!--\u2028'\"><img src=x onerror=alert(1)>&amp;{{7*7}}"
 """A name that would like to be more than a name."""
@@ -158,7 +158,7 @@ def saved_comparison(folder: Path, controllers: tuple[str, ...] = ("rapf", "rpf"
     runs = {name: saved_run(folder / name, walk(SQUARE, controller=name)) for name in controllers}
     rows = [{"controller": name, **run.summary} for name, run in runs.items()]
     content = {"format": "robocov-comparison", "version": 1, "folders": list(runs), "runs": rows}
-    write_json(folder / "comparison.json", finite(content))
+    write_json(folder / "comparison.json", replace_non_finite(content))
 
 
 class Page(HTMLParser):

@@ -15,7 +15,7 @@ from robocov.mapfile import from_json, to_json
 from robocov_app.benchmark import suite
 from robocov_app.replication.references import Question, searched
 from robocov_app.terminal.interruption import Interruption
-from robocov_app.terminal.progress import progress
+from robocov_app.terminal.progress import show_progress
 from robocov_app.toolkit.worker import Line
 
 RESTARTS, SEED = 24, 0
@@ -55,7 +55,7 @@ def make_references(path: Path, *, workers: int, quiet: bool, stop: Interruption
     bounds = [key for key in wanted if found(key).get("lower_bound_m") is None]
     left = total = len(searches) + len(bounds)
     _save(path, maps)
-    with progress("references", total, quiet=quiet) as update:
+    with show_progress("references", total, quiet=quiet) as update:
 
         def kept() -> None:
             nonlocal left

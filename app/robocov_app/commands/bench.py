@@ -14,8 +14,8 @@ import tyro
 
 from robocov.errors import ParameterError
 from robocov_app.commands.options import FigureOptions
-from robocov_app.terminal.output import RIGHT, console, echo, print_table, tell
-from robocov_app.terminal.progress import progress, tell_of_compiling
+from robocov_app.terminal.output import RIGHT, create_console, echo, print_answer, print_table
+from robocov_app.terminal.progress import report_compilation, show_progress
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -59,7 +59,7 @@ class Arguments(FigureOptions):
 def command(options: Arguments) -> None:
     for name in THREADS:  # read when numpy is loaded, which telling of compiling does
         os.environ.setdefault(name, "1")
-    tell_of_compiling()
+    report_compilation()
     parts = list(PARTS) if options.part == "all" else [options.part]
     if options.part == "all" and importlib.util.find_spec("gymnasium") is None:
         parts.remove("learning")
@@ -72,7 +72,7 @@ def command(options: Arguments) -> None:
     cases = [case for part in parts for case in getattr(modules[part], PARTS[part][2])(quick=options.quick)]
     rows, stopped = [], None
     try:
-        with progress("measuring", len(cases), quiet=options.json) as update:
+        with show_progress("measuring", len(cases), quiet=options.json) as update:
             for done, case in enumerate(cases, start=1):
                 rows.extend(case())
                 update(done)
@@ -86,10 +86,10 @@ def command(options: Arguments) -> None:
     packages = {name: version(name) for name in ("numpy", "scipy", "shapely", "pymunk", "pygame-ce")}
     machine: dict[str, Any] = {"python": platform.python_version(), "system": platform.system()}
     machine |= {"processor": platform.machine(), "cores": os.cpu_count(), "packages": packages}
-    tell(options, {"machine": machine, "rows": [row.to_dict() for row in rows]}, indent=1)
+    print_answer(options, {"machine": machine, "rows": [row.to_dict() for row in rows]}, indent=1)
     if not options.json:
         print_tables(rows)
-        out, told = console(), ", ".join(f"{name} {number}" for name, number in packages.items())
+        out, told = create_console(), ", ".join(f"{name} {number}" for name, number in packages.items())
         out.print("before: about the ratio when nothing was compiled (commit 8838167)")
         out.print(f"Python {machine['python']}, {machine['system']}, {machine['cores']} cores; {told}")
     if stopped is not None:

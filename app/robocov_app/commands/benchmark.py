@@ -10,7 +10,7 @@ from robocov.errors import InputError, ParameterError, format_count, require_num
 from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.arguments import parse_gains
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
-from robocov_app.terminal.output import BOLD, RIGHT, echo, print_table, tell
+from robocov_app.terminal.output import BOLD, RIGHT, echo, print_answer, print_table
 
 FAILED = 1
 _USED = {  # the options that each action has beside --json
@@ -101,7 +101,7 @@ def _run(options: Arguments) -> int:
     with Interruption() as stop:
         result = run_benchmark(contender, selection, out, stop=stop, quiet=options.json, **where)
     if result is None:
-        tell(options, {"out": str(out), "interrupted": True}, "stopped; the same command goes on")
+        print_answer(options, {"out": str(out), "interrupted": True}, "stopped; the same command goes on")
         return INTERRUPTED
     runs, failed = len(result["rows"]), sum("error" in row for row in result["rows"])
     if not options.json:
@@ -110,7 +110,7 @@ def _run(options: Arguments) -> int:
         (first, *others), rows = summary_rows(result)
         print_table([(first, BOLD), *((name, RIGHT) for name in others)], rows)
     words = f"{format_count(runs, 'run')}, {failed} failed; written to {out / RESULT}"
-    tell(options, {"out": str(out), "runs": runs, "failed": failed}, words)
+    print_answer(options, {"out": str(out), "runs": runs, "failed": failed}, words)
     return FAILED if failed else 0
 
 
@@ -119,7 +119,7 @@ def _suite(options: Arguments) -> int:
 
     if options.json:
         tracks = {name: {"maps": track.maps, "seeds": track.seeds} for name, track in suite.TRACKS.items()}
-        tell(options, {"version": suite.VERSION, "tracks": tracks, "quick": suite.QUICK})
+        print_answer(options, {"version": suite.VERSION, "tracks": tracks, "quick": suite.QUICK})
         return 0
     rows = []
     for name, track in suite.TRACKS.items():
@@ -145,7 +145,7 @@ def _verify(options: Arguments) -> int:
             return INTERRUPTED
     verdict = format_count(len(found), "difference") if found else "all alike, bit for bit"
     answer = {"path": str(options.paths[0]), "runs": count, "differences": found}
-    tell(options, answer, *found, f"{format_count(count, 'run')} done again: {verdict}")
+    print_answer(options, answer, *found, f"{format_count(count, 'run')} done again: {verdict}")
     return FAILED if found else 0
 
 
@@ -163,7 +163,7 @@ def _page(options: Arguments) -> int:
     with replace_file(target) as part:
         part.write_bytes(data)
     answer = {"path": str(target), "bytes": len(data), "entries": len(results)}
-    tell(options, answer, f"written to {target} ({len(data) / 1e6:.2f} MB)")
+    print_answer(options, answer, f"written to {target} ({len(data) / 1e6:.2f} MB)")
     return 0
 
 
@@ -178,5 +178,5 @@ def _references(options: Arguments) -> int:
     with Interruption() as stop:
         held, left = make_references(target, workers=workers, quiet=options.json, stop=stop)
     answer = {"path": str(target), "references_and_bounds": held, "left": left}
-    tell(options, answer, f"{target}: {held} references and bounds, {left} left")
+    print_answer(options, answer, f"{target}: {held} references and bounds, {left} left")
     return INTERRUPTED if left else 0

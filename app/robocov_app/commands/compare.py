@@ -11,7 +11,7 @@ from robocov.errors import ParameterError
 from robocov_app.commands.options import RunOptions
 from robocov_app.terminal.arguments import parse_gains
 from robocov_app.terminal.interruption import INTERRUPTED
-from robocov_app.terminal.output import BOLD, RIGHT, listed, print_table, tell
+from robocov_app.terminal.output import BOLD, RIGHT, list_files, print_answer, print_table
 
 _COLUMNS = {
     "": "{label}",
@@ -67,9 +67,9 @@ def command(options: Arguments) -> int:
         _print_rows(rows)
     notes = [f"note: {row['label']}: {note}" for row in rows for note in row.get("notes", ())]
     ending = "Interrupted. Partial results are in" if is_interrupted else "saved in"
-    saved = f"{ending} {out}/: {listed(out)}{options.describe_record()}"
+    saved = f"{ending} {out}/: {list_files(out)}{options.describe_record()}"
     answer = {"out": str(out), "interrupted": is_interrupted, "runs": rows}
-    tell(options, answer, *density_lines(environment), *notes, saved)
+    print_answer(options, answer, *density_lines(environment), *notes, saved)
     return INTERRUPTED if is_interrupted else 0
 
 

@@ -9,7 +9,7 @@ import tyro
 from robocov.controllers import CONTROLLERS
 from robocov.mapfile import list_bundled_maps
 from robocov_app.commands import COMMANDS
-from robocov_app.terminal.arguments import groups_of
+from robocov_app.terminal.arguments import list_option_groups
 from robocov_app.terminal.output import echo
 
 _BASH = """\
@@ -80,7 +80,11 @@ def command(options: Arguments) -> None:
 
 def _described(kind: Any) -> tuple[list[str], list[str], set[str]]:
     """Return a command's options, its groups' too, and words and names of its positional arguments."""
-    hints, plain, groups = get_type_hints(kind, include_extras=True), get_type_hints(kind), groups_of(kind)
+    hints, plain, groups = (
+        get_type_hints(kind, include_extras=True),
+        get_type_hints(kind),
+        list_option_groups(kind),
+    )
     flags, positionals = [], set()
     words: list[str] = []
     for each in fields(kind):

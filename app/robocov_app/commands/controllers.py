@@ -10,7 +10,7 @@ from robocov.controllers import RECOMMENDED_CONTROLLER, get_gains, get_informati
 from robocov.controllers.gains import Gain, Option, format_value
 from robocov.text import escape_controls
 from robocov_app.commands.options import JsonOption
-from robocov_app.terminal.output import console, tell
+from robocov_app.terminal.output import create_console, print_answer
 
 
 @dataclass
@@ -24,7 +24,7 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> None:
-    out, rows = console(), []
+    out, rows = create_console(), []
     for name, kind in list_controller_classes().items():
         label, summary = str(getattr(kind, "label", name)), str(getattr(kind, "summary", ""))
         information, gains = get_information(kind), get_gains(kind).values()
@@ -47,7 +47,7 @@ def command(options: Arguments) -> None:
             table.add_row(*map(escape_controls, cells))
         out.print(table)
     own = "A law of your own: robocov run rooms --controller mine.py:MyController (see robocov handbook)."
-    tell(options, {"controllers": rows}, own, indent=1)
+    print_answer(options, {"controllers": rows}, own, indent=1)
 
 
 def _told(gain: Gain | Option) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from robocov.mapfile import load_map
 from robocov_app.commands.options import FigureOptions
 from robocov_app.render.density import density_kind, density_lines, mean_label
 from robocov_app.runs.cost import build_cost, refine_cost_for_figures, save_distance_figure
-from robocov_app.terminal.output import tell
+from robocov_app.terminal.output import print_answer
 
 
 @dataclass
@@ -73,7 +73,7 @@ def command(options: Arguments) -> None:
     answer |= {"sites": len(cost.points), "density": density_kind(environment)}
     lines += [f"coverage cost   {result.value:.3f} m³", f"uncovered area  {result.uncovered_area:.3f} m²"]
     lines += [*density_lines(environment), f"on {len(cost.points)} sites, {len(robots)} robots"]
-    tell(options, answer, *lines)
+    print_answer(options, answer, *lines)
 
 
 def speeds_of(given: tuple[float, ...], robots: int) -> Array | None:

@@ -14,7 +14,7 @@ from robocov_app.commands.options import LayerOptions, ScenarioOptions, WindowOp
 from robocov_app.terminal.arguments import parse_gains, parse_window_size
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
 from robocov_app.terminal.output import echo
-from robocov_app.terminal.progress import progress
+from robocov_app.terminal.progress import show_progress
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -172,7 +172,7 @@ def rendered(opening: Launcher, options: Arguments) -> int:
         if count is None:
             assert window.tour is not None
             count = round(window.tour.seconds * HEADLESS_FPS)
-        with progress("frames", count) as update:
+        with show_progress("frames", count) as update:
 
             def frames() -> Iterator[Frame]:
                 for done in range(count):

@@ -7,7 +7,7 @@ from typing import Literal
 import tyro
 
 from robocov_app.commands.options import JsonOption
-from robocov_app.terminal.output import tell
+from robocov_app.terminal.output import print_answer
 
 
 @dataclass
@@ -39,5 +39,5 @@ def command(options: Arguments) -> int:
     for k, (title, seconds, ends) in enumerate(chapters, 1):
         rows.append({"title": title, "seconds": seconds, "ends": ends})
         lines.append(f"  {k:2}  {title:44}  {f'ends after {seconds:.1f} s' if ends else 'never ends'}")
-    tell(options, {"title": saved.lesson.title, "chapters": rows}, *lines)
+    print_answer(options, {"title": saved.lesson.title, "chapters": rows}, *lines)
     return 0 if all(ends for *_, ends in chapters) else 2

@@ -9,8 +9,8 @@ import tyro
 
 from robocov.errors import require_number
 from robocov_app.commands.options import FigureOptions
-from robocov_app.terminal.output import BOLD, RIGHT, print_table, tell, write_csv
-from robocov_app.terminal.progress import counting, progress
+from robocov_app.terminal.output import BOLD, RIGHT, print_answer, print_table, write_csv
+from robocov_app.terminal.progress import make_counter, show_progress
 
 
 @dataclass
@@ -48,8 +48,8 @@ def command(options: Arguments) -> None:
         for saved in runs:
             record, history = saved.record, saved.history
             total = len(select_nearest_moments(record.time, options.rate))
-            with progress(f"measuring {record.label}", total, quiet=options.json) as update:
-                metrics = compute_run_metrics(record, options.rate, counting(update))
+            with show_progress(f"measuring {record.label}", total, quiet=options.json) as update:
+                metrics = compute_run_metrics(record, options.rate, make_counter(update))
             target = result.staging / saved.folder.relative_to(folder)
             target.mkdir(exist_ok=True)
             write_csv(target / "metrics.csv", ",".join(COLUMNS.values()), metrics.rows())
@@ -67,7 +67,7 @@ def command(options: Arguments) -> None:
     if not options.json:
         print_table([(title, RIGHT if title else BOLD) for title in _COLUMNS], map(_cells, answers))
     folders = ", ".join(answer["folder"] for answer in answers)
-    tell(options, {"runs": answers}, f"written to metrics.csv in {folders}")
+    print_answer(options, {"runs": answers}, f"written to metrics.csv in {folders}")
 
 
 _COLUMNS = {

@@ -19,8 +19,8 @@ from robocov_app.commands.options import FigureOptions
 from robocov_app.render.density import density_kind, density_lines, mean_label
 from robocov_app.runs.cost import MIN_FIGURE_LATTICE, build_cost, save_distance_figure
 from robocov_app.runs.saved_runs import SavedRun, load_saved_runs
-from robocov_app.terminal.output import require_fresh, tell
-from robocov_app.terminal.progress import late_progress
+from robocov_app.terminal.output import check_output_file, print_answer
+from robocov_app.terminal.progress import show_late_progress
 
 _ROBOTS = 6
 _WITHIN = 0.001, 0.005, 0.02  # parts of the best within which restarts are counted
@@ -50,7 +50,7 @@ class Arguments(FigureOptions):
     radius: float | None = None
     """A robot's, in metres; 0.1 unless said otherwise, with --run as there."""
     run: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
-    """The folder of a run or a comparison: take map and team from there, and tell how far it stays above."""
+    """The folder of a run or a comparison: take map and team from there, and print how far it stays above."""
     positions: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
     """Save the positions there, as robocov cost --positions takes them."""
     overwrite: bool = False
@@ -73,7 +73,7 @@ class Arguments(FigureOptions):
         if self.seed < 0:
             raise ParameterError(f"--seed: expected a whole number of at least 0, got {self.seed}")
         if self.positions is not None:
-            require_fresh(self.positions, "another name", overwrite=self.overwrite)
+            check_output_file(self.positions, "another name", overwrite=self.overwrite)
         super().__post_init__()
 
 
@@ -90,12 +90,12 @@ def command(options: Arguments) -> None:
         radius = DEFAULT_RADIUS_M if options.radius is None else options.radius
     lattice, began = options.lattice, time.perf_counter()
     search: dict[str, Any] = {"lattice": lattice, "restarts": options.restarts, "seed": options.seed}
-    with late_progress("searching", quiet=options.json) as update:
+    with show_late_progress("searching", quiet=options.json) as update:
         best = find_optimum(environment, robots, radius=radius, progress=update, **search)
     seconds = time.perf_counter() - began
     bound: LowerBound | None = None
     if options.bound:
-        with late_progress("proving the bound", quiet=options.json) as update:
+        with show_late_progress("proving the bound", quiet=options.json) as update:
             how: dict[str, Any] = {"lattice": lattice, "precision": options.precision, "progress": update}
             bound = compute_lower_bound(environment, best.positions, radius=radius, **how)
     gaps = []
@@ -149,4 +149,4 @@ def command(options: Arguments) -> None:
         lines += [f"{row['run']}: mean distance {row['mean_distance_m']:.4f} m, {above}"]
     if options.positions is None:
         lines += ["positions       " + ", ".join(f"[{x:.3f}, {y:.3f}]" for x, y in best.positions.tolist())]
-    tell(options, answer, *lines)
+    print_answer(options, answer, *lines)

@@ -9,7 +9,7 @@ import tyro
 from robocov.errors import InputError, format_count, require_number
 from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
-from robocov_app.terminal.output import BOLD, RIGHT, echo, print_table, tell
+from robocov_app.terminal.output import BOLD, RIGHT, echo, print_answer, print_table
 
 
 @dataclass
@@ -101,7 +101,9 @@ def command(options: Arguments) -> int:
             pages.save(out / pages.PAGE, pages.paper_page(plan, images, runs, first, paper, found, more))
         except Interrupted:
             again = " ".join(["--out", str(out), *["--quick"] * options.quick, *options.parts])
-            tell(options, {"out": str(out), "interrupted": True}, f"stopped; to go on: robocov paper {again}")
+            print_answer(
+                options, {"out": str(out), "interrupted": True}, f"stopped; to go on: robocov paper {again}"
+            )
             return INTERRUPTED
     failed, verdicts = sum(part.failed for part in (paper, beyond) if part), (*found, *more)
     if verdicts and not quiet:
@@ -117,5 +119,5 @@ def command(options: Arguments) -> int:
     answer = {"out": str(out), "plan": plan.name, "interrupted": False}
     answer["runs"] = (paper.runs if paper else len(runs)) + (beyond.runs if beyond else 0)
     answer |= {"failed": failed, "page": str(out / "index.html")}
-    tell(options, answer | {"claims": [claim.to_json() for claim in verdicts]}, *lines)
+    print_answer(options, answer | {"claims": [claim.to_json() for claim in verdicts]}, *lines)
     return int(failed > 0)

@@ -14,7 +14,7 @@ from robocov.errors import InputError, ParameterError, summarize_names
 from robocov_app.commands.options import JsonOption, VideoOptions, WebOptions
 from robocov_app.terminal.arguments import parse_window_size
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
-from robocov_app.terminal.output import listed, tell, write_json
+from robocov_app.terminal.output import list_files, print_answer, write_json
 
 if TYPE_CHECKING:
     from robocov_app.runs.saved_runs import SavedRun
@@ -201,5 +201,5 @@ def _save_video(options: Arguments, saved_runs: Sequence[SavedRun]) -> int:
         )
     ending = "Interrupted. Partial results are in" if interruption.requested else "saved in"
     answer = {"out": str(out), "interrupted": interruption.requested}
-    tell(options, answer, f"{ending} {out}/: {listed(out)}")
+    print_answer(options, answer, f"{ending} {out}/: {list_files(out)}")
     return INTERRUPTED if interruption.requested else 0

@@ -14,8 +14,8 @@ from robocov.files.result_folder import REPORT_FILE, extend_result, is_report
 from robocov.files.writing import replace_file, resolve_target
 from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.interruption import Interruption
-from robocov_app.terminal.output import echo, tell
-from robocov_app.terminal.progress import progress
+from robocov_app.terminal.output import echo, print_answer
+from robocov_app.terminal.progress import show_progress
 
 SESSION = ".robocov"
 
@@ -83,7 +83,7 @@ def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: 
     check_target(target, overwrite=options.overwrite)
     for k, result in enumerate(results):  # reading all takes 10 ms a run
         quiet = options.json or result.kind != "sweep"
-        with progress("runs read", len(result.fine), quiet=quiet) as update:
+        with show_progress("runs read", len(result.fine), quiet=quiet) as update:
             results[k] = result.readable(update)
     damaged = [(result.folder, each) for result in results for each in result.damaged]
     if not any(result.entries for result in results):
@@ -93,7 +93,7 @@ def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: 
         echo(f"robocov: warning: {folder}: {each.folder} is left out: {each.reason}", to_stderr=True)
     for k, result in enumerate(results):
         quiet, total = options.json or not options.optimum, len({entry.setting for entry in result.fine})
-        with progress("searching", total, quiet=quiet) as update:
+        with show_progress("searching", total, quiet=quiet) as update:
             results[k] = with_references(result, search=options.optimum, tell=update)
     page = report(results, title=options.title, theme=options.theme)
     data = page.html.encode("utf-8", "replace")
@@ -114,7 +114,7 @@ def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: 
         words += [f"{result.missing} of {result.wanted} missing"] * bool(result.missing)
         lines.append(", ".join(words))
     answer = {"path": str(target), "bytes": len(data), "results": counts}
-    tell(options, answer, *lines, f"written to {target} ({len(data) / 1e6:.2f} MB)")
+    print_answer(options, answer, *lines, f"written to {target} ({len(data) / 1e6:.2f} MB)")
 
 
 def check_target(target: Path, *, overwrite: bool) -> None:

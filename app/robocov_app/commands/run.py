@@ -13,7 +13,7 @@ from robocov.defaults import DEFAULT_CONTROLLER
 from robocov_app.commands.options import RunOptions
 from robocov_app.terminal.arguments import parse_gains
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
-from robocov_app.terminal.output import echo, listed, tell
+from robocov_app.terminal.output import echo, list_files, print_answer
 
 if TYPE_CHECKING:
     from robocov_app.runs.execution import Run
@@ -62,8 +62,8 @@ def command(options: Arguments) -> int:
     ending = "saved in"
     if is_interrupted:
         ending = f"Interrupted at {run.record.time[-1]:.1f} s. Partial results are in"
-    lines = [*_describe_run(run), f"{ending} {out}/: {listed(out)}{options.describe_record()}"]
-    tell(options, {"out": str(out), "interrupted": is_interrupted, **run.summary}, *lines)
+    lines = [*_describe_run(run), f"{ending} {out}/: {list_files(out)}{options.describe_record()}"]
+    print_answer(options, {"out": str(out), "interrupted": is_interrupted, **run.summary}, *lines)
     return INTERRUPTED if is_interrupted else 0
 
 
@@ -106,7 +106,7 @@ def _replay_session(options: Arguments) -> int:
             answers.append(answer)
             if not options.json:
                 _print_branch(answer)
-    tell(options, answers[0] if len(answers) == 1 else {"stories": answers})
+    print_answer(options, answers[0] if len(answers) == 1 else {"stories": answers})
     return INTERRUPTED if interruption.requested else 0
 
 
@@ -116,7 +116,7 @@ def _print_branch(answer: dict[str, Any]) -> None:
         part = answer["parts"][row["part"] - 1]
         span = f"{part['from_s']:6.1f} to {part['to_s']:.1f} s"
         echo(f"{span}  {row['controller']}  {row['mean_distance_m']:.3f} m  {part['words']}")
-    echo(f"saved in {answer['out']}/: {listed(Path(answer['out']))}")
+    echo(f"saved in {answer['out']}/: {list_files(Path(answer['out']))}")
 
 
 def save_branches(options: Arguments, interruption: Interruption) -> Iterator[dict[str, Any]]:

@@ -10,7 +10,7 @@ from robocov.errors import ParameterError, format_count, require_number
 from robocov.optional_imports import import_optional
 from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
-from robocov_app.terminal.output import tell
+from robocov_app.terminal.output import print_answer
 
 FAILED = 1
 
@@ -79,7 +79,7 @@ def command(options: Arguments) -> int:
         lines += [f"a run takes {rehearsal.seconds_a_run:.2f} s and {each:.0f} kB"]
         words = f"{duration(rehearsal.seconds)} on {format_count(workers, 'worker')}; {all_:.0f} MB in all"
         lines += [f"all that is left: about {words}"]
-        tell(options, {"out": str(out), "workers": workers, **asdict(rehearsal)}, *lines)
+        print_answer(options, {"out": str(out), "workers": workers, **asdict(rehearsal)}, *lines)
         return 0
     where: dict[str, Any] = {"workers": options.workers, "scheduler": options.scheduler}
     how: dict[str, Any] = {**where, **again, "parquet": options.parquet, "quiet": options.json}
@@ -100,5 +100,5 @@ def command(options: Arguments) -> int:
     else:
         parquet = out / "results.parquet"
         lines += [f"the table is {out / 'results.csv'}" + f", and as Parquet {parquet}" * parquet.exists()]
-    tell(options, {"out": str(out), "runs": runs, **asdict(totals)}, *lines)
+    print_answer(options, {"out": str(out), "runs": runs, **asdict(totals)}, *lines)
     return INTERRUPTED if totals.interrupted else FAILED if totals.failed else 0

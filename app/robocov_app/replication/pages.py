@@ -30,8 +30,8 @@ from robocov_app.report.pictures import run_picture
 from robocov_app.report.replay import ReplayRun, asset, replay_css, replay_js, replay_part, script
 from robocov_app.report.theme_css import theme_rules
 from robocov_app.sweep.study import UNITS
-from robocov_app.terminal.output import finite
-from robocov_app.terminal.progress import progress
+from robocov_app.terminal.output import replace_non_finite
+from robocov_app.terminal.progress import show_progress
 
 PAGE, BEYOND_PAGE, CLAIMS = "index.html", "beyond.html", "claims.json"
 
@@ -57,7 +57,7 @@ def save(path: Path, text: str) -> None:
 
 
 def save_claims(folder: Path, found: Sequence[Claim]) -> None:
-    text = json.dumps([finite(claim.to_json()) for claim in found], indent=1, ensure_ascii=False)
+    text = json.dumps([replace_non_finite(claim.to_json()) for claim in found], indent=1, ensure_ascii=False)
     save(folder / CLAIMS, text + "\n")
 
 
@@ -90,7 +90,7 @@ def _save_figures(
         target.mkdir(exist_ok=True)
     light, dark = drawn("light"), drawn("dark")
     found: dict[str, Image] = {}
-    with progress("figures", len(light), quiet=quiet) as update:
+    with show_progress("figures", len(light), quiet=quiet) as update:
         for number, (name, draw) in enumerate(light.items(), start=1):
             figure = draw()
             for suffix in ("png", "svg", "pdf"):

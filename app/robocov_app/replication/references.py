@@ -18,7 +18,7 @@ from robocov.mapfile import from_json, to_json
 from robocov_app.replication.plan import ROBOTS, TEAM, Plan
 from robocov_app.sweep.study import StudyMap
 from robocov_app.terminal.interruption import Interruption
-from robocov_app.terminal.progress import progress
+from robocov_app.terminal.progress import show_progress
 from robocov_app.toolkit import worker
 
 _FORMAT = "robocov-reference 1"  # another one whenever the search gives other results
@@ -81,7 +81,7 @@ def find_references(
     found = {name: each for name, each in kept.items() if each is not None}
     missing = {name: question for name, question in wanted.items() if name not in found}
     if missing:
-        with progress("references", len(missing), quiet=quiet) as update:
+        with show_progress("references", len(missing), quiet=quiet) as update:
             for number, (name, answer) in enumerate(searched(missing, workers, stop), start=1):
                 _keep(folder / f"{name}.json", missing[name], answer)
                 found[name] = answer

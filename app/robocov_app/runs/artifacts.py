@@ -17,8 +17,8 @@ from robocov_app.runs.cost import build_cost, refine_cost_for_figures
 from robocov_app.runs.execution import Run, execute_scenario
 from robocov_app.runs.settings import OutputSettings
 from robocov_app.terminal.interruption import Interruption
-from robocov_app.terminal.output import finite, write_csv, write_json
-from robocov_app.terminal.progress import counting, progress
+from robocov_app.terminal.output import replace_non_finite, write_csv, write_json
+from robocov_app.terminal.progress import make_counter, show_progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -198,7 +198,7 @@ def save_comparison(
     """
     rows = build_comparison_rows(runs)
     content = {**_COMPARISON_HEADER, "lattice": settings.lattice, "folders": list(runs), "runs": rows}
-    write_json(folder / "comparison.json", finite(content))
+    write_json(folder / "comparison.json", replace_non_finite(content))
     columns = [name for name in rows[0] if name not in _JSON_ONLY_COLUMNS]
     lines = ([row[name] for name in columns] for row in rows)
     write_csv(folder / "comparison.csv", ",".join(columns), lines)
@@ -234,8 +234,8 @@ def save_figures(
         return
     from robocov_app.figures.files import save_figure
 
-    with progress("figures", 2 * len(_FIGURE_SUFFIXES), quiet=settings.quiet) as update:
-        report_figure = counting(update)
+    with show_progress("figures", 2 * len(_FIGURE_SUFFIXES), quiet=settings.quiet) as update:
+        report_figure = make_counter(update)
 
         def save(figure: Figure, stem: str) -> None:
             for suffix in _FIGURE_SUFFIXES:

@@ -10,7 +10,7 @@ from robocov.errors import format_count
 from robocov.geodesic import Geodesics
 from robocov.mapfile.check import MANY_VERTICES, count_vertices
 from robocov.team import Team
-from robocov_app.terminal.progress import late_progress
+from robocov_app.terminal.progress import show_late_progress
 
 MIN_FIGURE_LATTICE = 256
 """Coarsest lattice of figures of distances: its cells should be narrower than walls."""
@@ -37,7 +37,7 @@ def build_cost(
     -------
     CoverageCost
     """
-    with late_progress("shortest paths", quiet=quiet) as update:
+    with show_late_progress("shortest paths", quiet=quiet) as update:
         return CoverageCost(environment, lattice, progress=update, geodesics=geodesics)
 
 

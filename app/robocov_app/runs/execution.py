@@ -17,8 +17,8 @@ from robocov.record import Record
 from robocov.scenario import Scenario
 from robocov_app.runs.settings import OutputSettings
 from robocov_app.terminal.interruption import Interruption
-from robocov_app.terminal.output import finite, write_csv
-from robocov_app.terminal.progress import counting, progress
+from robocov_app.terminal.output import replace_non_finite, write_csv
+from robocov_app.terminal.progress import make_counter, show_progress
 
 MAX_SAMPLES_AFTER_INTERRUPTION = 200
 """Maximum number of samples of the coverage cost of a run that was interrupted."""
@@ -91,7 +91,7 @@ def _simulate(scenario: Scenario, settings: OutputSettings, interruption: Interr
         # What a user's controller prints must not be mixed with the JSON answer.
         redirected = redirect_stdout(sys.stderr)
     title = f"simulating {simulation.controller.label}"
-    with redirected, progress(title, scenario.steps, quiet=settings.quiet) as update:
+    with redirected, show_progress(title, scenario.steps, quiet=settings.quiet) as update:
 
         def report_step(step: int) -> bool:
             is_due = step % _STEPS_PER_PROGRESS_UPDATE == 0
@@ -124,8 +124,8 @@ def evaluate_record(record: Record, cost: CoverageCost, interruption: Interrupti
     if interruption.requested and end > 0:
         rate = min(rate, MAX_SAMPLES_AFTER_INTERRUPTION / end)
     samples = len(select_sampled_moments(record, rate))
-    with progress("coverage cost", samples, quiet=quiet) as update:
-        history = compute_cost_history(record, cost, rate, counting(update))
+    with show_progress("coverage cost", samples, quiet=quiet) as update:
+        history = compute_cost_history(record, cost, rate, make_counter(update))
     return Run(record, history, summarize(record, history))
 
 
@@ -144,7 +144,7 @@ def save_numbers(run: Run, folder: Path, lattice: int) -> None:
     OutputError
         If a file cannot be written.
     """
-    run.record.save(folder, finite(run.summary), lattice=lattice)
+    run.record.save(folder, replace_non_finite(run.summary), lattice=lattice)
     write_csv(folder / "cost.csv", *build_cost_table(run.history))
 
 

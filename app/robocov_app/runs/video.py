@@ -20,7 +20,7 @@ from robocov_app.runs.frames import draw_frames, select_frame_rows
 from robocov_app.runs.pane_layout import PaneLayout, build_pane_layout
 from robocov_app.runs.settings import VideoSettings
 from robocov_app.terminal.interruption import Interruption
-from robocov_app.terminal.progress import progress
+from robocov_app.terminal.progress import show_progress
 
 RUN_VIDEO = "run.mp4"
 COMPARISON_VIDEO = "comparison.mp4"
@@ -183,7 +183,7 @@ def write_frames_and_video(
     OutputError
         If a file cannot be written, or there is no encoder.
     """
-    with progress("video" if settings.video else "frames", total, quiet=quiet) as update:
+    with show_progress("video" if settings.video else "frames", total, quiet=quiet) as update:
 
         def report_frames() -> Iterator[Frame]:
             for count, frame in enumerate(frames, start=1):

@@ -21,7 +21,7 @@ from robocov_app.sweep.study import Study, Task, tasks_of
 from robocov_app.sweep.table import Table, columns_of, row_of
 from robocov_app.sweep.worker import Outcome, perform, prepared
 from robocov_app.terminal.interruption import Interruption
-from robocov_app.terminal.output import echo, json_text
+from robocov_app.terminal.output import echo, format_json
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -175,7 +175,7 @@ def sweep(
         columns = columns_of(study)
         content = study.to_json() | {"columns": [column._asdict() for column in columns]}
         ledger = stack.enter_context(opened(folder, content))
-        table = stack.enter_context(Table(folder, columns, json_text(content).encode(), parquet=parquet))
+        table = stack.enter_context(Table(folder, columns, format_json(content).encode(), parquet=parquet))
         count = Count(len(study))
         tell = stack.enter_context(sweep_progress(title, count, quiet=quiet))
         looked = takewhile(lambda _: not stopped.requested, tasks_of(study))

@@ -19,7 +19,7 @@ from robocov.optional_imports import import_optional
 from robocov_app.sweep.ledger import CSV, STUDY, Entry, has_all_rows, rows_in
 from robocov_app.sweep.study import CONDITIONS, UNITS, WORDS, Study, Task, parameter_column
 from robocov_app.sweep.worker import FIGURES, TIMED
-from robocov_app.terminal.output import csv_line
+from robocov_app.terminal.output import format_csv_line
 
 PARQUET = "results.parquet"
 _CSV_PART, _PARQUET_PART = ".results.part.csv", ".results.part.parquet"  # names while a table is written
@@ -128,7 +128,7 @@ class Table:
             with _told(self._folder / CSV):
                 self._csv = (self._folder / _CSV_PART).open("wb", buffering=0)
             stack.callback(lambda: self._csv.close())  # it may be another one by then
-            self._write(csv_line(column.name for column in self._columns))
+            self._write(format_csv_line(column.name for column in self._columns))
             self._stack = stack.pop_all()
         return self
 
@@ -161,7 +161,7 @@ class Table:
         if self._broken is not None:
             raise self._broken
         try:
-            self._write(csv_line(row.get(column.name) for column in self._columns))
+            self._write(format_csv_line(row.get(column.name) for column in self._columns))
         except OutputError as error:
             self._broken = error
             raise

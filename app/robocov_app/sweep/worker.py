@@ -26,7 +26,7 @@ from robocov.scenario import Scenario
 from robocov.simulation import Simulation
 from robocov_app.runs.execution import build_cost_table
 from robocov_app.sweep.study import Task, conditions_of, source_json, team_of
-from robocov_app.terminal.output import csv_text, finite, json_text
+from robocov_app.terminal.output import format_csv, format_json, replace_non_finite
 from robocov_app.toolkit.worker import Line
 
 _REMEMBERED = 4  # maps whose costs a worker keeps; tasks come map by map
@@ -81,7 +81,7 @@ def perform(task: Task) -> Outcome:
             record, effort = measured(task, environment)
             history = compute_cost_history(record, cost, task.cost_hz)
             # of all moments: what is kept of them is for people to look at
-            summary = finite(summarize(record, history))
+            summary = replace_non_finite(summarize(record, history))
             path = summary["path_length_m"]
             figures = {**summary, "path_length_m": sum(path) / len(path)}
             figures = {name: figures[name] for name in (*FIGURES, TIMED) if name in figures}
@@ -90,11 +90,11 @@ def perform(task: Task) -> Outcome:
             content["controller"] |= source_json(task.source)
             kept, arrays = record.thin(task.record_hz), io.BytesIO()
             np.savez_compressed(arrays, **{name: getattr(kept, name) for name in kept.arrays})
-            files = {"run.json": json_text(content).encode(), "record.npz": arrays.getvalue()}
-            files["cost.csv"] = csv_text(*build_cost_table(history)).encode()
+            files = {"run.json": format_json(content).encode(), "record.npz": arrays.getvalue()}
+            files["cost.csv"] = format_csv(*build_cost_table(history)).encode()
             if task.metrics:
-                figures |= finite(compute_final_metrics(record, history))
-                files[EFFORT] = json_text(effort).encode()
+                figures |= replace_non_finite(compute_final_metrics(record, history))
+                files[EFFORT] = format_json(effort).encode()
             return Outcome(files, figures)
         except BaseException as error:  # a user's controller may raise anything
             message = str(error) if isinstance(error, RobocovError) else f"{type(error).__name__}: {error}"
@@ -117,7 +117,9 @@ class Performing:
 def failed(message: str, details: str) -> Outcome:
     # one line of what files can hold, whatever a controller of a user's says
     message = " ".join(message.split()).encode(errors="replace").decode() or "it does not say why"
-    return Outcome({"error.json": json_text({"error": message, "traceback": details}).encode()}, {}, message)
+    return Outcome(
+        {"error.json": format_json({"error": message, "traceback": details}).encode()}, {}, message
+    )
 
 
 def simulated(task: Task, environment: Environment) -> Record:

@@ -1,4 +1,4 @@
-"""Words of the command line to values, with one line for what is wrong with them."""
+"""The words of a command line, parsed into options; mistakes are explained in one line."""
 
 import contextlib
 import io
@@ -15,35 +15,31 @@ from robocov.errors import InputError, ParameterError, quote, require_number
 
 T = TypeVar("T")
 
-_WORDING: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
-    (r"^Error parsing (\S+): invalid literal for int.* 10: (.*)$", r"\1: expected a whole number, got \2"),
-    (r"^Error parsing (\S+): could not convert string to float: (.*)$", r"\1: expected a number, got \2"),
-    (
-        r"^Error parsing (\S+): no type matching (INT|FLOAT) could be .* from \[(.*?)\]\. .*$",
-        lambda match: f"{match[1]}: expected a {'whole ' * (match[2] == 'INT')}number, got {match[3]}",
-    ),
-    (
-        r"^Error parsing (\S+): no type matching \{?FLOAT FLOAT\}? could be .* from \[(.*?)\]\. .*$",
-        r"\1: expected two numbers, got \2",
-    ),
-    (
-        r"^invalid choice (.*) for argument '(\S+)'\. Expected one of \((.*?),? ?\) ?\.$",
-        lambda match: f"{match[2]}: expected {_choices(match[3])}, got {match[1]}",
-    ),
-    (r"^Missing value for argument '(\S+)'\..*$", r"\1: expected a value"),
-    (r"^Missing from robocov \w+: (-\S+).*$", r"\1: this option is required"),
-    (r"^Missing from robocov \w+: (\S+).*$", r"missing argument: expected \1"),
-    (r"^Unrecognized options: (-[^\s,]+).*$", r"unknown option \1"),
-    (r"^Unrecognized options: ([^\s,]*).*$", r"unexpected argument \1"),
+_MIN_WINDOW_SIZE_PX = (900, 600)
+_MAX_WINDOW_SIZE_PX = (7680, 4320)
+_FIRST_OPTIONS = (
+    "map",
+    "controller",
+    "controllers",
+    "out",
+    "robots",
+    "gains",
+    "duration",
+    "seed",
+    "start",
+    "video",
 )
-_FIRST = ("map", "controller", "controllers", "out", "robots", "gains", "duration", "seed", "start", "video")
-_LAST = ("json", "overwrite")  # the help ends with these, as it begins with those
-_NEGATIVE = re.compile(r"-\.?\d.*")  # a value, not an option
+"""The most used options, with which the help begins."""
+_LAST_OPTIONS = ("json", "overwrite")
+"""Options with which the help ends."""
+_NEGATIVE_NUMBER = re.compile(r"-\.?\d.*")
 _WORD = r"[A-Za-z][A-Za-z0-9_-]*"
-_JSON_WORDS = frozenset(("null", "true", "false", "NaN", "Infinity"))  # no words of an option
+_JSON_CONSTANTS = frozenset(("null", "true", "false", "NaN", "Infinity"))
+_MIN_SIMILARITY = 0.8
 
 
-def _choices(text: str) -> str:
+def _describe_choices(text: str) -> str:
+    """Return "a, b or c" for tyro's list of choices."""
     choices = [choice.strip("'") for choice in text.split(", ")]
     if "None" in choices:
         choices = sorted(set(choices) - {"None"})
@@ -52,42 +48,112 @@ def _choices(text: str) -> str:
     return f"{', '.join(choices[:-1])} or {choices[-1]}"
 
 
-def parsed(kind: type[T], command: str, words: list[str]) -> T:
-    """Return the options that `words` give; raises InputError, or SystemExit after help."""
+def _explain_invalid_choice(match: re.Match[str]) -> str:
+    value, option, choices = match.groups()
+    return f"{option}: expected {_describe_choices(choices)}, got {value}"
+
+
+def _explain_invalid_number(match: re.Match[str]) -> str:
+    option, kind, value = match.groups()
+    number = "whole number" if kind == "INT" else "number"
+    return f"{option}: expected a {number}, got {value}"
+
+
+_EXPLANATIONS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
+    (r"^Error parsing (\S+): invalid literal for int.* 10: (.*)$", r"\1: expected a whole number, got \2"),
+    (r"^Error parsing (\S+): could not convert string to float: (.*)$", r"\1: expected a number, got \2"),
+    (
+        r"^Error parsing (\S+): no type matching (INT|FLOAT) could be .* from \[(.*?)\]\. .*$",
+        _explain_invalid_number,
+    ),
+    (
+        r"^Error parsing (\S+): no type matching \{?FLOAT FLOAT\}? could be .* from \[(.*?)\]\. .*$",
+        r"\1: expected two numbers, got \2",
+    ),
+    (
+        r"^invalid choice (.*) for argument '(\S+)'\. Expected one of \((.*?),? ?\) ?\.$",
+        _explain_invalid_choice,
+    ),
+    (r"^Missing value for argument '(\S+)'\..*$", r"\1: expected a value"),
+    (r"^Missing from robocov \w+: (-\S+).*$", r"\1: this option is required"),
+    (r"^Missing from robocov \w+: (\S+).*$", r"missing argument: expected \1"),
+    (r"^Unrecognized options: (-[^\s,]+).*$", r"unknown option \1"),
+    (r"^Unrecognized options: ([^\s,]*).*$", r"unexpected argument \1"),
+)
+"""Messages of tyro, and the messages that are printed instead."""
+
+
+def parse_options(kind: type[T], command: str, words: list[str]) -> T:
+    """Parse the words of a command.
+
+    Parameters
+    ----------
+    kind : type
+        Dataclass of the command's options.
+    command : str
+        Name of the command.
+    words : list of str
+        The words that follow it.
+
+    Returns
+    -------
+    object
+        An instance of the dataclass.
+
+    Raises
+    ------
+    InputError
+        If the words cannot be used.
+    SystemExit
+        After the help was printed.
+    """
+    words = merge_repeated_options(kind, words)
     complaint = io.StringIO()
-    words = merge_repeated(kind, words)
     try:
         with contextlib.redirect_stderr(complaint):
-            config = tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone
-            return tyro.cli(_for_readers(kind), prog=f"robocov {command}", args=words, config=config)
-    except SystemExit as ending:
-        if not ending.code:
+            config = (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)
+            return tyro.cli(_arrange_help(kind), prog=f"robocov {command}", args=words, config=config)
+    except SystemExit as error:
+        if not error.code:
             raise
-        problem = _with_hint(one_line(complaint.getvalue()), kind, command)
+        problem = _add_suggestion(summarize_complaint(complaint.getvalue()), kind, command)
         raise InputError(f"{problem} (robocov {command} -h explains)") from None
 
 
-def _with_hint(problem: str, kind: Any, command: str) -> str:
-    """Return what is wrong with the words of a command, with what may have been meant."""
-    options = [f"--{name}" for name in _option_names(kind)]
-    if found := re.match(r"unexpected argument (\S+)", problem):
-        word = found[1]
-        text = f"unexpected argument {quote(word)}"
-        meant = [f"{option} {word}" for option in options if option in ("--controller", "--controllers")]
-        near = get_close_matches(f"--{word}", options, n=1, cutoff=0.8)
-        if meant and _is_controller(word):
-            return f"{text}: did you mean {meant[0]}?"
-        return f"{text}: did you mean {near[0]}?" if near else text
-    if (found := re.fullmatch(r"unknown option (-[^-]\S+)", problem)) and f"-{found[1]}" in options:
-        return f"{problem}: did you mean -{found[1]}?"
-    # values of arguments without an option are known by the command alone
-    if (found := re.match(r"([a-z]\w*): expected ", problem)) and found[1] in _option_names(kind):
-        return f"{command}: {problem.removeprefix(f'{found[1]}: ')}"
+def _add_suggestion(problem: str, kind: Any, command: str) -> str:
+    """Return a problem with what the user may have meant."""
+    names = _list_option_names(kind)
+    options = [f"--{name}" for name in names]
+    match = re.match(r"unexpected argument (\S+)", problem)
+    if match:
+        return _explain_unexpected_argument(match[1], options)
+    match = re.fullmatch(r"unknown option (-[^-]\S+)", problem)
+    if match and f"-{match[1]}" in options:
+        return f"{problem}: did you mean -{match[1]}?"
+    match = re.match(r"([a-z]\w*): expected ", problem)
+    if match and match[1] in names:
+        # A positional argument has no name that users see.
+        return f"{command}: {problem.removeprefix(f'{match[1]}: ')}"
     return problem
 
 
-def _option_names(kind: Any) -> list[str]:
-    return [each.name.replace("_", "-") for one in (kind, *groups_of(kind)) for each in fields(one)]
+def _explain_unexpected_argument(word: str, options: list[str]) -> str:
+    text = f"unexpected argument {quote(word)}"
+    if _is_controller(word):
+        for option in options:
+            if option in ("--controller", "--controllers"):
+                return f"{text}: did you mean {option} {word}?"
+    similar = get_close_matches(f"--{word}", options, n=1, cutoff=_MIN_SIMILARITY)
+    return f"{text}: did you mean {similar[0]}?" if similar else text
+
+
+def _list_option_names(kind: Any) -> list[str]:
+    """Return the names of the options of a dataclass and its groups, as users write them."""
+    return [
+        option.name.replace("_", "-")
+        for group in (kind, *list_option_groups(kind))
+        for option in fields(group)
+    ]
 
 
 def _is_controller(word: str) -> bool:
@@ -96,149 +162,252 @@ def _is_controller(word: str) -> bool:
     return word in CONTROLLERS or bool(re.search(r"\.py:\w+$", word))
 
 
-def merge_repeated(kind: Any, words: list[str]) -> list[str]:
-    """Return words in which options that take any number of values stand once, with all their values.
+def merge_repeated_options(kind: Any, words: list[str]) -> list[str]:
+    """Merge the occurrences of options that take any number of values.
 
-    ``--skip a --skip b`` means ``--skip a b``: without this the last would silently replace the others.
+    Parameters
+    ----------
+    kind : type
+        Dataclass of the options.
+    words : list of str
+
+    Returns
+    -------
+    list of str
+        Words in which each such option occurs once: ``--skip a --skip b`` becomes ``--skip a b``. Otherwise
+        the last occurrence would silently replace the others.
     """
-    several = _options_of_several_values(kind)
-    given: dict[str, list[str]] = {}
-    kept: list[str] = []
-    values = kept
-    for k, word in enumerate(words):
+    names = _map_multiple_options(kind)
+    merged: list[str] = []
+    values_by_option: dict[str, list[str]] = {}
+    current = merged
+    for position, word in enumerate(words):
         if word == "--":
-            kept += words[k:]
+            merged += words[position:]
             break
-        name, equals, value = word.partition("=")
-        name = name.replace("_", "-")
-        if not name.startswith("-") or _NEGATIVE.fullmatch(word):
-            values.append(word)
+        option, has_value, value = word.partition("=")
+        option = option.replace("_", "-")
+        if not option.startswith("-") or _NEGATIVE_NUMBER.fullmatch(word):
+            current.append(word)
             continue
-        values = kept
-        if name not in several:
-            kept.append(word)
+        current = merged
+        if option not in names:
+            merged.append(word)
             continue
-        name = several[name]
-        if name in given:
-            values = given[name]
-        else:
-            values = given[name] = []
-            kept.append(name)
-        if equals:
-            values.append(value)
-            values = kept
-    merged = []
-    for word in kept:
-        merged.append(word)
-        merged += given.get(word, ())
-    return merged
+        name = names[option]
+        if name not in values_by_option:
+            values_by_option[name] = []
+            merged.append(name)
+        current = values_by_option[name]
+        if has_value:
+            current.append(value)
+            current = merged
+    complete = []
+    for word in merged:
+        complete.append(word)
+        complete += values_by_option.get(word, ())
+    return complete
 
 
-def _options_of_several_values(kind: Any) -> dict[str, str]:
-    """Return the options of a tuple of any length: each name or alias, and the name that it stands for."""
-    several: dict[str, str] = {}
-    for owner in (kind, *groups_of(kind)):
-        plain = get_type_hints(owner)
-        marked = get_type_hints(owner, include_extras=True)
-        for each in fields(owner):
-            kinds = (plain[each.name], *get_args(plain[each.name]))
-            if any(get_origin(hint) is tuple and ... in get_args(hint) for hint in kinds):
-                # an option may have another name than its field
-                names = [getattr(mark, "name", None) for mark in get_args(marked[each.name])[1:]]
-                chosen = next(filter(None, names), each.name)
-                name = f"--{chosen.replace('_', '-')}"
-                several |= dict.fromkeys((name, *each.metadata.get("aliases", ())), name)
-    return several
+def _map_multiple_options(kind: Any) -> dict[str, str]:
+    """Return the options that take any number of values: each name or alias, with the name it stands for."""
+    names: dict[str, str] = {}
+    for group in (kind, *list_option_groups(kind)):
+        plain_hints = get_type_hints(group)
+        hints = get_type_hints(group, include_extras=True)
+        for option in fields(group):
+            if not _takes_many_values(plain_hints[option.name]):
+                continue
+            # An option may have another name than its field.
+            given_names = [getattr(mark, "name", None) for mark in get_args(hints[option.name])[1:]]
+            chosen = next(filter(None, given_names), option.name)
+            name = f"--{chosen.replace('_', '-')}"
+            names |= dict.fromkeys((name, *option.metadata.get("aliases", ())), name)
+    return names
 
 
-def _for_readers(kind: type[T]) -> type[T]:
-    """Return options with the most used ones first in the help, and without defaults that say nothing."""
-    hint = tyro.conf.arg(help_behavior_hint=_default_hint)
-    for each in (kind, *groups_of(kind)):
-        own: Any = each
-        hints, known = get_type_hints(own, include_extras=True), own.__dataclass_fields__
-        own.__annotations__ = {name: Annotated[hints[name], hint] for name in hints}
-        for name, each in known.items():
-            if aliases := each.metadata.get("aliases"):
-                marked = tyro.conf.arg(help_behavior_hint=_default_hint, aliases=aliases)
-                own.__annotations__[name] = Annotated[hints[name], marked]
-        order = [*_FIRST, *(name for name in known if name not in _LAST), *_LAST]
-        own.__dataclass_fields__ = {name: known[name] for name in order if name in known}
+def _takes_many_values(hint: Any) -> bool:
+    """Return whether a type is a tuple of any length, or may be one."""
+    return any(get_origin(part) is tuple and ... in get_args(part) for part in (hint, *get_args(hint)))
+
+
+def _arrange_help(kind: type[T]) -> type[T]:
+    """Put the most used options first in the help, and drop default values that say nothing."""
+    for group in (kind, *list_option_groups(kind)):
+        owner: Any = group
+        hints = get_type_hints(owner, include_extras=True)
+        known_fields = owner.__dataclass_fields__
+        owner.__annotations__ = {
+            name: Annotated[hint, _make_help_settings(known_fields.get(name))] for name, hint in hints.items()
+        }
+        order = [*_FIRST_OPTIONS, *(name for name in known_fields if name not in _LAST_OPTIONS)]
+        order += _LAST_OPTIONS
+        owner.__dataclass_fields__ = {name: known_fields[name] for name in order if name in known_fields}
     return kind
 
 
-def _default_hint(label: str) -> str:
-    with contextlib.suppress(ValueError):
-        label = f"{float(label):.4g}" if "." in label else label
-    return "" if label in ("", "None", "False") else f"(default: {label})"
+def _make_help_settings(option: Any) -> Any:
+    """Return tyro's settings of an option, with its aliases."""
+    aliases = None if option is None else option.metadata.get("aliases")
+    if aliases:
+        return tyro.conf.arg(help_behavior_hint=_format_default, aliases=aliases)
+    return tyro.conf.arg(help_behavior_hint=_format_default)
 
 
-def groups_of(kind: Any) -> list[Any]:
-    return [each.default_factory for each in fields(kind) if is_dataclass(each.default_factory)]
+def _format_default(label: str) -> str:
+    """Return the hint at a default value; empty if it says nothing."""
+    if label in ("", "None", "False"):
+        return ""
+    if "." in label:
+        with contextlib.suppress(ValueError):
+            label = f"{float(label):.4g}"
+    return f"(default: {label})"
 
 
-def by_option(kind: Any, message: str) -> str:
-    """Return a message on a value with the option that gives it in the place of the value's path."""
-    groups = [kind, *groups_of(kind)]
-    found = re.match(r"(?:conditions\.|team\.)?(\w+)(?:\[\d+\])?(?=: )", message)
-    name = {"failures": "fail", "joins": "join"}.get(found[1], found[1]) if found else ""
-    if found is None or not any(name == each.name for group in groups for each in fields(group)):
+def list_option_groups(kind: Any) -> list[Any]:
+    """Return the dataclasses of the groups of options in a dataclass of options."""
+    return [option.default_factory for option in fields(kind) if is_dataclass(option.default_factory)]
+
+
+def name_option(kind: Any, message: str) -> str:
+    """Begin a message about a value with the option that gives it, instead of the parameter's name.
+
+    Parameters
+    ----------
+    kind : type
+        Dataclass of the command's options.
+    message : str
+        Such as ``team.max_speed: expected ...``.
+
+    Returns
+    -------
+    str
+        Such as ``--max-speed: expected ...``; the message itself if there is no such option.
+    """
+    match = re.match(r"(?:conditions\.|team\.)?(\w+)(?:\[\d+\])?(?=: )", message)
+    if match is None:
         return message
-    return f"--{name.replace('_', '-')}{message[found.end() :]}"
+    name = {"failures": "fail", "joins": "join"}.get(match[1], match[1])
+    option = name.replace("_", "-")
+    if option not in _list_option_names(kind):
+        return message
+    return f"--{option}{message[match.end() :]}"
 
 
-def one_line(boxed: str) -> str:
-    """Return the first paragraph of a boxed complaint as one line, with the suggestion where there is one."""
-    paragraphs: list[list[str]] = []
-    for line in boxed.splitlines():
-        words = line.strip("│| \t")
-        if words.startswith("╭") or re.fullmatch(r"[-─]{3,}", words):
-            paragraphs.append([])
-        elif paragraphs and words and not words.startswith("╰"):
-            paragraphs[-1].append(words)
-    text = " ".join(paragraphs[0])
-    for pattern, wording in _WORDING:
-        text, changed = re.subn(pattern, wording, text)
-        if changed:
+def summarize_complaint(text: str) -> str:
+    """Return tyro's complaint, which is printed in a box, as one line with its suggestion.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
+    """
+    paragraphs = _split_box(text)
+    summary = " ".join(paragraphs[0])
+    for pattern, explanation in _EXPLANATIONS:
+        summary, count = re.subn(pattern, explanation, summary)
+        if count:
             break
     for paragraph in paragraphs[1:]:
         if paragraph and paragraph[0].startswith("Perhaps you meant"):
             option = next((line.split()[0] for line in paragraph[1:] if line.startswith("--")), None)
-            text += f": did you mean {option}?" if option else ""
-    return text
+            if option is not None:
+                summary += f": did you mean {option}?"
+    return summary
+
+
+def _split_box(text: str) -> list[list[str]]:
+    """Return the lines of each paragraph in a box."""
+    paragraphs: list[list[str]] = []
+    for line in text.splitlines():
+        content = line.strip("│| \t")
+        if content.startswith("╭") or re.fullmatch(r"[-─]{3,}", content):
+            paragraphs.append([])
+        elif paragraphs and content and not content.startswith("╰"):
+            paragraphs[-1].append(content)
+    return paragraphs
 
 
 def parse_size(option: str, text: str, minimum: tuple[int, int], maximum: tuple[int, int]) -> tuple[int, int]:
-    """Return width and height from a text like ``1280x720``; raises ParameterError."""
+    """Parse a size such as ``1280x720``.
+
+    Parameters
+    ----------
+    option : str
+        Name of the option in messages.
+    text : str
+    minimum, maximum : (width, height), px
+        Range of valid sizes.
+
+    Returns
+    -------
+    (width, height), px
+
+    Raises
+    ------
+    ParameterError
+        If the text is not a size, or out of range.
+    """
     match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", text)
     if not match:
-        wanted = "expected WIDTHxHEIGHT in pixels, as in 1280x720"
-        raise ParameterError(f"{option}: {wanted}, got {quote(text)}")
-    width, height = int(match[1]), int(match[2])
+        expected = "expected WIDTHxHEIGHT in pixels, as in 1280x720"
+        raise ParameterError(f"{option}: {expected}, got {quote(text)}")
+    width = int(match[1])
+    height = int(match[2])
     require_number(option, width, minimum[0], maximum[0], "pixels wide")
     require_number(option, height, minimum[1], maximum[1], "pixels high")
     return width, height
 
 
 def parse_window_size(text: str | None) -> tuple[int, int] | None:
-    return None if text is None else parse_size("--size", text, (900, 600), (7680, 4320))
+    """Parse the option ``--size`` of a window; None if it is not given. See `parse_size`."""
+    if text is None:
+        return None
+    return parse_size("--size", text, _MIN_WINDOW_SIZE_PX, _MAX_WINDOW_SIZE_PX)
 
 
 def parse_gains(texts: tuple[str, ...]) -> dict[str, Any]:
-    """Return gains from texts like ``k_rep=0.3``; the value is JSON, ``null`` for no limit, or a word."""
+    """Parse the values of the option ``--set``.
+
+    Parameters
+    ----------
+    texts : tuple of str
+        Such as ``k_rep=0.3``. The value is JSON, ``null`` for no limit, or a word.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    ParameterError
+        If a text cannot be parsed, or a gain is given twice.
+
+    Examples
+    --------
+    >>> parse_gains(("k_rep=0.3", "target=median", "attraction_limit=null"))
+    {'k_rep': 0.3, 'target': 'median', 'attraction_limit': None}
+    """
     gains: dict[str, Any] = {}
     for text in texts:
-        name, equals, value = text.partition("=")
-        if not equals or not re.fullmatch(r"[^\W\d][\w.:/-]*", name):
+        name, has_value, value = text.partition("=")
+        if not has_value or not re.fullmatch(r"[^\W\d][\w.:/-]*", name):
             raise ParameterError(f"--set: expected GAIN=VALUE, as in k_rep=0.3, got {quote(text)}")
         if name in gains:
             raise ParameterError(f"--set: {name} is given twice")
-        if re.fullmatch(_WORD, value) and value not in _JSON_WORDS:
-            gains[name] = value
-            continue
-        try:
-            gains[name] = json.loads(value)
-        except (ValueError, RecursionError) as error:  # also of thousands of digits, or brackets
-            wanted = "expected a number (or null), or a word"
-            raise ParameterError(f"--set {name}: {wanted}, got {quote(value)}") from error
+        gains[name] = _parse_gain_value(name, value)
     return gains
+
+
+def _parse_gain_value(name: str, text: str) -> Any:
+    if re.fullmatch(_WORD, text) and text not in _JSON_CONSTANTS:
+        return text
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        # Numbers of thousands of digits and deeply nested brackets fail, too.
+        expected = "expected a number (or null), or a word"
+        raise ParameterError(f"--set {name}: {expected}, got {quote(text)}") from error

@@ -1,4 +1,4 @@
-"""Ctrl-C that keeps what is done."""
+"""Ctrl-C that keeps what has been computed."""
 
 import os
 import signal
@@ -8,30 +8,31 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Self
 
-INTERRUPTED = 130  # exit status
+INTERRUPTED = 130
+"""Exit status of a command that was interrupted."""
 
-
-_arrived: set[int] = set()
-"""Signals that have arrived since the command began."""
+_received_signals: set[int] = set()
+"""Signals that the command has received."""
 
 
 def was_interrupted() -> bool:
     """Return whether a `KeyboardInterrupt` comes from Ctrl-C, rather than from a user's controller."""
-    return bool(_arrived)
+    return bool(_received_signals)
 
 
 @contextmanager
-def noting_interrupts() -> Iterator[None]:
-    """Note Ctrl-C for `was_interrupted`, and raise `KeyboardInterrupt` as Python does by itself."""
-    _arrived.clear()
-    main = threading.current_thread() is threading.main_thread()
-    if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        _arrived.add(signal.SIGINT)  # it cannot be known
+def note_interrupts() -> Iterator[None]:
+    """Note Ctrl-C for `was_interrupted`, and raise `KeyboardInterrupt` as Python does."""
+    _received_signals.clear()
+    is_main_thread = threading.current_thread() is threading.main_thread()
+    if not is_main_thread or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        # Whether there will be a signal cannot be known here.
+        _received_signals.add(signal.SIGINT)
         yield
         return
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        _arrived.add(number)
+        _received_signals.add(number)
         raise KeyboardInterrupt
 
     signal.signal(signal.SIGINT, interrupt)
@@ -43,32 +44,44 @@ def noting_interrupts() -> Iterator[None]:
 
 
 class Interruption:
-    """Context in which the first Ctrl-C (or SIGTERM) is only noted, for long loops; a second ends at once."""
+    """Context in which the first Ctrl-C or SIGTERM is only noted, and a second one ends the command.
+
+    Attributes
+    ----------
+    requested : bool
+        Whether the loop should end.
+    """
 
     def __init__(self) -> None:
         self.requested = False
-        self._former: dict[signal.Signals, signal._HANDLER] = {}
+        self._previous_handlers: dict[signal.Signals, signal._HANDLER] = {}
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
             for number in (signal.SIGINT, signal.SIGTERM):
-                self._former[number] = signal.signal(number, self._note)
+                self._previous_handlers[number] = signal.signal(number, self._note)
         return self
 
     def __exit__(self, *exception: object) -> None:
-        for number, handler in self._former.items():
+        for number, handler in self._previous_handlers.items():
             signal.signal(number, handler)
 
     def _note(self, number: int, frame: FrameType | None) -> None:
-        _arrived.add(number)
+        _received_signals.add(number)
         if self.requested:
             raise KeyboardInterrupt
         self.requested = True
         with suppress(OSError):
-            os.write(2, b"\nstopping; Ctrl-C again ends at once\n")
+            os.write(2, b"\nstopping; press Ctrl-C again to end at once\n")
 
 
-def interruptible(now: bool) -> None:
-    """Hold Ctrl C back, which a terminal sends to all processes, while one of them begins; or let it come."""
+def block_interrupts() -> None:
+    """Block Ctrl-C while child processes start: a terminal sends it to all processes."""
     if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK if now else signal.SIG_BLOCK, {signal.SIGINT})
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+
+
+def unblock_interrupts() -> None:
+    """Let Ctrl-C arrive again after `block_interrupts`."""
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

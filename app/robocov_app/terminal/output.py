@@ -1,4 +1,4 @@
-"""Output of commands: small files of results, names for them, and tables for people."""
+"""Output of commands: answers, tables, and small files of results."""
 
 from __future__ import annotations
 
@@ -21,113 +21,226 @@ from robocov.text import escape_controls
 if TYPE_CHECKING:
     from rich.console import Console
 
+PIPED_TABLE_COLUMNS = 140
+"""Width in characters of a table that is written to a file or a pipe."""
+BOLD: Mapping[str, Any] = {"style": "bold", "no_wrap": True}
+"""Look of a column of `print_table`."""
+RIGHT: Mapping[str, Any] = {"justify": "right", "no_wrap": True}
+"""Look of a column of `print_table`."""
+
 
 def echo(
     *texts: object, sep: str = " ", end: str = "\n", to_stderr: bool = False, flush: bool = False
 ) -> None:
-    """Print texts. Whatever names and messages they contain, the terminal does not obey it.
+    """Print texts without the control characters that names and messages may contain.
 
-    All output of the application goes through here or through `console`; see `escape_controls`.
+    All output of the application is printed by this function or by `create_console`.
+
+    Parameters
+    ----------
+    *texts : object
+    sep, end, flush
+        As of `print`.
+    to_stderr : bool
     """
     file = sys.stderr if to_stderr else sys.stdout
     safe = [escape_controls(str(text)) for text in texts]
     print(*safe, sep=sep, end=end, file=file, flush=flush)
 
 
-def tell(options: Any, answer: Any, *lines: str, indent: int | None = None) -> None:
-    """Print an answer: with --json as one JSON object, with null for what is not finite; else as lines."""
+def print_answer(options: Any, answer: Any, *lines: str, indent: int | None = None) -> None:
+    """Print the answer of a command.
+
+    Parameters
+    ----------
+    options : JsonOption
+        Whether a program reads the answer.
+    answer : object
+        JSON content for programs; numbers that are not finite become null.
+    *lines : str
+        Text for people.
+    indent : int or None
+        Indentation of the JSON content.
+    """
     if options.json:
-        echo(json.dumps(finite(answer), indent=indent))
+        echo(json.dumps(replace_non_finite(answer), indent=indent))
     else:
         echo(*lines, sep="\n", end="\n" if lines else "")
 
 
-def free_name(folder: Path, stem: str, suffix: str) -> Path:
-    """Return a path that is not there yet: ``stem-1.suffix``, ``stem-2.suffix``, ..."""
+def find_free_path(folder: Path, stem: str, suffix: str) -> Path:
+    """Find a path that does not exist yet.
+
+    Parameters
+    ----------
+    folder : Path
+    stem, suffix : str
+
+    Returns
+    -------
+    Path
+        ``stem-1.suffix``, ``stem-2.suffix`` or so on. A number at the end of the stem is replaced.
+    """
     stem = stem.rstrip("0123456789").rstrip("-") or stem
-    paths = (folder / f"{stem}-{k}{suffix}" for k in count(1))
-    return next(path for path in paths if not os.path.lexists(path))  # a link to nothing is there, too
+    paths = (folder / f"{stem}-{number}{suffix}" for number in count(1))
+    # A link that points to nothing exists, too.
+    return next(path for path in paths if not os.path.lexists(path))
 
 
-def require_fresh(
-    path: Path, other: str, *, overwrite: bool, source: Path | None = None, read: str = "file"
+def check_output_file(
+    path: Path, alternative: str, *, overwrite: bool, source: Path | None = None, source_kind: str = "file"
 ) -> None:
-    """Raise InputError where `path` may not be written: it is the source, or there is a file already."""
+    """Check that a file may be written.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    alternative : str
+        Way out in the message, such as ``another --out``.
+    overwrite : bool
+        Whether an existing file may be replaced.
+    source : Path or None
+        File that the command reads, which is never replaced.
+    source_kind : str
+        What the source is, for the message.
+
+    Raises
+    ------
+    InputError
+        If the file may not be written.
+    """
     if not resolve_target(path).exists():
         return
     if source is not None and source.exists() and path.samefile(source):
-        raise InputError(f"{path}: the {read} that is read; choose {other}")
+        raise InputError(f"{path}: the {source_kind} that is read; choose {alternative}")
     if not overwrite:
-        raise InputError(f"{path}: exists already; choose {other} or pass --overwrite")
+        raise InputError(f"{path}: exists already; choose {alternative} or pass --overwrite")
 
 
-def listed(folder: Path) -> str:
+def list_files(folder: Path) -> str:
+    """Return the names of the visible files and folders in a folder, separated by commas."""
     return ", ".join(sorted(path.name for path in folder.iterdir() if not path.name.startswith(".")))
 
 
 def write_json(path: Path, content: Any) -> None:
-    with replace_file(path) as part:
-        part.write_text(json_text(content), encoding="utf-8")
+    """Write a JSON file, completely or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    content : object
+        Its numbers are finite.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    with replace_file(path) as temporary:
+        temporary.write_text(format_json(content), encoding="utf-8")
 
 
-def json_text(content: Any) -> str:
+def format_json(content: Any) -> str:
+    """Return the text of a JSON file with finite numbers."""
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
 def write_csv(path: Path, header: str, rows: Iterable[Iterable[object]]) -> None:
-    with replace_file(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(csv_text(header, rows))
+    """Write a CSV file, completely or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    header : str
+        First line.
+    rows : iterable of iterable of object
+        See `format_csv`.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    with replace_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(format_csv(header, rows))
 
 
-def csv_text(header: str, rows: Iterable[Iterable[object]]) -> str:
-    """Return a table as CSV: None is an empty cell, and no text is taken for a formula by a spreadsheet."""
-    return header + "\n" + "".join(csv_line(row) for row in rows)
+def format_csv(header: str, rows: Iterable[Iterable[object]]) -> str:
+    """Format a table as CSV.
+
+    Parameters
+    ----------
+    header : str
+        First line.
+    rows : iterable of iterable of object
+        Numbers keep all their digits, None is an empty cell, and texts are quoted so that no spreadsheet
+        takes them for formulas.
+
+    Returns
+    -------
+    str
+    """
+    return header + "\n" + "".join(format_csv_line(row) for row in rows)
 
 
-def csv_line(cells: Iterable[object]) -> str:
-    """Return one line of CSV, with all digits of its numbers."""
+def format_csv_line(cells: Iterable[object]) -> str:
+    """Format one row of `format_csv`."""
     text = io.StringIO()
-    # the writer puts only those line breaks into quotation marks that end its own lines
+    # The writer quotes only those line breaks that also end its own lines.
     csv.writer(text, lineterminator="\r\n").writerow(map(quote_cell, cells))
     return text.getvalue().removesuffix("\r\n") + "\n"
 
 
-def finite(content: Any) -> Any:
-    """Return JSON content with None for every number that is not finite: JSON has no other word for it."""
+def replace_non_finite(content: Any) -> Any:
+    """Return JSON content with None in place of every number that is not finite, which JSON cannot express.
+
+    Examples
+    --------
+    >>> replace_non_finite({"cost": float("inf"), "values": [1.0]})
+    {'cost': None, 'values': [1.0]}
+    """
     if isinstance(content, dict):
-        return {key: finite(value) for key, value in content.items()}
+        return {key: replace_non_finite(value) for key, value in content.items()}
     if isinstance(content, list):
-        return [finite(value) for value in content]
-    return None if isinstance(content, float) and not math.isfinite(content) else content
+        return [replace_non_finite(value) for value in content]
+    if isinstance(content, float) and not math.isfinite(content):
+        return None
+    return content
 
 
-PIPED_WIDTH = 140  # columns of a table that goes to a file or a pipe
+def create_console() -> Console:
+    """Create the console of tables, on standard output.
 
-
-def console() -> Console:
-    """Return the console of answers, on stdout.
-
-    Names may contain brackets, so none are taken for markup. Texts that are printed are safe to display;
-    cells of tables have to be passed through `escape_controls`, as `print_table` does.
+    Returns
+    -------
+    rich.console.Console
+        It does not interpret brackets in names as markup. Texts that are printed are safe to display; cells
+        of tables have to be passed through `escape_controls`, as `print_table` does.
     """
     from rich.console import Console
 
     class SafeConsole(Console):
         def print(self, *objects: Any, **options: Any) -> None:
-            safe = [escape_controls(each) if isinstance(each, str) else each for each in objects]
+            safe = [escape_controls(item) if isinstance(item, str) else item for item in objects]
             super().print(*safe, **options)
 
-    return SafeConsole(width=None if sys.stdout.isatty() else PIPED_WIDTH, highlight=False, markup=False)
-
-
-BOLD: Mapping[str, Any] = {"style": "bold", "no_wrap": True}
-RIGHT: Mapping[str, Any] = {"justify": "right", "no_wrap": True}
+    width = None if sys.stdout.isatty() else PIPED_TABLE_COLUMNS
+    return SafeConsole(width=width, highlight=False, markup=False)
 
 
 def print_table(
     columns: Iterable[tuple[str, Mapping[str, Any]]], rows: Iterable[Iterable[str]], title: str | None = None
 ) -> None:
-    """Print rows under the titles of columns, each with what `rich.table.Table.add_column` takes."""
+    """Print a table.
+
+    Parameters
+    ----------
+    columns : iterable of (str, mapping)
+        Title of each column, and its look: arguments of `rich.table.Table.add_column`.
+    rows : iterable of iterable of str
+    title : str or None
+    """
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, header_style="bold", title=title, title_justify="left")
@@ -135,4 +248,4 @@ def print_table(
         table.add_column(name, **look)
     for row in rows:
         table.add_row(*map(escape_controls, row))
-    console().print(table)
+    create_console().print(table)

@@ -1,4 +1,4 @@
-"""Progress of long work on stderr: a bar in a terminal, one plain line elsewhere."""
+"""Progress of long work on standard error: a bar in a terminal, one plain line elsewhere."""
 
 import sys
 import time
@@ -9,69 +9,113 @@ from itertools import count
 from robocov.text import escape_controls
 from robocov_app.terminal.output import echo
 
-PATIENCE = 1.0  # seconds without a word
+PATIENCE_S = 1.0
+"""Time after which `show_late_progress` shows something."""
 
 
 @contextmanager
-def progress(label: str, total: int, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
-    """Show how far `label` is; the value is a function to be called with the number done so far."""
+def show_progress(label: str, total: int, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
+    """Show the progress of some work.
+
+    Parameters
+    ----------
+    label : str
+    total : int
+        Number of steps.
+    quiet : bool
+        Whether nothing is shown.
+
+    Yields
+    ------
+    callable
+        To be called with the number of finished steps.
+    """
     label = escape_controls(label)
     if quiet:
-        yield lambda done: None
+        yield lambda finished: None
     elif sys.stderr.isatty():
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-        words = TextColumn(f"{label:<12}", markup=False)
-        left = TimeRemainingColumn(elapsed_when_finished=True)
-        with Progress(words, BarColumn(), MofNCompleteColumn(), left, console=Console(stderr=True)) as bar:
+        columns = (
+            TextColumn(f"{label:<12}", markup=False),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(elapsed_when_finished=True),
+        )
+        with Progress(*columns, console=Console(stderr=True)) as bar:
             task = bar.add_task(label, total=total)
-            yield lambda done: bar.update(task, completed=done)
+            yield lambda finished: bar.update(task, completed=finished)
     else:
-        began, reached = time.perf_counter(), 0
+        start = time.perf_counter()
+        latest = 0
 
-        def note(done: int) -> None:
-            nonlocal reached
-            reached = done
+        def note(finished: int) -> None:
+            nonlocal latest
+            latest = finished
 
         yield note
-        echo(f"{label}: {reached} of {total} in {time.perf_counter() - began:.1f} s", to_stderr=True)
+        seconds = time.perf_counter() - start
+        echo(f"{label}: {latest} of {total} in {seconds:.1f} s", to_stderr=True)
 
 
 @contextmanager
-def late_progress(label: str, *, quiet: bool = False) -> Iterator[Callable[[float], None]]:
-    """Show how far something is, from 0 to 1, once it takes more than `PATIENCE`; the value takes that."""
-    began = time.perf_counter()
+def show_late_progress(label: str, *, quiet: bool = False) -> Iterator[Callable[[float], None]]:
+    """Show the progress of some work once it takes more than `PATIENCE_S`.
+
+    Parameters
+    ----------
+    label : str
+    quiet : bool
+        Whether nothing is shown.
+
+    Yields
+    ------
+    callable
+        To be called with the finished fraction, from 0 to 1.
+    """
+    start = time.perf_counter()
     with ExitStack() as stack:
         update: Callable[[int], None] | None = None
 
-        def tell(done: float) -> None:
+        def report(fraction: float) -> None:
             nonlocal update
-            if update is None and time.perf_counter() - began > PATIENCE:
-                update = stack.enter_context(progress(label, 100, quiet=quiet))
+            if update is None and time.perf_counter() - start > PATIENCE_S:
+                update = stack.enter_context(show_progress(label, 100, quiet=quiet))
             if update is not None:
-                update(round(100 * done))
+                update(round(100 * fraction))
 
-        yield tell
+        yield report
         if update is not None:
             update(100)
 
 
-def counting(update: Callable[[int], None]) -> Callable[[], None]:
-    """Return what counts one more each time, for an `update` of `progress`."""
+def make_counter(update: Callable[[int], None]) -> Callable[[], None]:
+    """Make a function that counts its calls and reports the count.
+
+    Parameters
+    ----------
+    update : callable
+        The function that `show_progress` yields.
+
+    Returns
+    -------
+    callable
+    """
     numbers = count(1)
     return lambda: update(next(numbers))
 
 
-def tell_of_compiling() -> None:
+def report_compilation() -> None:
+    """Print a line when the first kernel is compiled, which makes the first command slow."""
     from robocov import compiled
 
-    if _tell not in compiled.on_compile:
-        compiled.on_compile.append(_tell)
+    if _report_first_kernel not in compiled.on_compile:
+        compiled.on_compile.append(_report_first_kernel)
 
 
-def _tell(_: str) -> None:
+def _report_first_kernel(_: str) -> None:
     from robocov import compiled
 
-    compiled.on_compile.remove(_tell)
+    compiled.on_compile.remove(_report_first_kernel)
     echo("compiling the simulation, once", to_stderr=True)

@@ -18,7 +18,7 @@ from robocov.errors import InputError
 from robocov.files.writing import replace_file
 from robocov.text import remove_controls
 from robocov_app.render.theme import LIGHT
-from robocov_app.terminal.output import free_name
+from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.faults import FaultLog
 from robocov_app.toolkit.input import KEY_REPEAT, clean_event
 from robocov_app.toolkit.layout import SMALLEST
@@ -258,7 +258,7 @@ class BaseWindow:
         self.screen = open_window(before) if before else pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
 
     def save_screenshot(self, folder: Path) -> str:
-        target, picture = free_name(folder, "robocov", ".png"), BytesIO()
+        target, picture = find_free_path(folder, "robocov", ".png"), BytesIO()
         pygame.image.save(self.screen, picture, ".png")
         with replace_file(target) as part:
             part.write_bytes(picture.getvalue())

@@ -10,7 +10,7 @@ from robocov.controllers.gains import Value
 from robocov.environment import Point
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.mapfile import list_bundled_maps, load_map, save_map
-from robocov_app.terminal.output import free_name
+from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.autosave import Record
 from robocov_app.toolkit.faults import describe_os_error
 from robocov_app.toolkit.opening import require_regular_file
@@ -253,7 +253,7 @@ class Presenter:
         self.panel = not self.panel
 
     def save_map(self) -> None:
-        target = free_name(self.folder, Path(self.map_name).stem or "map", ".json")
+        target = find_free_path(self.folder, Path(self.map_name).stem or "map", ".json")
         save_map(self.session.environment, target)
         self.map_name = str(target)
         self.say(f"map saved: {target}")

@@ -12,7 +12,7 @@ from robocov.environment import Point
 from robocov.errors import RobocovError
 from robocov_app.render.picture import standard_layers
 from robocov_app.render.theme import theme_named
-from robocov_app.terminal.output import free_name
+from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.autosave import Record, remove_draft
 from robocov_app.toolkit.command import Command, Commands, draw_keys, palette
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Option, Question, file_choice, list_choice
@@ -550,7 +550,7 @@ class Window(BaseWindow):
 
     def toggle_film(self) -> str:
         if self.film is None:
-            target = free_name(self.viewer.folder, "robocov", ".mp4")
+            target = find_free_path(self.viewer.folder, "robocov", ".mp4")
             self.film = Film(target, self.screen.get_size(), patient=self._patient)
             self.viewer.filming = True
             return f"recording {target}; F9 ends it"

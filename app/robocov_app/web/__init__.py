@@ -45,7 +45,7 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
     if not options.serve:
         window.run()
         return
-    from robocov_app.terminal.interruption import interruptible
+    from robocov_app.terminal.interruption import unblock_interrupts
     from robocov_app.toolkit.termination import ending_on_signals, is_ending
     from robocov_app.web.confined import confined
     from robocov_app.web.server import WebDisplay
@@ -63,7 +63,7 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
             window.closed = True  # who stops the process cannot be asked about unsaved work
 
         signal.signal(signal.SIGINT, stop)  # the window itself sees to SIGTERM
-        interruptible(True)
+        unblock_interrupts()
         window.run()
     if stopped or is_ending():
         raise KeyboardInterrupt

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, unquote, urlencode, urlsplit
 
 from robocov.errors import InputError, OutputError, RobocovError, describe_error
-from robocov_app.terminal.interruption import interruptible
+from robocov_app.terminal.interruption import block_interrupts, unblock_interrupts
 from robocov_app.web.access import cookies_of, link_to, query_of, same, token_in
 from robocov_app.web.connections import (
     FAULT,
@@ -410,9 +410,9 @@ class Sessions:
             process = context.Process(target=_run_window, args=(self._command, options, sender), daemon=False)
             if os.name == "posix":
                 resource_tracker.ensure_running()  # which would unblock what is blocked here
-            interruptible(False)
+            block_interrupts()
             process.start()
-            interruptible(True)
+            unblock_interrupts()
             self._processes.append(process)
             sender.close()
             with receiver:

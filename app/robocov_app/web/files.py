@@ -11,7 +11,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 from robocov.errors import InputError, OutputError, RobocovError, describe_error
 from robocov.files.result_folder import MANIFEST_FILE
 from robocov.files.writing import replace_file
-from robocov_app.terminal.output import free_name
+from robocov_app.terminal.output import find_free_path
 from robocov_app.toolkit.dialogs import MOST_LISTED
 
 MAX_DOWNLOAD_BYTES = 1 << 28
@@ -83,7 +83,7 @@ class Upload:
         path = folder / self.name
         try:
             if path.exists():
-                path = free_name(folder, path.stem, path.suffix)
+                path = find_free_path(folder, path.stem, path.suffix)
             with replace_file(path) as part:
                 part.write_bytes(b"".join(self._pieces))
         except OSError as error:

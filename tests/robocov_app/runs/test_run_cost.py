@@ -13,7 +13,7 @@ PLACE = np.array([[2.0, 2.0]])
 
 
 def test_it_is_the_cost(monkeypatch, capsys):
-    monkeypatch.setattr("robocov_app.terminal.progress.PATIENCE", 600.0)  # also on a slow machine
+    monkeypatch.setattr("robocov_app.terminal.progress.PATIENCE_S", 600.0)  # also on a slow machine
     cost = build_cost(ROOMS, 48)
     assert cost.lattice == 48
     assert cost(PLACE).value == CoverageCost(ROOMS, 48)(PLACE).value
@@ -22,7 +22,7 @@ def test_it_is_the_cost(monkeypatch, capsys):
 
 @pytest.mark.parametrize("quiet", [False, True])
 def test_what_takes_long_is_told(monkeypatch, capsys, quiet):
-    monkeypatch.setattr("robocov_app.terminal.progress.PATIENCE", -1.0)
+    monkeypatch.setattr("robocov_app.terminal.progress.PATIENCE_S", -1.0)
     build_cost(ROOMS, 48, quiet=quiet)
     said = capsys.readouterr().err
     assert ("shortest paths: 100 of 100 in" in said) == (not quiet)
@@ -30,7 +30,7 @@ def test_what_takes_long_is_told(monkeypatch, capsys, quiet):
 
 
 def test_in_a_terminal_there_is_a_bar(monkeypatch, capsys):
-    monkeypatch.setattr("robocov_app.terminal.progress.PATIENCE", -1.0)
+    monkeypatch.setattr("robocov_app.terminal.progress.PATIENCE_S", -1.0)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     build_cost(ROOMS, 48)
     assert "100/100" in capsys.readouterr().err

@@ -5,7 +5,13 @@ import pytest
 from tyro.conf import Positional, arg
 
 from robocov.errors import InputError
-from robocov_app.terminal.arguments import _default_hint, by_option, one_line, parse_gains, parsed
+from robocov_app.terminal.arguments import (
+    _format_default,
+    name_option,
+    parse_gains,
+    parse_options,
+    summarize_complaint,
+)
 
 
 @dataclass
@@ -23,7 +29,7 @@ class Options:
 
 
 def test_words_become_values() -> None:
-    assert parsed(Options, "try", ["--count", "3", "--kind", "b"]) == Options(3, 0.5, "b")
+    assert parse_options(Options, "try", ["--count", "3", "--kind", "b"]) == Options(3, 0.5, "b")
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "utf-8"])
@@ -44,24 +50,24 @@ def test_a_wrong_word_gets_one_line_whatever_the_terminal(
     monkeypatch.setenv("PYTHONIOENCODING", encoding)
     monkeypatch.setenv("COLUMNS", "40")
     with pytest.raises(InputError) as caught:
-        parsed(Options, "try", words.split())
+        parse_options(Options, "try", words.split())
     assert str(caught.value) == f"{message} (robocov try -h explains)"
 
 
 def test_a_box_in_either_drawing() -> None:
     lines = "╭─ Oh ─╮\n│ no   │\n│ more │\n│ ──── │\n│ rest │\n╰──────╯"
     dashes = " Oh \n ---- \n  no  \n  more \n  ---- \n  rest \n"
-    assert one_line(lines) == one_line(dashes) == "no more"
+    assert summarize_complaint(lines) == summarize_complaint(dashes) == "no more"
 
 
 def test_defaults_that_say_something_are_in_the_help() -> None:
-    assert _default_hint("0.016666666666666666") == "(default: 0.01667)"
-    assert _default_hint("None") == ""
+    assert _format_default("0.016666666666666666") == "(default: 0.01667)"
+    assert _format_default("None") == ""
 
 
 def test_a_message_names_the_option() -> None:
     kind = make_dataclass("Arguments", ["fail"])
-    said = by_option(kind, "conditions.failures[0]: expected 1, got robot 9")
+    said = name_option(kind, "conditions.failures[0]: expected 1, got robot 9")
     assert said == "--fail: expected 1, got robot 9"
 
 
@@ -95,12 +101,12 @@ class Several:
     ],
 )
 def test_an_option_of_several_values_may_be_repeated(words: list[str]) -> None:
-    assert parsed(Several, "try", words).skip == ("a", "b")
+    assert parse_options(Several, "try", words).skip == ("a", "b")
 
 
 def test_repeated_options_keep_their_own_values() -> None:
     words = ["f", "--set", "k=-1", "--skip", "a", "--place", "-1", ".5", "--set", "l=2", "--skip"]
-    assert parsed(Several, "try", words) == Several("f", ("a",), (-1.0, 0.5), ("k=-1", "l=2"))
+    assert parse_options(Several, "try", words) == Several("f", ("a",), (-1.0, 0.5), ("k=-1", "l=2"))
     # what is given once and takes one value is not merged
     with pytest.raises(InputError):
-        parsed(Several, "try", ["f", "--place", "1", "--place", "2"])
+        parse_options(Several, "try", ["f", "--place", "1", "--place", "2"])

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.files.csv_cells import unquote_cell
-from robocov_app.terminal.output import csv_line, finite, write_csv, write_json
+from robocov_app.terminal.output import format_csv_line, replace_non_finite, write_csv, write_json
 
 
 def test_numbers_keep_all_their_digits(tmp_path: Path) -> None:
@@ -19,7 +19,7 @@ def test_numbers_keep_all_their_digits(tmp_path: Path) -> None:
 
 def test_json_has_no_word_for_infinity() -> None:
     content = {"a": float("nan"), "b": [1.0, float("inf")], "c": {"d": -float("inf")}, "e": "nan"}
-    assert finite(content) == {"a": None, "b": [1.0, None], "c": {"d": None}, "e": "nan"}
+    assert replace_non_finite(content) == {"a": None, "b": [1.0, None], "c": {"d": None}, "e": "nan"}
 
 
 FORMULAS = ("=1+1", "+1", "-1.json", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "＝1", "'=1", "''-")
@@ -28,10 +28,10 @@ FORMULAS = ("=1+1", "+1", "-1.json", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "＝1",
 @given(st.lists(st.one_of(st.text(), st.sampled_from(FORMULAS)), min_size=1))
 def test_texts_are_no_formulas_and_come_back(texts: list[str]) -> None:
     texts = [text.replace("\0", "") for text in texts]
-    (cells,) = csv.reader(io.StringIO(csv_line(texts), newline=""))
+    (cells,) = csv.reader(io.StringIO(format_csv_line(texts), newline=""))
     assert [unquote_cell(cell) for cell in cells] == texts
     assert not any(cell.lstrip("'")[:1] in "=+-@\t\r\n" and cell[0] != "'" for cell in cells if cell)
 
 
 def test_numbers_are_never_quoted() -> None:
-    assert csv_line([-1, -0.5, None, "=1+1", "a,b"]) == '-1,-0.5,,\'=1+1,"a,b"\n'
+    assert format_csv_line([-1, -0.5, None, "=1+1", "a,b"]) == '-1,-0.5,,\'=1+1,"a,b"\n'

@@ -2,11 +2,11 @@ import re
 
 import pytest
 
-from robocov_app.terminal.progress import progress
+from robocov_app.terminal.progress import show_progress
 
 
 def test_one_plain_line_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    with progress("counting", 3) as update:
+    with show_progress("counting", 3) as update:
         for done in (1, 2, 3):
             update(done)
     said = capsys.readouterr()
@@ -15,7 +15,7 @@ def test_one_plain_line_where_there_is_no_terminal(capsys: pytest.CaptureFixture
 
 
 def test_quiet_is_quiet(capsys: pytest.CaptureFixture[str]) -> None:
-    with progress("counting", 3, quiet=True) as update:
+    with show_progress("counting", 3, quiet=True) as update:
         update(3)
     assert capsys.readouterr() == ("", "")
 
@@ -23,7 +23,7 @@ def test_quiet_is_quiet(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_bar_in_a_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     monkeypatch.setenv("TERM", "xterm")
-    with progress("counting", 3) as update:
+    with show_progress("counting", 3) as update:
         update(3)
     said = capsys.readouterr()
     assert said.out == ""

@@ -6,7 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from robocov_app.terminal.watch import INTERVAL, LONGEST, SETTLED, changes
+from robocov_app.terminal.file_watching import (
+    MAX_SETTLING_TIME_S,
+    POLLING_INTERVAL_S,
+    SETTLING_TIME_S,
+    watch_files,
+)
 
 
 class EndedError(Exception):
@@ -33,7 +38,7 @@ def found(clock: Clock, *paths: Path) -> list[tuple[Path, ...]]:
     seen: list[tuple[Path, ...]] = []
 
     def watched() -> Iterator[None]:
-        for changed in changes(paths, sleep=clock):
+        for changed in watch_files(paths, sleep=clock):
             seen.append(changed)
             yield
 
@@ -64,7 +69,7 @@ def moved_away_and_written(path: Path) -> None:
 def test_at_first_all_files_are_there_and_then_nothing_happens(file: Path, tmp_path: Path) -> None:
     clock = Clock(*[None] * 20)
     assert found(clock, file, tmp_path / "none.json") == [(file, tmp_path / "none.json")]
-    assert set(clock.slept) == {INTERVAL}
+    assert set(clock.slept) == {POLLING_INTERVAL_S}
 
 
 @pytest.mark.parametrize(
@@ -92,7 +97,7 @@ def test_what_is_written_in_pieces_or_by_removing_first_is_one_change(file: Path
     pieces = [lambda: file.unlink(), lambda: file.write_text("a"), lambda: file.write_text("ab"), None]
     clock = Clock(*pieces, None, None)
     assert found(clock, file) == [(file,), (file,)]
-    assert clock.slept[:4] == [INTERVAL, SETTLED, SETTLED, SETTLED]
+    assert clock.slept[:4] == [POLLING_INTERVAL_S, SETTLING_TIME_S, SETTLING_TIME_S, SETTLING_TIME_S]
 
 
 def test_a_second_file_that_is_saved_meanwhile_comes_with_it(file: Path, tmp_path: Path) -> None:
@@ -104,7 +109,7 @@ def test_a_second_file_that_is_saved_meanwhile_comes_with_it(file: Path, tmp_pat
 def test_a_file_that_never_settles_is_told_all_the_same(file: Path) -> None:
     grown: list[Callable[[], object]] = [lambda k=k: file.write_text("x" * k) for k in range(4, 80)]
     clock = Clock(*grown)
-    assert len(found(clock, file)) == 1 + int(76 // (1 + LONGEST / SETTLED))
+    assert len(found(clock, file)) == 1 + int(76 // (1 + MAX_SETTLING_TIME_S / SETTLING_TIME_S))
 
 
 def test_a_link_is_followed(file: Path, tmp_path: Path) -> None:

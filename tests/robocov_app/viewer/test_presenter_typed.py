@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from touched_run import RAPF, RPF, all_told, begun, viewer_of
 
 from robocov.errors import InputError, ParameterError, RobocovError
-from robocov_app.terminal.output import free_name
+from robocov_app.terminal.output import find_free_path
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import SAID_FOR, Presenter, plain
 from robocov_app.viewer.session.scenario import MOST_ROBOTS
@@ -218,9 +218,9 @@ def test_no_text_is_too_odd(text: str) -> None:
 
 
 def test_names_count_on(tmp_path: Path) -> None:
-    assert free_name(tmp_path, "robocov", ".png").name == "robocov-1.png"
+    assert find_free_path(tmp_path, "robocov", ".png").name == "robocov-1.png"
     (tmp_path / "robocov-1.png").write_text("")
     (tmp_path / "robocov-3.png").write_text("")
-    assert free_name(tmp_path, "robocov", ".png").name == "robocov-2.png"
-    assert free_name(tmp_path, "rooms-12", ".json").name == "rooms-1.json"
-    assert free_name(tmp_path, "2024", ".json").name == "2024-1.json"
+    assert find_free_path(tmp_path, "robocov", ".png").name == "robocov-2.png"
+    assert find_free_path(tmp_path, "rooms-12", ".json").name == "rooms-1.json"
+    assert find_free_path(tmp_path, "2024", ".json").name == "2024-1.json"

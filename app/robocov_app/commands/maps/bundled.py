@@ -6,7 +6,7 @@ from typing import Any
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.commands.options import JsonOption
 from robocov_app.render.density import density_kind
-from robocov_app.terminal.output import BOLD, print_table, tell
+from robocov_app.terminal.output import BOLD, print_answer, print_table
 
 
 @dataclass
@@ -29,7 +29,7 @@ def command(options: Arguments) -> None:
         rows.append(row | {"starts": starts, "density": density})
         told = f"{description} Density: {density}." if density else description
         cells.append((name, f"{width:.3g} x {height:.3g}", ", ".join(starts), told))
-    tell(options, {"maps": rows}, indent=1)
+    print_answer(options, {"maps": rows}, indent=1)
     if not options.json:
         columns = [("map", BOLD), ("size in m", {"no_wrap": True}), ("starts, the default first", {})]
         print_table([*columns, ("what it is", {})], cells)

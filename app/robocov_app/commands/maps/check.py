@@ -14,8 +14,8 @@ from robocov.errors import InputError, MapError, format_path
 from robocov.mapfile import find_map_file, load_map
 from robocov.mapfile.check import MapReport, check_map
 from robocov_app.commands.options import JsonOption
-from robocov_app.terminal.output import console, echo, tell
-from robocov_app.terminal.watch import changes
+from robocov_app.terminal.file_watching import watch_files
+from robocov_app.terminal.output import create_console, echo, print_answer
 
 _LISTED = 5  # components whose areas are told
 
@@ -55,13 +55,13 @@ def command(options: Arguments) -> int:
             echo(f"{name}: valid", *_lines(outcome), sep="\n")
         for line in () if valid or options.json else _lines(outcome):
             echo(f"robocov: error: {line}", to_stderr=True)
-    tell(options, {"maps": rows}, indent=1)
+    print_answer(options, {"maps": rows}, indent=1)
     return 0 if all(row["valid"] for row in rows) else 2
 
 
 def watch(options: Arguments) -> None:
     """Check again at each save, and say what has changed since the map was last valid; Ctrl-C ends it."""
-    names, output = {}, console()
+    names, output = {}, create_console()
     for name in options.files:
         try:
             names[find_map_file(name)] = name
@@ -69,7 +69,7 @@ def watch(options: Arguments) -> None:
             names[Path(name)] = name
     outcomes: dict[str, MapReport | InputError] = {}
     valid: dict[str, MapReport] = {}
-    for changed in changes(list(names)):
+    for changed in watch_files(list(names)):
         former = dict(valid)
         fresh = {names[path]: _outcome(names[path]) for path in changed}
         outcomes |= fresh

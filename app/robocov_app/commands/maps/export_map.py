@@ -10,7 +10,7 @@ from robocov.errors import InputError, to_one_line
 from robocov.mapfile import load_map
 from robocov_app.commands.options import JsonOption
 from robocov_app.formats import EXPORTERS, WriteOptions, export_map, exporter
-from robocov_app.terminal.output import echo, require_fresh, tell
+from robocov_app.terminal.output import check_output_file, echo, print_answer
 
 
 @dataclass
@@ -45,8 +45,10 @@ def command(options: Arguments) -> None:
         known = ", ".join(EXPORTERS)
         raise InputError(f"--format: expected one of {known}, got {to_one_line(options.format)!r}")
     for file in exporter(options.out, options.format).files(options.out, options.write):
-        require_fresh(file, "another -o", overwrite=options.overwrite, source=Path(options.map), read="map")
+        check_output_file(
+            file, "another -o", overwrite=options.overwrite, source=Path(options.map), source_kind="map"
+        )
     report = export_map(load_map(options.map), options.out, format=options.format, options=options.write)
     for line in report.warnings:
         echo(f"robocov: warning: {line}", to_stderr=True)
-    tell(options, report.to_dict(), *report.lines())
+    print_answer(options, report.to_dict(), *report.lines())

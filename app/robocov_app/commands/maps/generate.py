@@ -22,8 +22,8 @@ from robocov.files.writing import resolve_target
 from robocov.mapfile import dump_map, list_bundled_maps, load_map, save_map
 from robocov.mapfile.check import check_map
 from robocov_app.commands.options import FigureOptions
-from robocov_app.terminal.output import echo, require_fresh, tell
-from robocov_app.terminal.progress import progress
+from robocov_app.terminal.output import check_output_file, echo, print_answer
+from robocov_app.terminal.progress import show_progress
 
 KindName: TypeAlias = Literal["polygons", "blocks", "rooms", "mazes", "caves"]
 MOST = 10_000  # maps that are generated in one call at most
@@ -92,7 +92,7 @@ def command(options: Arguments) -> None:
     check_out(out, folder=several, overwrite=options.overwrite)
     jobs, rows = jobs_of(options), []
     made: list[Environment] = []
-    with progress("generating", len(jobs), quiet=options.json or not several) as update:
+    with show_progress("generating", len(jobs), quiet=options.json or not several) as update:
         for number, (name, make) in enumerate(jobs, start=1):
             path = out / f"{name}.json" if out is not None and several else out
             if path is not None and several:
@@ -115,7 +115,7 @@ def command(options: Arguments) -> None:
 
         save_figure(plot_maps(made, options.theme), options.plot)
     if out is not None:
-        tell(options, {"out": str(out), "maps": rows}, *map(_facts, rows), indent=1)
+        print_answer(options, {"out": str(out), "maps": rows}, *map(_facts, rows), indent=1)
 
 
 def _facts(row: dict[str, Any]) -> str:
@@ -140,7 +140,7 @@ def check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
         if out.is_dir() or not out.name:
             wanted = "expected the name of a file (--count makes a folder)"
             raise InputError(f"--out: {wanted}, got {str(out)!r}")
-        require_fresh(out, "another --out", overwrite=overwrite)
+        check_output_file(out, "another --out", overwrite=overwrite)
 
 
 def _require_map(path: Path) -> None:

@@ -12,8 +12,8 @@ from robocov.mapfile import save_map
 from robocov_app.commands.options import JsonOption
 from robocov_app.figures.files import check_figure_path
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, import_map
-from robocov_app.terminal.output import require_fresh, tell
-from robocov_app.terminal.progress import progress
+from robocov_app.terminal.output import check_output_file, print_answer
+from robocov_app.terminal.progress import show_progress
 
 
 @dataclass
@@ -62,11 +62,13 @@ def command(options: Arguments) -> None:
         known = ", ".join(IMPORTERS)
         raise InputError(f"--format: expected one of {known}, got {to_one_line(options.format)!r}")
     out = Path(f"{options.file.stem}.json") if options.out is None else options.out
-    require_fresh(out, "another -o", overwrite=options.overwrite, source=options.file)
+    check_output_file(out, "another -o", overwrite=options.overwrite, source=options.file)
     if options.preview is not None:
         check_figure_path(options.preview)
-        require_fresh(options.preview, "another --preview", overwrite=options.overwrite, source=options.file)
-    with progress("importing", 3, quiet=options.json or not sys.stderr.isatty()) as done:
+        check_output_file(
+            options.preview, "another --preview", overwrite=options.overwrite, source=options.file
+        )
+    with show_progress("importing", 3, quiet=options.json or not sys.stderr.isatty()) as done:
         environment, report, foreign = import_map(
             options.file, format=options.format, options=options.read, shaping=options.shaping
         )
@@ -79,4 +81,6 @@ def command(options: Arguments) -> None:
             preview(foreign, environment, report, options.preview)
         done(3)
     files = {"out": str(out)} | ({} if options.preview is None else {"preview": str(options.preview)})
-    tell(options, files | report.to_dict(), *report.lines(), f"saved in {' and '.join(files.values())}")
+    print_answer(
+        options, files | report.to_dict(), *report.lines(), f"saved in {' and '.join(files.values())}"
+    )

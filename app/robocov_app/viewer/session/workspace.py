@@ -15,7 +15,7 @@ from typing import Any
 from robocov.controllers import CONTROLLERS
 from robocov.errors import OutputError
 from robocov_app.runs.saved_runs import name_folders
-from robocov_app.terminal.output import echo, free_name
+from robocov_app.terminal.output import echo, find_free_path
 from robocov_app.toolkit import autosave
 from robocov_app.viewer.session.changes import Restart, SetController
 from robocov_app.viewer.session.file import SUFFIX, save_session, session_json, session_of
@@ -57,7 +57,9 @@ class Workspace:
         session = self.session
         session.require_document()
         session.stow()
-        target = path or self.path or free_name(folder, session.environment.name.lower() or "session", SUFFIX)
+        target = (
+            path or self.path or find_free_path(folder, session.environment.name.lower() or "session", SUFFIX)
+        )
         save_session(target, session.document, session.head, session.step_now, view)
         self.path, self._saved = target, session.revision
         self._autosaver.settle(target)
@@ -174,7 +176,7 @@ class RunSaver:
 def _made(folder: Path, stem: str) -> Path:
     """Make a folder that was not there before; OutputError when it cannot be made."""
     while True:
-        target = free_name(folder, stem, "")
+        target = find_free_path(folder, stem, "")
         try:
             target.mkdir(parents=True)
         except FileExistsError:

@@ -1,0 +1,70 @@
+"""Files that are watched for changes, in whatever way editors write them."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+POLLING_INTERVAL_S = 0.25
+"""Time between two looks at the files; one takes microseconds."""
+SETTLING_TIME_S = 0.1
+"""Time during which a file must not change: editors write in pieces, or remove and rename."""
+MAX_SETTLING_TIME_S = 2.0
+"""Time after which a file that keeps changing counts as changed."""
+_State: TypeAlias = tuple[int, int, int, int] | None
+
+
+def watch_files(
+    paths: Sequence[Path], *, sleep: Callable[[float], None] = time.sleep
+) -> Iterator[tuple[Path, ...]]:
+    """Watch files or links for ever.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+    sleep : callable
+        Waits for a number of seconds.
+
+    Yields
+    ------
+    tuple of Path
+        First all paths, then those that were written, removed or replaced.
+    """
+    known = [_get_state(path) for path in paths]
+    yield tuple(paths)
+    while True:
+        sleep(POLLING_INTERVAL_S)
+        first = [_get_state(path) for path in paths]
+        if first == known:
+            continue
+        settled = _wait_until_settled(paths, first, sleep)
+        changed = []
+        for path, old, new, newest in zip(paths, known, first, settled, strict=True):
+            if not old == new == newest:
+                changed.append(path)
+        # Anything that is written from now on is another change, also while this one is handled.
+        known = settled
+        yield tuple(changed)
+
+
+def _wait_until_settled(
+    paths: Sequence[Path], states: list[_State], sleep: Callable[[float], None]
+) -> list[_State]:
+    """Wait until the states of files stay the same, and return them."""
+    waited = 0.0
+    previous: list[_State] | None = None
+    while waited < MAX_SETTLING_TIME_S and states != previous:
+        sleep(SETTLING_TIME_S)
+        waited += SETTLING_TIME_S
+        previous = states
+        states = [_get_state(path) for path in paths]
+    return states
+
+
+def _get_state(path: Path) -> _State:
+    """Return what changes when a file is written or replaced; None if it does not exist."""
+    try:
+        status = path.stat()
+    except (OSError, ValueError):
+        return None
+    return status.st_mtime_ns, status.st_size, status.st_ino, status.st_dev
