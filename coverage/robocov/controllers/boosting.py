@@ -195,7 +195,7 @@ class Boosting(BaseController):
 
         phi         κ Φ_i^γ w: points that no other robot detects count more
         p           κ (1 - Π (1 - p))^-γ w: points that the whole team hardly detects count more
-        neighbors  w, and each neighbor in range repels with κ / d^γ
+        neighbours  w, and each neighbor in range repels with κ / d^γ
 
     A robot follows it until it rests again, or for `patience`, and then its own gradient to the next optimum.
     If it contributes less there than before, it returns on its trail, and stays. The result is therefore no
@@ -222,8 +222,8 @@ class Boosting(BaseController):
     decay: float = gain(
         0.1, "1/m", "λ, rate at which detection decreases with distance", low=1e-3, high=100.0
     )
-    boost: str = choice("phi", ("phi", "p", "neighbors"), "boosting function")
-    kappa: float = gain(1.0, "1", "κ, its factor; for neighbors in m^(1+γ)")
+    boost: str = choice("phi", ("phi", "p", "neighbours"), "boosting function")
+    kappa: float = gain(1.0, "1", "κ, its factor; for neighbours in m^(1+γ)")
     gamma: float = gain(2.0, "1", "γ, its exponent", high=20.0)
     boosts: float = gain(3.0, "times", "maximum number of boosts of a robot", whole=True, high=1e3)
     patience: float = gain(8.0, "s", "maximum duration of a boost")
@@ -293,7 +293,7 @@ class Boosting(BaseController):
         windows = find_windows(view, directions, reach, self.jump)
         boosted_weight = self._boost_weight(samples)
         boosted_gradient = self._compute_gradient(boosted_weight, samples, view, windows, reach)
-        if self.boost == "neighbors":
+        if self.boost == "neighbours":
             repulsion = self.kappa / np.maximum(pairs.distance, _MIN_DISTANCE_M) ** (self.gamma + 1.0)
             boosted_gradient = boosted_gradient + sum_by_robot(
                 pairs.robot, repulsion[:, None] * pairs.offset, len(reach)

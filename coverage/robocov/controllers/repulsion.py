@@ -253,7 +253,7 @@ class Poduri(BaseController):
     label = "Constrained coverage"
     summary = "spreads, but keeps at least K neighbors within R_c (Poduri and Sukhatme 2004)"
 
-    neighbors: float = gain(
+    neighbours: float = gain(
         2.0, "robots", "K, number of neighbors that each robot keeps", high=100.0, whole=True
     )
     link_range: float = gain(6.0, "m", "R_c, or the communication range if that is less", low=0.01, high=1e5)
@@ -305,8 +305,8 @@ class Poduri(BaseController):
         is_near = np.zeros((n, n), dtype=bool)
         is_near[links.robot, links.neighbor] = links.distance <= self.eta * link_ranges
         rank = _rank_by_distance(links.robot, links.distance)
-        is_critical: BoolArray = (is_near.sum(axis=1)[links.robot] <= self.neighbors) & (
-            rank < self.neighbors
+        is_critical: BoolArray = (is_near.sum(axis=1)[links.robot] <= self.neighbours) & (
+            rank < self.neighbours
         )
         others = np.flatnonzero(~is_critical)
         if seen.reported_positions is None:
@@ -325,14 +325,14 @@ class Poduri(BaseController):
         hears[first, second] = True
         # Products of float matrices are much faster than those of integers.
         near_counts = hears.astype(np.float32) @ is_near.astype(np.float32).T
-        is_critical = near_counts[links.robot, links.neighbor][selected] <= self.neighbors
+        is_critical = near_counts[links.robot, links.neighbor][selected] <= self.neighbours
         # The table of the remaining links is large: there are few of them.
         remaining = selected[is_critical]
         distances = np.full((n, n), np.inf)
         distances[links.robot, links.neighbor] = links.distance
         is_nearer = distances[links.neighbor[remaining]] < links.distance[remaining, None]
         nearer_counts = (is_nearer & hears[links.robot[remaining]]).sum(axis=1)
-        is_critical[is_critical] = nearer_counts < self.neighbors
+        is_critical[is_critical] = nearer_counts < self.neighbours
         return np.asarray(is_critical)
 
     def _is_critical_by_reports(
@@ -349,7 +349,7 @@ class Poduri(BaseController):
             near_range = self.eta * link_ranges[link]
             near_count = (distances <= near_range).sum() + (links.distance[link] <= near_range)
             nearer_count = (distances < links.distance[link]).sum()
-            is_critical[k] = near_count <= self.neighbors and nearer_count < self.neighbors
+            is_critical[k] = near_count <= self.neighbours and nearer_count < self.neighbours
         return is_critical
 
 

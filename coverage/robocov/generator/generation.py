@@ -147,7 +147,7 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
 
     Its free space is connected and has no passage narrower than `gap`. The blocked fraction of its area
     differs from `area` by at most `AREA_TOLERANCE`. Its starts are ``corner``, a disc in one of the corners,
-    ``center``, a disc near the middle, and ``uniform``. Its `extra` contains the parameters.
+    ``centre``, a disc near the middle, and ``uniform``. Its `extra` contains the parameters.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ def _build_environment(
             return None
         # The starts are added only now, because they depend on the free space, which is computed once.
         starts["corner"] = corner_disc
-        starts["center"] = center_disc
+        starts["centre"] = center_disc
         starts["uniform"] = UniformStart()
         check_rules(environment, environment.name)
     except (MapError, shapely.GEOSException):

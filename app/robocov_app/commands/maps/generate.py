@@ -38,7 +38,7 @@ class Arguments(FigureOptions):
 
     The kinds are polygons (scattered obstacles), blocks (a town), rooms (a building), mazes and caves. The
     free space of each is one piece, no passage of it is narrower than the gap, and it has the starts
-    corner, center and uniform. Without --out the map is printed.
+    corner, centre and uniform. Without --out the map is printed.
 
     With --count the maps of as many seeds, one after the other, go to a folder.
     With --study the maps go there that robocov paper draws by chance, with its starts.
