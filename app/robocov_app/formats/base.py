@@ -59,8 +59,8 @@ class ForeignMap:
     `boundary_source`: what the boundary is, for the report.
     `vertices_read`: of a raster, corners of the outline of its free cells. `cell`, m: the longer side of one.
     `specks`, m²: smaller obstacles are noise of how such maps are made. `cut_corners`: by a step or two of a
-    grid, so that `geometry.simplify.sharpen_corners` makes them whole. `primitives`: obstacles that the file draws
-    as such, not in `free`, kept instead of the polygons that they cover where nothing speaks against it.
+    grid, so that `geometry.corners` makes them whole. `primitives`: obstacles that the file draws as such,
+    not in `free`, kept instead of the polygons that they cover where nothing speaks against it.
     `robots`, (n, 2) m: where the file places some. `repaired`, `dropped`, `notes`: a line each, with counts.
     """
 

@@ -15,7 +15,7 @@ from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, load_map, save_map, to_json
 from robocov_app.formats import Shaping, detect, import_map
 from robocov_app.formats.base import ImportReport
-from robocov_app.formats.geometry.simplify import sharpen_corners
+from robocov_app.formats.geometry.corners import sharpen_corners
 
 # two rooms of 4 m x 3 m and a door of 0.9 m in a wall of 0.1 m, with corners cut by 1 cm as in such plans
 PLAN = [

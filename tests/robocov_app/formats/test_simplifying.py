@@ -8,12 +8,10 @@ from hypothesis import strategies as st
 from shapely import MultiPolygon, Polygon, affinity
 
 from robocov_app.formats.geometry.conversion import find_rooms
-from robocov_app.formats.geometry.simplify import (
-    KEPT_OUTLINE,
-    OriginalOutline,
-    find_closed_gaps,
-    simplify_free_space,
-)
+from robocov_app.formats.geometry.narrow_gaps import find_closed_gaps
+from robocov_app.formats.geometry.original_outline import OriginalOutline
+from robocov_app.formats.geometry.simplification_check import MAX_OUTLINE_CHANGE
+from robocov_app.formats.geometry.simplify import simplify_free_space
 from robocov_app.formats.geometry.vectorize import trace_outline
 
 CELL = 0.05
@@ -85,7 +83,7 @@ def test_round_things_keep_their_size() -> None:
         result = simplify_free_space(stairs, CELL, CELL, 0.1)
         (hole,) = result.free.geoms[0].interiors
         was = Polygon(stairs.geoms[0].interiors[0]).area
-        assert Polygon(hole).area == pytest.approx(was, rel=KEPT_OUTLINE)
+        assert Polygon(hole).area == pytest.approx(was, rel=MAX_OUTLINE_CHANGE)
         assert 5 <= len(hole.coords) - 1 <= 24
         assert shapely.hausdorff_distance(Polygon(hole).boundary, pillar.boundary) < 2 * CELL
 
@@ -109,7 +107,9 @@ def test_a_thin_wall_at_an_angle_keeps_its_area(angle: float) -> None:
     stairs = cells_of(shapely.box(0, 0, 5, 4) - wall)
     solid = shapely.box(*stairs.bounds) - stairs
     result = simplify_free_space(stairs, CELL, CELL, 0.1)
-    assert (shapely.box(*stairs.bounds) - result.free).area == pytest.approx(solid.area, rel=KEPT_OUTLINE)
+    assert (shapely.box(*stairs.bounds) - result.free).area == pytest.approx(
+        solid.area, rel=MAX_OUTLINE_CHANGE
+    )
 
 
 @pytest.mark.parametrize("thickness", [0.012, 0.02, 0.028])
@@ -205,11 +205,11 @@ def test_the_parts_of_it_are_what_they_say(cave: tuple[int, float, int, float]) 
     seed, share, smooth, _ = cave
     cells = trace_outline(blobs(seed, share, smooth), "grid")
     outline = OriginalOutline(list(cells.geoms), 1.0)
-    assert outline.areas.sum() == pytest.approx(cells.area, abs=0.01 * outline.neck.sum() + 1e-9)
+    assert outline.areas.sum() == pytest.approx(cells.area, abs=0.01 * outline.is_neck.sum() + 1e-9)
     everything = np.zeros(len(outline.points))
     nothing = np.zeros(len(outline.points), dtype=bool)
     # without any tolerance the very same outline comes back, necks and all
-    back = outline.polygons(outline.with_necks(outline.drawn(everything, nothing)))
+    back = outline.to_polygons(outline.restore_necks(outline.draw(everything, nothing)))
     assert shapely.equals_exact(back.normalize(), cells.normalize(), 1e-9)
 
 
@@ -218,7 +218,7 @@ def test_what_must_stay_does() -> None:
     outline = OriginalOutline([Polygon(np.column_stack([np.cos(angle), np.sin(angle)]))], None)
     fixed = np.zeros(100, dtype=bool)
     fixed[[7, 33, 90]] = True
-    source = set(outline.drawn(np.full(100, 0.5), fixed).source)
+    source = set(outline.draw(np.full(100, 0.5), fixed).source)
     assert {7.0, 33.0, 90.0} <= source
     assert len(source) <= 12
 
@@ -278,8 +278,8 @@ def test_cells_need_not_be_square(sides: tuple[float, float]) -> None:
     for shape, turn in ((cells, 0), (turned, 20)):
         outline = OriginalOutline(list(shape.geoms), max(sides))
         wanted = affinity.rotate(shapely.Point(5 * sides[0], 5 * sides[1]), turn, origin=(0, 0))
-        assert outline.neck.sum() == 2
-        assert outline.points[outline.neck] == pytest.approx(np.repeat([wanted.coords[0]], 2, axis=0))
+        assert outline.is_neck.sum() == 2
+        assert outline.points[outline.is_neck] == pytest.approx(np.repeat([wanted.coords[0]], 2, axis=0))
     # walls at an angle are straight
     room = affinity.rotate(shapely.box(0, 0, 6, 4), 20, origin=(0, 0))
     stretched = affinity.scale(room, 1 / sides[0], 1 / sides[1], origin=(0, 0))

@@ -10,11 +10,11 @@ from shapely import MultiPolygon, Polygon
 
 from robocov_app.formats.base import square_metres
 from robocov_app.formats.files import parse_yaml
+from robocov_app.formats.geometry.corners import sharpen_corners
 from robocov_app.formats.geometry.curves import flatten_beziers
 from robocov_app.formats.geometry.polygons import Rule, build_boundary, find_enclosed_area, format_decimal
 from robocov_app.formats.geometry.rasterize import _iterate_smaller_sizes
 from robocov_app.formats.geometry.shapes import _pluralize
-from robocov_app.formats.geometry.simplify import sharpen_corners
 from robocov_app.formats.geometry.vectorize import _format_share, trace_outline
 from robocov_app.formats.preview import _number
 from robocov_app.formats.svg.path import parse_declarations, parse_path

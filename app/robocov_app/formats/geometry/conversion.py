@@ -23,6 +23,8 @@ from robocov.mapfile.check import MANY_VERTICES, count_vertices, describe_vertex
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.formats.base import ForeignMap, ImportReport, Options, Primitive, square_metres
 from robocov_app.formats.geometry.cleaning import Cleaned, Deviation, measure_deviation, remove_hairs
+from robocov_app.formats.geometry.corners import sharpen_corners
+from robocov_app.formats.geometry.narrow_gaps import count_ray_crossings
 from robocov_app.formats.geometry.polygons import (
     buffer_with_mitres,
     build_boundary,
@@ -35,12 +37,7 @@ from robocov_app.formats.geometry.polygons import (
     to_multipolygon,
     unite,
 )
-from robocov_app.formats.geometry.simplify import (
-    SimplifiedSpace,
-    count_crossed_sides,
-    sharpen_corners,
-    simplify_free_space,
-)
+from robocov_app.formats.geometry.simplify import SimplifiedSpace, simplify_free_space
 
 _CRUMB = 1e-4  # obstacles and parts that are smaller, in m², come of rounding
 DEFAULT_TOLERANCE = 0.02  # by how much walls of vector formats may move, in metres
@@ -726,7 +723,7 @@ def find_roomiest_point(
     low_x, low_y, high_x, high_y = free.bounds
     width, height = high_x - low_x, high_y - low_y
     some = np.linspace(low_y, high_y, _SQUARES)
-    squares = max(min(_SQUARES, _SQUARES * _MOST_RAYS // max(count_crossed_sides(sides, some), 1)), 16)
+    squares = max(min(_SQUARES, _SQUARES * _MOST_RAYS // max(count_ray_crossings(sides, some), 1)), 16)
     side = max(min(width, height), max(width, height) / squares)
     corners = np.meshgrid(np.arange(low_x, high_x, side), np.arange(low_y, high_y, side))
     centres = np.stack(corners, axis=-1).reshape(-1, 2) + side / 2

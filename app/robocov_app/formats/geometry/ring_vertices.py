@@ -1,0 +1,135 @@
+"""The vertices of many rings in flat arrays, so that whole outlines are processed at once."""
+
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges, find_run_starts
+from robocov_app.formats.geometry.vectors import compute_cross
+
+_EXTREME_DIGITS = 6
+"""Decimals of relative distances, so that rounding does not decide between equally far vertices."""
+
+
+class RingVertices:
+    """The vertices of the rings of polygons, ring after ring; the first of a ring is not repeated.
+
+    Parameters
+    ----------
+    points : (k, 2) array, m
+    starts : (r,) array of int
+        Index of the first vertex of each ring; no ring is empty.
+    source : (k,) array
+        Index of the vertex of the original outline that each vertex is. An index plus one half is the
+        midpoint of the side after that vertex. Along a ring the values increase, except for one step
+        back to the lowest.
+
+    Attributes
+    ----------
+    vertex : (k,) array of int
+        ``source`` without the halves.
+    size : (r,) array of int
+        Number of vertices of each ring.
+    ring : (k,) array of int
+        Ring of each vertex.
+    after, before : (k,) arrays of int
+        Next and previous vertex along the ring.
+    """
+
+    def __init__(self, points: Array, starts: IntArray, source: Array) -> None:
+        self.points = points
+        self.starts = starts
+        self.source = source
+        self.vertex = source.astype(np.intp)
+        self.size = np.diff(starts, append=len(points))
+        self.ring = np.arange(len(starts)).repeat(self.size)
+        self.after = np.arange(1, len(points) + 1)
+        self.after[starts + self.size - 1] = starts
+        self.before = np.argsort(self.after)
+
+    @cached_property
+    def areas(self) -> Array:
+        """Signed area of each ring, (r,) m²; positive if counter-clockwise."""
+        local = self.points - self.points[self.starts].repeat(self.size, axis=0)
+        total = np.append(0.0, np.cumsum(compute_cross(local, local[self.after])))
+        return np.asarray((total[self.starts + self.size] - total[self.starts]) / 2)
+
+    @cached_property
+    def sides(self) -> Array:
+        """Vectors from each vertex to the next one, (k, 2) m."""
+        return np.asarray(self.points[self.after] - self.points)
+
+    @cached_property
+    def lengths(self) -> Array:
+        """Lengths of the sides, (k,) m."""
+        return np.asarray(np.hypot(*self.sides.T))
+
+    @property
+    def endpoints(self) -> Array:
+        """Start and end of each side, (k, 2, 2) m."""
+        return np.stack([self.points, self.points[self.after]], axis=1)
+
+    def find_extremes(self) -> BoolArray:
+        """Select two vertices of each ring that are far from each other, (k,)."""
+        reference = np.add.reduceat(self.points, self.starts, axis=0) / self.size[:, None]
+        is_extreme = np.zeros(len(self.points), dtype=bool)
+        for _ in range(2):
+            distance = np.hypot(*(self.points - reference[self.ring]).T)
+            relative = np.round(distance / distance.max(), _EXTREME_DIGITS)
+            farthest = np.lexsort((-relative, self.ring))[self.starts]
+            is_extreme[farthest] = True
+            reference = self.points[farthest]
+        return is_extreme
+
+    def simplify(
+        self, tolerance: Array, is_fixed: BoolArray, max_tolerance: Array
+    ) -> tuple[IntArray, IntArray]:
+        """Drop vertices by the algorithm of Douglas and Peucker, between vertices that are fixed.
+
+        Parameters
+        ----------
+        tolerance : (k,) array, m
+            Where it changes along a ring, the vertices on both sides are fixed.
+        is_fixed : (k,) array of bool
+            At least one vertex of each ring.
+        max_tolerance : (r,) array, m
+            Upper limit of the tolerance in each ring.
+
+        Returns
+        -------
+        kept : (m,) array of int
+            Indices of the remaining vertices, ring after ring.
+        starts : (r,) array of int
+            First remaining vertex of each ring.
+        """
+        changes = tolerance != tolerance[self.after]
+        is_fixed = is_fixed | changes
+        is_fixed[self.after[changes]] = True
+        vertex, line = self._split_at(is_fixed)
+        # Between its ends, a line has a single tolerance.
+        second = vertex[find_run_starts(line) + 1]
+        line_tolerance = np.minimum(tolerance[second], max_tolerance[self.ring[second]])
+        # The index of a vertex travels through GEOS as the third coordinate.
+        lines = shapely.linestrings(np.column_stack([self.points[vertex], vertex]), indices=line)
+        simple = shapely.simplify(lines, line_tolerance, preserve_topology=False)
+        coordinates, line = shapely.get_coordinates(simple, include_z=True, return_index=True)
+        is_inner = np.append(line[1:] == line[:-1], False)
+        kept = coordinates[is_inner, 2].astype(np.intp)
+        return kept, np.searchsorted(self.ring[kept], np.arange(len(self.starts)))
+
+    def _split_at(self, is_fixed: BoolArray) -> tuple[IntArray, IntArray]:
+        """Split each ring into lines from one fixed vertex to the next; return vertices and their lines."""
+        size = self.size
+        index = np.arange(len(is_fixed))
+        # Each ring is followed from its first fixed vertex around to that vertex again.
+        first = np.minimum.reduceat(np.where(is_fixed, index, len(is_fixed)), self.starts)
+        ring = np.arange(len(self.starts)).repeat(size + 1)
+        step = concatenate_ranges(np.zeros_like(size), size + 1)
+        vertex = self.starts[ring] + (first[ring] - self.starts[ring] + step) % size[ring]
+        is_inner = is_fixed[vertex] & (step > 0) & (step < size[ring])
+        # A fixed vertex ends one line and starts the next, so it occurs twice.
+        doubled = np.arange(len(vertex)).repeat(1 + is_inner)
+        line = (np.cumsum(is_inner | (step == 0)) - 1)[doubled]
+        line[:-1] -= doubled[:-1] == doubled[1:]
+        return vertex[doubled], line

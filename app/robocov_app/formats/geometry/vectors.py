@@ -1,0 +1,56 @@
+"""Arithmetic of arrays of plane vectors, (k, 2)."""
+
+import numpy as np
+
+from robocov.arrays import Array
+
+_MIN_CROSS = 1e-200
+"""Lines whose directions have a smaller cross product are parallel."""
+
+
+def compute_cross(first: Array, second: Array) -> Array:
+    """Return the cross product of each pair of vectors, (k,)."""
+    return np.asarray(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+
+
+def compute_dot(first: Array, second: Array) -> Array:
+    """Return the dot product of each pair of vectors, (k,)."""
+    return np.asarray(np.einsum("kd,kd->k", first, second))
+
+
+def project_onto_lines(points: Array, origins: Array, directions: Array) -> Array:
+    """Return the foot of the perpendicular from each point to a line.
+
+    Parameters
+    ----------
+    points, origins : (k, 2) arrays, m
+    directions : (k, 2) array
+        Unit vectors along the lines.
+
+    Returns
+    -------
+    (k, 2) array, m
+    """
+    return np.asarray(origins + compute_dot(points - origins, directions)[:, None] * directions)
+
+
+def intersect_lines(
+    first_origins: Array, first_directions: Array, second_origins: Array, second_directions: Array
+) -> tuple[Array, Array]:
+    """Intersect pairs of infinite lines.
+
+    Parameters
+    ----------
+    first_origins, first_directions, second_origins, second_directions : (k, 2) arrays
+
+    Returns
+    -------
+    intersections : (k, 2) array
+        Arbitrary for parallel lines.
+    cross : (k,) array
+        Cross products of the directions; 0 for parallel lines.
+    """
+    cross = compute_cross(first_directions, second_directions)
+    divisor = np.where(np.abs(cross) < _MIN_CROSS, 1.0, cross)
+    parameter = compute_cross(second_origins - first_origins, second_directions) / divisor
+    return first_origins + parameter[:, None] * first_directions, cross
