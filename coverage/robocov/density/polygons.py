@@ -14,13 +14,13 @@ continuously on all end points, however edges meet, touch or coincide.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import shapely
 
 from robocov.arrays import Array, IntArray, Ring
-from robocov.compiled import kernel
+from robocov.compiled import inlined_kernel, kernel
 from robocov.density.base import Density, require_weight
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError
@@ -172,6 +172,21 @@ def _build_jumps(points: Array, step: float) -> Array:
     return np.hstack([low, high, jump])
 
 
+class _Strip(NamedTuple):
+    """The area between a jump, on the left, and an edge, on the right, over the heights that both have."""
+
+    bottom: float
+    top: float
+    left_bottom: float
+    """x of the jump at the bottom."""
+    left_top: float
+    """x of the jump at the top."""
+    right_bottom: float
+    """x of the edge at the bottom."""
+    right_top: float
+    """x of the edge at the top."""
+
+
 @kernel
 def _add_jumps(
     moments: Array, jumps: Array, start: Array, end: Array, cell: IntArray, origins: Array
@@ -203,34 +218,43 @@ def _add_jumps(
             top = min(v, high_y)
             if bottom >= top or max(x, u) <= min(low_x, high_x):
                 continue
-            edge_bottom = _find_x(x, y, u, v, bottom)
-            edge_top = _find_x(x, y, u, v, top)
-            jump_bottom = _find_x(low_x, low_y, high_x, high_y, bottom)
-            jump_top = _find_x(low_x, low_y, high_x, high_y, top)
-            width_bottom = edge_bottom - jump_bottom
-            width_top = edge_top - jump_top
-            if width_bottom <= 0.0 and width_top <= 0.0:
-                continue
-            # If the edge crosses the jump, only the heights on one side of the crossing count.
-            first = 0.0
-            last = 1.0
-            if width_bottom < 0.0:
-                first = width_bottom / (width_bottom - width_top)
-            if width_top < 0.0:
-                last = width_bottom / (width_bottom - width_top)
-            fraction = last - first
-            weight = 0.5 * fraction * (top - bottom) * sign * jumps[f, 4]
-            for node in (_GAUSS_NODE, 1.0 - _GAUSS_NODE):
-                t = first + fraction * node
-                right = edge_bottom + t * (edge_top - edge_bottom)
-                left = jump_bottom + t * (jump_top - jump_bottom)
-                width = weight * (right - left)
-                height = bottom + t * (top - bottom)
-                mean_square = (right * right + right * left + left * left) / 3.0
-                moments[c, 0] += width
-                moments[c, 1] += 0.5 * width * (right + left)
-                moments[c, 2] += height * width
-                moments[c, 3] += width * (mean_square + height * height)
+            strip = _Strip(
+                bottom,
+                top,
+                _find_x(low_x, low_y, high_x, high_y, bottom),
+                _find_x(low_x, low_y, high_x, high_y, top),
+                _find_x(x, y, u, v, bottom),
+                _find_x(x, y, u, v, top),
+            )
+            _add_strip(moments, c, strip, sign * jumps[f, 4])
+
+
+@inlined_kernel
+def _add_strip(moments: Array, c: int, strip: _Strip, jump: float) -> None:
+    """Add a strip to the moments of cell c. Where the jump is to the right of the edge, nothing counts."""
+    width_bottom = strip.right_bottom - strip.left_bottom
+    width_top = strip.right_top - strip.left_top
+    if width_bottom > 0.0 or width_top > 0.0:
+        # If the edge crosses the jump, only the heights on one side of the crossing count.
+        first = 0.0
+        last = 1.0
+        if width_bottom < 0.0:
+            first = width_bottom / (width_bottom - width_top)
+        if width_top < 0.0:
+            last = width_bottom / (width_bottom - width_top)
+        fraction = last - first
+        weight = 0.5 * fraction * (strip.top - strip.bottom) * jump
+        for node in (_GAUSS_NODE, 1.0 - _GAUSS_NODE):
+            t = first + fraction * node
+            right = strip.right_bottom + t * (strip.right_top - strip.right_bottom)
+            left = strip.left_bottom + t * (strip.left_top - strip.left_bottom)
+            width = weight * (right - left)
+            height = strip.bottom + t * (strip.top - strip.bottom)
+            mean_square = (right * right + right * left + left * left) / 3.0
+            moments[c, 0] += width
+            moments[c, 1] += 0.5 * width * (right + left)
+            moments[c, 2] += height * width
+            moments[c, 3] += width * (mean_square + height * height)
 
 
 @kernel

@@ -64,14 +64,14 @@ def find_own_goal(
     """
     search = _NodeSearch(planner, weights, other_positions, first_node)
     node = first_node
-    neighbors = search.list_neighbors(node)
+    neighbors = search.evaluate_neighbors(node)
     for _ in range(_MAX_STEPS):
         candidates = [neighbor for neighbor in neighbors if neighbor >= 0]
         best = min(candidates, key=search.costs.__getitem__, default=node)
         if not search.costs[best] < search.costs[node]:
             break
         node = best
-        neighbors = search.list_neighbors(node)
+        neighbors = search.evaluate_neighbors(node)
     cell_distances = search.compute_cell_distances(node)
     goal, excess = _refine_goal(planner, node, neighbors, search.costs, former_goal)
     if np.isfinite(former_goal).all():
@@ -99,8 +99,8 @@ class _NodeSearch:
         self._distances: dict[int, Array] = {}
         self.costs: dict[int, float] = {}
 
-    def list_neighbors(self, node: int) -> list[int]:
-        """Return the neighbors of a node like `_list_neighbors`, and add their costs to `costs`."""
+    def evaluate_neighbors(self, node: int) -> list[int]:
+        """Add the costs of a node and its neighbors to `costs`. Return the neighbors."""
         neighbors = _list_neighbors(self._planner, node)
         new_nodes = [k for k in (node, *neighbors) if k >= 0 and k not in self._distances]
         tables = self._planner.compute_distances_within(new_nodes, self._limit)

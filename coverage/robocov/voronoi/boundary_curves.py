@@ -70,10 +70,10 @@ def trace_boundaries(
     sides : (k, 5) array
         The region, as `Region.sides`.
     pairs : (m, 6) array
-        Neighbors by robot; for the columns see `PAIR_ROBOT` and the following.
+        Pairs of a robot and a neighbor, sorted by robot. For the columns, see the constants `PAIR_...`.
     edges : (e, 6) array
-        Edges of the cells that robots of equal speeds would share: x, y, u, v of the ends relative to the
-        generator (m), cell and robot beyond, by cell.
+        Edges of the cells of equally fast robots, sorted by cell: x, y, u, v of the ends relative to the
+        generator (m), the cell, and the robot beyond.
     is_straight : (n,) bool array
         Overwritten: whether a cell is bounded by these edges alone.
 
