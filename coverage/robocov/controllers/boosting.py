@@ -222,6 +222,7 @@ class Boosting(BaseController):
     decay: float = gain(
         0.1, "1/m", "λ, rate at which detection decreases with distance", low=1e-3, high=100.0
     )
+    # British spelling here, because files of runs contain this name.
     boost: str = choice("phi", ("phi", "p", "neighbours"), "boosting function")
     kappa: float = gain(1.0, "1", "κ, its factor; for neighbours in m^(1+γ)")
     gamma: float = gain(2.0, "1", "γ, its exponent", high=20.0)

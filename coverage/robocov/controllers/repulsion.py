@@ -253,6 +253,7 @@ class Poduri(BaseController):
     label = "Constrained coverage"
     summary = "spreads, but keeps at least K neighbors within R_c (Poduri and Sukhatme 2004)"
 
+    # British spelling here, because files of runs contain this name.
     neighbours: float = gain(
         2.0, "robots", "K, number of neighbors that each robot keeps", high=100.0, whole=True
     )
