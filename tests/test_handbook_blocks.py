@@ -41,7 +41,7 @@ def words_of(line: str) -> list[str]:
 
 def parsed_alone(words: list[str]) -> None:
     parse_options(
-        import_module(f"robocov_app.commands.{COMMANDS[words[0]][0]}").Arguments, words[0], words[1:]
+        import_module(f"robocov_app.commands.{COMMANDS[words[0]].module}").Arguments, words[0], words[1:]
     )
 
 

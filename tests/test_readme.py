@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import robocov as rc
 from robocov.controllers import make_controller
 from robocov.errors import MapError
 from robocov.mapfile import list_bundled_maps, load_map, parse_map
@@ -31,7 +32,10 @@ def test_the_map_is_valid_and_its_mistakes_are_named_as_it_says() -> None:
 
 
 def test_the_python_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    exec(block("python", "import robocov as rc\n\nenvironment").replace("run(60.0)", "run(0.5)"), {})
+    exec(
+        block("python", "\nsimulation = rc.Simulation(environment").replace("run(60.0)", "run(0.5)"),
+        {"rc": rc},
+    )
     assert len(capsys.readouterr().out.split()) == 3
 
 

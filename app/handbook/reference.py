@@ -54,7 +54,7 @@ def gains_as_signature(*event: Any) -> tuple[str, None] | None:
 def commands() -> str:
     """Return the help of every command."""
     text = "# Commands\n\nWhat `robocov COMMAND -h` prints.\n"
-    for name, (_, line) in COMMANDS.items():
+    for name, (_, line, _) in COMMANDS.items():
         told = io.StringIO()
         with contextlib.redirect_stdout(told), contextlib.suppress(SystemExit):
             main([name, "-h"])

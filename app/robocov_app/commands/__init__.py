@@ -1,30 +1,67 @@
-"""The subcommands of `robocov`: parse, call, print; the work is done elsewhere."""
+"""The subcommands of `robocov`: parse, call, print. The work is done elsewhere."""
 
-COMMANDS = {  # module, and one line
-    "demo": ("demo", "open the interactive window: watch, touch, compare, go back in time"),
-    "run": ("run", "do one run without a window; save numbers, pictures and film in a folder"),
-    "compare": ("compare", "run several controllers from the same starts, side by side"),
-    "sweep": ("sweep", "do many runs in parallel from a study file; resumable; one table of all"),
-    "replay": ("replay", "show a saved run or comparison again: in the window, or as a film"),
-    "report": ("report", "make one HTML page of runs, comparisons and sweeps, with a replay; no network"),
-    "metrics": ("metrics", "measure saved runs: area in sight, energy, path length, connectivity, clearance"),
-    "paper": ("paper", "make the paper's figures again, and test its claims over many maps"),
-    "edit": ("edit", "draw, check and try maps in the editor; nothing is lost"),
-    "check": ("maps.check", "validate maps: area, free area, components, narrowest gap"),
-    "maps": ("maps.bundled", "list the bundled maps"),
-    "generate": (
-        "maps.generate",
-        "make random maps from a seed: scattered obstacles, towns, rooms, mazes, caves",
+from typing import NamedTuple
+
+
+class Subcommand(NamedTuple):
+    """A subcommand, in a module with its options `Arguments` and a function `command`.
+
+    Attributes
+    ----------
+    module : str
+        Name of the module in this package.
+    summary : str
+        One line for the list of commands.
+    uses_kernels : bool
+        Whether it calls compiled kernels, see `robocov.compiled`.
+    """
+
+    module: str
+    summary: str
+    uses_kernels: bool = False
+
+
+COMMANDS = {
+    "demo": Subcommand(
+        "demo", "open the interactive window: watch, edit, compare, go back in time", uses_kernels=True
     ),
-    "controllers": ("controllers", "list the controllers and their gains"),
-    "cost": ("cost", "evaluate the exact coverage cost (22) of given positions"),
-    "optimum": ("optimum", "find the best positions with the whole map known: a reference for the cost"),
-    "benchmark": ("benchmark", "rate a controller on frozen maps and tracks; verify and compare results"),
-    "bench": ("bench", "measure speed, as ratios to yardsticks in the same run"),
-    "import": ("maps.import_map", "turn a foreign map file into a map JSON"),
-    "export": ("maps.export_map", "write a map in a foreign format: SVG, GeoJSON, WKT, ROS, MovingAI, PNG"),
-    "lesson": ("lesson", "check a lesson for the window: its form, and that every chapter ends"),
-    "schema": ("maps.schema", "print the JSON Schema of map files"),
-    "completion": ("completion", "print a script by which the shell completes commands, options and names"),
-    "handbook": ("handbook", "open tutorials, guides and the reference in a browser; no network"),
+    "run": Subcommand(
+        "run", "simulate one run; save numbers, figures and a video in a folder", uses_kernels=True
+    ),
+    "compare": Subcommand(
+        "compare", "run several controllers from the same starting positions", uses_kernels=True
+    ),
+    "sweep": Subcommand(
+        "sweep", "run a parameter study in parallel; resumable; one table of all runs", uses_kernels=True
+    ),
+    "replay": Subcommand(
+        "replay", "replay a saved run or comparison, in the window or as a video", uses_kernels=True
+    ),
+    "report": Subcommand(
+        "report", "build one HTML page of runs, comparisons and sweeps, with replay", uses_kernels=True
+    ),
+    "metrics": Subcommand("metrics", "measure saved runs: visible area, energy, path length, clearance"),
+    "paper": Subcommand(
+        "paper", "reproduce the paper's figures, and test its claims on many maps", uses_kernels=True
+    ),
+    "edit": Subcommand("edit", "draw, check and try maps in the editor"),
+    "check": Subcommand("maps.check", "validate maps: area, free area, components, narrowest gap"),
+    "maps": Subcommand("maps.bundled", "list the bundled maps"),
+    "generate": Subcommand("maps.generate", "generate random maps: obstacles, towns, rooms, mazes, caves"),
+    "controllers": Subcommand("controllers", "list the controllers and their gains"),
+    "cost": Subcommand("cost", "compute the exact coverage cost (22) of given positions", uses_kernels=True),
+    "optimum": Subcommand(
+        "optimum", "search for the best positions on a known map, as a reference", uses_kernels=True
+    ),
+    "benchmark": Subcommand(
+        "benchmark", "rate a controller on frozen maps and tracks; verify and compare", uses_kernels=True
+    ),
+    "bench": Subcommand("bench", "measure speed, as ratios to yardsticks in the same run"),
+    "import": Subcommand("maps.import_map", "convert a foreign map file to a map of robocov"),
+    "export": Subcommand("maps.export_map", "write a map as SVG, GeoJSON, WKT, ROS, MovingAI or PNG"),
+    "lesson": Subcommand("lesson", "check a lesson for the window: its format, and that chapters end"),
+    "schema": Subcommand("maps.schema", "print the JSON Schema of map files"),
+    "completion": Subcommand("completion", "print a script for completion in the shell"),
+    "handbook": Subcommand("handbook", "open tutorials, guides and the reference in a browser"),
 }
+"""The subcommands by name, in the order of the help."""

@@ -52,14 +52,14 @@ class Arguments:
 
 def command(options: Arguments) -> None:
     flags, words, mapped = {}, {}, []
-    for name, (module, _) in COMMANDS.items():
+    for name, (module, _, _) in COMMANDS.items():
         own, words[name], positionals = _described(import_module(f"robocov_app.commands.{module}").Arguments)
         flags[name] = ["--help", *own]
         mapped += [name] * bool({"map", "files"} & positionals)
     maps, controllers = " ".join(list_bundled_maps()), " ".join(CONTROLLERS)
     if options.shell == "fish":
         echo("complete -c robocov -n __fish_use_subcommand -f")
-        for name, (_, line) in COMMANDS.items():
+        for name, (_, line, _) in COMMANDS.items():
             told = line.replace("'", "\\'")
             echo(f"complete -c robocov -n __fish_use_subcommand -f -a {name} -d '{told}'")
             seen = f"complete -c robocov -n '__fish_seen_subcommand_from {name}'"
