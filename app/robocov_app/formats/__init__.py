@@ -36,7 +36,8 @@ from robocov_app.formats.base import (
     ReadOptions,
     WriteOptions,
 )
-from robocov_app.formats.geometry.conversion import Shaping, build_environment
+from robocov_app.formats.geometry.conversion import build_environment
+from robocov_app.formats.geometry.shaping import Shaping
 from robocov_app.formats.svg import drawing as svg
 from robocov_app.formats.unreadable import described, named_kind
 

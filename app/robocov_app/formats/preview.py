@@ -22,7 +22,7 @@ from robocov_app.figures.arena import draw_map, map_handles
 from robocov_app.figures.files import check_figure_path, plain_style, save_figure
 from robocov_app.figures.page import HEADING, SMALL, TITLE, Box, Page, tone
 from robocov_app.formats.base import ForeignMap, ImportReport
-from robocov_app.formats.geometry.conversion import ImportComparison, compare_maps
+from robocov_app.formats.geometry.comparison import ImportComparison, compare_maps
 from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import LIGHT, Colour, Theme, theme_named
 

@@ -13,8 +13,10 @@ from robocov.environment import DiscStart, UniformStart
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
 from robocov_app.formats.base import ForeignMap
-from robocov_app.formats.geometry.conversion import Shaping, build_environment, find_roomiest_point
+from robocov_app.formats.geometry.conversion import build_environment
 from robocov_app.formats.geometry.polygons import build_boundary, round_polygons
+from robocov_app.formats.geometry.shaping import Shaping
+from robocov_app.formats.geometry.starts import find_roomiest_point
 
 ROOM = box(0, 0, 10, 8) - box(4, 3, 6, 5) - box(1, 1, 1.05, 1.05)
 CLOSET = box(20, 0, 23, 3)
@@ -335,7 +337,7 @@ def test_a_map_of_many_vertices_says_what_that_means() -> None:
     assert "many" not in lines(build_environment(foreign(round_room), Shaping(), "plan")[1])
 
 
-@pytest.mark.parametrize(("most", "wanted"), [("MAX_OBSTACLES", "obstacles"), ("MAX_KEPT", "vertices")])
+@pytest.mark.parametrize(("most", "wanted"), [("MAX_OBSTACLES", "obstacles"), ("MAX_VERTICES", "vertices")])
 def test_a_map_that_takes_too_long_is_refused(
     monkeypatch: pytest.MonkeyPatch, most: str, wanted: str
 ) -> None:

@@ -19,7 +19,7 @@ from robocov_app.formats import (
     build_environment,
     read_map,
 )
-from robocov_app.formats.geometry.conversion import ImportComparison, compare_maps
+from robocov_app.formats.geometry.comparison import ImportComparison, compare_maps
 from robocov_app.toolkit.worker import Line
 
 Kind = Literal["number", "place", "words", "colours", "width", "text", "choice"]

@@ -31,10 +31,10 @@ from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.colours import Paint, read_colour
 from robocov_app.formats.files import MAX_VERTICES, name_of_map, require_shapes
-from robocov_app.formats.geometry.conversion import transform_numbers
 from robocov_app.formats.geometry.curves import CURVE_TOLERANCE_M, flatten_arc
 from robocov_app.formats.geometry.frames import transform_points
 from robocov_app.formats.geometry.polygons import Rule, compute_free_area, format_decimal
+from robocov_app.formats.geometry.primitives import transform_numbers
 from robocov_app.formats.geometry.rasterize import describe_unsupported
 from robocov_app.formats.geometry.shapes import Shapes, WallLine
 from robocov_app.formats.svg import path as paths

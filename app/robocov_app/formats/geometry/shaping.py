@@ -1,0 +1,128 @@
+"""Parameters of the conversion of a foreign map, and what is known while it is converted."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+from robocov.defaults import DEFAULT_RADIUS_M
+from robocov.environment import MIN_START_GAP_RADII
+from robocov.errors import MapError, ParameterError, quote
+from robocov.mapfile.models import MAX_COORDINATE_M
+from robocov_app.formats.base import ForeignMap, Options
+
+DEFAULT_TOLERANCE_M = 0.02
+"""Distance by which walls of vector formats may move."""
+_MAX_GRID_M = 1e-4
+"""Coordinates are rounded to this, or to a hundredth of a cell if that is finer."""
+
+
+@dataclass(frozen=True)
+class Shaping(Options):
+    """Parameters of the conversion of a foreign map to an environment."""
+
+    simplify: float | None = None
+    """Walls may move by so many metres where that saves vertices; 0 keeps all. By default one cell of a
+    grid, 0.02 of the rest."""
+    specks: float | None = None
+    """Obstacles smaller than so many m² are dropped. By default single cells of ROS maps and JPEGs are, else
+    none."""
+    keep: Literal["largest", "all"] = "largest"
+    """Which connected parts of the free space stay; where the file places robots, the one with most of them
+    counts as the largest."""
+    inside: tuple[float, float] | None = None
+    """The part of the free space that holds this place, x and y in the map's metres, stays instead of the
+    largest."""
+    hull: bool = False
+    """The boundary is the convex hull of the free space, not its outline."""
+    margin: float = 0.0
+    """So many metres around the free space are solid."""
+    radius: float = DEFAULT_RADIUS_M
+    """Radius of a robot in metres: where it passes in the file, it passes in the map."""
+    default_start: Literal["room", "uniform"] = "room"
+    """The map's default start: a disc at the roomiest place, or anywhere."""
+
+    def __post_init__(self) -> None:
+        self.require(
+            simplify=(0, 10, "m"), specks=(0, 1e6, "m²"), margin=(0, 100, "m"), radius=(1e-3, 100, "m")
+        )
+        if self.inside is None:
+            return
+        if len(self.inside) != 2 or not all(abs(value) <= MAX_COORDINATE_M for value in self.inside):
+            wanted = f"expected two numbers from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} (m)"
+            raise ParameterError(f"inside: {wanted}, got {quote(self.inside)}")
+        if self.keep == "all":
+            raise ParameterError("inside: keeps one part of the free space, but keep is all")
+
+
+@dataclass(eq=False)
+class Conversion:
+    """A foreign map that is being converted.
+
+    Attributes
+    ----------
+    foreign : ForeignMap
+    shaping : Shaping
+    where : str
+        The file, for messages.
+    repaired, dropped, changed, notes : list of str
+        Lines of the import report.
+    """
+
+    foreign: ForeignMap
+    shaping: Shaping
+    where: str
+    repaired: list[str] = field(init=False)
+    dropped: list[str] = field(init=False)
+    changed: list[str] = field(init=False)
+    notes: list[str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.repaired = [*self.foreign.repaired]
+        self.dropped = [*self.foreign.dropped]
+        self.changed = []
+        self.notes = [*self.foreign.notes]
+
+    @property
+    def radius(self) -> float:
+        """Radius of a robot, m."""
+        return self.shaping.radius
+
+    @property
+    def clearance(self) -> float:
+        """Distance from walls at which a robot starts, m; map files require it for the usual robot."""
+        return max(DEFAULT_RADIUS_M, self.radius) * (1 + MIN_START_GAP_RADII)
+
+    @property
+    def min_obstacle_area(self) -> float:
+        """Area below which obstacles are dropped as specks, m²."""
+        return self.foreign.specks if self.shaping.specks is None else self.shaping.specks
+
+    @cached_property
+    def digits(self) -> int:
+        """Number of decimals of coordinates."""
+        cell = self.foreign.cell
+        grid = _MAX_GRID_M if cell is None else min(_MAX_GRID_M, cell / 100)
+        return -math.floor(math.log10(grid) + 1e-9)
+
+    @property
+    def grid(self) -> float:
+        """Distance between two neighboring coordinates of the map, m."""
+        return 10.0**-self.digits
+
+    @property
+    def tolerance(self) -> float:
+        """Distance by which walls may move, m. Where cells are larger than robots, each cell counts."""
+        if self.shaping.simplify is not None:
+            return self.shaping.simplify
+        if self.foreign.cell is None:
+            return DEFAULT_TOLERANCE_M
+        return min(self.foreign.cell, 2 * self.radius)
+
+    def require_at_most(self, maximum: int, count: int, what: str) -> None:
+        """Raise MapError if there are more than `maximum` obstacles or vertices."""
+        if count > maximum:
+            hint = "--specks AREA drops small obstacles, --simplify METRES draws walls with fewer vertices"
+            raise MapError(f"{self.where}: expected at most {maximum}, got {count} {what}: {hint}")
