@@ -358,4 +358,4 @@ def test_the_roomiest_place(blocks: list[tuple[int, int, int, int]]) -> None:
     assert room.contains(shapely.Point(x, y))
     assert away == pytest.approx(room.boundary.distance(shapely.Point(x, y)))
     assert away >= shapely.maximum_inscribed_circle(room, tolerance=0.001).length - 0.0101
-    assert find_roomiest_point(room, 0.01, enough=0.5)[1] >= min(0.5, away - 0.01)
+    assert find_roomiest_point(room, 0.01, sufficient=0.5)[1] >= min(0.5, away - 0.01)
