@@ -99,7 +99,7 @@ class Drawable:
         return self._draw_for_notebook("png")
 
     def _draw_for_notebook(self, form: str) -> Any:
-        """Return what the backend draws in some form; None, so that the text is displayed, if it cannot."""
+        """Return what the backend draws in the given form; None, so that the text is shown, if it cannot."""
         try:
             backend = load_drawing_backend()
         except RobocovError:
@@ -114,8 +114,8 @@ def show(map: Any, **options: Any) -> Any:  # noqa: A002 - The parameter has thi
     Parameters
     ----------
     map : str, Path, Environment or Simulation
-        Name of a bundled map, a file, the map itself, or a simulation to continue; only `height` goes with a
-        simulation.
+        Name of a bundled map, a file, the map itself, or a simulation to continue. For a simulation, `height`
+        is the only valid option.
     **options
         Options of the window:
 

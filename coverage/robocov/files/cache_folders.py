@@ -63,7 +63,7 @@ def is_private(path: Path) -> bool:
     Raises
     ------
     OSError
-        If the path cannot be looked at.
+        If the path cannot be accessed.
     """
     if sys.platform == "win32":
         return True

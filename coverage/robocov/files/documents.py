@@ -75,7 +75,7 @@ def read_document(path: Path, model: type[DocumentType], format_name: str, versi
     Raises
     ------
     MapError
-        If the file cannot be read, or is no such document.
+        If the file cannot be read, or is not a document of this format.
     """
     where = str(path)
     document = parse_json(read_bytes(path), where)
@@ -126,7 +126,7 @@ def check_header(document: object, where: str, format_name: str, version: int) -
     Raises
     ------
     MapError
-        If the document is no object, or has another format or version.
+        If the document is not an object, or has another format or version.
     """
     if not isinstance(document, dict):
         expected = f"a JSON object with a {format_name.removeprefix('robocov-')}"

@@ -1,11 +1,11 @@
 """Folders of results that contain either the old result or the new one, and are otherwise not touched.
 
 A result is written to a hidden staging folder inside its folder. To commit it, a journal is written that
-lists the files of the new result, and those of the old one that are to be removed. As soon as the journal has
-its name, the new result counts: the next process that opens the folder completes the remaining steps
-(`complete_commit`). At the end the journal becomes the manifest, the list of the files of the result. Files
-that are not in the manifest belong to somebody else, and are neither replaced nor removed. Links inside the
-folder are not followed.
+lists the files of the new result, and those of the old one that are to be removed. Once the journal has
+been renamed into place, the new result counts: the next process that opens the folder completes the
+remaining steps (`complete_commit`). At the end the journal becomes the manifest, the list of the files of
+the result. Files that are not in the manifest were not written by robocov, and are neither replaced nor
+removed. Links inside the folder are not followed.
 """
 
 import json
@@ -91,7 +91,7 @@ class ResultFolder:
         Raises
         ------
         OutputError
-            If the folder cannot be written to, or a file of somebody else is in the way.
+            If the folder cannot be written to, or a file not written by robocov is in the way.
         """
         if not self._replaces:
             self.commit()
@@ -102,7 +102,7 @@ class ResultFolder:
         Raises
         ------
         OutputError
-            If the folder cannot be written to, or a file of somebody else is in the way.
+            If the folder cannot be written to, or a file not written by robocov is in the way.
         """
         with report_folder_errors(self.path):
             staging = self.path / _STAGING_FOLDER
@@ -157,7 +157,8 @@ def create_result(
     InputError
         If the content of the folder must not be replaced.
     OutputError
-        If the folder cannot be used, another process is using it, or a file of somebody else is in the way.
+        If the folder cannot be used, another process is using it, or a file not written by robocov is in the
+        way.
     """
     with report_folder_errors(folder):
         existed = folder.exists()
@@ -199,7 +200,8 @@ def extend_result(folder: Path) -> Iterator[ResultFolder]:
     InputError
         If there is no result in the folder.
     OutputError
-        If the folder cannot be used, another process is using it, or a file of somebody else is in the way.
+        If the folder cannot be used, another process is using it, or a file not written by robocov is in the
+        way.
     """
     home, part = _find_home(folder)
     with _open_folder(home):
@@ -425,7 +427,7 @@ def _list_parts(folder: Path) -> list[Path]:
 
 
 def _has_signature(path: Path, name: str) -> bool:
-    """Return whether a file starts like robocov's file of some name."""
+    """Return whether a file starts like robocov's file with the given name."""
     try:
         if not path.is_file():
             return False
@@ -440,7 +442,7 @@ def _is_file_or_link(path: Path) -> bool:
 
 
 def _require_replaceable(folder: Path, name: str, owned_files: set[str]) -> None:
-    """Raise an error if the file of a result would replace a file of somebody else."""
+    """Raise an error if the file of a result would replace a file not written by robocov."""
     path = _resolve_inside(folder, name)
     if not os.path.lexists(path):
         return

@@ -230,7 +230,7 @@ def require_json(value: object, where: str) -> None:
     Raises
     ------
     MapError
-        If the value contains anything else than finite numbers, texts, lists and objects, true, false and
+        If the value contains anything other than finite numbers, texts, lists and objects, true, false and
         null, or is nested too deeply.
     """
     mistake = _find_first_mistake(value, ())
@@ -261,7 +261,7 @@ def _find_first_mistake(value: Any, path: JsonPath) -> Mistake | None:
 
 
 def _find_invalid_key(value: dict[Any, Any], path: JsonPath) -> Mistake | None:
-    """Return the mistake of the first key that is no text, or of the first duplicate one."""
+    """Return the mistake of the first key that is not a string, or of the first duplicate one."""
     for key in value:
         if not isinstance(key, str) or not _is_encodable(key):
             place = f"{format_path(path)}: " if path else ""
@@ -273,7 +273,7 @@ def _find_invalid_key(value: dict[Any, Any], path: JsonPath) -> Mistake | None:
 
 
 def _describe_invalid_scalar(item: object) -> str | None:
-    """Return why a value that is no list or object is no JSON; None if it is."""
+    """Return why a value that is not a list or object is not JSON; None if it is."""
     if isinstance(item, float):
         return None if math.isfinite(item) else f"expected a finite number, got {item}"
     if isinstance(item, str):

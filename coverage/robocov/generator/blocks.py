@@ -207,7 +207,7 @@ def cut_cell(
         Points to the side that is removed.
     setback : float, m
     widening_share : float
-        Those of the new edge, see `Edge`.
+        Setback and widening share of the new edge; see `Edge`.
 
     Returns
     -------

@@ -109,7 +109,7 @@ class _Site:
     tolerance : float, m
         Tolerance with which walls are simplified.
     min_radius : float, m
-        Smallest dilation of the core: half the gap, and what simplifying and rounding may take.
+        Smallest dilation of the core: half the gap, plus an allowance for simplification and rounding.
     start : geometry
         Area that stays free around the start.
     """
@@ -167,7 +167,7 @@ def _survey_site(request: Request, corner: DiscStart) -> _Site:
 
 
 def _build_inner_rectangle(request: Request, distance: float) -> Polygon:
-    """Return the rectangle inside the rim of rock that is some distance away from it."""
+    """Return the rectangle inside the rim of rock at the given distance from it."""
     width = float(request.width)
     height = float(request.height)
     offset = _RIM_SIDES * min(width, height) + distance
@@ -307,7 +307,7 @@ def build_tunnels(parts: Array, rng: np.random.Generator) -> list[LineString]:
     Returns
     -------
     list of LineString
-        One less than there are parts.
+        One fewer than the number of parts.
     """
     tunnels: list[LineString] = []
     tree = shapely.STRtree(parts)

@@ -1,4 +1,4 @@
-"""Generation of random maps: obstacles of some kind, checked against the request, and starts."""
+"""Generation of random maps: obstacles of the given kind, checked against the request, and starts."""
 
 from __future__ import annotations
 

@@ -49,8 +49,8 @@ _GAP_TOLERANCE_M = 1e-9
 def build_maze(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
     """Build walls between corridors of equal width.
 
-    The thickness of the walls follows from the blocked area. Thicknesses are rounded; what they block too
-    much is mended by removing more walls.
+    The thickness of the walls follows from the blocked area. Thicknesses are rounded; if they block too
+    much, more walls are removed.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def grow_passages(shape: GridShape, rng: np.random.Generator) -> BoolArray:
 def _remove_wall(walls: BoolArray, rng: np.random.Generator) -> None:
     """Remove a wall, if possible one that is attached at both ends, which makes a loop.
 
-    Often it is one at a dead end.
+    Walls at dead ends are often preferred.
     """
     columns, rows, is_horizontal = np.argwhere(walls).T
     starts = (columns, rows)
@@ -254,8 +254,10 @@ def _remove_wall(walls: BoolArray, rng: np.random.Generator) -> None:
         is_candidate[:] = True
     if rng.random() < _DEAD_END_PROBABILITY:
         opening_counts = _count_openings(walls)
-        # A wall is between the cell whose lower left post it starts at, and the cell on its other side.
-        other_cells = (columns - (1 - is_horizontal), rows - is_horizontal)
+        # A wall starts at the lower left post of one cell. The other cell is to the left of a vertical wall,
+        # or below a horizontal one.
+        is_vertical = 1 - is_horizontal
+        other_cells = (columns - is_vertical, rows - is_horizontal)
         is_dead_end = (opening_counts[starts] == 1) | (opening_counts[other_cells] == 1)
         if (is_candidate & is_dead_end).any():
             is_candidate &= is_dead_end
@@ -274,9 +276,9 @@ def _count_openings(walls: BoolArray) -> IntArray:
 
 
 def trace_trails(walls: BoolArray) -> Iterator[list[Post]]:
-    """Trace poly-lines that contain every wall once.
+    """Trace polylines that contain every wall once.
 
-    A poly-line goes straight on if it can, and round a corner if no other wall meets there.
+    A polyline goes straight on if it can, and round a corner if no other wall meets there.
 
     Parameters
     ----------
@@ -286,7 +288,7 @@ def trace_trails(walls: BoolArray) -> Iterator[list[Post]]:
     Yields
     ------
     list of (int, int)
-        The posts at the ends and bends of a poly-line.
+        The posts at the ends and bends of a polyline.
     """
     neighbors: defaultdict[Post, set[Post]] = defaultdict(set)
     for column, row, is_horizontal in np.argwhere(walls).tolist():

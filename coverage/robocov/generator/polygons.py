@@ -91,7 +91,7 @@ def _place_shape(
     kept_free: shapely.Polygon,
     rng: np.random.Generator,
 ) -> shapely.Polygon | None:
-    """Return an outline of a shape at the first of many random positions that is free; None if none is."""
+    """Place a random outline at a free position. Return None if none is found."""
     gap = request.gap
     size = request.size
     tree = shapely.STRtree(others)
@@ -101,15 +101,15 @@ def _place_shape(
         if (free_size < 0.0).any():
             continue
         offsets = rng.random((_POSITIONS_PER_OUTLINE, 2)) - 0.5
-        middles = size / 2.0 + offsets * free_size
-        candidates = shapely.polygons(request.round_points(middles[:, None] + outline))
+        centers = size / 2.0 + offsets * free_size
+        candidates = shapely.polygons(request.round_points(centers[:, None] + outline))
         low, high = np.split(shapely.bounds(candidates), 2, axis=1)
         is_good = shapely.disjoint(candidates, kept_free) & shapely.is_valid(candidates)
         is_good &= ((low >= gap - _TOLERANCE_M) & (high <= size - gap + _TOLERANCE_M)).all(axis=1)
         search_boxes = shapely.box(low[:, 0] - gap, low[:, 1] - gap, high[:, 0] + gap, high[:, 1] + gap)
-        candidate, other = tree.query(search_boxes)
-        is_too_close = shapely.distance(candidates[candidate], others[other]) < gap
-        is_good[candidate[is_too_close]] = False
+        candidate_indices, other_indices = tree.query(search_boxes)
+        is_too_close = shapely.distance(candidates[candidate_indices], others[other_indices]) < gap
+        is_good[candidate_indices[is_too_close]] = False
         if is_good.any():
             return candidates[int(is_good.argmax())]
     return None
@@ -171,7 +171,7 @@ def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
 
 
 def draw_u_shape(rng: np.random.Generator, area: float, opening: float) -> Array | None:
-    """Draw a U with an opening of some width; its arms may differ in length.
+    """Draw a U with an opening of the given width; its arms may differ in length.
 
     Parameters
     ----------

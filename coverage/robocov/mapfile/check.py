@@ -27,8 +27,8 @@ from robocov.errors import StartError, format_count, format_path, summarize_name
 
 MANY_VERTICES = 5000
 """Maps with more vertices get a warning about computing time."""
-_COST_SECONDS = 6.1e-8
-"""Measured time to set up a `robocov.cost.CoverageCost`, per squared number of vertices."""
+_SECONDS_PER_SQUARED_VERTEX = 6.1e-8
+"""Measured time to set up a `robocov.cost.CoverageCost`, divided by the squared number of vertices."""
 _MAX_EQUAL_DISTANCE_M = 1e-6
 """Vertices closer than this are probably meant to be one."""
 
@@ -206,11 +206,11 @@ def describe_vertex_count(count: int) -> str:
     -------
     str
     """
-    seconds = _COST_SECONDS * count * count
+    seconds = _SECONDS_PER_SQUARED_VERTEX * count * count
     time = f"{seconds:.0f} seconds" if seconds < 90.0 else f"{seconds / 60:.0f} minutes"
     return (
-        f"{count} vertices are many: computing the distances between them takes about {time} before a run, "
-        "and four times as long for twice as many"
+        f"This map has many vertices ({count}): computing the distances between them takes about {time} "
+        "before a run, and four times as long for twice as many"
     )
 
 

@@ -76,7 +76,7 @@ def read_gray_levels(content: bytes) -> Array:
     Raises
     ------
     InputError
-        If the content is no such image, or has too many pixels.
+        If the content is not a PNG or PGM image, or has too many pixels.
     """
     from PIL import Image
 

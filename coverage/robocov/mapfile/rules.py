@@ -187,7 +187,7 @@ def _find_position_mistakes(environment: Environment, name: str, start: PointsSt
 def _find_room_mistakes(
     environment: Environment, name: str, start: DiscStart | UniformStart
 ) -> Iterator[Mistake]:
-    """Yield the mistake of a disc or free space without room for a robot of the default size."""
+    """Yield a mistake if the disc or free space has no room for a robot of the default size."""
     if _certainly_has_room(environment, start):
         return
     try:

@@ -117,7 +117,8 @@ def _build_mistake(detail: ErrorDetails) -> Mistake:
             model = PARTS.get(str(path[object_length]), model)
         return _build_unknown_key_mistake(path, model)
     last_key = max(k for k, step in enumerate(path) if isinstance(step, str))
-    expected = _EXPECTED[str(path[last_key])][len(path) - 1 - last_key]
+    nesting_depth = len(path) - 1 - last_key
+    expected = _EXPECTED[str(path[last_key])][nesting_depth]
     message = describe_mismatch(expected, value, is_missing=detail["type"] == "missing")
     return Mistake.at_path(tuple(path), message)
 

@@ -61,7 +61,7 @@ def test_many_vertices_are_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robocov.mapfile.check.MANY_VERTICES", 7)
     report = check_map(room(block(4, 2, 2, 2)))
     assert report.vertices == 8
-    assert report.warnings[0].startswith("8 vertices are many: ")
+    assert report.warnings[0].startswith("This map has many vertices (8): ")
 
 
 def test_a_clean_map_has_no_warnings() -> None:

@@ -332,7 +332,8 @@ def test_a_map_of_many_vertices_says_what_that_means() -> None:
     _, report = build_environment(foreign(round_room), Shaping(simplify=0.0), "plan")
     assert report.vertices_kept > 5900  # after rounding, some are on the line between their neighbours
     assert report.notes[-1].startswith(
-        f"{report.vertices_kept} vertices are many: computing the distances between them takes about"
+        f"This map has many vertices ({report.vertices_kept}): computing the distances between them takes "
+        "about"
     )
     assert "many" not in lines(build_environment(foreign(round_room), Shaping(), "plan")[1])
 
