@@ -157,7 +157,7 @@ class Kernel:
         """
         with _lock:
             if self._dispatcher is None or (self._is_cached and not _is_cache_usable):
-                self._is_cached = _is_cache_usable and cache_folder() is not None
+                self._is_cached = _is_cache_usable and open_cache_folder() is not None
                 self._dispatcher = self._build_dispatcher()
             return self._dispatcher
 
@@ -168,7 +168,7 @@ class Kernel:
         previous = numba.config.CACHE_DIR
         try:
             if self._is_cached:
-                numba.config.CACHE_DIR = str(cache_folder())
+                numba.config.CACHE_DIR = str(open_cache_folder())
                 with suppress(RuntimeError):  # functions without a file, as in a doctest, cannot be cached
                     return numba.njit(self.py_func, cache=True, **options)
             return numba.njit(self.py_func, **options)
@@ -269,8 +269,8 @@ def _import_numba() -> ModuleType:
 
 
 @functools.cache
-def cache_folder() -> Path | None:
-    """Return the folder that keeps the machine code of this version.
+def open_cache_folder() -> Path | None:
+    """Open the folder with the machine code of this version; create it if needed.
 
     A folder that belongs to somebody else, or that others may write to, is ignored, because code from it
     would run as this user. A folder that cannot be written to is ignored as well.

@@ -26,7 +26,7 @@ import numpy as np
 from filelock import FileLock
 
 from robocov.arrays import Array
-from robocov.compiled import cache_folder, import_numba, interpret_kernels, list_compiled_kernels
+from robocov.compiled import import_numba, interpret_kernels, list_compiled_kernels, open_cache_folder
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Lloyd, Rapf
 from robocov.cost import CoverageCost
@@ -149,7 +149,7 @@ def compile_kernels(examples: Sequence[Example] = COMMON_EXAMPLES) -> None:
     examples : sequence of functions
         By default those that a run and its summary need.
     """
-    folder = cache_folder()
+    folder = open_cache_folder()
     for example in examples:
         if folder is None:
             example()
@@ -172,7 +172,7 @@ def are_kernels_compiled(examples: Sequence[Example] = COMMON_EXAMPLES) -> bool:
     -------
     bool
     """
-    folder = cache_folder()
+    folder = open_cache_folder()
     return folder is not None and all(_get_marker(folder, example).exists() for example in examples)
 
 
@@ -188,7 +188,7 @@ def compile_in_background() -> Iterator[None]:
     -------
     context manager
     """
-    folder = cache_folder()
+    folder = open_cache_folder()
     if folder is None or are_kernels_compiled(ALL_EXAMPLES):
         yield
         return

@@ -33,7 +33,7 @@ class RangeSensor:
         Convex polygons that tile everything that is not free, see
         `world.obstacle_pieces.build_solid_pieces`.
     movers : tuple of Mover
-        Moving obstacles, which stand where they are at time zero until `set_time` moves them.
+        Moving obstacles, at their positions at time zero until `set_time` is called.
 
     Examples
     --------
@@ -68,14 +68,14 @@ class RangeSensor:
         return RangeSensor, (self._walls, self._movers)
 
     def set_time(self, time: float, failed_robots: Array | None = None) -> None:
-        """Move obstacles to where they are at a time.
+        """Move the obstacles to their positions at a given time.
 
         Parameters
         ----------
         time : float, s
             Simulation time.
         failed_robots : (w, 3) array or None, m
-            x, y and radius of the robots that have failed by then, which are obstacles.
+            x, y and radius of the robots that have failed by then; they count as obstacles.
         """
         for body, mover in zip(self._mover_bodies, self._movers, strict=True):
             body.position = tuple(mover.path.compute_displacement(time).tolist())
@@ -178,7 +178,7 @@ class RangeSensor:
 
 
 def _get_compiled_queries() -> ModuleType | None:
-    """Return `robocov.compiled_queries`, or None if pymunk's public queries are to be used now."""
+    """Return `robocov.compiled_queries`, or None if pymunk's public queries must be used."""
     return None if is_interpreting() else _load_compiled_queries()
 
 

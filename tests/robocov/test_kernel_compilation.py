@@ -12,7 +12,13 @@ import numpy as np
 import pytest
 
 from robocov import compiled
-from robocov.compiled import IS_COMPILER_ENABLED, Kernel, cache_folder, interpret_kernels, is_interpreting
+from robocov.compiled import (
+    IS_COMPILER_ENABLED,
+    Kernel,
+    interpret_kernels,
+    is_interpreting,
+    open_cache_folder,
+)
 from robocov.controllers import Controller, Lloyd, Rapf
 from robocov.environment import Environment
 from robocov.kernel_compilation import (
@@ -33,11 +39,11 @@ pytestmark = pytest.mark.skipif(not IS_COMPILER_ENABLED, reason="kernels are Pyt
 @pytest.fixture
 def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    cache_folder.cache_clear()
-    folder = cache_folder()
+    open_cache_folder.cache_clear()
+    folder = open_cache_folder()
     assert folder is not None
     yield folder
-    cache_folder.cache_clear()
+    open_cache_folder.cache_clear()
 
 
 def wait_until(condition: Callable[[], bool]) -> None:
@@ -109,7 +115,7 @@ def test_examples_are_called_once_for_a_cache(empty_cache: Path) -> None:
 
 
 def test_without_a_cache_examples_are_called_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robocov.kernel_compilation.cache_folder", lambda: None)
+    monkeypatch.setattr("robocov.kernel_compilation.open_cache_folder", lambda: None)
     calls: list[str] = []
     compile_kernels([lambda: calls.append("first"), lambda: calls.append("second")])
     assert calls == ["first", "second"]

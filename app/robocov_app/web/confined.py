@@ -12,7 +12,7 @@ from typing import Any
 
 import robocov
 import robocov_app
-from robocov.compiled import cache_folder
+from robocov.compiled import open_cache_folder
 from robocov.errors import InputError
 from robocov.files.array_files import ArrayCache
 from robocov.mapfile import list_bundled_maps
@@ -68,7 +68,7 @@ def confined(folder: Path) -> Iterator[None]:
         *(path.parent for path in list_bundled_maps().values()),
     )
     arrays = ArrayCache.open_default()
-    caches = [each for each in (cache_folder(), arrays and arrays.folder) if each]
+    caches = [each for each in (open_cache_folder(), arrays and arrays.folder) if each]
     before = tempfile.tempdir
     with tempfile.TemporaryDirectory(prefix="robocov-") as own:
         tempfile.tempdir = own

@@ -106,7 +106,7 @@ def compute_locational_costs(edges: CellEdges, points: Array, f: Performance) ->
     array([2.666667])
     """
     points = np.ascontiguousarray(points, dtype=np.float64)
-    return _sum_costs(edges.start, edges.end, edges.cell, points, f.kind, f.height, _GAUSS_RULE)
+    return _sum_edge_costs(edges.start, edges.end, edges.cell, points, f.kind, f.height, _GAUSS_RULE)
 
 
 def compute_gradients(edges: CellEdges, points: Array, f: Performance) -> Array:
@@ -257,10 +257,13 @@ def _subtract_arctan(x: float) -> float:
 
 
 @kernel
-def _sum_costs(
+def _sum_edge_costs(
     start: Array, end: Array, cell: IntArray, points: Array, kind: int, height: float, rule: Array
 ) -> Array:
-    """Return the sums of ∫ f over the triangles of points and edges, with the sign of the distance."""
+    """Return the cost of each cell: the sum of ∫ f over the triangles of its point and its edges.
+
+    A triangle counts as negative if the point is on the outer side of the edge.
+    """
     sums = np.zeros(len(points))
     for k in range(len(cell)):
         i = cell[k]
@@ -277,20 +280,29 @@ def _sum_costs(
             inverse = _integrate_inverse(d, first, last)
             sums[i] += d * (last * last_r - first * first_r + d * d * inverse) / 6.0
         else:
-            # By quadrature, exact up to rounding. The closed form has dilogarithms, which cancel if a
-            # triangle is flat or the height is large.
-            w = np.sqrt(d * d + height * height)
-            first_tau = np.arcsinh(first / w)
-            last_tau = np.arcsinh(last / w)
-            panels = max(int(np.ceil((last_tau - first_tau) / _PANEL_LENGTH)), 1)
-            half = 0.5 * (last_tau - first_tau) / panels
-            for panel in range(panels):
-                for node in range(rule.shape[1]):
-                    tau = first_tau + half * (2 * panel + 1 + rule[0, node])
-                    s = w * np.sinh(tau)
-                    ratio = (s * s + d * d) / (height * height)
-                    # log(1 + r²/h²)/r², times h²; its limit at r = 0 is 1.
-                    logarithm = np.log1p(ratio) / ratio if ratio > 0.0 else 1.0
-                    term = logarithm * w * np.cosh(tau) * rule[1, node]
-                    sums[i] += 0.5 * d / (height * height) * term * half
+            _add_sensing_cost(sums, i, edge, height, rule)
     return sums
+
+
+@kernel
+def _add_sensing_cost(sums: Array, i: int, edge: _RelativeEdge, height: float, rule: Array) -> None:
+    """Add to sum i the integral of 1/(r²+h²) over the triangle of a point and an edge.
+
+    The quadrature is exact up to rounding. The closed form has dilogarithms, which cancel if the triangle is
+    flat or the height is large.
+    """
+    d = edge.distance
+    w = np.sqrt(d * d + height * height)
+    first_tau = np.arcsinh(edge.start / w)
+    last_tau = np.arcsinh((edge.start + edge.length) / w)
+    panels = max(int(np.ceil((last_tau - first_tau) / _PANEL_LENGTH)), 1)
+    half = 0.5 * (last_tau - first_tau) / panels
+    for panel in range(panels):
+        for node in range(rule.shape[1]):
+            tau = first_tau + half * (2 * panel + 1 + rule[0, node])
+            s = w * np.sinh(tau)
+            ratio = (s * s + d * d) / (height * height)
+            # log(1 + r²/h²)/r², times h²; its limit at r = 0 is 1.
+            logarithm = np.log1p(ratio) / ratio if ratio > 0.0 else 1.0
+            term = logarithm * w * np.cosh(tau) * rule[1, node]
+            sums[i] += 0.5 * d / (height * height) * term * half

@@ -161,7 +161,7 @@ class BodyArrays:
         Returns
         -------
         list of int
-            Their ids, each once per contact.
+            Ids of the bodies; each appears once for every contact that it has.
         """
         self._id_buffer.clear()
         batch.get_space_arbiters(self._space, _CONTACT_FIELDS, self._id_buffer)

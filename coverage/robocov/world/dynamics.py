@@ -62,7 +62,7 @@ def compute_response(team: Team, dt: float) -> MotionResponse:
 
 @kernel
 def compute_clip_factor(x: float, y: float, limit: float) -> float:
-    """Return the factor that clips a vector to a length.
+    """Compute the factor by which to scale a vector so that it is at most `limit` long.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def compute_clip_factor(x: float, y: float, limit: float) -> float:
     Returns
     -------
     float
-        1 if the vector is not longer.
+        At most 1; exactly 1 if the vector is short enough.
     """
     square = x * x + y * y
     if square > limit * limit:

@@ -79,7 +79,7 @@ def build_obstacles(environment: Environment) -> Obstacles:
 
 
 def build_solid_pieces(environment: Environment) -> tuple[Array, ...]:
-    """Build convex polygons that tile everything that is not free and does not move.
+    """Build convex polygons that tile all static obstacles and the outside of the map.
 
     They cover the obstacles at rest, the area outside the boundary, and a frame around the region.
 
@@ -90,7 +90,7 @@ def build_solid_pieces(environment: Environment) -> tuple[Array, ...]:
     Returns
     -------
     tuple of (k, 2) arrays, m
-        Counter-clockwise. They are computed only once for each environment.
+        Counter-clockwise. Computed only once for each environment.
     """
     static = environment.static
     pieces = _pieces_by_environment.get(id(static))

@@ -118,8 +118,10 @@ class World:
             self._may_exceed_max_speed = False
         else:
             self._may_exceed_max_speed = True
-        self._set_state(np.array(positions, dtype=float), np.array(velocities, dtype=float))
-        self.steering = initialize_steering(team, self.velocities, steering)
+        velocities = np.array(velocities, dtype=float)
+        self._set_state(
+            np.array(positions, dtype=float), velocities, initialize_steering(team, velocities, steering)
+        )
         self._mover_states = compute_mover_states(obstacles.movers, time=0.0, dt=1.0)
         self._response: MotionResponse | None = None
         self._response_dt = math.nan
@@ -135,18 +137,17 @@ class World:
         run : int
         positions : (n / runs, 2) array, m
         """
-        rows = self._rows_of_run(run)
+        rows = self._get_rows(run)
         new_positions = self.positions.copy()
         new_velocities = self.velocities.copy()
         new_positions[rows] = positions
         new_velocities[rows] = 0.0
-        self._set_state(new_positions, new_velocities)
-        self._update_spaces()
+        new_steering = None
         if self.steering is not None:
-            steering = self.steering.copy()
-            steering[rows] = 0.0
-            steering.setflags(write=False)
-            self.steering = steering
+            new_steering = self.steering.copy()
+            new_steering[rows] = 0.0
+        self._set_state(new_positions, new_velocities, new_steering)
+        self._update_spaces()
 
     def copy(self) -> World:
         """Return an independent world in the same state, which continues identically.
@@ -163,9 +164,7 @@ class World:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        for array in (self.positions, self.velocities, self.steering):
-            if array is not None:
-                array.setflags(write=False)  # Pickles do not contain this flag.
+        self._protect_state()  # Pickles do not contain the flags of arrays.
 
     def step(
         self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
@@ -191,7 +190,7 @@ class World:
         for k in range(substeps):
             if self._obstacles.movers:
                 self._move_obstacles(time + k * substep, substep)
-            self._substep(forces, external, substep)
+            self._run_substep(forces, external, substep)
 
     def _count_substeps(self, external: Array, dt: float) -> int:
         """Return the number of substeps in which no robot can cross a thin wall."""
@@ -202,18 +201,18 @@ class World:
         crossed_radii = (speed + self._obstacles.max_speed) * dt / self._min_radius
         return max(math.ceil(dt / MAX_SUBSTEP_S - 1e-9), math.ceil(crossed_radii))
 
-    def _substep(self, forces: Array, external: Array, dt: float) -> None:
+    def _run_substep(self, forces: Array, external: Array, dt: float) -> None:
         """Move all robots by `dt` seconds: freely at first, then again where they touch something."""
         response = self._get_response(dt)
         max_speed_after_contact = self.team.max_speed
-        may_exceed_max_speed = self._may_exceed_max_speed or len(external) > 0
-        if may_exceed_max_speed:
+        if self._may_exceed_max_speed or len(external) > 0:
+            self._may_exceed_max_speed = True
             limits = self._compute_speed_limits(external, dt)
             response = response._replace(max_speed=limits.driving)
             max_speed_after_contact = limits.pushed
+        is_rolling = self._find_rolling(external)
         steering = self.steering
         if steering is not None:
-            is_rolling = self._find_rolling(external)
             command = self._drive_wheels(forces, steering, is_rolling, response, dt)
             forces = command.forces
             steering = command.steering
@@ -223,21 +222,18 @@ class World:
         has_contacts = self._resolve_contacts(states, net_forces, max_speed_after_contact, dt)
         positions = np.ascontiguousarray(states[:, :2])
         velocities = np.ascontiguousarray(states[:, 2:])
-        if steering is not None:
-            if has_contacts:
-                turning_speed = 0.5 * self.team.track_width * np.abs(steering[:, 1])
-                velocities = remove_sideways_velocity(
-                    velocities=velocities,
-                    steering=steering,
-                    max_speed=max_speed_after_contact - turning_speed,
-                    is_rolling=is_rolling,
-                )
-            steering.setflags(write=False)
-            self.steering = steering
-        if may_exceed_max_speed:
+        if steering is not None and has_contacts:
+            turning_speed = 0.5 * self.team.track_width * np.abs(steering[:, 1])
+            velocities = remove_sideways_velocity(
+                velocities=velocities,
+                steering=steering,
+                max_speed=max_speed_after_contact - turning_speed,
+                is_rolling=is_rolling,
+            )
+        if self._may_exceed_max_speed:
             speeds = compute_lengths(velocities)
             self._may_exceed_max_speed = bool((speeds > self.team.max_speed).any())
-        self._set_state(positions, velocities)
+        self._set_state(positions, velocities, steering)
         if has_contacts:
             self._update_spaces()
 
@@ -284,14 +280,20 @@ class World:
     def _compute_speeds(self) -> Array:
         return compute_lengths(self.velocities)
 
-    def _set_state(self, positions: Array, velocities: Array) -> None:
-        """Set the state of all robots, in read-only arrays."""
-        positions.setflags(write=False)
-        velocities.setflags(write=False)
+    def _set_state(self, positions: Array, velocities: Array, steering: Array | None) -> None:
+        """Set the state of all robots, and make its arrays read-only."""
         self.positions = positions
         self.velocities = velocities
+        self.steering = steering
+        self._protect_state()
 
-    def _rows_of_run(self, run: int) -> slice:
+    def _protect_state(self) -> None:
+        for array in (self.positions, self.velocities, self.steering):
+            if array is not None:
+                array.setflags(write=False)
+
+    def _get_rows(self, run: int) -> slice:
+        """Return the rows of the robots of a run."""
         return slice(run * self._team_size, (run + 1) * self._team_size)
 
     def _get_spaces(self) -> list[tuple[slice, FreeSpace]]:
@@ -331,7 +333,7 @@ class World:
         states = [space.step(net_forces[rows], dt) for rows, space in self._get_spaces()]
         return states[0] if len(states) == 1 else np.concatenate(states)
 
-    def _list_touching(self) -> list[int]:
+    def _list_touching_robots(self) -> list[int]:
         """Return the robots that touched something in the last free substep, ascending."""
         touching: list[int] = []
         for rows, space in self._get_spaces():
@@ -340,22 +342,22 @@ class World:
 
     def _resolve_contacts(self, states: Array, net_forces: Array, max_speed: Array, dt: float) -> bool:
         """Correct, in place, the states of robots that touch something; return whether any do."""
-        touching_in_run: dict[int, list[int]] = {}
-        for robot in self._list_touching():
-            touching_in_run.setdefault(robot // self._team_size, []).append(robot)
-        for run, touching in touching_in_run.items():
-            self._resolve_contacts_of_run(
+        touching_by_run: dict[int, list[int]] = {}
+        for robot in self._list_touching_robots():
+            touching_by_run.setdefault(robot // self._team_size, []).append(robot)
+        for run, touching in touching_by_run.items():
+            self._resolve_contacts_in_run(
                 run=run, touching=touching, states=states, net_forces=net_forces, max_speed=max_speed, dt=dt
             )
-        return bool(touching_in_run)
+        return bool(touching_by_run)
 
-    def _resolve_contacts_of_run(
+    def _resolve_contacts_in_run(
         self, run: int, touching: list[int], states: Array, net_forces: Array, max_speed: Array, dt: float
     ) -> None:
         """Move the robots in contact again, together with all robots that they are pushed into."""
         if self._contact_solver is None:
             self._contact_solver = ContactSolver(self.team, self._obstacles)
-        rows = self._rows_of_run(run)
+        rows = self._get_rows(run)
         radius = self.team.radius[rows]
         before = np.column_stack([self.positions, self.velocities])
         is_resolved = np.zeros(self._team_size, dtype=bool)

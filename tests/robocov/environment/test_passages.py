@@ -89,7 +89,7 @@ def test_the_narrowest_of_several_components() -> None:
 
 
 @st.composite
-def rooms_with_blocks(draw: st.DrawFn) -> Polygon:
+def draw_room_with_blocks(draw: st.DrawFn) -> Polygon:
     """Draw a rectangular room with discs and boxes in it that touch neither each other nor a wall."""
     space: BaseGeometry = box(0, 0, 10, 8)
     used: list[BaseGeometry] = []
@@ -115,7 +115,7 @@ def count_parts_and_holes(space: BaseGeometry, radius: float) -> tuple[int, int]
 
 
 @settings(deadline=None, max_examples=150)
-@given(rooms_with_blocks())
+@given(draw_room_with_blocks())
 def test_erosion_changes_at_the_gap_and_not_before(space: Polygon) -> None:
     gap = find_narrowest_gap(build_free_space(space))
     untouched = (1, len(space.interiors))
@@ -128,7 +128,7 @@ def test_erosion_changes_at_the_gap_and_not_before(space: Polygon) -> None:
 
 
 @settings(deadline=None, max_examples=60)
-@given(rooms_with_blocks(), st.integers(0, 30), st.floats(0, 6.3), st.booleans())
+@given(draw_room_with_blocks(), st.integers(0, 30), st.floats(0, 6.3), st.booleans())
 def test_the_gap_moves_with_the_map(space: Polygon, first: int, turn: float, mirrored: bool) -> None:
     gap = find_narrowest_gap(build_free_space(space))
     c, s = math.cos(turn), math.sin(turn)

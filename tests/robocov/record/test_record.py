@@ -128,41 +128,41 @@ def test_a_stopped_run_is_a_shorter_run(empty: Environment) -> None:
     np.testing.assert_array_equal(part.positions, whole.positions[: len(part)])
 
 
-def edited(*path: str | int, to: object = None):
-    """Return what changes one value of a ``run.json``, or takes it away where it is to be nothing."""
+def edit_document(*path: str | int, to: object = None):
+    """Return a function that sets one value in the ``run.json`` of a folder; None deletes it."""
 
-    def spoil(folder: Path) -> None:
+    def damage(folder: Path) -> None:
         run = json.loads((folder / "run.json").read_text())
-        holder = run
+        parent = run
         for step in path[:-1]:
-            holder = holder.setdefault(step, {}) if isinstance(holder, dict) else holder[step]
+            parent = parent.setdefault(step, {}) if isinstance(parent, dict) else parent[step]
         if to is None:
-            del holder[path[-1]]
+            del parent[path[-1]]
         else:
-            holder[path[-1]] = to
+            parent[path[-1]] = to
         (folder / "run.json").write_text(json.dumps(run))
 
-    return spoil
+    return damage
 
 
-def with_arrays(**changes):
-    """Return what changes arrays of a ``record.npz``, by functions of what is there."""
+def edit_arrays(**changes):
+    """Return a function that applies functions to arrays in the ``record.npz`` of a folder."""
 
-    def spoil(folder: Path) -> None:
+    def damage(folder: Path) -> None:
         with np.load(folder / "record.npz") as found:
             arrays = {name: changes[name](found[name]) if name in changes else found[name] for name in found}
         np.savez(
             folder / "record.npz", **{name: values for name, values in arrays.items() if values is not None}
         )
 
-    return spoil
+    return damage
 
 
 CONDITIONS = Conditions(loss=0.1, failures=((1, 0.5),), joins=((2, 0.5, (1.0, 1.0)),)).to_dict()
 
 
 @pytest.mark.parametrize(
-    ("spoil", "message"),
+    ("damage", "message"),
     [
         (lambda folder: (folder / "run.json").unlink(), "not the folder of a run (there is no run.json)"),
         (lambda folder: (folder / "record.npz").unlink(), "not the folder of a run (there is no record.npz)"),
@@ -172,112 +172,122 @@ CONDITIONS = Conditions(loss=0.1, failures=((1, 0.5),), joins=((2, 0.5, (1.0, 1.
             "run.json: expected a JSON object with a run",
         ),
         (lambda folder: (folder / "run.json").write_text("[" * 99), "run.json:1:"),
-        (edited("format", to="robocov-map"), 'run.json: format: expected "robocov-run", got "robocov-map"'),
         (
-            edited("version", to=99),
+            edit_document("format", to="robocov-map"),
+            'run.json: format: expected "robocov-run", got "robocov-map"',
+        ),
+        (
+            edit_document("version", to=99),
             "run.json: version: expected 1, got 99; it was written by a newer robocov",
         ),
-        (edited("version", to=True), "run.json: version: expected 1, got true"),
-        (edited("dt_s"), "run.json: dt_s: missing"),
-        (edited("dt_s", to=-1), "run.json: dt_s: expected a number above 0 (s), got -1"),
-        (edited("dt_s", to="0.02"), 'run.json: dt_s: expected a number above 0 (s), got "0.02"'),
-        (edited("seed", to=-3), "run.json: seed: expected a whole number from 0, or null, got -3"),
+        (edit_document("version", to=True), "run.json: version: expected 1, got true"),
+        (edit_document("dt_s"), "run.json: dt_s: missing"),
+        (edit_document("dt_s", to=-1), "run.json: dt_s: expected a number above 0 (s), got -1"),
+        (edit_document("dt_s", to="0.02"), 'run.json: dt_s: expected a number above 0 (s), got "0.02"'),
+        (edit_document("seed", to=-3), "run.json: seed: expected a whole number from 0, or null, got -3"),
         (
-            edited("start", to=["corner"]),
+            edit_document("start", to=["corner"]),
             'run.json: start: expected the name of a start, or null, got ["corner"]',
         ),
-        (edited("lattice", to=1), "run.json: lattice: expected a whole number from 2 to 2048, got 1"),
-        (edited("map", "boundary", 0, 0, to="x"), "run.json: map: boundary[0][0]: "),
-        (edited("map", to=[]), "run.json: map: expected an object, got []"),
-        (edited("controller", to="rapf"), 'run.json: controller: expected an object, got "rapf"'),
-        (edited("controller", "name", to=3), "run.json: controller.name: expected a name, got 3"),
+        (edit_document("lattice", to=1), "run.json: lattice: expected a whole number from 2 to 2048, got 1"),
+        (edit_document("map", "boundary", 0, 0, to="x"), "run.json: map: boundary[0][0]: "),
+        (edit_document("map", to=[]), "run.json: map: expected an object, got []"),
+        (edit_document("controller", to="rapf"), 'run.json: controller: expected an object, got "rapf"'),
+        (edit_document("controller", "name", to=3), "run.json: controller.name: expected a name, got 3"),
         (
-            edited("controller", "gains", "k_rep", to=[1.0]),
+            edit_document("controller", "gains", "k_rep", to=[1.0]),
             "run.json: controller.gains.k_rep: expected a number, a word or null, got [1.0]",
         ),
         (
-            edited("team", "robots", to=10**12),
+            edit_document("team", "robots", to=10**12),
             "run.json: team.robots: expected a whole number from 1 to 10000, got 1000000000000",
         ),
         (
-            edited("team", "mass_kg"),
+            edit_document("team", "mass_kg"),
             "run.json: team.mass_kg: expected a number from 1e-06 to 1e+06, or one ",
         ),
         (
-            edited("team", "radius_m", to=-1),
+            edit_document("team", "radius_m", to=-1),
             "run.json: team.radius_m: expected a number from 0.001 to 1000, or one for each of 4 ",
         ),
         (
-            edited("team", "radius_m", to=[0.1] * 3),
+            edit_document("team", "radius_m", to=[0.1] * 3),
             "run.json: team.radius_m: expected a number from 0.001 to 1000, or one for each of 4 ",
         ),
-        (edited("team", "mass_kg", to=[1, 1, 1, "1"]), "run.json: team.mass_kg: "),
+        (edit_document("team", "mass_kg", to=[1, 1, 1, "1"]), "run.json: team.mass_kg: "),
         (
-            edited("conditions", to={**CONDITIONS, "loss": 2}),
+            edit_document("conditions", to={**CONDITIONS, "loss": 2}),
             "run.json: conditions.loss: expected a number from 0",
         ),
         (
-            edited("conditions", to={**CONDITIONS, "failures": [{"robot": 0, "time_s": 1}]}),
+            edit_document("conditions", to={**CONDITIONS, "failures": [{"robot": 0, "time_s": 1}]}),
             "run.json: conditions.failures[0].robot: expected the number of a robot, from 1, got 0",
         ),
         (
-            edited("conditions", to={**CONDITIONS, "failures": [{"robot": 9, "time_s": 1}]}),
+            edit_document("conditions", to={**CONDITIONS, "failures": [{"robot": 9, "time_s": 1}]}),
             "run.json: conditions.failures[0]: expected a robot from 1 to 4, got robot 9",
         ),
         (
-            edited("conditions", to={**CONDITIONS, "joins": [{"robot": 1, "time_s": 0.0, "place_m": [1]}]}),
+            edit_document(
+                "conditions", to={**CONDITIONS, "joins": [{"robot": 1, "time_s": 0.0, "place_m": [1]}]}
+            ),
             "run.json: conditions.joins[0].place_m: expected a point [x, y], got [1]",
         ),
-        (edited("session", to=[1]), "run.json: session: expected an object, got [1]"),
+        (edit_document("session", to=[1]), "run.json: session: expected an object, got [1]"),
         (
-            edited("session", "control_dt_s", to="often"),
+            edit_document("session", "control_dt_s", to="often"),
             "run.json: session.control_dt_s: expected a number",
         ),
-        (edited("session", "robots", to="1234"), 'run.json: session.robots: expected a list, got "1234"'),
-        (edited("session", "failed", to={"x": [1.0, 1.0]}), "run.json: session.failed.x: "),
         (
-            edited("session", "failed", to={"4": [1.0]}),
+            edit_document("session", "robots", to="1234"),
+            'run.json: session.robots: expected a list, got "1234"',
+        ),
+        (edit_document("session", "failed", to={"x": [1.0, 1.0]}), "run.json: session.failed.x: "),
+        (
+            edit_document("session", "failed", to={"4": [1.0]}),
             'run.json: session.failed["4"]: expected a point [x, y]',
         ),
         (
-            edited("session", "touched", to=[{"from_s": 0, "to_s": "soon", "robots": [1]}]),
+            edit_document("session", "touched", to=[{"from_s": 0, "to_s": "soon", "robots": [1]}]),
             'run.json: session.touched[0].to_s: expected a number from 0 (s), got "soon"',
         ),
         (
             lambda folder: (folder / "record.npz").write_bytes(b"PK\x03\x04 no"),
             "record.npz: cannot be read: ",
         ),
-        (with_arrays(goals=lambda values: None), "record.npz: there is no array goals"),
+        (edit_arrays(goals=lambda values: None), "record.npz: there is no array goals"),
         (
-            with_arrays(forces=lambda values: values[:, :3]),
+            edit_arrays(forces=lambda values: values[:, :3]),
             "record.npz: forces: expected shape (101, 4, 2) of float64, got (101, 3, 2) of float64",
         ),
         (
-            with_arrays(time=lambda values: values[None]),
+            edit_arrays(time=lambda values: values[None]),
             "record.npz: time: expected shape (T,) of float64, got (1, 101) of float64",
         ),
         (
-            with_arrays(goals=lambda values: values.astype("f4")),
+            edit_arrays(goals=lambda values: values.astype("f4")),
             "record.npz: goals: expected shape (101, 4, 2) of float64, got (101, 4, 2) of float32",
         ),
         (
-            with_arrays(**{name: lambda values: values[:0] for name in ARRAYS}),
+            edit_arrays(**{name: lambda values: values[:0] for name in ARRAYS}),
             "record.npz: time: expected shape (T,) of float64, got (0,) of float64",
         ),
-        (with_arrays(time=lambda values: 0 * values), "record.npz: time: expected ascending numbers"),
+        (edit_arrays(time=lambda values: 0 * values), "record.npz: time: expected ascending numbers"),
         (
-            with_arrays(positions=lambda values: values * 1e9),
+            edit_arrays(positions=lambda values: values * 1e9),
             "record.npz: positions: expected finite numbers up to 1e+07, got ",
         ),
         (
-            with_arrays(velocities=lambda values: values * np.nan),
+            edit_arrays(velocities=lambda values: values * np.nan),
             "record.npz: velocities: expected finite numbers up to 1e+300, got nan",
         ),
     ],
 )
-def test_a_spoilt_folder_is_refused_in_one_line(record: Record, tmp_path: Path, spoil, message: str) -> None:
+def test_a_damaged_folder_is_refused_in_one_line(
+    record: Record, tmp_path: Path, damage, message: str
+) -> None:
     record.save(tmp_path)
-    spoil(tmp_path)
+    damage(tmp_path)
     with pytest.raises(InputError) as caught:
         Record.load(tmp_path)
     assert "\n" not in str(caught.value)
@@ -289,10 +299,10 @@ def test_what_later_versions_may_add_is_passed_over(record: Record, tmp_path: Pa
     """And what earlier ones did not write yet may be missing."""
     record.save(tmp_path)
     for path in (("mood",), ("controller", "label"), ("team", "color_rgb"), ("session", "weather")):
-        edited(*path, to={"fine": [1, None]})(tmp_path)
+        edit_document(*path, to={"fine": [1, None]})(tmp_path)
     for name in ("lattice", "versions", "summary", "starts_m", "duration_s"):
-        edited(name)(tmp_path)
-    with_arrays()(tmp_path)
+        edit_document(name)(tmp_path)
+    edit_arrays()(tmp_path)
     with np.load(tmp_path / "record.npz") as found:
         np.savez_compressed(tmp_path / "record.npz", **found, moods=np.arange(3))
     again = Record.load(tmp_path)

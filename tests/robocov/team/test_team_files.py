@@ -26,14 +26,14 @@ communication_range = 4.0
 """
 
 
-def written(folder: Path, text: str, name: str = "team.toml") -> Path:
+def write_file(folder: Path, text: str, name: str = "team.toml") -> Path:
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path
 
 
 def test_groups_become_rows_in_their_order(tmp_path: Path) -> None:
-    team = read_team(written(tmp_path, TEAM))
+    team = read_team(write_file(tmp_path, TEAM))
     assert team.max_speed.tolist() == [1.5, 1.5, 0.5, 0.5, 0.5]
     assert team.radius.tolist() == [0.1, 0.1, 0.2, 0.2, 0.2]
     assert team.communication_range.tolist() == [np.inf, np.inf, 4.0, 4.0, 4.0]
@@ -44,13 +44,13 @@ def test_groups_become_rows_in_their_order(tmp_path: Path) -> None:
 
 def test_json_is_the_same(tmp_path: Path) -> None:
     groups = [{"count": 1, "sensing_range": None}, {"count": 1, "mass": 2.5}]
-    team = read_team(written(tmp_path, json.dumps({"group": groups}), "team.json"))
+    team = read_team(write_file(tmp_path, json.dumps({"group": groups}), "team.json"))
     assert team.sensing_range.tolist() == [np.inf, 3.0]
     assert team.mass.tolist() == [1.0, 2.5]
 
 
 def test_what_a_group_leaves_open_is_as_said_for_all(tmp_path: Path) -> None:
-    team = read_team(written(tmp_path, TEAM), {"radius": 0.3, "viscosity": 1.0, "sensing_range": None})
+    team = read_team(write_file(tmp_path, TEAM), {"radius": 0.3, "viscosity": 1.0, "sensing_range": None})
     assert team.radius.tolist() == [0.3, 0.3, 0.2, 0.2, 0.2]
     assert team.viscosity.tolist() == [1.0] * 5
     assert np.isinf(team.sensing_range).all()
@@ -106,7 +106,7 @@ def test_teams_survive_the_way_to_json_and_back(groups: list[dict[str, float]]) 
 )
 def test_what_is_wrong_is_told_in_one_line(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as told:
-        read_team(written(tmp_path, text))
+        read_team(write_file(tmp_path, text))
     assert "\n" not in str(told.value)
     assert str(told.value).startswith(str(tmp_path / "team.toml"))
 
@@ -115,9 +115,9 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     with pytest.raises(RobocovError, match="no such file"):
         read_team(tmp_path / "none.toml")
     with pytest.raises(RobocovError, match=r"bad.json"):
-        read_team(written(tmp_path, "[1,", "bad.json"))
+        read_team(write_file(tmp_path, "[1,", "bad.json"))
     with pytest.raises(InputError, match='expected an object with a list "group"'):
-        read_team(written(tmp_path, "[1]", "list.json"))
+        read_team(write_file(tmp_path, "[1]", "list.json"))
     (tmp_path / "latin.toml").write_bytes(b"# \xff")
     with pytest.raises(InputError, match="not UTF-8"):
         read_team(tmp_path / "latin.toml")

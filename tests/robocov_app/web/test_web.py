@@ -19,7 +19,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.compiled import cache_folder
+from robocov.compiled import open_cache_folder
 from robocov.errors import InputError, RobocovError
 from robocov.mapfile import load_map
 from robocov_app.cli import main
@@ -638,16 +638,16 @@ def test_a_program_that_asks_for_heads_alone_gets_them(display):
 def test_served_window_uses_the_caches_of_kernels_and_arrays(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
     monkeypatch.setenv("ROBOCOV_CACHE", str(tmp_path / "arrays"))
-    cache_folder.cache_clear()
+    open_cache_folder.cache_clear()
     try:
-        kernels = cache_folder()
+        kernels = open_cache_folder()
         (tmp_path / "folder").mkdir()
         with confined(tmp_path / "folder"):
             (tmp_path / "arrays").mkdir()
             for folder in (kernels, tmp_path / "arrays"):
                 (folder / "entry").write_text("")
     finally:
-        cache_folder.cache_clear()
+        open_cache_folder.cache_clear()
 
 
 def test_a_served_window_reads_and_writes_below_its_folder_alone(tmp_path):
