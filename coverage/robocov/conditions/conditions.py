@@ -119,7 +119,7 @@ class Conditions:
         if not is_number(self.seed, Integral) or self.seed < 0:
             raise ParameterError(f"conditions.seed: expected a whole number from 0, got {quote(self.seed)}")
         self._check_forget_after()
-        self._check_order_of_events()
+        self._check_event_order()
 
     def _check_forget_after(self) -> None:
         """Raise an error if a robot would be forgotten before its next message is due."""
@@ -130,7 +130,7 @@ class Conditions:
                 f"got {self.forget_after:g} s"
             )
 
-    def _check_order_of_events(self) -> None:
+    def _check_event_order(self) -> None:
         """Raise an error if a robot joins after it has failed."""
         failure_times = {failure.robot: failure.time for failure in self.failures}
         for k, join in enumerate(self.joins):

@@ -103,7 +103,7 @@ def _build_outward_rule(f: Performance, size: Array, cell: IntArray) -> tuple[Ar
     nodes = np.tile(plain_nodes, (len(size), 1))
     weights = np.tile(plain_weights, (len(size), 1))
     if isinstance(f, Sensing):
-        # The steeper f is near the point, the more nodes are there.
+        # The steeper f is near the point, the more nodes lie there.
         bend = np.arcsinh(np.maximum(size / f.height, 1e-3))[:, None]
         weights = weights * bend * np.cosh(bend * nodes) / np.sinh(bend)
         nodes = np.sinh(bend * nodes) / np.sinh(bend)

@@ -148,11 +148,12 @@ def _describe_trembling(record: Record, robots: IntArray) -> str:
 def _describe_zigzags(record: Record, zigzags: IntArray) -> str:
     robots = np.flatnonzero(zigzags >= MIN_ZIGZAGS)
     limit = float(record.team.max_acceleration[robots].min())
-    bouncing = (
-        f"{_format_robots(record, robots)} went {int(zigzags.sum())} times from one wall to the opposite one"
+    crossings = int(zigzags.sum())
+    return (
+        f"Zigzag in a narrow passage: {_format_robots(record, robots)} went {crossings} times from one wall "
+        f"to the opposite one. Try a higher maximum acceleration than {limit:g} m/s² (--max-acceleration), "
+        "or a lower maximum speed (--max-speed)."
     )
-    remedy = f"Try a higher maximum acceleration than {limit:g} m/s² (--max-acceleration)"
-    return f"Zigzag in a narrow passage: {bouncing}. {remedy}, or a lower maximum speed (--max-speed)."
 
 
 def _format_robots(record: Record, robots: IntArray) -> str:

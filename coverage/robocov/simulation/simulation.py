@@ -130,7 +130,7 @@ class Simulation:
         self._world = self._build_world(state)
         self.sensor = RangeSensor(build_solid_pieces(environment), build_movers(environment))
         has_team_changes = self.conditions is not None and self.conditions.has_team_changes
-        self._obstacles_change = environment.has_moving_obstacles or has_team_changes
+        self._has_changing_obstacles = environment.has_moving_obstacles or has_team_changes
         self._perception: Perception | None = None
         self.inbox: Inbox | None = None
         if self.conditions is not None:
@@ -165,7 +165,7 @@ class Simulation:
         """Discard observations and decision of the last step, and move the sensor's obstacles."""
         self._knowledge: _Knowledge | None = None
         self._snapshot: Snapshot | None = None
-        if self._obstacles_change:
+        if self._has_changing_obstacles:
             self.sensor.set_time(self.time, self._world.failed_robots)
 
     def __repr__(self) -> str:
@@ -419,7 +419,7 @@ class Simulation:
         twin = copy(self)
         twin._world = self._world.copy()
         twin.memory = deepcopy(self.memory)
-        if self._obstacles_change:
+        if self._has_changing_obstacles:
             twin.sensor = self.sensor.copy()
         # The snapshot contains the next memory, which must not be shared.
         twin._start_step()

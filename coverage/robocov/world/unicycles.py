@@ -214,7 +214,7 @@ def compute_drive_command(
 
 @kernel
 def _choose_motion(motion: _Motion, along: float, across: float, limits: _WheelLimits, dt: float) -> _Motion:
-    """Return the motion that follows a point whose velocity changes along the heading and across it, m/s."""
+    """Return the target motion, given a point robot's velocity change along and across the heading, m/s."""
     # The turning rate toward the velocity that the point would have after the response time.
     future_along = motion.speed + along * (RESPONSE_TIME_S / dt)
     future_across = across * (RESPONSE_TIME_S / dt)
@@ -238,7 +238,7 @@ def _choose_motion(motion: _Motion, along: float, across: float, limits: _WheelL
 
 @kernel
 def _approach_motion(motion: _Motion, target: _Motion, limits: _WheelLimits) -> _Motion:
-    """Return the motion after a substep, in which the wheels approach the target within their limits.
+    """Return the motion after a substep in which the wheels approach the target within their limits.
 
     Braking comes first, then the turn, then speeding up.
     """
@@ -260,7 +260,7 @@ def _approach_motion(motion: _Motion, target: _Motion, limits: _WheelLimits) -> 
 def remove_sideways_velocity(
     velocities: Array, steering: Array, max_speed: Array, is_rolling: BoolArray
 ) -> Array:
-    """Remove the velocity that a contact gave to unicycles and that their wheels do not allow.
+    """Remove velocity that the wheels of unicycles do not allow, after a contact.
 
     Parameters
     ----------

@@ -213,7 +213,7 @@ class World:
         is_rolling = self._find_rolling(external)
         steering = self.steering
         if steering is not None:
-            command = self._drive_wheels(forces, steering, is_rolling, response, dt)
+            command = self._compute_drive_command(forces, steering, is_rolling, response, dt)
             forces = command.forces
             steering = command.steering
             response = command.response
@@ -237,10 +237,10 @@ class World:
         if has_contacts:
             self._update_spaces()
 
-    def _drive_wheels(
+    def _compute_drive_command(
         self, forces: Array, steering: Array, is_rolling: BoolArray, response: MotionResponse, dt: float
     ) -> DriveCommand:
-        """Return the wheel motion for a substep, in which robots that are carried do not turn."""
+        """Return the motion of the wheels in a substep. Robots that external forces carry do not turn."""
         return compute_drive_command(
             forces=forces,
             velocities=self.velocities,

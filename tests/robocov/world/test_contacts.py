@@ -27,7 +27,7 @@ def test_robots_without_contact_move_as_if_they_were_alone() -> None:
         alone.step(forces[1:2], DT)
         assert team.positions[1].tobytes() == alone.positions[0].tobytes()
         assert team.velocities[1].tobytes() == alone.velocities[0].tobytes()
-    assert team._list_touching() == [0, 2, 3]
+    assert team._list_touching_robots() == [0, 2, 3]
 
 
 @pytest.mark.parametrize("ratio", [100.0, 1000.0])
@@ -57,7 +57,7 @@ def test_pushes_are_passed_on_along_a_row_of_robots() -> None:
         Obstacles((DISTANT_WALL,)), replace(row, mass=mass, max_speed=max_speed), starts, velocities
     )
     world.step(np.zeros((n, 2)), DT)
-    assert world._list_touching() == [0, 1]
+    assert world._list_touching_robots() == [0, 1]
     assert (world.positions[1:, 0] > starts[1:, 0] + 0.01).all()
     for _ in range(30):
         assert np.diff(world.positions[:, 0]).min() >= 0.2 - MAX_PENETRATION

@@ -178,7 +178,7 @@ def test_robots_of_the_copy_test_touch_each_other(cluttered: Environment) -> Non
     steps_with_contact = 0
     for step in range(200):
         world.step(draw_forces(0, step), DT)
-        steps_with_contact += bool(world._list_touching())
+        steps_with_contact += bool(world._list_touching_robots())
     assert steps_with_contact > 20
 
 
