@@ -1,4 +1,4 @@
-"""Adaptive coverage: robots do not know the density, and learn it from measurements where they move."""
+"""Adaptive coverage: robots learn an unknown density from measurements along their paths."""
 
 from __future__ import annotations
 
@@ -54,34 +54,47 @@ class AdaptiveMemory:
 class Adaptive(BaseController):
     """Lloyd's algorithm with a density that is learned (Schwager, Rus and Slotine, IJRR 28, 2009).
 
-    A robot measures the density at its own position, and nowhere else. Its estimate of the density is
-    K(q)·a_i, with basis functions K, here Gaussians on a grid of `basis` by `basis`, divided by their sum, so
-    that a constant density is represented exactly. All robots start with `prior` everywhere. Each moves to
-    the centroid C_i of its Voronoi cell V_i by its own estimate, and learns while it moves:
+    A robot measures the density only at its own position. It estimates the density everywhere from its own
+    measurements and from what its neighbors send, and moves to the centroid of its Voronoi cell under that
+    estimate. It does not explore: where no robot has been, the estimate stays close to `prior`.
 
-        dΛ_i/dt = w K K^T,  dλ_i/dt = w K φ,                        at its position p_i
+    With ``estimate="basis"``, the estimate is a sum of Gaussians as in the paper, and neighbors send each
+    other their estimates. With ``estimate="gp"``, it is the mean of a Gaussian process, and neighbors send
+    each other their measurements. Both have the information "shared map". Obstacles are not known; robots
+    slide along them as with `Lloyd`.
+
+    The gains are the fields of the dataclass; `get_gains` returns their meanings, units and ranges.
+
+    Notes
+    -----
+    *Basis functions.* The estimate of robot i is K(q)·a_i. K are Gaussians on a grid of `basis` by `basis`,
+    divided by their sum, so that a constant density is represented exactly. At its position p_i, in its cell
+    V_i with the centroid C_i, robot i learns by
+
+        dΛ_i/dt = w K K^T,  dλ_i/dt = w K φ
         da_i/dt = γ (λ_i - Λ_i a_i) + k P_i (C_i - p_i) + ζ Σ_j (a_j - a_i) / deg_i,    a_i >= `least`
 
-    The first term fits all measurements of the robot. The second one makes the paper's Lyapunov function
-    fall, with P_i = ∫ K (q - p_i)^T dq over V_i. The third one is the consensus with the neighbors. Where no
-    robot has been, the estimate stays close to the initial one: robots move to where the cost is low, not to
-    where there is much to learn.
+    The first term of da_i/dt fits the robot's measurements. The second one, with P_i = ∫ K (q - p_i)^T dq
+    over V_i, makes the paper's Lyapunov function decrease. The third one is the consensus with the neighbors.
 
-    With ``estimate="gp"`` robots exchange their measurements instead, one for each of 20 by 20 squares, as if
-    taken at its center. The estimate is the mean of a Gaussian process with a squared exponential kernel of
-    length `correlation`, following Luo and Sycara (ICRA 2018) and Santos, Diaz-Mercado and Egerstedt (2018),
-    plus `explore` times its standard deviation. With `explore` above 0, which takes several times as long to
-    compute, robots are drawn to where no robot has been.
+    *Gaussian process.* One measurement is stored for each of 20 by 20 squares, as if taken at its center. The
+    kernel is the squared exponential with the length `correlation`, as in Luo and Sycara (ICRA 2018) and
+    Santos, Diaz-Mercado and Egerstedt (2018), without their mixtures and bounds. With `explore` above 0, that
+    many standard deviations are added to the mean, so that robots are drawn to where no robot has been. This
+    takes several times as long to compute.
 
-    The controller reads the density of the map at the positions of the robots, and nowhere else. Neighbors
-    exchange their estimates, so ``information`` is "shared map". A robot without neighbors
-    learns alone, and treats the whole region as its cell. Obstacles are not known; the robot slides along
-    them, as with `lloyd`.
+    The implementation is based on summaries of the papers, not on their full texts. It differs from the
+    paper as follows: implicit steps of `period` seconds, which are stable for all gains; cells and centroids
+    that are sampled on a lattice; w = 1; equal weights of all neighbors in the consensus.
 
-    The implementation follows summaries of the papers, not their texts. Decisions made here: parameters are
-    integrated by implicit steps of `period` seconds, so that no gain is unstable; cells and centroids are
-    sampled on a lattice; w = 1; all neighbors have the same weight in the consensus. The Gaussian process is
-    the plain one, without the mixtures and bounds of the papers.
+    Examples
+    --------
+    >>> from robocov.environment import Environment
+    >>> from robocov.simulation import Simulation
+    >>> room = Environment("room", ((0, 0), (8, 0), (8, 6), (0, 6)))
+    >>> simulation = Simulation(room, Adaptive(), [[1.0, 1.0]])
+    >>> simulation.run(20.0).positions[-1].round(1)
+    array([[4., 3.]])
     """
 
     name = "adaptive"
@@ -212,15 +225,15 @@ class Adaptive(BaseController):
     def _estimate_by_process(self, lattice: Lattice, measurements: Array) -> Array:
         """Return the estimate of one robot at the samples, (k,), from measurements in the squares, (s,)."""
         is_known = ~np.isnan(measurements)
-        samples_known = lattice.sample_covariance[:, is_known]
-        known_known = lattice.square_covariance[is_known][:, is_known]
-        factor = scipy.linalg.cho_factor(known_known + _NOISE_VARIANCE * np.eye(len(known_known)))
-        deviations = measurements[is_known] - self.prior
-        estimate = self.prior + samples_known @ scipy.linalg.cho_solve(factor, deviations)
+        covariance = lattice.square_covariance[is_known][:, is_known]
+        factor = scipy.linalg.cho_factor(covariance + _NOISE_VARIANCE * np.eye(len(covariance)))
+        weights = scipy.linalg.cho_solve(factor, measurements[is_known] - self.prior)
+        estimate = self.prior + lattice.sample_covariance[:, is_known] @ weights
         if self.explore:
-            squares_known = lattice.square_covariance[:, is_known]
-            solved = scipy.linalg.cho_solve(factor, squares_known.T).T
-            variance = np.maximum(1.0 - (squares_known * solved).sum(axis=1), 0.0)
+            # The standard deviation at a sample is taken from the nearest square.
+            square_covariance = lattice.square_covariance[:, is_known]
+            solution = scipy.linalg.cho_solve(factor, square_covariance.T).T
+            variance = np.maximum(1.0 - (square_covariance * solution).sum(axis=1), 0.0)
             nearest_square = lattice.sample_covariance.argmax(axis=1)
             estimate += self.explore * self.prior * np.sqrt(variance)[nearest_square]
         return np.asarray(estimate)
@@ -228,7 +241,7 @@ class Adaptive(BaseController):
 
 @kernel
 def _multiply(first: Array, second: Array) -> Array:
-    """Return the product of two matrices, bit-identical on all processors, unlike that of BLAS."""
+    """Multiply two matrices. The result has the same bits on all processors, unlike that of BLAS."""
     result = np.zeros((len(first), second.shape[1]))
     for i in range(len(first)):
         for k in range(len(second)):

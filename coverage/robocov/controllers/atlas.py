@@ -19,9 +19,9 @@ from robocov.controllers.route_following import follow_routes
 from robocov.controllers.shared_map import (
     CERTAIN_RANGE_FRACTION,
     MAX_SILENCE_S,
-    Circle,
+    HearingGroup,
     build_unknown_map,
-    list_circles,
+    list_hearing_groups,
     update_maps,
 )
 from robocov.controllers.teammates import Teammates
@@ -94,10 +94,10 @@ class PlannerState:
     next_plan_time: float
     """s"""
     teammates: Teammates
-    met: frozenset[int] = frozenset()
+    encountered: frozenset[int] = frozenset()
     """Robots that it has heard, or that others have reported to it, except for failed ones."""
-    gone: Mapping[int, float] = field(default_factory=dict)
-    """Times at which it considered robots failed or missing, s. Never changed in place."""
+    loss_times: Mapping[int, float] = field(default_factory=dict)
+    """Times at which it lost robots, because they had failed or were missing, s. Never changed in place."""
     start_time: float = 0.0
     """Time of its start, or of the last change of the team or the walls, s."""
     path_length: float = 0.0
@@ -150,7 +150,7 @@ class AtlasMemory:
     legs: IntArray
     """(n,) Index of the waypoint that each robot heads for."""
     returns: Array | None = None
-    """(n, rays, 2) m, obstacle points that the last scan of each robot has met; nan for none."""
+    """(n, rays, 2) m, obstacle points in the last scan of each robot; nan for none."""
     estimates: Estimates | None = None
     """Position estimates, if robots know positions of others by messages."""
 
@@ -176,6 +176,15 @@ class _Others(NamedTuple):
     """(k,) Whether each is at rest, out of contact now, or not planned for."""
     is_quiet: bool
     """Whether all of them are at rest."""
+
+
+class _LostRobots(NamedTuple):
+    """Which of the k robots that one knows of are lost. Neither is true for those that it hears."""
+
+    has_failed: BoolArray
+    """(k,) Whether each became silent although it cannot have moved out of range."""
+    is_missing: BoolArray
+    """(k,) Whether each is not heard although its assumed position is well within range."""
 
 
 class _Cooperation(NamedTuple):
@@ -205,29 +214,18 @@ _LATEST_PLANS: WeakKeyDictionary[GridPlanner, _TeamPlan] = WeakKeyDictionary()
 
 @dataclass(frozen=True)
 class Atlas(BaseController):
-    """Each robot plans for its whole team on its own discovered map, and moves to its own goal in that plan.
+    """Each robot maps the region, plans for the whole team on its own map, and moves to its own goal.
 
-    Twice a second each robot scans, and adds the scan to its own grid map (`DiscoveredMap`). Robots send
-    nothing but positions; cells at the positions of others become free. A robot out of range is assumed to
-    move to its goal in the plan, and forgotten if it is not there. Once in `period` seconds a robot minimizes
-    the coverage cost (22) on its own map, in four stages:
+    Robots scan twice a second, and send each other nothing but their positions. Every `period` seconds, a
+    robot reduces the coverage cost (22) on its own map in four stages:
 
-    1. *A plan for the team*, on a coarse lattice: Lloyd's iteration from the former plan, alternating with
-       interchange (the k-median problem). A robot at rest (`MIN_REST_S`) keeps its position in the plan.
-       Relocations must save the fraction `threshold` of the cost, those within the robot's own cell the
-       fraction `nearby`. Goals are assigned such that the sum of the squared path lengths is minimal; this
-       assignment stays the same while the robots move. After some time, enough to cross the region a few
-       times, each robot plans for itself alone on known free space, and leaves its cell only while all others
-       are at rest.
-    2. *Its own goal*, on a fine lattice: the local minimum of the cost as a function of its own position,
-       interpolated between nodes by a parabola. A new goal must save the fraction `rest` of the cost of its
-       own cell.
-    3. *Viewpoints*: at its goal, it moves to points from which it sees unknown parts of its own cell, if the
-       cost at stake exceeds the fraction `stake` of the cost. This fraction doubles with the length of the
-       path to viewpoints (`patience`). A robot without others does not look around: its goal hardly depends
-       on unknown space.
-    4. *The route*: the shortest one on its map. The robot brakes before walls and other robots
-       (`route_following`).
+    1. *Plan for the team.* It computes goals for all robots that it knows of. Robots at rest keep their
+       positions.
+    2. *Own goal.* It refines its own goal on a finer lattice.
+    3. *Viewpoints.* At its goal, it looks at unknown parts of its cell if these matter enough for the cost.
+    4. *Route.* It follows the shortest path on its map, and brakes before walls and other robots.
+
+    The gains are the fields of the dataclass; `get_gains` returns their meanings, units and ranges.
 
     Notes
     -----
@@ -236,14 +234,28 @@ class Atlas(BaseController):
         J(P) = sum over q of w_q min_j d(q, p_j),
 
     where q are the nodes of a lattice, d are geodesic distances among known walls, and w_q are areas times φ.
-    Unknown cells are weighted by their openness, because the insides of obstacles stay unknown (`openness`).
+    Unknown cells are weighted by the probability that they are free (`openness`), because the insides of
+    obstacles stay unknown.
 
-    The maps of different robots become more and more similar where it matters, and so do the plans. Otherwise
-    the team comes to rest because robots at rest are fixed, and because the required savings of relocations
-    and goals double with the path length of a robot (`settling`), not with time: a robot at rest stays as
-    ready to move as it was. Path lengths start from zero when robots join or fail, and when a robot sees a
-    wall appear or disappear. In a team of more than `MAX_PLANNING_GROUP` robots each one plans for itself and
-    its nearest neighbors, in the part of the map around them; the others stay where they are.
+    *Plan for the team.* The solver alternates Lloyd's iteration with interchange (the k-median problem),
+    starting from the last plan. A relocation must save the fraction `threshold` of the cost, or `nearby` if
+    it is within the robot's own cell. Goals are assigned so that the sum of the squared path lengths is
+    minimal; this assignment does not change while the robots move. After the time in which a robot could
+    cross the region a few times, it plans for itself alone on known free space, and leaves its cell only
+    while all others are at rest. In a team of more than `MAX_PLANNING_GROUP` robots, each robot plans for
+    itself and its nearest neighbors only.
+
+    *Own goal and viewpoints.* A new goal must save the fraction `rest` of the cost of the robot's own cell. A
+    viewpoint must put at least the fraction `stake` of that cost at stake; the fraction doubles with the
+    length of the path to viewpoints (`patience`). A robot without others does not look for viewpoints,
+    because its goal hardly depends on unknown space.
+
+    *Coming to rest.* The required savings double with the path length of a robot (`settling`), not with time,
+    so that a team at rest still responds to changes. Path lengths start from zero when a robot joins or
+    fails, and when a wall appears or disappears.
+
+    *Lost robots.* A robot out of range is assumed to be at its goal in the last plan, and is removed from the
+    plan if it is not heard there.
 
     Examples
     --------
@@ -273,7 +285,7 @@ class Atlas(BaseController):
     settling: float = gain(
         0.5, "1", "path, in diameters, that doubles the required savings", low=1e-3, high=1e6
     )
-    clearance: float = gain(0.03, "m", "that routes keep between rim and walls", high=10.0)
+    clearance: float = gain(0.03, "m", "gap between robots and walls along routes", high=10.0)
     k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
 
@@ -341,16 +353,16 @@ class Atlas(BaseController):
     def _update_maps(
         self, maps: list[DiscoveredMap], seen: Observations, scans: Scans, radius: Array
     ) -> list[DiscoveredMap]:
-        """Return the maps after a scan of each robot; cells at the positions of others become free."""
-        later = []
+        """Return the maps after a scan of each robot; cells at the positions of other robots become free."""
+        updated_maps = []
         for robot, known_map in enumerate(maps):
             scanned = known_map.add_scan(seen.positions[robot], scans.distances[robot], scans.hit[robot])
             neighbors = seen.get_neighbor_positions(robot)
-            later.append(scanned.add_robots(neighbors, float(radius[robot])))
-        return later
+            updated_maps.append(scanned.add_robots(neighbors, float(radius[robot])))
+        return updated_maps
 
-    def _list_reports(self, states: Sequence[PlannerState], heard: IntArray) -> list[Teammates]:
-        """Return the reports about others of the robots that are heard."""
+    def _list_reports(self, states: Sequence[PlannerState], neighbors: IntArray) -> list[Teammates]:
+        """Return what the neighbors of a robot report about others."""
         return []
 
     def _is_agreed(self, teammates: Teammates, seen: Observations) -> bool:
@@ -369,36 +381,47 @@ class Atlas(BaseController):
         others = _list_others(state.teammates, position, seen.time, is_agreed=is_agreed)
         window = Window.build_around(state.known_map.raster, position, math.inf, _OWN_NODES)
         spacing = window.stride * state.known_map.raster.cell_size
-        step_length = 0.0 if before.positions is None else math.dist(position, before.positions[0])
-        state = replace(
-            state,
-            next_plan_time=seen.time + self._compute_period(before, robot, spacing / max_speed),
-            path_length=before.path_length + step_length,
-            was_quiet=others.is_quiet,
-        )
-        if _has_changed(before, state, radius):
-            state = replace(
-                state, start_time=seen.time, path_length=0.0, looking_length=0.0, former_viewpoints=()
-            )
+        period = self._compute_period(before, robot, spacing / max_speed)
+        state = replace(state, next_plan_time=seen.time + period, was_quiet=others.is_quiet)
         group = np.concatenate([[robot], others.robots])
         positions = np.vstack([position, others.positions])
         if _is_unchanged(before, group, positions, others.is_quiet, max_move=_MAX_IDLE_MOVE * spacing):
-            return replace(state, path_length=before.path_length), None
+            return state, None
+        state = _update_path_lengths(before, state, position, seen.time, radius)
         planner = state.planner or GridPlanner.get_shared(state.known_map, window, radius + self.clearance)
-        planner = planner.update(state.known_map, window)
-        state = replace(state, planned_map=state.known_map, positions=positions, group=group, planner=planner)
+        state = replace(
+            state,
+            planned_map=state.known_map,
+            positions=positions,
+            group=group,
+            planner=planner.update(state.known_map, window),
+        )
         cooperation = self._choose_cooperation(state, seen, others, max_speed=max_speed, is_agreed=is_agreed)
         state = self._plan_for_team(state, seen, cooperation)
+        return self._plan_own_motion(before, state, seen, cooperation, robot)
+
+    def _plan_own_motion(
+        self,
+        before: PlannerState,
+        state: PlannerState,
+        seen: Observations,
+        cooperation: _Cooperation,
+        robot: int,
+    ) -> tuple[PlannerState, Array]:
+        """Return the state of a robot after the plan for its team, and the robot's next goal."""
+        position = seen.positions[robot]
         own = self._find_own_goal(state, seen, cooperation)
         if own is None:
             return replace(state, own_goal=position, is_idle=False), position
         state = replace(state, own_goal=own.goal)
-        if is_agreed and before.positions is not None:
+        if cooperation.is_agreed and before.positions is not None:
+            step_length = math.dist(position, before.positions[0])
             state, evasion_goal = self._find_evasion_goal(state, step_length, seen.time, robot)
             if evasion_goal is not None:
                 return state, evasion_goal
-        walked = state.path_length - before.path_length
-        return self._choose_goal(state, own, position, walked, is_agreed=is_agreed)
+        # After a change of the team or the walls, the path length starts from zero.
+        path_increase = max(state.path_length - before.path_length, 0.0)
+        return self._choose_goal(state, own, position, path_increase, is_agreed=cooperation.is_agreed)
 
     def _choose_cooperation(
         self, state: PlannerState, seen: Observations, others: _Others, *, max_speed: float, is_agreed: bool
@@ -449,33 +472,24 @@ class Atlas(BaseController):
     def _update_teammates(
         self, seen: Observations, team: Team, state: PlannerState, robot: int, reports: Sequence[Teammates]
     ) -> PlannerState:
-        """Return the state with a robot's present knowledge about the others.
-
-        A robot that becomes silent, and cannot have moved out of range, has failed. Other silent robots are
-        assumed to be at their goals in the last plan. They are missing, but not considered failed, if they
-        are not heard there.
-        """
-        teammates = state.teammates
-        position = seen.positions[robot]
-        communication_range = float(team.communication_range[robot])
-        robots = seen.neighbors.list_neighbors(robot)
-        silence = np.where(np.isin(teammates.robots, robots), 0.0, seen.time - teammates.heard_times)
-        max_distance = teammates.heard_distances + 2.0 * float(team.max_speed[robot]) * silence
-        has_failed = (silence > 0.0) & (max_distance < communication_range)
-        if state.planned_robots is not None and state.planned_goals is not None:
-            _, here, there = np.intersect1d(teammates.robots, state.planned_robots, return_indices=True)
-            teammates = teammates._replace(positions=teammates.positions.copy())
-            teammates.positions[here] = state.planned_goals[there]
-        distance = np.sqrt(((teammates.positions - position) ** 2).sum(axis=1))
-        is_missed = (silence > MAX_SILENCE_S) & (distance < CERTAIN_RANGE_FRACTION * communication_range)
-        is_gone = has_failed | is_missed
-        met = state.met - {*teammates.robots[has_failed].tolist()}
-        gone = {**state.gone, **dict.fromkeys(teammates.robots[is_gone].tolist(), seen.time)}
-        neighbors = seen.get_neighbor_positions(robot)
-        teammates = teammates.add_observation(robots, neighbors, position, seen.time, is_gone)
+        """Return the state with a robot's present knowledge of the others."""
+        teammates = _assume_at_goals(state)
+        lost = _find_lost_robots(teammates, seen, team, robot)
+        is_lost = lost.has_failed | lost.is_missing
+        failed_robots = teammates.robots[lost.has_failed].tolist()
+        lost_robots = teammates.robots[is_lost].tolist()
+        loss_times = {**state.loss_times, **dict.fromkeys(lost_robots, seen.time)}
+        teammates = teammates.add_observation(
+            robots=seen.neighbors.list_neighbors(robot),
+            positions=seen.get_neighbor_positions(robot),
+            own_position=seen.positions[robot],
+            time=seen.time,
+            is_lost=is_lost,
+        )
         if reports:
-            teammates = teammates.add_reports(reports, robot, gone)
-        return replace(state, teammates=teammates, met=met | {*teammates.robots.tolist()}, gone=gone)
+            teammates = teammates.add_reports(reports, robot, loss_times)
+        encountered = (state.encountered - {*failed_robots}) | {*teammates.robots.tolist()}
+        return replace(state, teammates=teammates, encountered=encountered, loss_times=loss_times)
 
     def _plan_for_team(
         self, state: PlannerState, seen: Observations, cooperation: _Cooperation
@@ -537,7 +551,7 @@ class Atlas(BaseController):
         return replace(state, stuck_plans=0, is_idle=False), goal
 
     def _choose_goal(
-        self, state: PlannerState, own: OwnGoal, position: Array, walked: float, *, is_agreed: bool
+        self, state: PlannerState, own: OwnGoal, position: Array, path_increase: float, *, is_agreed: bool
     ) -> tuple[PlannerState, Array]:
         """Return the state, and the next goal: the own goal, or first a viewpoint."""
         planner = state.planner
@@ -547,7 +561,7 @@ class Atlas(BaseController):
         former_viewpoints = state.former_viewpoints
         looking_length = state.looking_length
         if state.viewpoint is not None:
-            looking_length += max(walked, 0.0)
+            looking_length += path_increase
             if math.dist(state.viewpoint, position) < _ARRIVAL_RADIUS_M:
                 former_viewpoints = (*former_viewpoints, state.viewpoint)
         viewpoint = None
@@ -571,6 +585,40 @@ class Atlas(BaseController):
         return state, own.goal if viewpoint is None else viewpoint
 
 
+def _assume_at_goals(state: PlannerState) -> Teammates:
+    """Return what a robot knows of the others, with each one at its goal in the last plan, if it has one."""
+    teammates = state.teammates
+    if state.planned_robots is None or state.planned_goals is None:
+        return teammates
+    _, rows, planned_rows = np.intersect1d(teammates.robots, state.planned_robots, return_indices=True)
+    positions = teammates.positions.copy()
+    positions[rows] = state.planned_goals[planned_rows]
+    return teammates._replace(positions=positions)
+
+
+def _find_lost_robots(teammates: Teammates, seen: Observations, team: Team, robot: int) -> _LostRobots:
+    """Find which of the others have failed or are missing, for a robot with the given number."""
+    communication_range = float(team.communication_range[robot])
+    is_heard = np.isin(teammates.robots, seen.neighbors.list_neighbors(robot))
+    silence = np.where(is_heard, 0.0, seen.time - teammates.heard_times)
+    max_distance = teammates.heard_distances + 2.0 * float(team.max_speed[robot]) * silence
+    distance = np.sqrt(((teammates.positions - seen.positions[robot]) ** 2).sum(axis=1))
+    return _LostRobots(
+        has_failed=(silence > 0.0) & (max_distance < communication_range),
+        is_missing=(silence > MAX_SILENCE_S) & (distance < CERTAIN_RANGE_FRACTION * communication_range),
+    )
+
+
+def _update_path_lengths(
+    before: PlannerState, state: PlannerState, position: Array, time: float, radius: float
+) -> PlannerState:
+    """Return the state with the path since the last plan; lengths start from zero after a change."""
+    if _has_changed(before, state, radius):
+        return replace(state, start_time=time, path_length=0.0, looking_length=0.0, former_viewpoints=())
+    assert before.positions is not None
+    return replace(state, path_length=before.path_length + math.dist(position, before.positions[0]))
+
+
 def _build_situation(state: PlannerState, group: IntArray, is_fixed: BoolArray) -> TeamSituation:
     """Return the situation of a group of robots; all start from their former goals except for fixed ones."""
     assert state.positions is not None
@@ -579,9 +627,9 @@ def _build_situation(state: PlannerState, group: IntArray, is_fixed: BoolArray) 
     is_fixed_in_group = np.concatenate([[False], is_fixed])[:size]
     former_goals = positions.copy()
     if state.planned_robots is not None and state.planned_goals is not None:
-        _, here, there = np.intersect1d(group, state.planned_robots, return_indices=True)
-        is_free = ~is_fixed_in_group[here]
-        former_goals[here[is_free]] = state.planned_goals[there[is_free]]
+        _, rows, planned_rows = np.intersect1d(group, state.planned_robots, return_indices=True)
+        is_free = ~is_fixed_in_group[rows]
+        former_goals[rows[is_free]] = state.planned_goals[planned_rows[is_free]]
     return TeamSituation(
         positions=positions,
         former_goals=former_goals,
@@ -640,7 +688,7 @@ def _list_others(teammates: Teammates, position: Array, time: float, *, is_agree
 
 def _has_changed(before: PlannerState, state: PlannerState, radius: float) -> bool:
     """Return whether this is the first plan, or the team or the walls have changed."""
-    if before.planned_map is None or state.met != before.met:
+    if before.planned_map is None or state.encountered != before.encountered:
         return True
     changed_walls = state.known_map.count_changed_walls(before.planned_map)
     return changed_walls * state.known_map.raster.cell_size > _CHANGED_WALL_RADII * radius
@@ -676,12 +724,15 @@ def _build_team_window(known_map: DiscoveredMap, positions: Array, *, is_whole_t
 class AtlasShared(Atlas):
     """`Atlas` with shared maps: robots that hear each other exchange their maps and positions of others.
 
-    As long as a robot hears all robots that it has met, all have the same map, and make the same plan for the
-    whole team, however large it is: relocations are final, no robot plans for itself alone, and all learn
-    from each viewpoint. A robot that is stuck for some plans, away from its goal, is in a jam: it moves out
-    of it for a while, each robot for a different time. A robot that does not hear all others behaves as with
-    `Atlas` on the map that it has. It assumes that robots out of contact are where one of the robots that it
-    hears has last heard them.
+    Robots that all hear each other have the same map, and make the same plan for the whole team, however
+    large it is. Relocations are then final, no robot plans for itself alone, and all learn from each
+    viewpoint. A robot that does not hear all others behaves as with `Atlas`. It assumes that robots out of
+    range are where one of its neighbors last heard them.
+
+    Notes
+    -----
+    A robot that is stuck away from its goal for several plans is in a jam. It moves away from the robots
+    around it for a while, each robot for a different time.
     """
 
     name = "atlas-shared"
@@ -693,23 +744,23 @@ class AtlasShared(Atlas):
     def _update_maps(
         self, maps: list[DiscoveredMap], seen: Observations, scans: Scans, radius: Array
     ) -> list[DiscoveredMap]:
-        circles = list_circles(seen.neighbors)
-        scanned_maps = update_maps(maps, seen, scans, circles)
-        # Robots that share a map also share the next one.
-        shared_maps: dict[tuple[int, Circle, float], DiscoveredMap] = {}
-        later = []
-        for known_map, circle, size in zip(scanned_maps, circles, radius.tolist(), strict=True):
-            key = (id(known_map), circle, size)
+        groups = list_hearing_groups(seen.neighbors)
+        scanned_maps = update_maps(maps, seen, scans, groups)
+        # Robots that share a map before this update also share the updated one.
+        shared_maps: dict[tuple[int, HearingGroup, float], DiscoveredMap] = {}
+        updated_maps = []
+        for known_map, group, robot_radius in zip(scanned_maps, groups, radius.tolist(), strict=True):
+            key = (id(known_map), group, robot_radius)
             if key not in shared_maps:
-                shared_maps[key] = known_map.add_robots(seen.positions[list(circle)], size)
-            later.append(shared_maps[key])
-        return later
+                shared_maps[key] = known_map.add_robots(seen.positions[list(group)], robot_radius)
+            updated_maps.append(shared_maps[key])
+        return updated_maps
 
-    def _list_reports(self, states: Sequence[PlannerState], heard: IntArray) -> list[Teammates]:
-        hears_all = len(heard) == len(states) - 1
+    def _list_reports(self, states: Sequence[PlannerState], neighbors: IntArray) -> list[Teammates]:
+        hears_all = len(neighbors) == len(states) - 1
         if hears_all:
             return []
-        return [states[other].teammates for other in heard.tolist()]
+        return [states[neighbor].teammates for neighbor in neighbors.tolist()]
 
     def _is_agreed(self, teammates: Teammates, seen: Observations) -> bool:
         return bool((teammates.heard_times == seen.time).all())

@@ -29,7 +29,7 @@ _MIN_PASSING_CLEARANCE_M = 1e-3
 _MIN_NORM = 1e-300
 
 
-class HeardNeighbors(NamedTuple):
+class NeighborReports(NamedTuple):
     """Reported positions of near robots at one time."""
 
     time: float
@@ -51,9 +51,9 @@ class HalfPlanes(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BarrierMemory(Memory):
-    """Memory of the robots, with the neighbors at the last step."""
+    """Memory of the robots, with the reports of near neighbors at the last step."""
 
-    heard: HeardNeighbors | None = None
+    reports: NeighborReports | None = None
 
 
 @dataclass(frozen=True)
@@ -73,11 +73,11 @@ class Barrier(BaseController):
 
     Robots do not know the velocities of others: each derives them from two reported positions. Obstacle
     points are the closest one and those of the last scan. The bodies and limits of the others are assumed to
-    be known. Decisions made here: the square root is rounded over the last millimeter, and continued as an
-    odd function within the safe distance, so that robots that start too close to each other separate.
+    be known. The square root is rounded over the last millimeter, and continued as an odd function within the
+    safe distance, so that robots that start too close to each other separate.
 
-    The implementation follows summaries of the paper (IEEE T-RO 33, 661-674), not its text; h_ij is that of
-    the documentation of MathWorks' barrier certificate block.
+    The implementation is based on summaries of the paper (IEEE T-RO 33, 661-674), not on the full text; h_ij
+    is taken from the documentation of MathWorks' barrier certificate block.
     """
 
     name = "barrier"
@@ -103,9 +103,9 @@ class Barrier(BaseController):
         desired = (velocities - seen.velocities) / self.response_time
         accelerations, memory = self.certify(seen, memory, desired)
         forces = accelerations * team.mass[:, None] + seen.velocities * team.viscosity[:, None]
-        limit = team.max_acceleration / np.maximum(np.hypot(*desired.T), _MIN_NORM)
-        possible = desired * np.minimum(1.0, limit)[:, None]
-        corrections = (accelerations - possible) * team.mass[:, None]
+        scale = team.max_acceleration / np.maximum(np.hypot(*desired.T), _MIN_NORM)
+        attainable = desired * np.minimum(1.0, scale)[:, None]
+        corrections = (accelerations - attainable) * team.mass[:, None]
         return Decision(
             forces=forces,
             goals=cells.centroid,
@@ -133,8 +133,8 @@ class Barrier(BaseController):
         team = memory.team
         returns = update_returns(seen, memory.returns)
         near = self._find_near_neighbors(seen, team)
-        heard = _to_heard_neighbors(near, seen)
-        neighbor_velocities = _derive_velocities(heard, memory.heard, team.max_speed[near.neighbor])
+        reports = _collect_reports(near, seen)
+        neighbor_velocities = _derive_velocities(reports, memory.reports, team.max_speed[near.neighbor])
         robots = self._constrain_to_robots(seen, team, near, neighbor_velocities)
         obstacles = self._constrain_to_obstacles(seen, team, collect_obstacle_points(seen, returns))
         nearest, is_feasible = find_nearest_allowed(
@@ -147,7 +147,7 @@ class Barrier(BaseController):
         speed = np.hypot(*seen.velocities.T)
         rate = -np.minimum(1.0 / self.response_time, team.max_acceleration / np.maximum(speed, _MIN_NORM))
         accelerations = np.where(is_feasible[:, None], nearest, seen.velocities * rate[:, None])
-        return accelerations, replace(memory, heard=heard, returns=returns)
+        return accelerations, replace(memory, reports=reports, returns=returns)
 
     def _find_near_neighbors(self, seen: Observations, team: Team) -> NearNeighbors:
         """Find the neighbors that constrain a robot now."""
@@ -221,30 +221,32 @@ class Barrier(BaseController):
         return np.asarray(np.maximum(self.gamma * h**3 + 0.5 * root / rounded * along, -alpha))
 
 
-def _to_heard_neighbors(near: NearNeighbors, seen: Observations) -> HeardNeighbors:
+def _collect_reports(near: NearNeighbors, seen: Observations) -> NeighborReports:
     """Return the reported positions of near neighbors."""
     pair = near.robot * len(seen.positions) + near.neighbor
-    return HeardNeighbors(seen.time, pair, seen.positions[near.robot] - near.offset)
+    return NeighborReports(seen.time, pair, seen.positions[near.robot] - near.offset)
 
 
-def _derive_velocities(heard: HeardNeighbors, previous: HeardNeighbors | None, max_speed: Array) -> Array:
+def _derive_velocities(reports: NeighborReports, previous: NeighborReports | None, max_speed: Array) -> Array:
     """Derive the velocities of neighbors from two reported positions; unknown velocities are zero.
 
     Parameters
     ----------
-    heard : HeardNeighbors
-    previous : HeardNeighbors or None
-        The neighbors heard at the last step.
+    reports : NeighborReports
+    previous : NeighborReports or None
+        The reports at the last step.
     max_speed : (m,) array, m/s
-        Maximum speeds of the neighbors. The position jumps when a message was late.
+        Maximum speeds of the neighbors, which limit the result: positions jump after a late message.
 
     Returns
     -------
     (m, 2) array, m/s
     """
-    velocities = np.zeros_like(heard.positions)
-    if previous is not None and heard.time > previous.time:
-        _, now, before = np.intersect1d(heard.pair, previous.pair, assume_unique=True, return_indices=True)
-        moves = heard.positions[now] - previous.positions[before]
-        velocities[now] = moves / (heard.time - previous.time)
+    velocities = np.zeros_like(reports.positions)
+    if previous is not None and reports.time > previous.time:
+        _, rows, former_rows = np.intersect1d(
+            reports.pair, previous.pair, assume_unique=True, return_indices=True
+        )
+        moves = reports.positions[rows] - previous.positions[former_rows]
+        velocities[rows] = moves / (reports.time - previous.time)
     return compute_approach_velocities(velocities, 1.0, max_speed)

@@ -98,7 +98,7 @@ def get_information(controller: Any) -> Information:
 
 
 def inform_controller(controller: Controller, environment: Environment) -> Controller:
-    """Return the controller that knows the map, if it uses the whole map; any other one as it is.
+    """Return the controller with the map, if it uses the whole map; return any other one unchanged.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class Memory:
     team: Team
     """A robot knows its own body and limits."""
     returns: Array | None = None
-    """(n, rays, 2) m, the obstacle points that the last scan of each robot has met; nan for none."""
+    """(n, rays, 2) m, obstacle points in the last scan of each robot; nan for none."""
     triangulation: Mesh | None = None
     """Triangulation from which the next cells are computed."""
 
@@ -168,5 +168,5 @@ class BaseController:
         validate_gains(self)
 
     def begin(self, region: Region, team: Team) -> Any:
-        """Return the memory of robots that know only themselves."""
+        """Return the initial memory of the robots, each of which knows only its own body and limits."""
         return self.memory_type(team)

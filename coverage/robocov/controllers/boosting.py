@@ -139,7 +139,7 @@ class Ascent:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoostingMemory(Memory):
-    """Memory of the robots: their views in the last scan, and the motion that follows from these."""
+    """Memory of the robots: the last view, gradient and ascent of each."""
 
     view: View | None = None
     gradient: Array | None = None
@@ -179,38 +179,54 @@ class _ViewSamples(NamedTuple):
 class Boosting(BaseController):
     """Coverage by joint detection, with boosting functions (Sun, Cassandras and Gokbayrak, CDC 2014).
 
-    A robot detects an event at x, within its line of sight and its sensing range, with the probability
-    p_i = exp(-λ d) at the distance d. The team maximizes
+    The team maximizes the probability that events are detected:
 
         H = ∫ φ(x) (1 - Π_i (1 - p_i(x))) dx
 
-    Notes
-    -----
-    Robot i contributes ∫ φ Φ_i p_i over its view, where Φ_i is the probability that no other robot detects x.
-    The gradient of that has three terms: w λ p_i toward each point in view, with w = φ Φ_i; for each corner
-    that hides something, the integral of w p_i (s - ρ)/ρ along the edge of the view (see `Windows`); and
-    w p_i along the arcs where the view ends at the sensing range.
+    Robot i detects an event at distance d with the probability p_i = exp(-λ d), if the event is in its line
+    of sight and within its sensing range. Each robot follows its gradient of H to a local optimum. There it
+    follows a boosted gradient for a while, which leads out of the optimum, and then its own gradient to
+    another optimum. If it contributes less there, it returns on its trail.
 
-    At an optimum, where a robot comes to rest, the weight w is boosted, which gives another gradient:
-
-        phi         κ Φ_i^γ w: points that no other robot detects count more
-        p           κ (1 - Π (1 - p))^-γ w: points that the whole team hardly detects count more
-        neighbours  w, and each neighbor in range repels with κ / d^γ
-
-    A robot follows it until it rests again, or for `patience`, and then its own gradient to the next optimum.
-    If it contributes less there than before, it returns on its trail, and stays. The result is therefore no
-    worse, apart from changes by the other robots in the meantime.
-
-    The objective is not the coverage cost: it counts detections within the line of sight, decays
-    exponentially and ends at the sensing range, and path lengths do not matter. Robots gather where much is
+    This objective differs from the coverage cost: path lengths do not matter, and robots gather where much is
     in view.
 
-    The implementation follows the abstract of the paper (arXiv 1409.0776), that of its sequel by Welikala and
-    Cassandras (arXiv 1903.04133), and summaries of both, not their texts. There the map is known. Here a
-    robot uses its own scan, and assumes that a neighbor sees a point unless something that the scan has met
-    is in front of the line between them. Each robot boosts itself when it rests, without synchronization. The
-    trail back, the times, and avoiding obstacles and robots are ours as well. The gains of the boosts are of
-    the known kinds, with our values.
+    The gains are the fields of the dataclass; `get_gains` returns their meanings, units and ranges.
+
+    Notes
+    -----
+    Robot i contributes ∫ w p_i over its view to H, where w = φ Φ_i, and Φ_i is the probability that no other
+    robot detects x. The gradient of the contribution is the sum of three terms:
+
+    - w λ p_i toward each point in view,
+    - the integral of w p_i (s - ρ)/ρ along the edge of the view behind each corner (see `Windows`), and
+    - w p_i along the arcs where the view ends at the sensing range.
+
+    The gain `boost` selects the boosted gradient:
+
+    - ``phi``: the weight κ Φ_i^γ w, larger for points that no other robot detects
+    - ``p``: the weight κ (1 - Π (1 - p))^-γ w, larger for points that the whole team hardly detects
+    - ``neighbours``: the weight w; in addition, each neighbor in range repels with κ / d^γ
+
+    A robot follows it until it comes to rest, or for at most `patience`. A robot that has returned on its
+    trail is not boosted again, so that the result is no worse than without boosts, apart from what the other
+    robots have changed in the meantime.
+
+    The implementation is based on the abstracts of the paper (arXiv 1409.0776) and of its sequel by Welikala
+    and Cassandras (arXiv 1903.04133), and on summaries, not on the full texts. It differs from the papers as
+    follows. The map is not known: a robot uses its own scan, and assumes that a neighbor sees a point unless
+    the scan shows an obstacle in the line between them. Each robot is boosted when it comes to rest, without
+    synchronization. The trail, the durations, the values of the gains, and the avoidance of obstacles and
+    robots are our own.
+
+    Examples
+    --------
+    >>> from robocov.environment import Environment
+    >>> from robocov.simulation import Simulation
+    >>> room = Environment("room", ((0, 0), (8, 0), (8, 6), (0, 6)))
+    >>> simulation = Simulation(room, Boosting(), [[1.0, 1.0]])
+    >>> simulation.run(20.0).positions[-1].round(0)
+    array([[4., 3.]])
     """
 
     name = "boosting"
@@ -230,7 +246,7 @@ class Boosting(BaseController):
     patience: float = gain(8.0, "s", "maximum duration of a boost")
     k_grad: float = gain(0.3, "1/s", "desired speed per meter of the gradient", high=100.0)
     jump: float = gain(0.3, "m", "minimum step of the depth in view at a window", low=0.01)
-    clearance: float = gain(0.05, "m", "distance kept from obstacles and robots, rim to rim", high=10.0)
+    clearance: float = gain(0.05, "m", "minimum gap to obstacles and other robots", high=10.0)
     response_time: float = response_time_gain()
 
     def decide(self, seen: Observations, memory: BoostingMemory) -> Decision:

@@ -262,16 +262,16 @@ def _build_weights(mesh: _Mesh, stiffness: Array) -> csr_array:
     columns = []
     weights = []
     for k in range(3):
-        here = mesh.triangles[:, k]
+        vertex = mesh.triangles[:, k]
         left = mesh.triangles[:, (k + 1) % 3]
         right = mesh.triangles[:, (k + 2) % 3]
-        u = mesh.points[left] - mesh.points[here]
-        v = mesh.points[right] - mesh.points[here]
+        u = mesh.points[left] - mesh.points[vertex]
+        v = mesh.points[right] - mesh.points[vertex]
         u_length = np.hypot(*u.T)
         v_length = np.hypot(*v.T)
         cross = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
         tangent_of_half_angle = cross / (u_length * v_length + (u * v).sum(axis=1))
-        rows += [here, here]
+        rows += [vertex, vertex]
         columns += [left, right]
         weights += [
             stiffness * tangent_of_half_angle / u_length,

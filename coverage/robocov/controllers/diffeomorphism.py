@@ -45,10 +45,9 @@ class DiffeomorphismMemory:
 class Diffeomorphism(WholeMapController):
     """Coverage of a non-convex region by means of a convex one (Caicedo-Núñez and Žefran 2008).
 
-    A diffeomorphism F maps the free space to the convex region without some points or slits: the obstacles.
-    In this chart, Lloyd's algorithm moves straight to the centroids of Voronoi cells, with the density that F
-    transfers, so that each part has the mass that it has in the map. Back in the map, robots move around
-    obstacles:
+    A diffeomorphism F maps the free space to a convex region, in which each obstacle is only a point or a
+    slit. In this chart, Lloyd's algorithm moves straight to the centroids of Voronoi cells, with the density
+    transferred by F, so that each part keeps its mass. In the map, the robots then move around the obstacles:
 
         u_i = k DF(p_i)⁻¹ (C_i - F(p_i)),    C_i the centroid of the cell of F(p_i)
 
@@ -62,13 +61,12 @@ class Diffeomorphism(WholeMapController):
 
     Obstacles are enlarged by the radius of the robot and `clearance`; the image of a robot within that margin
     is the image of the nearest point outside. Robots avoid collisions by slowing down. Cells are sampled by
-    the triangles of the mesh, and computed once in `period` seconds; a robot that does not hear all others
-    computes its cell by those that it hears. Unreachable rooms are part of the chart, and moving obstacles
-    are not.
+    the triangles of the mesh, and computed every `period` seconds; a robot that does not hear all others
+    computes its cell from those that it hears. The chart includes unreachable rooms, but no moving obstacles.
 
-    The controller is based on general knowledge, not on the texts of the two papers ("A coverage algorithm
-    for a class of non-convex regions", CDC 2008; "Performing coverage on nonconvex domains", CCA 2008). It
-    differs in F, which is piecewise linear, and in that obstacles become small but not points.
+    The implementation is based on general knowledge, not on the full texts of the two papers ("A coverage
+    algorithm for a class of non-convex regions", CDC 2008; "Performing coverage on nonconvex domains", CCA
+    2008). Here F is piecewise linear, and obstacles become small areas instead of points.
     """
 
     name = "diffeomorphism"
@@ -77,7 +75,7 @@ class Diffeomorphism(WholeMapController):
 
     shrink: float = gain(1e4, "1", "stiffness of obstacles relative to the free space", low=1.0, high=1e6)
     lattice: float = gain(64.0, "cells", "of the mesh along a side", low=4.0, high=512.0, whole=True)
-    clearance: float = gain(0.03, "m", "that paths keep between rim and walls", high=10.0)
+    clearance: float = gain(0.03, "m", "gap between robots and walls along paths", high=10.0)
     period: float = gain(0.2, "s", "between two plans", high=60.0)
     k_prop: float = gain(2.0, "1/s", "desired speed per meter to the centroid, in the map", high=100.0)
     response_time: float = response_time_gain()

@@ -36,7 +36,7 @@ class Margins(NamedTuple):
 
     @classmethod
     def build_with_gap(cls, team: Team, gap: float) -> Margins:
-        """Build the margins of robots that keep a gap, m, from obstacles and from each other, rim to rim.
+        """Build the margins for a minimum gap, m, from the surface of a robot to obstacles and other robots.
 
         Each robot assumes that others may be as large as the largest of the team.
         """
@@ -95,18 +95,18 @@ def compute_drive_forces(velocities: Array, seen: Observations, team: Team, resp
 
 
 def update_returns(seen: Observations, previous: Array | None) -> Array | None:
-    """Return the obstacle points that the last scan of each robot has met.
+    """Return the obstacle points in the last scan of each robot.
 
     Parameters
     ----------
     seen : Observations
     previous : (n, rays, 2) array or None, m
-        What this function returned before, which is returned again between two scans.
+        What this function returned at the previous step. It is returned again if there is no new scan.
 
     Returns
     -------
     (n, rays, 2) array or None, m
-        nan where a ray met nothing; None before the first scan.
+        nan where a ray hit nothing; None before the first scan.
     """
     scans = seen.scans
     if scans is None:
@@ -116,7 +116,7 @@ def update_returns(seen: Observations, previous: Array | None) -> Array | None:
 
 
 def collect_obstacle_points(seen: Observations, returns: Array | None) -> Array:
-    """Return the closest obstacle point of each robot and those of its last scan, (n, k, 2) m, or nan."""
+    """Return the closest obstacle point of each robot and those in its last scan, (n, k, 2) m, or nan."""
     nearest = seen.obstacle_points[:, None]
     if returns is None:
         return nearest
@@ -126,7 +126,7 @@ def collect_obstacle_points(seen: Observations, returns: Array | None) -> Array:
 def avoid_collisions(
     velocities: Array, seen: Observations, team: Team, obstacle_points: Array, margins: Margins
 ) -> Array:
-    """Compute the safe velocities nearest to desired ones: slow toward obstacles and other robots.
+    """Compute the velocities nearest to the desired ones that avoid obstacles and other robots.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def avoid_collisions(
 def limit_approach_speed(
     velocities: Array, offsets: Array, clearance: Array, rate: float, braking: Array, max_speed: Array
 ) -> Array:
-    """Compute the velocities nearest to desired ones that are slow toward close objects.
+    """Compute the velocities nearest to the desired ones that are slow enough toward close objects.
 
     Parameters
     ----------
@@ -177,16 +177,16 @@ def limit_approach_speed(
     clearance : (n, k) array, m
         Distance to which the robot may come.
     rate : float, 1/s
-        The rest of the distance falls exponentially at most with this rate,
+        Maximum rate of the exponential decrease of the remaining distance to the clearance.
     braking : (n, k) array, m/s²
-        and no faster than the robot can brake with this acceleration.
+        Acceleration with which the robot must be able to stop at the clearance.
     max_speed : (n,) array, m/s
 
     Returns
     -------
     (n, 2) array, m/s
-        Within the clearance they lead away from the object. If not all of that is possible, no object is
-        approached.
+        Within the clearance of an object, they point away from it. If this is not possible for all objects at
+        once, they only do not approach any object.
     """
     distance = np.sqrt(offsets[..., 0] ** 2 + offsets[..., 1] ** 2)
     normals = offsets / np.where(distance > 0.0, distance, np.nan)[..., None]
@@ -205,7 +205,7 @@ def limit_approach_speed(
 def find_nearest_allowed(
     points: Array, normals: Array, offsets: Array, radius: Array
 ) -> tuple[Array, BoolArray]:
-    """Find for each robot the point of a disc, cut by half planes, that is nearest to a desired one.
+    """Find the points nearest to desired ones in the intersections of discs and half planes.
 
     Parameters
     ----------
@@ -214,7 +214,9 @@ def find_nearest_allowed(
     normals : (n, m, 2) array
         Unit normals of the half planes; nan for no constraint.
     offsets : (n, m) array
+        Distances of the edges of the half planes from the origin, along the normals.
     radius : (n,) array
+        Radii of the discs around the origin.
 
     Returns
     -------
@@ -226,7 +228,7 @@ def find_nearest_allowed(
     -----
     Minimize |u - p|² subject to normals[k] · u <= offsets[k] for all k and |u| <= radius. Constraints are
     added one by one: if the optimum so far violates the next one, the new optimum lies on its line, in the
-    interval that those before leave (de Berg et al., *Computational Geometry*, section 4.3, incremental
+    interval that the earlier ones allow (de Berg et al., *Computational Geometry*, section 4.3, incremental
     linear programming, with this objective).
     """
     nearest = np.empty(points.shape)

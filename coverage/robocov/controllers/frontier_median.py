@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from robocov.arrays import Array
+from robocov.arrays import Array, IntArray
 from robocov.controllers.gains import gain
 from robocov.controllers.shared_map import Candidates, Placement, SharedMapController, Situation, assign_goals
 from robocov.k_median import choose_greedily, improve_sources
@@ -41,13 +41,13 @@ class FrontierMedian(SharedMapController):
 
     is assigned first, where V is the path length, and U is the utility, which is 1 at first. Then the utility
     of each target t' in view of t and within the sensing range R is reduced by 1 - |t - t'| / R, because a
-    robot at t will see it; and so on for the other robots.
+    robot at t will see it. This is repeated for the remaining robots.
 
-    The controller is based on the abstracts of the papers and on general knowledge, not on their texts. The
-    following choices are ours. The distance between targets is the spacing of the planning lattice. Small
-    gaps between rays are no frontiers, nor are frontiers that are shorter than `shortest` or out of reach. A
-    frontier is ignored after a robot has been there, or has got stuck on its path to it. A robot for which no
-    target has any utility left stays where it is; in the paper it moves to one all the same.
+    The implementation is based on the abstracts of the papers and on general knowledge, not on the full
+    texts. The following choices are our own. The distance between targets is the spacing of the planning
+    lattice. Small gaps between rays are ignored, and so are frontiers that are shorter than `shortest` or out
+    of reach. A frontier is also ignored after a robot has been there, or was stuck on its path to it. A robot
+    stays where it is if no target has any utility left for it; in the paper, it moves to a target even then.
     """
 
     name = "frontier-median"
@@ -65,43 +65,51 @@ class FrontierMedian(SharedMapController):
         targets = self._find_targets(situation, inspected)
         if len(targets):
             goals = self._assign_targets(situation, targets)
-            return Placement(goals=goals, is_final=False, notes=inspected)
-        return Placement(goals=self._compute_median(situation), is_final=True, notes=inspected)
+            return Placement(goals=goals, is_final=False, inspected_targets=inspected)
+        return Placement(goals=self._compute_median(situation), is_final=True, inspected_targets=inspected)
 
     def _list_inspected_targets(self, situation: Situation) -> Array:
         """Return the targets that need no further visit, (m, 2) m."""
         former_plan = situation.former_plan
         if former_plan is None:
             return np.empty((0, 2))
-        notes = former_plan.placement.notes
+        inspected = former_plan.placement.inspected_targets
         if former_plan.placement.is_final:
-            return notes
+            return inspected
         goals = situation.former_goals
-        is_there = np.sqrt(((situation.positions - goals) ** 2).sum(axis=1)) < _ARRIVAL_RADIUS_M
+        has_arrived = np.sqrt(((situation.positions - goals) ** 2).sum(axis=1)) < _ARRIVAL_RADIUS_M
+        # The former group may have consisted of other robots: the nearest former position counts.
         moves = situation.positions[:, None] - former_plan.group.positions
         progress = np.sqrt((moves**2).sum(axis=2)).min(axis=1)
         is_stuck = np.isfinite(goals[:, 0]) & (progress < _MIN_PROGRESS_M)
-        return np.unique(np.vstack([notes, goals[is_there | is_stuck]]), axis=0)
+        return np.unique(np.vstack([inspected, goals[has_arrived | is_stuck]]), axis=0)
 
     def _find_targets(self, situation: Situation, inspected: Array) -> Array:
         """Return positions on the frontiers, (t, 2) m."""
         raster = situation.known_map.raster
         planner = situation.planner
         window = planner.window
-        state = window.crop(situation.known_map.state, np.uint8(FREE))
-        is_unknown = (state == UNKNOWN) & ~planner.is_outside
-        # Gaps between neighboring rays are not worth a visit.
-        is_area = ndimage.binary_opening(is_unknown, _BLOCK) & ~planner.is_tight
-        is_frontier = (state == FREE) & ~planner.is_tight & ndimage.binary_dilation(is_area)
-        labels, _ = ndimage.label(is_frontier, _BLOCK)
-        is_long = np.bincount(labels.ravel()) * raster.cell_size >= self.shortest
-        row, column = np.nonzero(is_frontier & is_long[labels])
-        block = row // window.stride * window.columns + column // window.stride
+        labels = self._label_frontiers(situation)
+        row, column = np.nonzero(labels)
         # One target for each block of a frontier.
+        block = row // window.stride * window.columns + column // window.stride
         _, first = np.unique(labels[row, column] * len(planner.nodes) + block, return_index=True)
         targets = raster.compute_centers(row[first] + window.first_row, column[first] + window.first_column)
         square = ((targets[:, None] - inspected) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
         return np.asarray(targets[square > _INSPECTED_RADIUS_M**2])
+
+    def _label_frontiers(self, situation: Situation) -> IntArray:
+        """Return the number of the frontier, from 1, that each cell of the window is on; 0 for none."""
+        planner = situation.planner
+        state = planner.window.crop(situation.known_map.state, np.uint8(FREE))
+        is_unknown = (state == UNKNOWN) & ~planner.is_outside
+        # Gaps between neighboring rays are not worth a visit.
+        is_unknown_area = ndimage.binary_opening(is_unknown, _BLOCK) & ~planner.is_tight
+        is_frontier = (state == FREE) & ~planner.is_tight & ndimage.binary_dilation(is_unknown_area)
+        labels, _ = ndimage.label(is_frontier, _BLOCK)
+        cell_size = situation.known_map.raster.cell_size
+        is_long = np.bincount(labels.ravel()) * cell_size >= self.shortest
+        return np.asarray(np.where(is_long[labels], labels, 0))
 
     def _assign_targets(self, situation: Situation, targets: Array) -> Array:
         """Return the target of each robot, (k, 2) m, or its position if it has none."""
@@ -114,15 +122,15 @@ class FrontierMedian(SharedMapController):
             [planner.compute_distances_from(position[None])[nodes] for position in situation.positions]
         )
         utility = np.ones(len(targets))
-        is_waiting = np.ones(len(goals), dtype=bool)
+        is_unassigned = np.ones(len(goals), dtype=bool)
         for _ in range(len(goals)):
-            is_possible = is_waiting[:, None] & (utility > 0.0)
+            is_possible = is_unassigned[:, None] & (utility > 0.0)
             value = np.where(is_possible, utility - self.beta * path_lengths, -np.inf)
             robot, target = np.unravel_index(value.argmax(), value.shape)
             if value[robot, target] == -np.inf:
                 break
             goals[robot] = targets[target]
-            is_waiting[robot] = False
+            is_unassigned[robot] = False
             distance = np.sqrt(((targets - targets[target]) ** 2).sum(axis=1))
             is_clear = planner.find_clear_lines(targets[target], targets, planner.is_blocked)
             is_in_view = (distance < situation.sensing_range) & is_clear

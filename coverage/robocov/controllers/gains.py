@@ -13,9 +13,9 @@ Value: TypeAlias = float | str | None
 
 _METADATA_KEY = "gain"
 _MAX_PLAIN_GAIN = 1e12
-"""Range of a plain number that a user's dataclass declares without `gain`."""
+"""Limit of the absolute value of a number that a user's dataclass declares without `gain`."""
 _DIMENSIONLESS = "1"
-"""Unit in formulas that is not written after a number."""
+"""Unit of dimensionless gains, which is not written after a number."""
 
 
 def format_value(value: Value, *, digits: int = 6, none: str = "none") -> str:
@@ -58,7 +58,7 @@ class Gain:
     """Whether only whole numbers are allowed."""
 
     def validate(self, value: object, where: str) -> float | None:
-        """Return a value of the gain as a float, or raise an error.
+        """Return a value as a float if the gain allows it.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class Option:
     optional: ClassVar[bool] = False
 
     def validate(self, value: object, where: str) -> str:
-        """Return a value of the gain, or raise an error.
+        """Return a value unchanged if it is one of the choices.
 
         Parameters
         ----------
@@ -157,7 +157,16 @@ def gain(
     >>> get_gains(Homing)["stiffness"].unit
     'N/m'
     """
-    declared = Gain("", default, unit, low, high, meaning, optional, whole)
+    declared = Gain(
+        name="",
+        default=default,
+        unit=unit,
+        low=low,
+        high=high,
+        meaning=meaning,
+        optional=optional,
+        whole=whole,
+    )
     return field(default=default, metadata={_METADATA_KEY: declared})
 
 
@@ -205,30 +214,30 @@ def get_gains(controller: Any) -> dict[str, Gain | Option]:
     Returns
     -------
     dict of str to Gain or Option
-        A plain number in a user's dataclass is a gain with a very wide range.
+        Gains by name. A plain number in a user's dataclass is a gain with a very wide range.
     """
     if not is_dataclass(controller):
         return {}
     gains: dict[str, Gain | Option] = {}
-    for declared in fields(controller):
-        known = _to_gain(declared)
-        if known is not None:
-            gains[declared.name] = known
+    for dataclass_field in fields(controller):
+        declared = _to_gain(dataclass_field)
+        if declared is not None:
+            gains[declared.name] = declared
     return gains
 
 
-def _to_gain(declared: Field[Any]) -> Gain | Option | None:
-    """Return the gain that a dataclass field declares; None if it declares none."""
-    known = declared.metadata.get(_METADATA_KEY)
-    default = None if declared.default is MISSING else declared.default
-    if known is None and is_number(default):
-        return Gain(declared.name, default, "", -_MAX_PLAIN_GAIN, _MAX_PLAIN_GAIN, "")
-    if known is None:
+def _to_gain(dataclass_field: Field[Any]) -> Gain | Option | None:
+    """Return the gain that a dataclass field declares; None if it does not declare any."""
+    declared: Gain | Option | None = dataclass_field.metadata.get(_METADATA_KEY)
+    default = None if dataclass_field.default is MISSING else dataclass_field.default
+    if declared is None:
+        if is_number(default):
+            return Gain(dataclass_field.name, default, "", -_MAX_PLAIN_GAIN, _MAX_PLAIN_GAIN, "")
         return None
-    complete: Gain | Option = replace(known, name=declared.name, default=default)
-    if isinstance(complete, Gain) and complete.unit == _DIMENSIONLESS:
-        complete = replace(complete, unit="")
-    return complete
+    declared = replace(declared, name=dataclass_field.name, default=default)
+    if isinstance(declared, Gain) and declared.unit == _DIMENSIONLESS:
+        declared = replace(declared, unit="")
+    return declared
 
 
 def get_gain_values(controller: Any) -> dict[str, Value]:
@@ -237,9 +246,9 @@ def get_gain_values(controller: Any) -> dict[str, Value]:
 
 
 def validate_gains(controller: Any) -> None:
-    """Check every gain of a controller, and replace its value by a float or a string.
+    """Validate all gains of a controller, and convert numbers to floats.
 
-    It is called by ``__post_init__`` of the controller, whose name begins the messages.
+    Call it in ``__post_init__`` of a frozen dataclass. Error messages begin with the controller's name.
 
     Raises
     ------
@@ -247,9 +256,9 @@ def validate_gains(controller: Any) -> None:
         If a value is not allowed.
     """
     where = getattr(controller, "name", type(controller).__name__)
-    for name, known in get_gains(controller).items():
-        value = known.validate(getattr(controller, name), where)
-        object.__setattr__(controller, name, value)  # Attributes of a frozen object cannot be assigned.
+    for name, declared in get_gains(controller).items():
+        value = declared.validate(getattr(controller, name), where)
+        object.__setattr__(controller, name, value)  # A frozen dataclass does not allow assignment.
 
 
 def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any:
@@ -268,8 +277,8 @@ def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any
     Raises
     ------
     ParameterError
-        If there is no such gain, with the most similar name; if a value is not allowed; or if the class of a
-        user raises an error.
+        If a gain is unknown, with the most similar name; if a value is not allowed; or if the constructor of
+        a user's class raises an error.
     """
     gains = get_gains(kind)
     where = getattr(kind, "name", kind.__name__)

@@ -53,8 +53,8 @@ class GeodesicLloyd(WholeMapController):
 
     Pimenta et al. (CDC 2008) and Bhattacharya, Ghrist and Kumar (IJRR 33, 2014) replace the straight distance
     in the locational cost by the length d of the shortest path. Each robot moves along the shortest path to
-    the goal that minimizes an upper bound of the cost of its cell. No other controller knows the whole map:
-    this one is a bound for the others.
+    the goal that minimizes an upper bound of the cost of its cell. This controller knows the whole map, and
+    therefore serves as a bound for those that do not.
 
     Notes
     -----
@@ -69,8 +69,8 @@ class GeodesicLloyd(WholeMapController):
     Distances are exact, and cells are sampled on a lattice. Walls are enlarged by the radius of the robot and
     `clearance`; goals are moved into the remaining space, in which robots follow shortest paths.
 
-    The controller is based on general knowledge, not on the texts of the two papers, whose cells consist of
-    grid cells.
+    The implementation is based on general knowledge, not on the full texts of the two papers, which compute
+    the Voronoi cells on a grid.
     """
 
     name = "geodesic-lloyd"
@@ -79,7 +79,7 @@ class GeodesicLloyd(WholeMapController):
 
     exponent: float = gain(2.0, "1", "s in f = d^s; 2 as in the papers, 1 the cost (22)", low=1.0, high=2.0)
     lattice: float = gain(48.0, "cells", "of the lattice along a side", low=4.0, high=512.0, whole=True)
-    clearance: float = gain(0.03, "m", "that paths keep between rim and walls", high=10.0)
+    clearance: float = gain(0.03, "m", "gap between robots and walls along paths", high=10.0)
     period: float = gain(0.2, "s", "between two plans", high=60.0)
     k_prop: float = gain(2.0, "1/s", "desired speed per meter of path to the goal", high=100.0)
     response_time: float = response_time_gain()

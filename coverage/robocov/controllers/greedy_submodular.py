@@ -25,15 +25,16 @@ class GreedySubmodular(SharedMapController):
     -----
     Sun, Cassandras and Meng (Automatica 100, 2019) start the distributed gradient descent of Zhong and
     Cassandras (IEEE T-AC 56, 2011) from the greedy solution. Coverage is monotone and submodular in the set
-    of positions: each position adds the less, the more there are. The greedy solution therefore gains at
-    least 1 - 1/e of the maximum gain (Nemhauser, Wolsey and Fisher 1978).
+    of positions: the more positions there are, the less another one adds. The greedy solution therefore gains
+    at least 1 - 1/e of the maximum gain (Nemhauser, Wolsey and Fisher 1978).
 
     The papers maximize a probability of detection on a known map. This controller minimizes the cost (22).
     The gain of a set of positions is the reduction of the cost of a single robot that is far from everything.
     This gain is submodular as well; the bound holds for it, not for the cost. The descent is Lloyd's
     iteration on geodesic cells, without interchange.
 
-    The controller is based on the abstracts of the papers and on general knowledge, not on their texts.
+    The implementation is based on the abstracts of the papers and on general knowledge, not on the full
+    texts.
     """
 
     name = "greedy-submodular"
@@ -44,12 +45,11 @@ class GreedySubmodular(SharedMapController):
 
     def compute_placement(self, situation: Situation) -> Placement:
         """Compute the greedy placement, or the former one if that is about as good, after descent."""
-        notes = np.empty((0, 2))
         weights = situation.compute_weights(~situation.known_map.is_blocked)
         candidates = Candidates.build_at_nodes(situation, weights, situation.planner.sources)
         count = len(situation.positions)
         if len(candidates.positions) < count:
-            return Placement(goals=situation.positions, is_final=False, notes=notes)
+            return Placement(goals=situation.positions, is_final=False)
         chosen = run_lloyd(candidates.table, choose_greedily(candidates.table, count))
         if np.isfinite(situation.former_goals).all():
             former = run_lloyd(candidates.table, candidates.find_nearest(situation.former_goals))
@@ -57,4 +57,4 @@ class GreedySubmodular(SharedMapController):
             if not candidates.compute_cost(chosen) < max_cost:
                 chosen = former
         goals = assign_goals(situation, candidates.refine(situation, weights, chosen))
-        return Placement(goals=goals, is_final=True, notes=notes)
+        return Placement(goals=goals, is_final=True)

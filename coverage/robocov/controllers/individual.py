@@ -1,4 +1,4 @@
-"""Controllers of one robot, which are called for each robot in turn, and their adapter for a team."""
+"""Controllers of a single robot, and the adapter that calls them for each robot of a team."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class OwnView:
     heading: float | None = None
     """Heading of a unicycle, rad from +x; None in a team of points."""
     memory: Any = None
-    """Memory of the robot: the value that ``begin`` returned, or that was assigned here in the last step."""
+    """Memory of the robot: the result of ``begin``, or the value that the controller assigned last."""
 
     @property
     def centroid(self) -> Array:
@@ -55,10 +55,10 @@ class OwnView:
 
 @runtime_checkable
 class IndividualController(Protocol):
-    """A controller of one robot: one method, from what the robot knows to its force.
+    """A controller of a single robot, with a method that computes a force from what the robot knows.
 
-    An optional method ``begin(number, team)`` returns the memory of the robot with a number, from 0, at the
-    start. The controller reads it from ``own.memory``, and may assign the next memory there.
+    An optional method ``begin(number, team)`` returns the initial memory of a robot; numbers start from 0.
+    The controller reads the memory from ``own.memory``, and may assign a new value to it in each step.
     """
 
     def force(self, own: OwnView) -> Sequence[float] | Array:
@@ -67,7 +67,7 @@ class IndividualController(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IndividualMemories:
-    """Memories of the robots under an individual controller."""
+    """Memories of the robots of a team with an individual controller."""
 
     own: Sequence[Any]
     """Memory of each robot."""
@@ -86,7 +86,8 @@ class IndividualControllerAdapter:
     ----------
     controller : IndividualController
     name, label, summary : str
-        Those of the individual controller; by default its class and the first line of its docstring.
+        Those of the individual controller. By default, they are its class name and the first line of its
+        docstring.
     information : Information
 
     Examples
@@ -129,7 +130,7 @@ class IndividualControllerAdapter:
         Raises
         ------
         ParameterError
-            If a force is anything but two finite numbers.
+            If a force is not two finite numbers.
         """
         if memory is None:
             memory = IndividualMemories([None] * len(seen.positions))
@@ -157,23 +158,23 @@ class IndividualControllerAdapter:
     def _call_controller(self, own: OwnView) -> Array:
         """Return the force on one robot."""
         try:
-            answer = self.controller.force(own)
+            result = self.controller.force(own)
         except BaseException as error:
-            error.add_note(f"robot {own.number + 1}")  # `explain_fault` puts it into the message.
+            error.add_note(f"robot {own.number + 1}")  # `explain_fault` adds it to the message.
             raise
-        force = to_numbers(answer)
+        force = to_numbers(result)
         if force is not None and force.shape == (2,) and isfinite(force[0]) and isfinite(force[1]):
             return force
-        hint = " (is a return statement missing?)" if answer is None else ""
+        hint = " (is a return statement missing?)" if result is None else ""
         raise ParameterError(
-            f"controller {self.name!r}: force(own) returned {quote(answer)}{hint} for robot {own.number + 1} "
+            f"controller {self.name!r}: force(own) returned {quote(result)}{hint} for robot {own.number + 1} "
             f"at {own.time:.3f} s{format_location(self.controller.force)}, "
             "expected two finite numbers in newtons"
         )
 
 
 def _build_view(seen: Observations, cells: VoronoiPartition, robot: int, memory: Any) -> OwnView:
-    """Return what one robot knows, in arrays that the controller may change."""
+    """Return what one robot knows. The controller may change the arrays, which are copies."""
     obstacle_point = None
     if not np.isnan(seen.obstacle_points[robot, 0]):
         obstacle_point = seen.obstacle_points[robot].copy()
@@ -192,7 +193,7 @@ def _build_view(seen: Observations, cells: VoronoiPartition, robot: int, memory:
 
 
 def to_team_controller(controller: Any) -> Any:
-    """Adapt an individual controller to a team; return anything else as it is."""
+    """Adapt an individual controller to a team; return any other object unchanged."""
     is_individual = isinstance(controller, IndividualController) and not isinstance(controller, type)
     if is_individual and not hasattr(controller, "decide"):
         return IndividualControllerAdapter(controller)
@@ -226,7 +227,7 @@ def require_controller(value: Any) -> Controller:
 
 
 def unwrap_controller(controller: Controller) -> Controller | IndividualController:
-    """Return the individual controller within an adapter, which has the gains; any other one as it is."""
+    """Return the individual controller in an adapter, which has the gains; return others unchanged."""
     if isinstance(controller, IndividualControllerAdapter):
         return controller.controller
     return controller

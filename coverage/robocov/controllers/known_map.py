@@ -31,14 +31,14 @@ class WholeMapController(BaseController):
         return replace(self, environment=environment)
 
     def get_environment(self) -> Environment:
-        """Return the map; raise ParameterError if the controller does not know any."""
+        """Return the map; raise ParameterError if `inform` was not called before."""
         if self.environment is None:
             raise ParameterError(f"controller {self.name!r}: expected a map, call inform(environment) first")
         return self.environment
 
 
 def build_configuration_space(environment: Environment, clearance: float) -> shapely.Geometry:
-    """Build the space where the centers of robots may be.
+    """Build the space in which the centers of robots can be.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def build_configuration_space(environment: Environment, clearance: float) -> sha
     Raises
     ------
     ParameterError
-        If it is empty.
+        If the space is empty.
     """
     free_space = environment.free.buffer(-clearance, quad_segs=_QUARTER_CIRCLE_EDGES)
     configuration_space = free_space.simplify(_SIMPLIFICATION_M)
@@ -65,5 +65,14 @@ def build_configuration_space(environment: Environment, clearance: float) -> sha
 
 
 def is_plan_due(plan_time: float, period: float, time: float) -> bool:
-    """Return whether the last plan is older than the period, or from the future, after a rewind; all in s."""
+    """Return whether it is time for a new plan.
+
+    Parameters
+    ----------
+    plan_time : float, s
+        Time of the last plan. It is later than `time` after a simulation was rewound; a new plan is then due.
+    period : float, s
+        Time between two plans.
+    time : float, s
+    """
     return not plan_time <= time < plan_time + period - 1e-9

@@ -16,7 +16,7 @@ from robocov.team import Team
 _AVERAGING_S = 2.0
 """Time over which position fixes are averaged."""
 _OUTLIER_SIGMAS = 6.0
-"""Number of standard deviations of a fix, off the prediction, at which a robot was carried away."""
+"""Deviation of a fix from the prediction, in standard deviations, above which the robot was displaced."""
 _MIN_FIXES = 10
 """Number of fixes after which their noise is known."""
 _MIN_DISTANCE_M = 1e-9
@@ -156,14 +156,14 @@ def _filter_own_positions(seen: Observations, previous: Estimates, team: Team) -
     predicted = previous.positions + 0.5 * dt * (previous.velocities + seen.velocities)
     residual = ((seen.positions - predicted) ** 2).sum(axis=1)
     max_residual = 2.0 * _OUTLIER_SIGMAS**2 * previous.variance + (team.max_speed * dt) ** 2
-    was_carried = (residual > max_residual) & (previous.fixes >= _MIN_FIXES)
-    fixes = np.where(was_carried, 1.0, previous.fixes + 1.0)
+    was_displaced = (residual > max_residual) & (previous.fixes >= _MIN_FIXES)
+    fixes = np.where(was_displaced, 1.0, previous.fixes + 1.0)
     gain = np.maximum(1.0 / fixes, min(dt / _AVERAGING_S, 1.0))
     # The residual of a mean of k - 1 fixes is larger than the error of one fix.
     square = 0.5 * residual * (1.0 - 1.0 / np.maximum(fixes, 1.0))
     variance_gain = np.maximum(1.0 / np.maximum(fixes - 1.0, 1.0), gain)
     variance = previous.variance + variance_gain * (square - previous.variance)
-    variance = np.where(was_carried, previous.variance, variance)
+    variance = np.where(was_displaced, previous.variance, variance)
     positions = predicted + gain[:, None] * (seen.positions - predicted)
     return positions, fixes, variance
 

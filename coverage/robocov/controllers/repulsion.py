@@ -37,7 +37,7 @@ _MIN_DISTANCE_M = 1e-9
 _MIN_CHARGE_DISTANCE_M = 0.05
 """Distance below which Howard's forces no longer grow; robots in contact are farther apart."""
 _WALL_FACTOR = 2.0 / (3.0 * math.pi)
-"""Force of all rays that meet a straight wall, relative to that of a point charge at the same distance."""
+"""Force of all rays that hit a straight wall, relative to that of a point charge at the same distance."""
 _MAX_LINK_STRETCH = 0.999
 """Fraction of the range of a link beyond which the force that maintains it no longer grows."""
 _MIN_EXPLORING_SPEED = 0.01
@@ -172,14 +172,14 @@ class Howard(BaseController):
     The equation of motion is m q'' = F - ν q', where ν is the gain `friction`, which replaces the viscosity
     of the robots.
 
-    Obstacles are the points that the rays of the range sensor meet. Each ray carries an equal fraction of the
+    Obstacles are the points that the rays of the range sensor hit. Each ray carries an equal fraction of the
     charge `k_obs`, so that its effect does not depend on the number of rays. Before the first scan the
     closest obstacle point is taken for a straight wall.
 
     The sum over all obstacles and robots, the inverse-square forces and the friction are based on general
-    knowledge, not on the text of the paper. Three choices are ours: the fraction of a ray; forces that no
-    longer grow below 5 cm; and that robots repel others if they hear them, because the range sensor does not
-    detect robots.
+    knowledge, not on the full text of the paper. Three choices are our own: each ray carries a fraction of
+    the charge; forces do not grow below 5 cm; and robots repel those that they hear, because the range sensor
+    does not detect robots.
     """
 
     name = "howard"
@@ -202,7 +202,7 @@ class Howard(BaseController):
             offsets = np.nan_to_num(seen.positions - seen.obstacle_points)
             obstacle = self.k_obs * _WALL_FACTOR * _compute_inverse_squares(offsets)
         else:
-            # A ray that meets nothing has the offset nan, and exerts no force.
+            # A ray that hits nothing has the offset nan, and exerts no force.
             offsets = np.nan_to_num(seen.positions[:, None] - returns)
             k_ray = self.k_obs / returns.shape[1]
             obstacle = k_ray * _compute_inverse_squares(offsets).sum(axis=1)
@@ -240,9 +240,9 @@ class Poduri(BaseController):
     At d = η R_c the two are equal: k_degree = k_cover (1/η - 1)².
 
     The two forces, their balance at η R_c and the degree of at least K are based on general knowledge, not on
-    the text of the paper. The following choices are ours. If at most K robots are within η R_c of a robot,
-    the links to its K nearest neighbors are critical for it, before they are in danger. Robots know only
-    positions of others: each also keeps a link that, by the positions that it knows, is critical for the
+    the full text of the paper. The following choices are our own. If at most K robots are within η R_c of a
+    robot, the links to its K nearest neighbors are critical for it, before they are in danger. Robots know
+    only positions of others: each also keeps a link that, by the positions that it knows, is critical for the
     neighbor. The closest obstacle point repels with (24), within `rho_obs`.
 
     Links are never lost if robots can exert these forces: two robots that move apart at full speed have to be
@@ -380,8 +380,8 @@ class Dispersion(BaseController):
 
     Notes
     -----
-    The behaviors and their order are based on the paper's abstract and on general knowledge, not
-    on its text; the formulas are ours. Robots of the paper move at constant speed and never come to rest. To
+    The behaviors and their order are based on the paper's abstract and on general knowledge, not on the full
+    text; the formulas are our own. In the paper, robots move at constant speed and never come to rest. To
     make placements comparable, `explore_speed` is 0 by default, and the speed falls to zero at `reach`, so
     that robots do not oscillate there. Each robot assumes that others may be as large as the largest of the
     team.

@@ -39,9 +39,12 @@ MAX_SILENCE_S = 5.0
 CERTAIN_RANGE_FRACTION = 0.8
 """Fraction of the communication range within which a robot would certainly be heard."""
 
+_REFINEMENT_RADIUS = 1.5
+"""Distance from chosen candidates within which nodes are close, in spacings of candidates."""
+
 
 class Group(NamedTuple):
-    """The k robots that one robot plans for: itself and those that it has heard."""
+    """The k robots that a robot plans for: itself and those that it hears or has heard."""
 
     robots: IntArray
     """(k,) Their numbers, ascending."""
@@ -58,8 +61,8 @@ class Placement(NamedTuple):
     """(k, 2) m"""
     is_final: bool
     """Whether the goals stay the same until the map, the density or the group changes."""
-    notes: Array
-    """(m, 2) m, points that are passed to the next plan."""
+    inspected_targets: Array = np.empty((0, 2))
+    """(m, 2) m, targets that need no further visit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,7 +118,7 @@ class Candidates(NamedTuple):
 
     @classmethod
     def build_at_nodes(cls, situation: Situation, weights: Array, nodes: IntArray) -> Candidates:
-        """Build the candidates at the reachable ones of some nodes, from the weights of all nodes."""
+        """Build candidates at the reachable ones of the given nodes, from the weights of all nodes."""
         targets = np.flatnonzero(weights > 0.0)
         nodes = nodes[weights[nodes] > 0.0]
         distances = situation.planner.compute_distance_table(nodes)[:, targets]
@@ -127,18 +130,19 @@ class Candidates(NamedTuple):
         return float(self.table[:, chosen].min(axis=1).sum())
 
     def find_nearest(self, positions: Array) -> IntArray:
-        """Find a different candidate for each of (k, 2) positions, by least squares."""
+        """Assign a different candidate to each of (k, 2) positions, by least squares; return (k,) indices."""
         square = ((positions[:, None] - self.positions) ** 2).sum(axis=2)
         _, candidates = scipy.optimize.linear_sum_assignment(square)
         return np.asarray(candidates, dtype=np.intp)
 
     def refine(self, situation: Situation, weights: Array, chosen: IntArray) -> Array:
-        """Refine chosen candidates by Lloyd's iteration on all nodes close to them; return (k, 2) m."""
+        """Return positions, (k, 2) m, refined from candidates by Lloyd's iteration on all nodes near them."""
         planner = situation.planner
         positions = self.positions[chosen]
+        # Candidates are farther apart than nodes.
         spacing = planner.spacing * math.sqrt(np.count_nonzero(weights) / len(self.positions))
         square = ((planner.nodes[:, None] - positions) ** 2).sum(axis=2).min(axis=1)
-        is_close = planner.is_roomy & (square < (1.5 * spacing) ** 2)
+        is_close = planner.is_roomy & (square < (_REFINEMENT_RADIUS * spacing) ** 2)
         fine = Candidates.build_at_nodes(situation, weights, np.flatnonzero(is_close))
         return fine.positions[run_lloyd(fine.table, fine.find_nearest(positions))]
 
@@ -183,18 +187,18 @@ class SharedMapMemory:
     next_plan_time: float = -math.inf
     """s"""
     returns: Array | None = None
-    """(n, rays, 2) m, obstacle points that the last scan of each robot has met; nan for none."""
+    """(n, rays, 2) m, obstacle points in the last scan of each robot; nan for none."""
 
 
 @dataclass(frozen=True)
 class SharedMapController(BaseController):
     """Base class of controllers with which each robot plans for itself and all robots that it hears.
 
-    Robots scan, and merge their maps with those of the robots that they hear (`DiscoveredMap`). Once in
-    `period` seconds all plan. Robots with the same knowledge make the same plan, and each moves to its own
-    goal in it by the shortest route. A robot that is no longer heard is assumed to be at its goal, and
-    forgotten if it is not heard there. With short ranges plans differ, and two robots may move to the same
-    position until they hear each other.
+    Robots scan, and merge their maps with those of the robots that they hear (`DiscoveredMap`). Every
+    `period` seconds, each robot makes a plan, and follows the shortest route to its own goal in that plan.
+    Robots with the same knowledge make the same plan. A robot that is no longer heard is assumed to be at its
+    goal, and is removed from the plan if it is not heard there. With short communication ranges plans differ,
+    and two robots may move to the same position until they hear each other.
     """
 
     information: ClassVar[Information] = "shared map"
@@ -204,7 +208,7 @@ class SharedMapController(BaseController):
     nodes: float = gain(
         1600.0, "nodes", "maximum number of nodes of the planning lattice", low=16.0, high=1e5, whole=True
     )
-    clearance: float = gain(0.03, "m", "that routes keep between rim and walls", high=10.0)
+    clearance: float = gain(0.03, "m", "gap between robots and walls along routes", high=10.0)
     k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
 
@@ -226,7 +230,7 @@ class SharedMapController(BaseController):
     def decide(self, seen: Observations, memory: SharedMapMemory) -> Decision:
         """Compute the forces along the routes to the robots' own goals in their plans."""
         if seen.scans is not None:
-            maps = update_maps(memory.maps, seen, seen.scans, list_circles(seen.neighbors))
+            maps = update_maps(memory.maps, seen, seen.scans, list_hearing_groups(seen.neighbors))
             memory = replace(memory, maps=tuple(maps))
         if seen.time >= memory.next_plan_time - 1e-9:
             memory = self._plan_routes(seen, memory)
@@ -283,7 +287,7 @@ class SharedMapController(BaseController):
         radius: float,
         sensing_range: float,
     ) -> Plan:
-        """Return the plan of a robot with this radius and sensing range, m."""
+        """Return the plan of a robot; its radius and sensing range are in m."""
         window = Window.build_around(known_map.raster, group.positions[0], math.inf, int(self.nodes))
         former_goals = np.full(group.positions.shape, np.nan)
         if former_plan is None:
@@ -292,8 +296,8 @@ class SharedMapController(BaseController):
             if _is_still_valid(former_plan, known_map, seen.density, group):
                 return replace(former_plan, group=group)
             planner = former_plan.planner
-            _, here, there = np.intersect1d(group.robots, former_plan.group.robots, return_indices=True)
-            former_goals[here] = former_plan.placement.goals[there]
+            _, rows, former_rows = np.intersect1d(group.robots, former_plan.group.robots, return_indices=True)
+            former_goals[rows] = former_plan.placement.goals[former_rows]
         planner = planner.update(known_map, window)
         situation = Situation(
             positions=group.positions,
@@ -330,12 +334,12 @@ def _is_still_valid(plan: Plan, known_map: DiscoveredMap, density: Density | Non
     )
 
 
-Circle: TypeAlias = tuple[int, ...]
+HearingGroup: TypeAlias = tuple[int, ...]
 """Numbers of a robot and of those that it hears, ascending."""
 
 
-def list_circles(neighbors: Neighbors) -> list[Circle]:
-    """Return the circle of each robot."""
+def list_hearing_groups(neighbors: Neighbors) -> list[HearingGroup]:
+    """Return the hearing group of each robot."""
     if neighbors.is_complete:
         return [tuple(range(neighbors.count))] * neighbors.count
     return [
@@ -344,12 +348,12 @@ def list_circles(neighbors: Neighbors) -> list[Circle]:
 
 
 def update_maps(
-    maps: Sequence[DiscoveredMap], seen: Observations, scans: Scans, circles: Sequence[Circle]
+    maps: Sequence[DiscoveredMap], seen: Observations, scans: Scans, hearing_groups: Sequence[HearingGroup]
 ) -> list[DiscoveredMap]:
-    """Add the scan of each robot to the maps of all robots in its circle.
+    """Add the scan of each robot to the maps of all robots in its hearing group.
 
-    Robots that all hear each other share one map, to which all scans are added in turn; later scans correct
-    earlier ones. Maps that are merged again and again would keep an error of one of them for ever.
+    Robots that all hear each other share one map. All scans are added to it in turn, so that later scans can
+    correct earlier ones: maps that are only merged would keep the error of any one of them forever.
 
     Parameters
     ----------
@@ -357,8 +361,8 @@ def update_maps(
         One of each robot.
     seen : Observations
     scans : Scans
-    circles : sequence of Circle
-        As `list_circles` returns them.
+    hearing_groups : sequence of HearingGroup
+        The hearing group of each robot, as `list_hearing_groups` returns them.
     """
 
     def add_scan(known_map: DiscoveredMap, robot: int) -> DiscoveredMap:
@@ -368,21 +372,22 @@ def update_maps(
     def build_own_map(robot: int) -> DiscoveredMap:
         return add_scan(maps[robot], robot)
 
-    sizes = Counter(circles)
-    shared_maps: dict[Circle, DiscoveredMap] = {}
-    later = []
-    for robot, circle in enumerate(circles):
-        if sizes[circle] < len(circle):
-            others = (build_own_map(other) for other in circle if other != robot)
-            later.append(build_own_map(robot).merge(others))
+    sizes = Counter(hearing_groups)
+    shared_maps: dict[HearingGroup, DiscoveredMap] = {}
+    updated_maps = []
+    for robot, group in enumerate(hearing_groups):
+        if sizes[group] < len(group):
+            # Not all of these robots hear each other.
+            others = (build_own_map(other) for other in group if other != robot)
+            updated_maps.append(build_own_map(robot).merge(others))
             continue
-        if circle not in shared_maps:
-            shared = maps[robot].merge(maps[other] for other in circle if maps[other] is not maps[robot])
-            for member in circle:
+        if group not in shared_maps:
+            shared = maps[robot].merge(maps[other] for other in group if maps[other] is not maps[robot])
+            for member in group:
                 shared = add_scan(shared, member)
-            shared_maps[circle] = shared
-        later.append(shared_maps[circle])
-    return later
+            shared_maps[group] = shared
+        updated_maps.append(shared_maps[group])
+    return updated_maps
 
 
 def _build_group(seen: Observations, team: Team, former_plan: Plan | None, robot: int) -> Group:

@@ -26,11 +26,11 @@ from robocov.observation import Decision, Observations, Scanning, compute_ray_di
 from robocov.team import Team
 
 _SQUARE_SIDE_M = 0.1
-"""Side of the squares in which a robot remembers that it has met an obstacle."""
+"""Side of the squares in which a robot stores the obstacle points that it has detected."""
 _MIN_IMPROVEMENT_M = 0.2
 """Minimum difference for a point to count as nearer to the goal; smaller values let modes alternate."""
 _RETURN_RADIUS_M = 0.3
-"""Distance from a point at which a robot has returned to it."""
+"""Distance from a point within which a robot has returned to it."""
 _ARRIVAL_RADIUS_M = 0.05
 """Distance from a point at which a robot has arrived."""
 _MIN_BOUNDARY_LENGTH_M = 1.0
@@ -38,7 +38,7 @@ _MIN_BOUNDARY_LENGTH_M = 1.0
 _PATIENCE_DECAY = 0.9
 """Factor of the length for which boundaries are followed, with each attempt to reach a goal."""
 _CONTACT_FRACTION = 0.95
-"""Fraction of the distance to a point within the clearance down to which a robot may approach it."""
+"""Fraction of its present distance to which a robot may approach a point that is within the clearance."""
 
 
 class Mode(Enum):
@@ -63,13 +63,13 @@ class BugState:
     is_passing: bool = False
     """Whether it continues from the waypoint, and need not slow down there."""
     fixed_goal: Array | None = None
-    """Its goal since it met an obstacle; None while the goal is its centroid."""
+    """Its goal while it passes an obstacle; None while the goal is its centroid."""
     best_point: Array | None = None
     """The point nearest to the fixed goal of all boundaries that it followed or left."""
     entry_point: Array | None = None
-    """Where it met the boundary that it follows."""
+    """Point at which it began to follow the boundary."""
     last_position: Array | None = None
-    """Where it was at the last scan."""
+    """Its position at the last scan."""
     followed_length: float = 0.0
     """Length of its path along the boundary, m."""
     max_followed_length: float = math.inf
@@ -80,7 +80,7 @@ class BugState:
     """Number of goals that it has fixed so far."""
 
     def release_goal(self, position: Array, centroid: Array, min_move: float) -> BugState:
-        """Return the state without the fixed goal if this is reached, or given up and out of date.
+        """Return the state without the fixed goal if that is reached, or given up and out of date.
 
         Parameters
         ----------
@@ -109,8 +109,8 @@ class TangentBugMemory(Memory):
     """Memory of the robots, with their navigation states."""
 
     bugs: tuple[BugState, ...] = ()
-    met_squares: tuple[ComplexArray, ...] = ()
-    """(w,) Squares in which each robot has met an obstacle: column + i row."""
+    obstacle_squares: tuple[ComplexArray, ...] = ()
+    """(w,) Squares in which each robot has detected obstacle points, as complex numbers column + i row."""
 
 
 @dataclass(frozen=True)
@@ -125,19 +125,19 @@ class TangentBug(BaseController):
       decreases.
     - *Boundary following*: otherwise it follows the boundary until a point in view is nearer to the goal than
       the boundary followed so far: d_reach < d_followed.
-    - *Projection*: a robot that has followed the whole boundary in vain cannot reach its goal, which is
-      inside an obstacle. It moves to the point of the boundary nearest to the goal, and comes to rest. It
-      does so at once if the goal is in an obstacle that it has met, or closer to one than a robot can be.
+    - *Projection*: a robot that has followed the whole boundary without finding such a point cannot reach its
+      goal, which is inside an obstacle. It moves to the point of the boundary nearest to the goal, and comes
+      to rest. It does so at once if the goal is in a known obstacle, or closer to one than a robot can be.
 
     Notes
     -----
-    The controller is based on the paper's abstract and on general knowledge, not on the texts of the papers.
-    The following choices are ours. Because a robot's centroid moves with it and would draw it back from each
-    detour, the goal is fixed from the time when the robot meets a boundary until it is reached or given up. A
-    path along a wall may be as long as the building: the robot follows a boundary for at most `detour` times
-    the distance to its goal, and then returns. It tries again after its centroid has moved by `moved`.
-    Obstacles in a scan are enlarged by the radius of the robot and `clearance`. Robots slide along each
-    other, and assume that others may be as large as the largest of the team.
+    The implementation is based on the paper's abstract and on general knowledge, not on the full texts of the
+    papers. The following choices are our own. A robot's centroid moves with the robot, and would draw it back
+    from each detour; therefore the goal is fixed from the time when the robot begins to follow a boundary
+    until it is reached or given up. Because a boundary may be as long as the building, the robot follows it
+    for at most `detour` times the distance to its goal, and then returns. It tries again after its centroid
+    has moved by `moved`. Obstacles in a scan are enlarged by the radius of the robot and `clearance`. Robots
+    slide along each other, and assume that others may be as large as the largest of the team.
     """
 
     name = "tangentbug"
@@ -146,7 +146,7 @@ class TangentBug(BaseController):
     scanning = Scanning(rays=120, period=0.1)
     memory_type = TangentBugMemory
 
-    clearance: float = gain(0.05, "m", "distance kept from obstacles and robots, rim to rim", high=10.0)
+    clearance: float = gain(0.05, "m", "minimum gap to obstacles and other robots", high=10.0)
     jump: float = gain(0.5, "m", "minimum step of the depth in view at the end of an obstacle", low=0.01)
     detour: float | None = gain(
         4.0,
@@ -166,14 +166,14 @@ class TangentBug(BaseController):
         returns = update_returns(seen, memory.returns)
         obstacle_points = collect_obstacle_points(seen, returns)
         bugs = memory.bugs or tuple(BugState(Mode.GOAL, 1, position) for position in seen.positions)
-        met_squares = memory.met_squares or (np.empty(0, dtype=np.complex128),) * len(team)
-        # Robots navigate after each scan; without any scan, by the closest obstacle points in each step.
+        obstacle_squares = memory.obstacle_squares or (np.empty(0, dtype=np.complex128),) * len(team)
+        # Robots navigate after each scan. Before the first one, they use the closest obstacle points instead.
         if not memory.bugs or seen.scans is not None or returns is None:
-            met_squares = tuple(
+            obstacle_squares = tuple(
                 _add_squares(squares, points)
-                for squares, points in zip(met_squares, obstacle_points, strict=True)
+                for squares, points in zip(obstacle_squares, obstacle_points, strict=True)
             )
-            bugs = self._navigate(seen, team, bugs, cells.centroid, obstacle_points, met_squares)
+            bugs = self._navigate(seen, team, bugs, cells.centroid, obstacle_points, obstacle_squares)
         velocities = self._compute_velocities(seen, team, bugs, cells.centroid)
         margins = Margins.build_with_gap(team, 0.5 * self.clearance)
         velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
@@ -192,7 +192,7 @@ class TangentBug(BaseController):
                 returns=returns,
                 triangulation=cells.triangulation,
                 bugs=bugs,
-                met_squares=met_squares,
+                obstacle_squares=obstacle_squares,
             ),
         )
 
@@ -203,11 +203,11 @@ class TangentBug(BaseController):
         bugs: tuple[BugState, ...],
         centroids: Array,
         obstacle_points: Array,
-        met_squares: tuple[ComplexArray, ...],
+        obstacle_squares: tuple[ComplexArray, ...],
     ) -> tuple[BugState, ...]:
         """Return the navigation states of all robots after a scan."""
         directions = compute_ray_directions(self.scanning.rays)
-        later = []
+        updated_bugs = []
         for i, bug in enumerate(bugs):
             position = seen.positions[i]
             bug = bug.release_goal(position, centroids[i], self.moved)
@@ -215,21 +215,21 @@ class TangentBug(BaseController):
             points = obstacle_points[i] - position
             clearance = float(team.radius[i]) + self.clearance
             reach = min(float(team.sensing_range[i]), seen.region.diameter)
-            squares = np.column_stack([met_squares[i].real, met_squares[i].imag])
+            squares = np.column_stack([obstacle_squares[i].real, obstacle_squares[i].imag])
             navigator = Navigator(
                 jump=self.jump,
                 detour=self.detour,
                 position=position,
                 goal=goal - position,
                 points=points,
-                met_points=(squares + 0.5) * _SQUARE_SIDE_M - position,
+                known_points=(squares + 0.5) * _SQUARE_SIDE_M - position,
                 directions=directions,
                 free_distances=compute_free_distances(points, directions, clearance, reach),
                 clearance=clearance,
                 reach=reach,
             )
-            later.append(navigator.update(bug))
-        return tuple(later)
+            updated_bugs.append(navigator.update(bug))
+        return tuple(updated_bugs)
 
     def _compute_velocities(
         self, seen: Observations, team: Team, bugs: tuple[BugState, ...], centroids: Array
@@ -249,7 +249,7 @@ class TangentBug(BaseController):
 
 
 def _add_squares(squares: ComplexArray, points: Array) -> ComplexArray:
-    """Return the squares in which a robot has met an obstacle, with those of (k, 2) points; nan for none."""
+    """Return the squares with those of further obstacle points added, (k, 2) m; nan for none."""
     indices = np.floor(points[~np.isnan(points[:, 0])] / _SQUARE_SIDE_M)
     return np.unique(np.concatenate([squares, indices[:, 0] + 1j * indices[:, 1]]))
 
@@ -276,9 +276,9 @@ class Navigator:
     goal: Array
     """(2,)"""
     points: Array
-    """(m, 2) Obstacle points; nan for rays that met nothing."""
-    met_points: Array
-    """(w, 2) Centers of the squares in which it has met an obstacle so far."""
+    """(m, 2) Obstacle points; nan for rays that hit nothing."""
+    known_points: Array
+    """(w, 2) Centers of the squares in which it has detected obstacle points so far."""
     directions: Array
     """(k, 2) Unit vectors of the rays."""
     free_distances: Array
@@ -387,10 +387,10 @@ class Navigator:
         return self._follow_boundary(bug)
 
     def _is_goal_blocked(self) -> bool:
-        """Return whether the goal is in an obstacle that the robot has met, or too close to it."""
-        if not len(self.met_points):
+        """Return whether the goal is in a known obstacle, or too close to one."""
+        if not len(self.known_points):
             return False
-        distance = np.hypot(*(self.goal - self.met_points).T).min()
+        distance = np.hypot(*(self.goal - self.known_points).T).min()
         return bool(distance < self.clearance + _SQUARE_SIDE_M)
 
     def _follow_boundary(self, bug: BugState) -> BugState:
@@ -402,13 +402,13 @@ class Navigator:
         if np.isnan(distances).all():
             return self._head_for(bug, Mode.GOAL, self.position + self.goal)
         ends = self._find_contour_ends(self.points[int(np.nanargmin(distances))])
-        # Of a closed contour, all is in view.
+        # A closed contour has no end to move to.
         offset = ends[bug.turn].point if bug.turn in ends else np.zeros(2)
         best_point = self._find_best_point(bug, ends)
         bug = replace(bug, waypoint=freeze(self.position + offset), best_point=best_point)
         if bug.mode is Mode.RETURN:
             if bug.followed_length > 3.0 * bug.max_followed_length:
-                # It does not find the best point again.
+                # The robot has lost its best point, and stays where it is.
                 bug = replace(bug, best_point=freeze(self.position))
             return self._move_to_best_point(bug)
         leaving_point = self._find_leaving_point(best_point)
@@ -416,13 +416,13 @@ class Navigator:
             return self._head_for(bug, Mode.LEAVING, leaving_point, is_passing=True)
         is_around = self._is_around(bug)
         if is_around or not ends or bug.followed_length > bug.max_followed_length:
-            # A robot that has not been around returns the way it came.
+            # After a full turn, the robot keeps going; otherwise it returns the way it came.
             turn = bug.turn if is_around else -bug.turn
             return self._move_to_best_point(replace(bug, mode=Mode.RETURN, turn=turn))
         return bug
 
     def _is_around(self, bug: BugState) -> bool:
-        """Return whether a robot has followed the whole boundary, back to where it met it."""
+        """Return whether a robot has followed the whole boundary, back to its entry point."""
         assert bug.entry_point is not None
         if bug.followed_length <= 2.0 * math.pi * _RETURN_RADIUS_M:
             return False
@@ -457,7 +457,7 @@ class Navigator:
         offset = bug.best_point - self.position
         distance = math.hypot(*offset)
         free_distance = self._compute_free_distance(offset)
-        # From here, the boundary may be a little closer to the point than it looked before.
+        # Seen from here, the boundary may be a little closer to the point than it was before.
         if distance >= _ARRIVAL_RADIUS_M and free_distance < distance - self.clearance:
             return replace(bug, mode=Mode.RETURN)
         fraction = min(1.0, free_distance / max(distance, 1e-300))
@@ -521,7 +521,7 @@ def find_contour_end(
     jump: float,
     reach: float,
 ) -> ContourEnd | None:
-    """Find where the contour ends that blocks a ray.
+    """Find the end of the contour that blocks a ray.
 
     Parameters
     ----------
@@ -536,9 +536,9 @@ def find_contour_end(
     blocked_distance : float, m
         Free distance in the blocked direction.
     jump : float, m
-        The contour ends before a ray that is free for longer than the one before by this,
+        The contour ends before a ray whose free distance exceeds that of the previous ray by this.
     reach : float, m
-        or for this distance.
+        The contour also ends before a ray with this free distance.
 
     Returns
     -------

@@ -43,7 +43,7 @@ class Teammates(NamedTuple):
         )
 
     def add_observation(
-        self, robots: IntArray, positions: Array, own_position: Array, time: float, is_gone: BoolArray
+        self, robots: IntArray, positions: Array, own_position: Array, time: float, is_lost: BoolArray
     ) -> Teammates:
         """Add the positions of robots that are heard now.
 
@@ -53,48 +53,54 @@ class Teammates(NamedTuple):
         positions : (m, 2) array, m
         own_position : (2,) array, m
         time : float, s
-        is_gone : (k,) bool array
-            Robots known so far that are removed unless they are heard.
+        is_lost : (k,) bool array
+            Whether each robot known so far has failed or is missing. It is removed unless it is heard now.
         """
         now = np.full(len(robots), time)
         distances = np.sqrt(((positions - own_position) ** 2).sum(axis=1))
-        heard = Teammates(robots, positions, now, distances, now, positions)
-        is_kept = ~(np.isin(self.robots, robots) | is_gone)
-        columns = [np.concatenate([new, old[is_kept]]) for new, old in zip(heard, self, strict=True)]
+        observed = Teammates(robots, positions, now, distances, now, positions)
+        is_kept = ~(np.isin(self.robots, robots) | is_lost)
+        columns = [np.concatenate([new, old[is_kept]]) for new, old in zip(observed, self, strict=True)]
         order = np.argsort(columns[0])
-        later = Teammates(*(column[order] for column in columns))
-        _, here, there = np.intersect1d(later.robots, self.robots, assume_unique=True, return_indices=True)
-        distances = np.sqrt(((later.positions[here] - self.rest_positions[there]) ** 2).sum(axis=1))
-        is_at_rest = distances < REST_RADIUS_M
-        here = here[is_at_rest]
-        there = there[is_at_rest]
-        later.rest_positions[here] = self.rest_positions[there]
-        later.rest_times[here] = self.rest_times[there]
-        return later
+        updated = Teammates(*(column[order] for column in columns))
+        _, rows, former_rows = np.intersect1d(
+            updated.robots, self.robots, assume_unique=True, return_indices=True
+        )
+        moves = updated.positions[rows] - self.rest_positions[former_rows]
+        is_at_rest = np.sqrt((moves**2).sum(axis=1)) < REST_RADIUS_M
+        rows = rows[is_at_rest]
+        former_rows = former_rows[is_at_rest]
+        updated.rest_positions[rows] = self.rest_positions[former_rows]
+        updated.rest_times[rows] = self.rest_times[former_rows]
+        return updated
 
-    def add_reports(self, reports: Sequence[Teammates], robot: int, gone: Mapping[int, float]) -> Teammates:
-        """Add reports about robots that were heard by others more recently.
+    def add_reports(
+        self, reports: Sequence[Teammates], robot: int, loss_times: Mapping[int, float]
+    ) -> Teammates:
+        """Add reports of other robots that are more recent than what the robot knows.
 
         Parameters
         ----------
         reports : sequence of Teammates
-            Of several reports with the same time the first one counts.
+            Of several reports with the same time, the first one counts.
         robot : int
             The robot itself; reports about it are ignored.
-        gone : mapping of int to float, s
-            Times at which it considered robots failed or missing: only later reports about these count.
+        loss_times : mapping of int to float, s
+            Times at which the robot lost others. Only later reports about these count.
         """
         sources: list[Sequence[Array | IntArray]] = [self]
         for report in reports:
             min_times = [
-                math.inf if other == robot else gone.get(other, -1.0) for other in report.robots.tolist()
+                math.inf if other == robot else loss_times.get(other, -1.0)
+                for other in report.robots.tolist()
             ]
             is_new = report.heard_times > np.array(min_times)
-            # The robot cannot be considered failed because of its silence: it may never have been in range.
+            # A reported robot may never have been in range: its silence does not mean that it has failed.
             report = report._replace(heard_distances=np.full(len(is_new), math.inf))
             sources.append([column[is_new] for column in report])
-        columns = [np.concatenate(parts) for parts in zip(*sources, strict=True)]
-        order = np.lexsort((-columns[2], columns[0]))  # by robot, the latest first; stable
-        _, first = np.unique(columns[0][order], return_index=True)
+        merged = Teammates(*(np.concatenate(parts) for parts in zip(*sources, strict=True)))
+        # By robot, the most recent first. The sort is stable.
+        order = np.lexsort((-merged.heard_times, merged.robots))
+        _, first = np.unique(merged.robots[order], return_index=True)
         order = order[first]
-        return Teammates(*(column[order] for column in columns))
+        return Teammates(*(column[order] for column in merged))

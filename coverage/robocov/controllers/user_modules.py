@@ -1,6 +1,6 @@
-"""Controllers in files of users: their classes, the modules that they import, and their faults in one line.
+"""Controllers in users' own files: their classes, the modules that they import, and errors in their code.
 
-A file and the modules of its author that it imports can also be loaded from their texts, on any machine.
+A file and the modules that it imports can also be loaded from stored texts, for example on another machine.
 """
 
 import ast
@@ -23,17 +23,17 @@ from typing import Any, NamedTuple
 from robocov.errors import ControllerEndedError, ParameterError, RobocovError, describe_unknown_name, quote
 
 _MODULE_PREFIX = "robocov_user_"
-"""Prefix of the names of modules that are loaded from files of users."""
+"""Prefix of the names of modules that are loaded from users' files."""
 _LIBRARY_FOLDER = str(Path(__file__).parents[1])
 _PACKAGE_FOLDERS = frozenset(("site-packages", "dist-packages"))
-"""Folders of installed packages, which have versions."""
+"""Names of folders of installed packages."""
 
 
 class ModuleText(NamedTuple):
     """A module that a controller's file imports."""
 
     path: str
-    """Empty for a package without ``__init__.py``."""
+    """Path of its file; empty for a package without ``__init__.py``."""
     text: str
 
 
@@ -48,7 +48,7 @@ class ControllerSource(NamedTuple):
 
 
 class _Call(NamedTuple):
-    """A call that led to an error."""
+    """A call in a traceback."""
 
     module: str
     file: str
@@ -56,29 +56,29 @@ class _Call(NamedTuple):
 
 
 def explain_fault(where: str, error: BaseException, when: str = "") -> RobocovError:
-    """Return the error that explains, in one line, a fault in code outside robocov.
+    """Return an error with a one-line explanation of an exception in code outside robocov.
 
     Parameters
     ----------
     where : str
-        The controller, with which the message begins.
+        Beginning of the message, which names the controller.
     error : BaseException
-        The exception that the code raised. Its notes, such as "robot 3", are added to the message.
+        The exception that the code raised. Notes that name a robot, as "robot 3", are added to the message.
     when : str
-        The end of the message, such as " at 0.117 s".
+        End of the message, as " at 0.117 s".
 
     Returns
     -------
     ControllerEndedError
-        If the exception would have ended Python, as `SystemExit` does.
+        For exceptions that would end Python, as `SystemExit` does. The message names file and line.
     ParameterError
-        For any other exception. Both name file and line.
+        For all other exceptions. The message names file and line.
     """
     notes = [note for note in getattr(error, "__notes__", ()) if note.startswith("robot ")]
     place = _format_place(error) + "".join(f" for {note}" for note in notes) + when
     try:
         message = str(error)
-    except Exception:  # The exception is the user's own.
+    except Exception:  # The class of the exception may be the user's own.
         message = "it has no message"
     fault = f"{type(error).__name__}: {message}" if message else type(error).__name__
     if isinstance(error, Exception):
@@ -87,15 +87,15 @@ def explain_fault(where: str, error: BaseException, when: str = "") -> RobocovEr
 
 
 def explain_user_fault(error: BaseException) -> RobocovError | None:
-    """Return the error that explains a fault in a file of a user; None if the fault is elsewhere."""
+    """Return an error that explains an exception in a user's file; None if it was not raised there."""
     if any(_is_in_user_file(call) for call in _list_calls(error)):
         return explain_fault("a controller of your own", error)
     return None
 
 
 def format_location(function: object) -> str:
-    """Return file and line of a function of a user, as " (mine.py, line 12)"; empty if they are unknown."""
-    with suppress(Exception):  # Any object can be callable.
+    """Return file and line of a user's function, as " (mine.py, line 12)"; empty if they are unknown."""
+    with suppress(Exception):  # A callable object may have any attributes.
         code = inspect.unwrap(getattr(function, "__func__", function)).__code__  # type: ignore[arg-type]
         return f" ({Path(code.co_filename).name}, line {code.co_firstlineno})"
     return ""
@@ -113,7 +113,7 @@ def _format_place(error: BaseException) -> str:
 
 
 def _list_calls(error: BaseException) -> list[_Call]:
-    """Return the calls that led to an error, the last one at the end."""
+    """Return the calls in the traceback of an error, outermost first."""
     return [
         _Call(str(frame.f_globals.get("__name__")), frame.f_code.co_filename, line)
         for frame, line in traceback.walk_tb(error.__traceback__)
@@ -132,7 +132,7 @@ def load_class(name: str, source: ControllerSource | None) -> type[Any]:
     name : str
         ``file.py:ClassName``.
     source : ControllerSource or None
-        Text that is run instead of the file.
+        Text to run instead of the file.
 
     Returns
     -------
@@ -141,8 +141,8 @@ def load_class(name: str, source: ControllerSource | None) -> type[Any]:
     Raises
     ------
     ParameterError
-        If there is no such file or class, the file cannot be run, or the class is no frozen dataclass with a
-        method ``decide`` or ``force``.
+        If there is no such file or class, the file cannot be run, or the class is not a frozen dataclass with
+        a method ``decide`` or ``force``.
     """
     file, _, class_name = name.rpartition(":")
     where = f"controller {quote(name)}"
@@ -202,11 +202,10 @@ def _list_own_classes(module: ModuleType) -> list[str]:
 
 
 def find_own_modules(text: str) -> dict[str, ModuleText]:
-    """Find the modules of its author that a text imports, and those that these import.
+    """Find the author's own modules that a text imports, directly or indirectly.
 
     Modules are looked up on ``sys.path`` without being executed. The standard library, installed packages and
-    robocov are left out; so are files that cannot be read, and imports of a name that is only known when the
-    text runs.
+    robocov are left out, and so are files that cannot be read. Imports by a computed name are not found.
 
     Parameters
     ----------
@@ -232,7 +231,7 @@ class _ModuleCollector:
     def __init__(self) -> None:
         self.modules: dict[str, ModuleText] = {}
         self._locations: dict[str, list[str]] = {}
-        """Folders that contain the submodules of each module that was looked up; empty if there are none."""
+        """Folders with the submodules of each module looked up so far; empty for a module without any."""
 
     def add(self, name: str) -> list[str]:
         """Add a module, and the packages that contain it; return the names that they import."""
@@ -268,16 +267,16 @@ class _ModuleCollector:
 
 
 def _list_imports(text: str, package: str) -> Iterator[str]:
-    """Yield the names of all modules that a text within a package may import."""
+    """Yield the names of all modules that a text in the given package may import."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             base = node.module or ""
             if node.level:
-                with suppress(ImportError):  # Outside the package the import will fail as well.
+                with suppress(ImportError):  # The import will also fail when the text runs.
                     base = importlib.util.resolve_name("." * node.level + base, package)
-            # Whatever is imported from a package may be a module.
+            # A name that is imported from a package may be a module.
             yield from (f"{base}.{alias.name}" for alias in node.names if base)
 
 
@@ -333,7 +332,7 @@ class _TextFinder(importlib.abc.MetaPathFinder):
 
 @contextmanager
 def provide_modules(modules: Mapping[str, ModuleText]) -> Iterator[None]:
-    """Import modules from their texts while the context lasts, in place of others of the same names.
+    """Within the context, import modules from their texts instead of others of the same names.
 
     Parameters
     ----------
@@ -341,7 +340,7 @@ def provide_modules(modules: Mapping[str, ModuleText]) -> Iterator[None]:
         As `find_own_modules` returns them.
     """
     if any(isinstance(finder, _TextFinder) and finder.modules is modules for finder in sys.meta_path):
-        # An outer context provides them already, so that they are loaded once.
+        # An outer context already provides them; they are not loaded twice.
         yield
         return
     former_modules = {name: sys.modules.pop(name) for name in modules if name in sys.modules}

@@ -37,7 +37,7 @@ _SAMPLE_FRACTIONS = np.append((np.arange(_SAMPLES_PER_RAY) + 0.5) / _SAMPLES_PER
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VisibilityMemory(Memory):
-    """Memory of the robots: their views in the last scan, and the motion that follows from these."""
+    """Memory of the robots: the last view and gradient of each."""
 
     view: View | None = None
     gradient: Array | None = None
@@ -70,10 +70,10 @@ class Visibility(BaseController):
     Arcs and windows are found in the robot's own scan; between scans, robots keep their velocities. A robot
     that hears no others has the whole view as its cell.
 
-    The motion is based on the paper's abstract (Automatica 53, 195-207) and on general knowledge, not on its
-    text. In the paper, robots send each other their views. Here they send positions, and a robot assumes that
-    a neighbor sees a point unless its own scan has met an obstacle in front of the line between the two.
-    Avoiding collisions by slowing down is ours as well.
+    The implementation is based on the paper's abstract (Automatica 53, 195-207) and on general knowledge, not
+    on the full text. In the paper, robots send each other their views. Here they send positions, and a robot
+    assumes that a neighbor sees a point unless its own scan shows an obstacle in the line between the two.
+    Robots also slow down to avoid collisions, which is our own addition.
     """
 
     name = "visibility"
@@ -86,7 +86,7 @@ class Visibility(BaseController):
         0.1, "1/s", "desired speed per square meter of area in view and meter of motion", high=100.0
     )
     jump: float = gain(0.3, "m", "minimum step of the depth in view at a window", low=0.01)
-    clearance: float = gain(0.05, "m", "distance kept from obstacles and robots, rim to rim", high=10.0)
+    clearance: float = gain(0.05, "m", "minimum gap to obstacles and other robots", high=10.0)
     response_time: float = response_time_gain()
 
     def decide(self, seen: Observations, memory: VisibilityMemory) -> Decision:
@@ -126,7 +126,7 @@ class Visibility(BaseController):
         (n, 2) array, m
             Growth of the area, weighted by φ, per meter of the robot's motion.
         """
-        n, rays = view.distances.shape
+        robots, rays = view.distances.shape
         directions = compute_ray_directions(rays)
         depths = view.distances[..., None] * _SAMPLE_FRACTIONS
         walls = np.where(view.hit, view.distances, np.inf)
@@ -135,11 +135,10 @@ class Visibility(BaseController):
         weight = evaluate_density(seen.density, points)
         weight = weight * find_cells_in_view(depths, walls, directions, pairs, reach)
         arcs = ~view.hit * weight[..., -1] * reach[:, None] * (2.0 * np.pi / rays)
-
         windows = find_windows(view, directions, reach, self.jump)
         # The last sample is the end of the ray, which only the arcs need.
         growth = integrate_over_windows(windows, view, depths[..., :-1], weight[..., :-1])
-        window_terms = sum_by_robot(windows.robot, growth, n)
+        window_terms = sum_by_robot(windows.robot, growth, robots)
         return np.asarray((arcs[..., None] * directions).sum(axis=1) + window_terms)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from robocov.arrays import BoolArray
 from robocov.controllers.gains import gain
 from robocov.controllers.shared_map import Candidates, Placement, SharedMapController, Situation, assign_goals
 from robocov.k_median import apply_best_swap
@@ -47,8 +48,8 @@ class VoronoiGraphCoverage(SharedMapController):
     `threshold` of the cost. Robots follow the shortest paths on the map, not the graph. Goals are assigned to
     robots such that the sum of the squared path lengths is minimal.
 
-    The controller is based on the abstract of Yun and Rus and on general knowledge, not on the texts of the
-    papers.
+    The implementation is based on the abstract of Yun and Rus and on general knowledge, not on the full texts
+    of the papers.
     """
 
     name = "voronoi-graph"
@@ -59,11 +60,10 @@ class VoronoiGraphCoverage(SharedMapController):
 
     def compute_placement(self, situation: Situation) -> Placement:
         """Compute the placement by vertex substitution, starting from the former one."""
-        notes = np.empty((0, 2))
         candidates = self._build_vertices(situation)
         count = len(situation.positions)
         if len(candidates.positions) < count:
-            return Placement(goals=situation.positions, is_final=False, notes=notes)
+            return Placement(goals=situation.positions, is_final=False)
         goals = situation.former_goals
         chosen = candidates.find_nearest(np.where(np.isfinite(goals), goals, situation.positions))
         is_fixed = np.zeros(count, dtype=bool)
@@ -74,27 +74,19 @@ class VoronoiGraphCoverage(SharedMapController):
                 break
             chosen = improved
             min_saving = _MIN_FURTHER_SAVING
-        return Placement(
-            goals=assign_goals(situation, candidates.positions[chosen]), is_final=True, notes=notes
-        )
+        return Placement(goals=assign_goals(situation, candidates.positions[chosen]), is_final=True)
 
     def _build_vertices(self, situation: Situation) -> Candidates:
         """Build the vertices of the graph where the robots are, with distances along it."""
         known_map = situation.known_map
         raster = known_map.raster
-        planner = situation.planner
         window = Window.build_around(raster, situation.positions[0], math.inf, MAX_CELLS)
-        rows, columns = raster.shape
-        is_tight = window.crop(planner.is_tight[:rows, :columns], True)
-        is_roomy = ~is_tight.reshape(window.block_shape).any(axis=(1, 3))
+        is_reachable = _find_reachable_blocks(situation, window)
         free_cells = window.crop(~known_map.is_blocked, False).reshape(window.block_shape).sum(axis=(1, 3))
-        labels, _ = ndimage.label(is_roomy, np.ones((3, 3)))
-        own_nodes = [planner.find_own_node(position) for position in situation.positions]
-        row, column = raster.find_cells(planner.nodes[own_nodes])
-        own_labels = labels[row // window.stride, column // window.stride]
-        is_roomy &= np.isin(labels, own_labels) & (labels > 0)
         block_size = raster.cell_size * window.stride
-        roadmap = VoronoiRoadmap.build(is_roomy, free_cells > 0, _MIN_SPACING_M / block_size, MAX_VERTICES)
+        roadmap = VoronoiRoadmap.build(
+            is_reachable, free_cells > 0, _MIN_SPACING_M / block_size, MAX_VERTICES
+        )
         vertices = np.asarray(raster.origin) + (roadmap.vertices[:, ::-1] + 0.5) * block_size
         mass = free_cells.astype(np.float64)
         if situation.density is not None and not situation.density.is_uniform:
@@ -103,3 +95,17 @@ class VoronoiGraphCoverage(SharedMapController):
         weights = np.bincount(roadmap.vertex_of_cell[has_vertex], mass[has_vertex], minlength=len(vertices))
         distances = np.minimum(roadmap.distances * block_size, UNREACHABLE_M)
         return Candidates(positions=vertices, table=np.ascontiguousarray((distances * weights).T))
+
+
+def _find_reachable_blocks(situation: Situation, window: Window) -> BoolArray:
+    """Return which blocks of the window robots can reach without passing through tight ones."""
+    raster = situation.known_map.raster
+    planner = situation.planner
+    rows, columns = raster.shape
+    is_tight = window.crop(planner.is_tight[:rows, :columns], True)
+    is_roomy = ~is_tight.reshape(window.block_shape).any(axis=(1, 3))
+    labels, _ = ndimage.label(is_roomy, np.ones((3, 3)))
+    own_nodes = [planner.find_own_node(position) for position in situation.positions]
+    row, column = raster.find_cells(planner.nodes[own_nodes])
+    own_labels = labels[row // window.stride, column // window.stride]
+    return np.asarray(is_roomy & np.isin(labels, own_labels) & (labels > 0))

@@ -304,8 +304,8 @@ def test_silent_robots_are_kept_unless_they_are_gone() -> None:
     times = np.full(3, 2.0)
     teammates = Teammates(np.array([1, 2, 4]), positions, times, np.ones(3), times, positions)
     no_robots = np.empty(0, dtype=np.intp)
-    is_gone = np.array([False, True, False])
-    later = teammates.add_observation(no_robots, np.empty((0, 2)), np.zeros(2), 3.0, is_gone)
+    is_lost = np.array([False, True, False])
+    later = teammates.add_observation(no_robots, np.empty((0, 2)), np.zeros(2), 3.0, is_lost)
     assert later.robots.tolist() == [1, 4]
     assert later.heard_times.tolist() == [2.0, 2.0]
 

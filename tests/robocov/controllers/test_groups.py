@@ -57,7 +57,7 @@ def test_silent_robots_are_expected_at_their_goals_until_they_are_missed_there(
     )
     former_plan = Plan(
         group=former_group,
-        placement=Placement(goals=np.array([[1.0, 1.0], goal]), is_final=False, notes=np.empty((0, 2))),
+        placement=Placement(goals=np.array([[1.0, 1.0], goal]), is_final=False),
         known_map=build_map(),
         planner=build_planner(),
         density=None,

@@ -10,7 +10,7 @@ from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Rapf, get_information, make_controller
 from robocov.controllers.frontier_median import FrontierMedian
 from robocov.controllers.greedy_submodular import GreedySubmodular
-from robocov.controllers.shared_map import Situation, assign_goals, list_circles, update_maps
+from robocov.controllers.shared_map import Situation, assign_goals, list_hearing_groups, update_maps
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, WallObstacle
@@ -128,7 +128,7 @@ def add_scans(
     seen = Observations(
         np.tile([2.02, 2.02], (n, 1)), np.zeros((n, 2)), neighbors, np.full((n, 2), np.nan), ROOMS.region
     )
-    return update_maps(maps, seen, Scans(distances, is_hit), list_circles(neighbors))
+    return update_maps(maps, seen, Scans(distances, is_hit), list_hearing_groups(neighbors))
 
 
 def build_random_maps() -> list[DiscoveredMap]:
@@ -244,9 +244,9 @@ def test_targets_are_not_visited_again(is_stuck: bool) -> None:
         density=None,
         sensing_range=3.0,
     )
-    notes = FrontierMedian().compute_placement(situation).notes
+    inspected = FrontierMedian().compute_placement(situation).inspected_targets
     for goal in plan.placement.goals:
-        assert (np.hypot(*(notes - goal).T) < 1e-9).any()
+        assert (np.hypot(*(inspected - goal).T) < 1e-9).any()
 
 
 def test_a_final_plan_is_computed_again_for_another_density() -> None:
