@@ -148,10 +148,11 @@ class Adaptive(BaseController):
         return Decision(forces, memory.goals, {"attraction": forces}, memory=memory)
 
     def _plan(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
-        """Return the memory with new estimates, and the centroids of the cells by these as goals."""
+        """Return the memory with new estimates, and the centroids of the cells under these as goals."""
         samples = memory.lattice.samples
-        robot, _, offset, _ = seen.find_near_neighbors(np.inf)
-        is_own = find_own_samples(samples, seen.positions, robot, seen.positions[robot] - offset)
+        pairs = seen.find_near_neighbors(np.inf)
+        neighbor_positions = seen.positions[pairs.robot] - pairs.offset
+        is_own = find_own_samples(samples, seen.positions, pairs.robot, neighbor_positions)
         if self.estimate == "gp":
             memory = self._learn_by_process(seen, memory)
         else:

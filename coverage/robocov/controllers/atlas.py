@@ -645,7 +645,11 @@ def _place_agreed_team(
     situation: TeamSituation,
     min_savings: MinSavings,
 ) -> Array:
-    """Return the goals of a team, (k, 2) m, in a plan that all robots make, but that is computed once."""
+    """Return the goals of a team, (k, 2) m, in the plan on which all robots agree.
+
+    The plan is computed for the first robot that needs it, and stored for the others.
+    """
+    # In ascending order, the situation is the same for all robots.
     order = np.argsort(group)
     situation = TeamSituation(
         positions=situation.positions[order],

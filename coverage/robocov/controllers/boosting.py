@@ -224,8 +224,8 @@ class Boosting(BaseController):
     >>> from robocov.environment import Environment
     >>> from robocov.simulation import Simulation
     >>> room = Environment("room", ((0, 0), (8, 0), (8, 6), (0, 6)))
-    >>> simulation = Simulation(room, Boosting(), [[1.0, 1.0]])
-    >>> simulation.run(20.0).positions[-1].round(0)
+    >>> simulation = Simulation(room, Boosting(), [[4.0, 1.0]])
+    >>> simulation.run(15.0).positions[-1].round(1)
     array([[4., 3.]])
     """
 

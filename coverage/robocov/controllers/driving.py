@@ -276,8 +276,8 @@ def find_nearest_allowed(
 
 def list_neighbor_offsets(seen: Observations, reach: float) -> Array:
     """Return the offsets from each robot's neighbors within reach to itself, (n, k, 2) m, or nan."""
-    robot, _, offset, _ = seen.find_near_neighbors(reach)
-    return arrange_in_rows(robot, len(seen.positions), offset, np.nan)
+    pairs = seen.find_near_neighbors(reach)
+    return arrange_in_rows(pairs.robot, len(seen.positions), pairs.offset, np.nan)
 
 
 def arrange_in_rows(robot: IntArray, n: int, values: Array, fill: float) -> Array:

@@ -146,7 +146,7 @@ class GeodesicPlanner:
         shapely.prepare(self.configuration_space)
 
     def plan(self, seen: Observations, exponent: float) -> GeodesicPlan:
-        """Plan the goals of all robots, each by the robots that it hears.
+        """Plan the goals of all robots, each from the positions of the robots that it hears.
 
         Parameters
         ----------
@@ -178,7 +178,7 @@ class GeodesicPlanner:
         return GeodesicPlan(goals=goals, waypoints=waypoints, remaining_lengths=remaining_lengths)
 
     def _compute_goals(self, positions: Array, exponent: float) -> Array:
-        """Return the goals, (k, 2) m, of robots at (k, 2) positions, by their geodesic cells."""
+        """Return the goals, (k, 2) m, of robots at (k, 2) positions, from their geodesic cells."""
         result = self.cost(positions)
         sites = np.flatnonzero(result.owner >= 0)
         owner = result.owner[sites]

@@ -132,7 +132,7 @@ def _add_names(kind: type[Any], name: str) -> type[Any]:
 
 
 def load_controller_class(name: str, *, source: ControllerSource | None = None) -> type[Any]:
-    """Load a controller class; code outside robocov is run.
+    """Load a controller class. This runs code outside robocov, unless the class is built in.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def load_controller_class(name: str, *, source: ControllerSource | None = None) 
 def make_controller(
     name: str, gains: Mapping[str, object] | None = None, *, source: ControllerSource | None = None
 ) -> Controller:
-    """Make a controller by name; code outside robocov is run.
+    """Make a controller by name. This runs code outside robocov, unless the controller is built in.
 
     Parameters
     ----------

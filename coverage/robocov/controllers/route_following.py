@@ -122,7 +122,7 @@ def _compute_speed_limits(seen: Observations, team: Team) -> Array:
     """
     gap = np.maximum(np.hypot(*(seen.positions - seen.obstacle_points).T) - team.radius, 0.0)
     braking = _BRAKING_FRACTION * team.max_acceleration
-    # No obstacle in range, nan, is no limit.
+    # fmin ignores nan, which stands for no obstacle in range.
     return np.asarray(np.fmin(team.max_speed, np.sqrt(2.0 * braking * gap) + _MIN_SPEED_LIMIT))
 
 

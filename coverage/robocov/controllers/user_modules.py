@@ -237,6 +237,7 @@ class _ModuleCollector:
         """Add a module, and the packages that contain it; return the names that they import."""
         imports: list[str] = []
         locations: Sequence[str] | None = None  # The first name is looked up on ``sys.path``.
+        # The packages of a.b.c are a and a.b.
         for module in accumulate(name.split("."), "{}.{}".format):
             if module not in self._locations:
                 imports += self._add_module(module, locations)
