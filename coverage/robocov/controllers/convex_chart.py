@@ -74,7 +74,7 @@ class ConvexChart:
         self._to_region = _PiecewiseAffineMap.build(image_corners, corners)
 
         mass = _compute_areas(corners)
-        # The margin that walls are enlarged by belongs to the free space.
+        # Walls are enlarged by a margin, which still has mass.
         mass[is_obstacle] = shapely.area(
             shapely.intersection(environment.free, shapely.polygons(corners[is_obstacle]))
         )

@@ -327,7 +327,7 @@ class Poduri(BaseController):
         # Products of float matrices are much faster than those of integers.
         near_counts = hears.astype(np.float32) @ is_near.astype(np.float32).T
         is_critical = near_counts[links.robot, links.neighbor][selected] <= self.neighbours
-        # The table of the remaining links is large: there are few of them.
+        # The next table has a row of n columns for each link. Only few links remain.
         remaining = selected[is_critical]
         distances = np.full((n, n), np.inf)
         distances[links.robot, links.neighbor] = links.distance
