@@ -228,16 +228,16 @@ def get_gains(controller: Any) -> dict[str, Gain | Option]:
 
 def _to_gain(dataclass_field: Field[Any]) -> Gain | Option | None:
     """Return the gain that a dataclass field declares; None if it does not declare any."""
-    declared: Gain | Option | None = dataclass_field.metadata.get(_METADATA_KEY)
+    declared = dataclass_field.metadata.get(_METADATA_KEY)
     default = None if dataclass_field.default is MISSING else dataclass_field.default
     if declared is None:
         if is_number(default):
             return Gain(dataclass_field.name, default, "", -_MAX_PLAIN_GAIN, _MAX_PLAIN_GAIN, "")
         return None
-    declared = replace(declared, name=dataclass_field.name, default=default)
-    if isinstance(declared, Gain) and declared.unit == _DIMENSIONLESS:
-        declared = replace(declared, unit="")
-    return declared
+    complete: Gain | Option = replace(declared, name=dataclass_field.name, default=default)
+    if isinstance(complete, Gain) and complete.unit == _DIMENSIONLESS:
+        complete = replace(complete, unit="")
+    return complete
 
 
 def get_gain_values(controller: Any) -> dict[str, Value]:

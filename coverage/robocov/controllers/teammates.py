@@ -98,9 +98,10 @@ class Teammates(NamedTuple):
             # A reported robot may never have been in range: its silence does not mean that it has failed.
             report = report._replace(heard_distances=np.full(len(is_new), math.inf))
             sources.append([column[is_new] for column in report])
-        merged = Teammates(*(np.concatenate(parts) for parts in zip(*sources, strict=True)))
+        columns = [np.concatenate(parts) for parts in zip(*sources, strict=True)]
+        merged = Teammates(*columns)
         # By robot, the most recent first. The sort is stable.
         order = np.lexsort((-merged.heard_times, merged.robots))
         _, first = np.unique(merged.robots[order], return_index=True)
         order = order[first]
-        return Teammates(*(column[order] for column in merged))
+        return Teammates(*(column[order] for column in columns))
