@@ -374,8 +374,10 @@ def _find_home(folder: Path, list_name: str = MANIFEST_FILE) -> tuple[Path, str]
     real_folder = Path(os.path.realpath(folder))  # Unlike `resolve`, this accepts circular links.
     with suppress(InputError):
         lists = _read_file_lists(real_folder.parent / list_name)
-        if lists is not None and any(name.startswith(f"{real_folder.name}/") for name in lists[0]):
-            return real_folder.parent, real_folder.name
+        if lists is not None:
+            files, _ = lists
+            if any(name.startswith(f"{real_folder.name}/") for name in files):
+                return real_folder.parent, real_folder.name
     return folder, ""
 
 
@@ -388,7 +390,8 @@ def _list_owned_files(folder: Path) -> set[str] | None:
     with suppress(InputError):
         lists = _read_file_lists(folder / MANIFEST_FILE)
         if lists is not None:
-            return lists[0]
+            files, _ = lists
+            return files
     kind = _identify_kind(folder)
     if kind is None and not os.path.lexists(folder / MANIFEST_FILE):
         return None

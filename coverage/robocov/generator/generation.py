@@ -228,6 +228,7 @@ def _build_environment(
     width = float(request.width)
     height = float(request.height)
     about = "about " if GENERATORS[kind].is_approximate else ""
+    # The starts depend on the free space, which the environment computes only once. They are added below.
     starts: dict[str, Any] = {}
     environment = Environment(
         name=f"{kind} {seed}",
@@ -257,7 +258,6 @@ def _build_environment(
         center_disc = _choose_center_disc(environment, request, corner)
         if corner_disc is None or center_disc is None:
             return None
-        # The starts are added only now, because they depend on the free space, which is computed once.
         starts["corner"] = corner_disc
         starts["centre"] = center_disc
         starts["uniform"] = UniformStart()

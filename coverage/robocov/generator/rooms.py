@@ -436,15 +436,16 @@ def _draw_piece(request: Request, area: float, rng: np.random.Generator) -> _Pie
     return _Piece(kind, np.maximum(request.round_points(size), _MIN_PIECE_STEPS * request.step))
 
 
-def _place_piece(
-    request: Request,
-    piece: _Piece,
-    room: Box,
-    others: list[Polygon],
-    start_disc: Polygon,
-    rng: np.random.Generator,
-) -> CircleObstacle | PolygonObstacle | None:
-    """Return a piece of furniture at a free position of a room; None if none is found."""
+def _sample_piece_corners(
+    request: Request, piece: _Piece, room: Box, rng: np.random.Generator
+) -> Array | None:
+    """Sample positions of a piece in a room, each at a wall or with the gap to it.
+
+    Returns
+    -------
+    (k, 2) array or None, m
+        Lower left corners; None if the piece is larger than the room.
+    """
     room_low = np.array(room[:2])
     room_high = np.array(room[2:])
     play = room_high - room_low - piece.size
@@ -461,7 +462,21 @@ def _place_piece(
     is_good = clearances >= request.gap
     if not piece.is_round:
         is_good |= clearances < request.step / 2.0
-    low = low[is_good.all(axis=1)]
+    return low[is_good.all(axis=1)]
+
+
+def _place_piece(
+    request: Request,
+    piece: _Piece,
+    room: Box,
+    others: list[Polygon],
+    start_disc: Polygon,
+    rng: np.random.Generator,
+) -> CircleObstacle | PolygonObstacle | None:
+    """Return a piece of furniture at a free position of a room; None if none is found."""
+    low = _sample_piece_corners(request, piece, room, rng)
+    if low is None:
+        return None
     high = request.round_points(low + piece.size)
     middle = request.round_points(low + piece.size / 2.0)
     radius = request.round_down(piece.size[0] / 2.0 - request.step / 2.0) if piece.is_round else 0.0
