@@ -63,15 +63,14 @@ def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tupl
     RobocovError
         If the run fails, or the folder cannot be written.
     """
-    compile_kernels()
-    cost = build_cost(scenario.environment, settings.lattice, quiet=settings.quiet)
-    with (
-        create_result(out, "run", overwrite=settings.overwrite) as result,
-        Interruption() as interruption,
-    ):
-        run = execute_scenario(scenario, cost, result, "", settings, interruption)
-        save_figures([run], cost, result.staging, settings)
-        _save_videos([run], cost, result, settings, interruption)
+    # A folder that cannot be used is reported before anything takes long.
+    with create_result(out, "run", overwrite=settings.overwrite) as result:
+        compile_kernels()
+        cost = build_cost(scenario.environment, settings.lattice, quiet=settings.quiet)
+        with Interruption() as interruption:
+            run = execute_scenario(scenario, cost, result, "", settings, interruption)
+            save_figures([run], cost, result.staging, settings)
+            _save_videos([run], cost, result, settings, interruption)
     return run, interruption.requested
 
 
@@ -99,21 +98,19 @@ def execute_comparison(
     RobocovError
         If a run fails, or the folder cannot be written.
     """
-    compile_kernels()
     environment = next(iter(scenarios.values())).environment
-    cost = build_cost(environment, settings.lattice, quiet=settings.quiet)
     runs: dict[str, Run] = {}
-    with (
-        create_result(out, "comparison", overwrite=settings.overwrite, parts=scenarios) as result,
-        Interruption() as interruption,
-    ):
-        start_comparison(result.staging, list(scenarios))
-        for subfolder, scenario in scenarios.items():
-            runs[subfolder] = execute_scenario(scenario, cost, result, subfolder, settings, interruption)
-            if interruption.requested:
-                break
-        save_comparison(runs, cost, result.staging, settings)
-        _save_videos(list(runs.values()), cost, result, settings, interruption)
+    with create_result(out, "comparison", overwrite=settings.overwrite, parts=scenarios) as result:
+        compile_kernels()
+        cost = build_cost(environment, settings.lattice, quiet=settings.quiet)
+        with Interruption() as interruption:
+            start_comparison(result.staging, list(scenarios))
+            for subfolder, scenario in scenarios.items():
+                runs[subfolder] = execute_scenario(scenario, cost, result, subfolder, settings, interruption)
+                if interruption.requested:
+                    break
+            save_comparison(runs, cost, result.staging, settings)
+            _save_videos(list(runs.values()), cost, result, settings, interruption)
     return runs, interruption.requested
 
 
