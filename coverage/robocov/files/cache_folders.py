@@ -35,7 +35,7 @@ def open_private_folder(folder: Path) -> Path | None:
     Returns
     -------
     Path or None
-        The folder; None if it cannot be created or written to, belongs to somebody else, may be written to by
+        The folder; None if it cannot be created or written to, belongs to another user, may be written to by
         others, or lies in a folder in which others could replace it.
     """
     with suppress(OSError):

@@ -111,12 +111,7 @@ class ResultFolder:
             }
             if not new_files:
                 return
-            for name in new_files:
-                _require_replaceable(self.path, name, self._owned_files)
-            for folder in {(self.path / name).parent for name in new_files}:
-                folder.mkdir(parents=True, exist_ok=True)
-                if not os.access(folder, os.W_OK | os.X_OK):
-                    raise OutputError(f"{folder}: cannot be written to: Permission denied")
+            self._prepare_targets(new_files)
             files = new_files if self._replaces else new_files | self._owned_files
             removed_files = self._owned_files - files
             journal = {**_HEADER, "files": sorted(files), "removed": sorted(removed_files)}
@@ -128,6 +123,15 @@ class ResultFolder:
             self._owned_files = files
             self._replaces = False
             self.staging.mkdir(parents=True)
+
+    def _prepare_targets(self, names: set[str]) -> None:
+        """Create the folders of new files; raise an error if a file cannot be written or replaced."""
+        for name in names:
+            _require_replaceable(self.path, name, self._owned_files)
+        for folder in {(self.path / name).parent for name in names}:
+            folder.mkdir(parents=True, exist_ok=True)
+            if not os.access(folder, os.W_OK | os.X_OK):
+                raise OutputError(f"{folder}: cannot be written to: Permission denied")
 
 
 @contextmanager
@@ -292,7 +296,7 @@ def _read_file_lists(path: Path) -> tuple[set[str], set[str]] | None:
 def _require_result_file(name: str) -> None:
     """Raise ValueError unless a name is that of a file of a result, in its folder or below it.
 
-    Otherwise, a folder from somebody else could have any file replaced or removed.
+    Otherwise, a folder from an untrusted source could have any file replaced or removed.
     """
     steps = name.split("/")
     if not all(_FILE_NAME.fullmatch(step) for step in steps):
@@ -386,7 +390,7 @@ def _list_owned_files(folder: Path) -> set[str] | None:
 
     Without a readable manifest, as in a copy without hidden files, they are identified by their names.
     """
-    # A damaged manifest still tells that the folder is one of robocov.
+    # A damaged manifest still shows that robocov wrote the folder.
     with suppress(InputError):
         lists = _read_file_lists(folder / MANIFEST_FILE)
         if lists is not None:

@@ -110,8 +110,9 @@ def _build_mistake(detail: ErrorDetails) -> Mistake:
     if kinds and len(path) == object_length:
         return _build_kind_mistake(tuple(path), value, list(kinds))
     if kinds and len(path) > object_length:
-        # The path of pydantic contains the kind after the object.
-        model = kinds[str(path.pop(object_length))]
+        # The path of pydantic contains the kind after the object; the path of the mistake does not.
+        model = kinds[str(path[object_length])]
+        path = path[:object_length] + path[object_length + 1 :]
     if detail["type"] == "extra_forbidden":
         if kinds and len(path) > object_length + 1:
             model = PARTS.get(str(path[object_length]), model)
