@@ -345,7 +345,7 @@ def test_only_with_shared_maps_a_robot_reports_others_to_its_neighbors(
     run_until(simulation, 2.5)
     state = simulation.memory.states[0]
     assert state.teammates.robots.tolist() == expected
-    assert state.met == set(expected)
+    assert state.encountered == set(expected)
 
 
 PAIR = [[9.8, 1.5], [10.2, 1.5]]
