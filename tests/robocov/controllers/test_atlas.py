@@ -556,4 +556,4 @@ def test_a_robot_starts_again_when_walls_change() -> None:
     assert atlas._has_changed(before, after, 0.1)
     # Small changes are the side of another robot that has come into view, or is gone.
     assert not atlas._has_changed(before, after, 0.3)
-    assert atlas._has_changed(before, replace(before, met=frozenset({1})), 0.1)
+    assert atlas._has_changed(before, replace(before, encountered=frozenset({1})), 0.1)
