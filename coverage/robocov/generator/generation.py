@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Integral
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import shapely
@@ -228,13 +228,10 @@ def _build_environment(
     width = float(request.width)
     height = float(request.height)
     about = "about " if GENERATORS[kind].is_approximate else ""
-    # The starts depend on the free space, which the environment computes only once. They are added below.
-    starts: dict[str, Any] = {}
     environment = Environment(
         name=f"{kind} {seed}",
         boundary=((0.0, 0.0), (width, 0.0), (width, height), (0.0, height)),
         obstacles=tuple(layout),
-        starts=starts,
         description=(
             f"Generated with seed {seed}: {about}{request.obstacles} {GENERATORS[kind].counted}, "
             f"{request.area:.3g} of the area blocked, every passage at least {request.gap:g} m wide."
@@ -258,9 +255,12 @@ def _build_environment(
         center_disc = _choose_center_disc(environment, request, corner)
         if corner_disc is None or center_disc is None:
             return None
-        starts["corner"] = corner_disc
-        starts["centre"] = center_disc
-        starts["uniform"] = UniformStart()
+        starts: dict[str, DiscStart | UniformStart] = {
+            "corner": corner_disc,
+            "centre": center_disc,
+            "uniform": UniformStart(),
+        }
+        environment = replace(environment, starts=starts)
         check_rules(environment, environment.name)
     except (MapError, shapely.GEOSException):
         return None
