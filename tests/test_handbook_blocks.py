@@ -50,8 +50,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty working folder; sweeps in this process, tracks of half a second."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", InProcess)
-    monkeypatch.setattr("robocov_app.benchmark.running.LocalPool", InProcess)
-    for name in suite.QUICK:
+    monkeypatch.setattr("robocov_app.benchmark.verification.LocalPool", InProcess)
+    for name in suite.QUICK_TRACKS:
         track = replace(suite.TRACKS[name], duration=0.5, maps=suite.TRACKS[name].maps[:1])
         monkeypatch.setitem(suite.TRACKS, name, track)  # type: ignore[arg-type]
     return tmp_path

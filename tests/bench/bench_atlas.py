@@ -32,7 +32,7 @@ from robocov import (
 from robocov.environment import WallObstacle
 from robocov.metrics import compute_path_lengths, find_settling_time
 from robocov_app.benchmark import suite
-from robocov_app.benchmark.running import reference
+from robocov_app.benchmark.results import find_reference
 
 SIZES, SEEDS, SHORT = (1, 2, 3, 6, 8, 9, 12, 20, 50, 100, 200), range(901, 905), 3.0
 RANGES = ({}, {"communication_range": 3.0}, {"communication_range": 6.0}, {"sensing_range": 6.0})
@@ -90,12 +90,12 @@ def sizes(name: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
 
 def ended(name: str, on: str, changes: dict[str, float]) -> tuple[float, float, float]:
     """Return gap, when the team came to rest (s, or nan), and mean way (m) of 120 s on a map of the suite."""
-    rooms, team = suite.suite_map(on), Team.homogeneous(suite.TEAM, **changes)
-    start = rooms.start(None).sample(suite.TEAM, seed=0, radius=suite.RADIUS)
+    rooms, team = suite.load_suite_map(on), Team.homogeneous(suite.TEAM_SIZE, **changes)
+    start = rooms.start(None).sample(suite.TEAM_SIZE, seed=0, radius=suite.ROBOT_RADIUS_M)
     record = Simulation(rooms, make_controller(name), start, team).run(120.0)
     cost = CoverageCost(rooms, suite.LATTICE)(record.positions[-1]).mean_distance
     rest = find_settling_time(record.time, record.positions)
-    gap = cost / reference(on, suite.TEAM)["mean_distance_m"] - 1.0
+    gap = cost / find_reference(on, suite.TEAM_SIZE)["mean_distance_m"] - 1.0
     return gap, math.nan if rest is None else rest, float(compute_path_lengths(record.positions).mean())
 
 

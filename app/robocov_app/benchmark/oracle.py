@@ -1,14 +1,16 @@
 """The oracle: robots that know the map and walk straight to the best placement that was found for it.
 
-The benchmark hands this file to its runs as a controller of a user's, because it obeys no rule of distributed
-control: who goes where is decided for all robots at once, and it knows who will fail. The placements stand in
-the map's extra content, under ``oracle``: a list of ``[from (s), [robots], [[x, y], ...]]``.
+The benchmark passes this file to its runs like a controller of a user, because it obeys no rule of
+distributed control: the goals are assigned for all robots at once, and failures are known in advance. The
+placements are in the extra content of the map, under ``oracle``: a list of ``[start (s), [robots],
+[[x, y], ...]]``.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -25,29 +27,38 @@ from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.team import Team
 
-_COARSE = 8  # lattice of the plan, which is asked for ways only
+_LATTICE = 8
+"""Cells of the planner's lattice along a side. It is coarse because only paths are planned, no costs."""
+_TIME_TOLERANCE_S = 1e-9
+_UNREACHABLE_M = 1e6
+"""Length that stands for a path that does not exist, when goals are assigned."""
 
 
 @dataclass(frozen=True, eq=False)
 class OracleMemory:
-    """Memory of the routes, and of where each robot is to be in the end."""
+    """Memory of the routes of n robots, which end at their goals."""
 
     team: Team
-    routes: tuple[Array, ...]  # the way-points of each, (w, 2) m
-    legs: IntArray  # (n,), the way-point that is headed for
-    returns: Array | None = None  # (n, rays, 2) m, what the last scan of each met
+    routes: tuple[Array, ...]
+    """Waypoints of each robot, (w, 2) m."""
+    legs: IntArray
+    """Index of the waypoint that each robot heads for, (n,)."""
+    returns: Array | None = None
+    """Points that the last scan of each robot hit, (n, rays, 2) m."""
     stage: int = -1
-    planned: float = -np.inf  # s
+    """Index of the placement in use."""
+    plan_time: float = -np.inf
+    """Time of the last plan, s."""
 
 
 @dataclass(frozen=True)
 class Oracle(BaseController):
-    """Walks to the best placement: a yardstick for the time and ways of robots that know the map.
+    """Walks to the best placement: a yardstick for the time and path length of robots that know the map.
 
-    Robots are assigned to places such that the sum of the squared ways, geodesic ones, is least, anew in
-    each `period`. They go there by the shortest ways among walls that are widened by the radius and
-    `clearance`, with the braking, giving way and keeping off of `follow_routes`. With that care it is no
-    bound: who dares more may be there sooner.
+    Once in each `period`, goals are assigned to robots such that the sum of the squared geodesic distances is
+    minimal. The robots follow the shortest paths among walls that are enlarged by their radius and
+    `clearance`, and brake, give way and keep their distance as in `follow_routes`. Because of this care it is
+    no bound: a bolder robot may arrive earlier.
     """
 
     name = "oracle"
@@ -56,60 +67,108 @@ class Oracle(BaseController):
     information = "whole map"
     scanning = Scanning(rays=240, period=0.5)
 
-    period: float = gain(1.0, "s", "between two looks for the ways", low=0.05, high=60.0)
-    clearance: float = gain(0.03, "m", "that routes keep between rim and walls", high=10.0)
-    k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the goal", high=100.0)
+    period: float = gain(1.0, "s", "between two plans of the paths", low=0.05, high=60.0)
+    clearance: float = gain(0.03, "m", "that paths keep between rim and walls", high=10.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
     environment: Environment | None = field(default=None, repr=False, compare=False)
 
     def inform(self, environment: Environment) -> Oracle:
-        """Return the same law with the map."""
+        """Return the same controller with the map."""
         return replace(self, environment=environment)
 
     def begin(self, region: Region, team: Team) -> OracleMemory:
-        """Return the memory before the first assignment; a ParameterError where the map has no placement."""
+        """Return the memory before the first plan; raise ParameterError if the map has no placement."""
         if self.environment is None or "oracle" not in self.environment.extra:
-            told = "the map does not tell the best placement, which only those of the benchmark do"
-            raise ParameterError(f"controller {self.name!r}: {told}")
-        nowhere = (np.full((1, 2), np.nan),) * len(team)
-        return OracleMemory(team, nowhere, np.zeros(len(team), dtype=np.intp))
+            raise ParameterError(
+                f"controller {self.name!r}: expected a map with the best placement, which only those of the "
+                "benchmark have"
+            )
+        unknown = (np.full((1, 2), np.nan),) * len(team)
+        return OracleMemory(team, routes=unknown, legs=np.zeros(len(team), dtype=np.intp))
 
     def decide(self, seen: Observations, memory: OracleMemory) -> Decision:
-        """Return the forces along the ways, which are looked for again now and then."""
+        """Compute the forces along the paths, which are planned again in each period."""
         assert self.environment is not None
-        plan = _plan(self.environment, float(memory.team.radius.max()) + self.clearance)
         stages = self.environment.extra["oracle"]
-        stage = max(k for k, (begin, _, _) in enumerate(stages) if begin <= seen.time + 1e-9)
-        if stage != memory.stage or seen.time >= memory.planned + self.period - 1e-9:
-            # also for robots on their way: who stands in another one's takes over its goal
-            robots = np.array(stages[stage][1], dtype=np.intp)
-            inside = find_nearest_inside(plan.configuration_space, seen.positions)
-            goals = find_nearest_inside(plan.configuration_space, np.array(stages[stage][2], dtype=float))
-            places = inside.copy()
-            places[robots] = goals[assigned(plan, inside[robots], goals)]
-            routes = tuple(way(plan, at, goal) for at, goal in zip(inside, places, strict=True))
+        stage = _find_stage(stages, seen.time)
+        is_due = seen.time >= memory.plan_time + self.period - _TIME_TOLERANCE_S
+        if stage != memory.stage or is_due:
+            clearance = float(memory.team.radius.max()) + self.clearance
+            planner = _get_planner(self.environment, clearance)
+            _, robots, positions = stages[stage]
+            routes = plan_routes(planner, seen.positions, robots, np.array(positions, dtype=float))
             legs = np.zeros(len(routes), dtype=np.intp)
-            memory = replace(memory, stage=stage, routes=routes, legs=legs, planned=seen.time)
-        returns, drive = update_returns(seen, memory.returns), (self.k_prop, self.response_time)
-        forces, goals, legs = follow_routes(seen, memory.team, memory.routes, memory.legs, returns, *drive)
-        return Decision(
-            forces, goals, {"attraction": forces}, memory=replace(memory, legs=legs, returns=returns)
+            memory = replace(memory, stage=stage, routes=routes, legs=legs, plan_time=seen.time)
+        returns = update_returns(seen, memory.returns)
+        forces, goals, legs = follow_routes(
+            seen, memory.team, memory.routes, memory.legs, returns, self.k_prop, self.response_time
         )
+        memory = replace(memory, legs=legs, returns=returns)
+        return Decision(forces, goals, {"attraction": forces}, memory=memory)
 
 
-def assigned(plan: GeodesicPlanner, places: Array, goals: Array) -> IntArray:
-    """Return which goal each robot at (n, 2) places walks to: the sum of the squared ways is least."""
-    ways = plan.paths.compute_distances(places, goals)
-    ways = np.where(np.isfinite(ways), ways, 1e6)
-    return np.asarray(linear_sum_assignment(ways**2)[1])
+def _find_stage(stages: list[Any], time: float) -> int:
+    """Return the index of the last placement that is in use at a time, s."""
+    started = [k for k, (start, _, _) in enumerate(stages) if start <= time + _TIME_TOLERANCE_S]
+    return max(started)
 
 
-def way(plan: GeodesicPlanner, place: Array, goal: Array) -> Array:
-    """Return the way-points to a goal, (w, 2) m; the place alone where no way leads."""
-    path = plan.paths.find_path(place, goal)
-    return path[1:] if len(path) > 1 else place[None]
+def plan_routes(
+    planner: GeodesicPlanner, positions: Array, robots: list[int], placement: Array
+) -> tuple[Array, ...]:
+    """Assign the positions of a placement to robots, and plan the shortest paths to them.
+
+    Goals are assigned anew even while the robots move: one that blocks the path of another takes over its
+    goal.
+
+    Parameters
+    ----------
+    planner : GeodesicPlanner
+    positions : (n, 2) array, m
+    robots : list of int
+        Indices of the k robots that work. The others stay.
+    placement : (k, 2) array, m
+
+    Returns
+    -------
+    tuple of (w, 2) arrays, m
+        Waypoints of each of the n robots.
+    """
+    working = np.array(robots, dtype=np.intp)
+    inside = find_nearest_inside(planner.configuration_space, positions)
+    goals = find_nearest_inside(planner.configuration_space, placement)
+    targets = inside.copy()
+    targets[working] = goals[assign_goals(planner, inside[working], goals)]
+    return tuple(
+        find_waypoints(planner, position, target) for position, target in zip(inside, targets, strict=True)
+    )
+
+
+def assign_goals(planner: GeodesicPlanner, positions: Array, goals: Array) -> IntArray:
+    """Assign each robot a goal such that the sum of the squared geodesic distances is minimal.
+
+    Parameters
+    ----------
+    planner : GeodesicPlanner
+    positions, goals : (n, 2) arrays, m
+
+    Returns
+    -------
+    (n,) array of int
+        Index of the goal of each robot.
+    """
+    lengths = planner.paths.compute_distances(positions, goals)
+    lengths = np.where(np.isfinite(lengths), lengths, _UNREACHABLE_M)
+    return np.asarray(linear_sum_assignment(lengths**2)[1])
+
+
+def find_waypoints(planner: GeodesicPlanner, position: Array, goal: Array) -> Array:
+    """Return the waypoints of the shortest path, (w, 2) m; the position alone if there is no path."""
+    path = planner.paths.find_path(position, goal)
+    return path[1:] if len(path) > 1 else position[None]
 
 
 @lru_cache(maxsize=4)
-def _plan(environment: Environment, clearance: float) -> GeodesicPlanner:
-    return GeodesicPlanner(environment, clearance, _COARSE)
+def _get_planner(environment: Environment, clearance: float) -> GeodesicPlanner:
+    return GeodesicPlanner(environment, clearance, _LATTICE)

@@ -13,7 +13,7 @@ from robocov.arrays import Array
 from robocov.errors import ParameterError, format_count
 from robocov.text import escape_controls
 from robocov_app.benchmark import ratings, suite
-from robocov_app.benchmark.ratings import Rating, number
+from robocov_app.benchmark.ratings import Rating, format_number
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import quiet_axes, tone
 from robocov_app.figures.styles import MARKS, CurveStyle, styles_of
@@ -25,39 +25,102 @@ from robocov_app.report.svg import inline_svg
 from robocov_app.report.tables import Table
 from robocov_app.report.theme_css import theme_rules
 
-AXES: Mapping[str, tuple[str, str, Callable[[Rating], float]]] = {
-    "path": ("path length", "mean path length of a robot (m)", lambda each: each.median("path_length_m")),
-    "computing": ("computing time", "µs per robot and second", lambda each: 1e6 * each.rate("deciding_s")),
-    "told": ("bytes sent", "bytes a robot sends per second", lambda each: each.rate("told_bytes")),
+
+class Quantity(NamedTuple):
+    """A quantity that the gap is plotted against."""
+
+    title: str
+    axis_label: str
+    compute: Callable[[Rating], float]
+    """Returns the value of a rating."""
+
+
+QUANTITIES: Mapping[str, Quantity] = {
+    "path": Quantity(
+        "path length",
+        "mean path length of a robot (m)",
+        lambda rating: rating.compute_median("path_length_m"),
+    ),
+    "computing": Quantity(
+        "computing time",
+        "µs per robot and second",
+        lambda rating: 1e6 * rating.compute_rate("deciding_s"),
+    ),
+    "told": Quantity(
+        "bytes sent",
+        "bytes a robot sends per second",
+        lambda rating: rating.compute_rate("told_bytes"),
+    ),
 }
-"""Quantities that the gap is plotted against: title, axis label, and the value of an entry."""
-WHOLE = "whole map"  # what those know that are no rivals
-PANEL = 560, 350  # of a plot in pixels: there are many labels
-_POINTS = 72.0  # in an inch
-_LETTER, _LINE = 6.0, 13.0  # width of a letter of a label, and height of the label, in pixels
-_AWAY = 8.0  # pixels of a label from its mark
-_ALIKE = 1.01  # times that values differ at least
-_SPAN = 8.0  # times that values differ from which on their axis is logarithmic
+PLOT_SIZE_PX = (560, 350)
+"""Size of a plot. It is large, because there are many labels."""
+_WHOLE_MAP = "whole map"
+"""Information of the controllers that do not compete."""
+_DPI = 72.0
+"""Resolution of the plots, at which a pixel is a point."""
+_CHARACTER_WIDTH_PX = 6.0
+_LINE_HEIGHT_PX = 13.0
+_MARK_HALF_SIZE_PX = 6.0
+_LABEL_DISTANCE_PX = 8.0
+"""Horizontal distance of a label from its mark."""
+_LABEL_ROWS = (0.0, 0.7, -0.7, 1.4, -1.4, 2.1, -2.1, 2.8, -2.8)
+"""Heights at which a label may be placed, in lines above its mark."""
+_MIN_RATIO = 1.01
+"""Ratio of the largest value to the smallest from which a quantity is plotted."""
+_MIN_LOG_RATIO = 8.0
+"""Ratio of the largest value to the smallest from which an axis is logarithmic."""
 
 
-class Point(NamedTuple):
-    """An entry in a plot; `rival`: it does not know the whole map."""
+class ParetoPoint(NamedTuple):
+    """A controller in a plot."""
 
     style: CurveStyle
     label: str
     x: float
+    """Value of the quantity."""
     gap: float
-    rival: bool
+    """Median gap, %."""
+    is_rival: bool
+    """Whether the controller competes: it does not know the whole map."""
 
 
-def page_of(results: Sequence[Mapping[str, Any]], title: str) -> str:
-    """Return the page of some results, a section for each track; same results, same page."""
-    labels = ratings.labels_of(results)
-    looks = dict(zip(labels, styles_of([each["entry"]["controller"] for each in results]), strict=True))
-    knows = {label: each["entry"]["information"] for label, each in zip(labels, results, strict=True)}
+class _Entries(NamedTuple):
+    """What the page shows of each controller, by its label."""
+
+    styles: Mapping[str, CurveStyle]
+    information: Mapping[str, str]
+
+
+def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
+    """Build the page of some results, with a section for each track.
+
+    Parameters
+    ----------
+    results : sequence of Mapping
+        As returned by `robocov_app.benchmark.results.read_result`.
+    title : str
+        Title of the page.
+
+    Returns
+    -------
+    str
+        The page as HTML. The same results give the same page.
+
+    Raises
+    ------
+    ParameterError
+        If the results have no run in common.
+    """
+    labels = ratings.label_results(results)
+    styles = styles_of([result["entry"]["controller"] for result in results])
+    information = [result["entry"]["information"] for result in results]
+    entries = _Entries(
+        styles=dict(zip(labels, styles, strict=True)),
+        information=dict(zip(labels, information, strict=True)),
+    )
     tracks = {
-        name: sorted(own, key=lambda each: (np.isnan(each.gap.estimate), each.gap.estimate))
-        for name, own in ratings.ratings_of(results).items()
+        name: sorted(track_ratings, key=_sort_by_gap)
+        for name, track_ratings in ratings.build_ratings(results).items()
     }
     if not tracks:
         raise ParameterError("DIR: the results have no run in common, so there is nothing to compare")
@@ -67,111 +130,208 @@ def page_of(results: Sequence[Mapping[str, Any]], title: str) -> str:
         version=__version__,
         style=theme_rules(":root") + replay.asset("report.css"),
         marks=MARKS,
-        looks=looks,
-        overview=_overview(labels, tracks),
-        tracks=[_section(name, own, looks, knows) for name, own in tracks.items()],
+        looks=entries.styles,
+        overview=_build_overview(labels, tracks),
+        tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
         notes=ratings.NOTES,
-        method=list(dict.fromkeys(words for each in results for words in each["method"])),
-        entries=_entries(results, labels),
+        method=list(dict.fromkeys(sentence for result in results for sentence in result["method"])),
+        entries=_build_entries_table(results, labels),
     )
     return escape_controls(page)
 
 
-def _overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]) -> Table:
-    """Return the median gaps of all entries on all tracks, those first that are ahead on most."""
-    gaps = {(each.label, name): each.gap.estimate for name, own in tracks.items() for each in own}
-    every = [(each.label, rank) for own in tracks.values() for rank, each in enumerate(own)]
-    ranks = {label: [rank for other, rank in every if other == label] for label in labels}
-    order = sorted((label for label in labels if ranks[label]), key=lambda label: np.mean(ranks[label]))
-    percent = [[number(100.0 * gaps.get((label, name), np.nan), ".1f") for name in tracks] for label in order]
-    rows = [(label, *cells) for label, cells in zip(order, percent, strict=True)]
-    heads = (suite.heading(name) for name in tracks)
-    return Table("Median gap to the best placement known, %", ("Controller", *heads), rows)
+def _sort_by_gap(rating: Rating) -> tuple[bool, float]:
+    """Return a sort key: the lowest gap first, controllers without a gap last."""
+    gap = rating.gap.estimate
+    return bool(np.isnan(gap)), gap
 
 
-def _section(
-    name: str, own: Sequence[Rating], looks: Mapping[str, CurveStyle], knows: Mapping[str, str]
-) -> dict[str, Any]:
-    track, some = suite.TRACKS[name], own[0]
-    maps = len({row["map"] for rating in own for row in rating.rows})
-    head, families = ratings.family_rows(own)
-    runs = f"{format_count(len(some.rows) + some.failed, 'run')} on {format_count(maps, 'map')}"
-    team = f"{format_count(track.robots, 'robot')}, {track.duration:g} s"
-    rows, plots = [ratings.rating_row(each, knows[each.label]) for each in own], []
-    for axis, (title, label, of) in AXES.items():
-        points = []
-        for each in own:
-            x, gap, rival = of(each), 100.0 * each.gap.estimate, knows[each.label] != WHOLE
-            points.append(Point(looks[each.label], each.label, x, gap, rival))
-        fine = [point for point in points if np.isfinite((point.x, point.gap)).all()]
-        values = [point.x for point in fine]
-        # what is the same for all tells nothing
-        if len(fine) > 1 and max(values) > _ALIKE * min(values):
-            words = "; ".join(f"{point.label}: {point.x:.3g}, gap {point.gap:.1f} %" for point in fine)
-            sentence = f"Median gap against {label}. {words}."
-            svg = inline_svg(pareto_figure(fine, label), f"{name}-{axis}", sentence)
-            plots.append(Plot(f"Gap and {title}", svg))
+def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]) -> Table:
+    """Build the table of median gaps on all tracks, sorted by the mean rank."""
+    gaps: dict[tuple[str, str], float] = {}
+    ranks: dict[str, list[int]] = {}
+    for name, track_ratings in tracks.items():
+        for rank, rating in enumerate(track_ratings):
+            gaps[rating.label, name] = rating.gap.estimate
+            ranks.setdefault(rating.label, []).append(rank)
+    rated = [label for label in labels if label in ranks]
+    rows = []
+    for label in sorted(rated, key=lambda label: np.mean(ranks[label])):
+        cells = [format_number(100.0 * gaps.get((label, name), np.nan), ".1f") for name in tracks]
+        rows.append((label, *cells))
+    headings = [suite.format_heading(name) for name in tracks]
+    return Table("Median gap to the best placement known, %", ("Controller", *headings), rows)
+
+
+def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> dict[str, Any]:
+    """Build the variables of a track's section in the template."""
+    family_head, family_rows = ratings.build_family_rows(track_ratings)
+    rows = [ratings.build_rating_row(rating, entries.information[rating.label]) for rating in track_ratings]
     return {
         "name": name,
-        "title": suite.heading(name),
-        "summary": f"{track.summary.capitalize()}; {team}. {runs}, the same for all entries.",
+        "title": suite.format_heading(name),
+        "summary": _summarize_track(name, track_ratings),
         "table": Table("Ratings", ratings.HEAD, rows, frozenset({1})),
-        "families": Table("Median gap by families of maps, %", head, families),
-        "plots": plots,
+        "families": Table("Median gap by families of maps, %", family_head, family_rows),
+        "plots": _build_plots(name, track_ratings, entries),
     }
 
 
+def _summarize_track(name: str, track_ratings: Sequence[Rating]) -> str:
+    track = suite.TRACKS[name]
+    run_count = len(track_ratings[0].rows) + track_ratings[0].failed
+    map_count = len({row["map"] for rating in track_ratings for row in rating.rows})
+    runs = f"{format_count(run_count, 'run')} on {format_count(map_count, 'map')}"
+    team = f"{format_count(track.robots, 'robot')}, {track.duration:g} s"
+    return f"{track.summary.capitalize()}; {team}. {runs}, the same for all entries."
+
+
+def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> list[Plot]:
+    """Build the plots of a track: the gap against each quantity that differs between controllers."""
+    plots = []
+    for key, quantity in QUANTITIES.items():
+        points = []
+        for rating in track_ratings:
+            point = ParetoPoint(
+                style=entries.styles[rating.label],
+                label=rating.label,
+                x=quantity.compute(rating),
+                gap=100.0 * rating.gap.estimate,
+                is_rival=entries.information[rating.label] != _WHOLE_MAP,
+            )
+            if np.isfinite((point.x, point.gap)).all():
+                points.append(point)
+        values = [point.x for point in points]
+        if len(points) < 2 or max(values) <= _MIN_RATIO * min(values):
+            continue
+        texts = [f"{point.label}: {point.x:.3g}, gap {point.gap:.1f} %" for point in points]
+        description = f"Median gap against {quantity.axis_label}. {'; '.join(texts)}."
+        figure = draw_pareto_figure(points, quantity.axis_label)
+        svg = inline_svg(figure, f"{name}-{key}", description)
+        plots.append(Plot(f"Gap and {quantity.title}", svg))
+    return plots
+
+
 @plain_style()
-def pareto_figure(points: Sequence[Point], label: str) -> Figure:
-    """Plot the gap (%) of entries against something else, both to be small, with the front of the rivals."""
-    width, height = PANEL
-    figure = Figure((width / _POINTS, height / _POINTS), dpi=_POINTS)
+def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure:
+    """Draw the gap of controllers against another quantity, both better when smaller.
+
+    A line connects the controllers that compete and that no other one beats in both.
+
+    Parameters
+    ----------
+    points : sequence of ParetoPoint
+    axis_label : str
+        Label of the horizontal axis.
+
+    Returns
+    -------
+    Figure
+    """
+    width, height = PLOT_SIZE_PX
+    figure = Figure((width / _DPI, height / _DPI), dpi=_DPI)
     axes = figure.add_axes((0.08, 0.14, 0.9, 0.75))
-    rivals = [(point.x, point.gap) for point in points if point.rival]
-    front = np.array([rivals[k] for k in pareto_front(rivals)]).reshape(-1, 2)
+    rivals = [(point.x, point.gap) for point in points if point.is_rival]
+    front = np.array([rivals[k] for k in find_pareto_front(rivals)]).reshape(-1, 2)
     axes.plot(*front.T, color=tone(LIGHT.faint), linewidth=1.0, zorder=1)
     for point in points:
-        colour = tone(point.style.colour(LIGHT))
-        fill = colour if point.rival else tone(LIGHT.background)
-        look: Any = {"markersize": 9, "markeredgewidth": 1.6, "markeredgecolor": colour, "linestyle": ""}
-        axes.plot([point.x], [point.gap], marker=point.style.mark, markerfacecolor=fill, zorder=3, **look)
+        color = tone(point.style.colour(LIGHT))
+        axes.plot(
+            [point.x],
+            [point.gap],
+            marker=point.style.mark,
+            markerfacecolor=color if point.is_rival else tone(LIGHT.background),
+            zorder=3,
+            markersize=9,
+            markeredgewidth=1.6,
+            markeredgecolor=color,
+            linestyle="",
+        )
     values = [point.x for point in points]
-    if min(values) > 0.0 and max(values) > _SPAN * min(values):
+    if min(values) > 0.0 and max(values) > _MIN_LOG_RATIO * min(values):
         axes.set_xscale("log")
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.set_yscale("symlog", linthresh=1.0)  # per cent
-    for line in (axes.xaxis, axes.yaxis):
-        line.set_major_formatter("{x:g}")
-        line.set_minor_locator(NullLocator())
+    axes.set_yscale("symlog", linthresh=1.0)  # Linear up to one percent.
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_locator(NullLocator())
     axes.margins(x=0.12, y=0.1)
-    quiet_axes(axes, LIGHT, label, "median gap (%)", grid="y")
-    pixels = axes.transData.transform([(point.x, point.gap) for point in points])
-    words: Any = {"fontsize": 11, "color": tone(LIGHT.ink), "ha": "center", "va": "center"}
-    for point, place, middle in zip(points, pixels, label_places(pixels, points), strict=True):
-        axes.annotate(point.label, (point.x, point.gap), middle - place, textcoords="offset points", **words)
+    quiet_axes(axes, LIGHT, axis_label, "median gap (%)", grid="y")
+    marks = axes.transData.transform([(point.x, point.gap) for point in points])
+    label_centers = place_labels(marks, [point.label for point in points])
+    for point, mark, center in zip(points, marks, label_centers, strict=True):
+        axes.annotate(
+            point.label,
+            (point.x, point.gap),
+            center - mark,
+            textcoords="offset points",
+            fontsize=11,
+            color=tone(LIGHT.ink),
+            ha="center",
+            va="center",
+        )
     return figure
 
 
-def label_places(marks: Array, points: Sequence[Point]) -> Array:
-    """Return where the middles of the labels are, (n, 2) pixels, so that they hide no mark and no label."""
-    taken = list(shapely.box(*(marks - 6.0).T, *(marks + 6.0).T))
-    frame, middles = shapely.box(0.0, 0.0, *PANEL), []
-    for mark, point in zip(marks, points, strict=True):
-        half = np.array([0.5 * _LETTER * len(point.label), 0.5 * _LINE])
-        beside, steps = half[0] + _AWAY, []
-        for up in (0.0, 0.7, -0.7, 1.4, -1.4, 2.1, -2.1, 2.8, -2.8):
-            steps += [(beside, up * _LINE), (-beside, up * _LINE)] + [(0.0, up * _LINE)] * (abs(up) > 1.0)
-        tried = mark + np.array(steps)
-        boxes = shapely.box(*(tried - half).T, *(tried + half).T)
-        hidden = shapely.area(shapely.intersection(boxes[:, None], taken)).sum(axis=1)
-        best = int(np.argmin(np.round(hidden + 1e3 * shapely.area(shapely.difference(boxes, frame)), 6)))
-        taken.append(boxes[best])
-        middles.append(tried[best])
-    return np.array(middles)
+def place_labels(marks: Array, labels: Sequence[str]) -> Array:
+    """Place labels next to marks such that they hide no mark and no other label if possible.
+
+    Parameters
+    ----------
+    marks : (n, 2) array, px
+    labels : sequence of str
+
+    Returns
+    -------
+    (n, 2) array, px
+        Centers of the labels.
+    """
+    occupied = list(shapely.box(*(marks - _MARK_HALF_SIZE_PX).T, *(marks + _MARK_HALF_SIZE_PX).T))
+    frame = shapely.box(0.0, 0.0, *PLOT_SIZE_PX)
+    centers = []
+    for mark, label in zip(marks, labels, strict=True):
+        half_size = np.array([0.5 * _CHARACTER_WIDTH_PX * len(label), 0.5 * _LINE_HEIGHT_PX])
+        candidates = mark + _list_label_offsets(half_size[0])
+        boxes = shapely.box(*(candidates - half_size).T, *(candidates + half_size).T)
+        hidden_areas = shapely.area(shapely.intersection(boxes[:, None], occupied)).sum(axis=1)
+        outside_areas = shapely.area(shapely.difference(boxes, frame))
+        # A label that leaves the frame is cut off, which is worse than any overlap.
+        best = int(np.argmin(np.round(hidden_areas + 1e3 * outside_areas, 6)))
+        occupied.append(boxes[best])
+        centers.append(candidates[best])
+    return np.array(centers)
 
 
-def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
-    """Return which points no other one beats in both, by their first values."""
+def _list_label_offsets(half_width: float) -> Array:
+    """Return the offsets of a label from its mark, (k, 2) px, the preferred ones first."""
+    distance = half_width + _LABEL_DISTANCE_PX
+    offsets = []
+    for row in _LABEL_ROWS:
+        height = row * _LINE_HEIGHT_PX
+        offsets += [(distance, height), (-distance, height)]
+        if abs(row) > 1.0:
+            offsets.append((0.0, height))
+    return np.array(offsets)
+
+
+def find_pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
+    """Find the points that no other one beats in both values.
+
+    Parameters
+    ----------
+    points : sequence of (float, float)
+        Pairs of values, better when smaller.
+
+    Returns
+    -------
+    list of int
+        Indices of the points, sorted by their first values.
+
+    Examples
+    --------
+    >>> find_pareto_front([(3.0, 1.0), (1.0, 2.0), (2.0, 4.0)])
+    [1, 0]
+    """
     front: list[int] = []
     for k in sorted(range(len(points)), key=lambda k: points[k]):
         if not front or points[k][1] < points[front[-1]][1]:
@@ -179,13 +339,15 @@ def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
     return front
 
 
-def _entries(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> Table:
+def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> Table:
     rows = []
     for result, label in zip(results, labels, strict=True):
         entry = result["entry"]
         gains = ", ".join(f"{name} {value}" for name, value in entry["gains"].items())
-        source = f"source {entry['source_sha256'][:12]}" if entry["source_sha256"] else "built in"
-        versions = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
-        rows.append((label, entry["controller"], source, gains or "–", versions))
+        source = "built in"
+        if entry["source_sha256"]:
+            source = f"source {entry['source_sha256'][:12]}"
+        versions = ", ".join(f"{name} {version}" for name, version in result["versions"].items())
+        rows.append((label, entry["controller"], source, gains or ratings.NO_VALUE, versions))
     head = ("Controller", "Name", "Code", "Gains", "Made with")
     return Table("Entries", head, rows, frozenset({1, 2, 3, 4}))

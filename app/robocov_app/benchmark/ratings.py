@@ -1,4 +1,4 @@
-"""Ratings of results on each track, over the runs that all of them have."""
+"""Ratings of controllers on each track, over the runs that all results have in common."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,77 +10,39 @@ from robocov.arrays import Array
 from robocov_app.benchmark import suite
 from robocov_app.figures.statistics import Interval, bootstrap, median_time
 
-NOTHING = "–"
+NO_VALUE = "–"
 
-
-@dataclass(frozen=True)
-class Rating:
-    """One entry on one track: its runs among those that all entries of the track have."""
-
-    label: str
-    track: str
-    rows: Sequence[Mapping[str, Any]]  # those that did not fail
-    failed: int
-
-    def values(self, figure: str) -> Array:
-        return np.array([row[figure] for row in self.rows if row[figure] is not None], dtype=float)
-
-    def median(self, figure: str) -> float:
-        values = self.values(figure)
-        return float(np.median(values)) if len(values) else float("nan")
-
-    @property
-    def gap(self) -> Interval:
-        maps = [row["map"] for row in self.rows if row["gap"] is not None]
-        return bootstrap(self.values("gap"), "median", maps) if maps else Interval(np.nan, np.nan, np.nan)
-
-    def at_rest(self) -> tuple[float, float | None]:
-        """Return the share of runs at rest at the end, and the Kaplan-Meier median of the time to rest, s."""
-        rest = self.values("settled_at_s").tolist()
-        censored = [suite.TRACKS[self.track].duration] * (len(self.rows) - len(rest))
-        median = median_time(rest, censored) if rest else np.inf
-        return len(rest) / len(self.rows), median if np.isfinite(median) else None
-
-    def rate(self, figure: str) -> float:
-        """Return the median of a figure for a simulated second of one robot."""
-        track = suite.TRACKS[self.track]
-        return self.median(figure) / (track.robots * track.duration)
-
-
-def ratings_of(results: Sequence[Mapping[str, Any]]) -> dict[str, list[Rating]]:
-    """Return the ratings by track: of each track over the runs that every result has that has the track."""
-    found: dict[str, list[Rating]] = {}
-    for track in suite.TRACKS:
-        tables = ([row for row in each["rows"] if row["track"] == track] for each in results)
-        own = [{(row["map"], row["seed"]): row for row in rows} for rows in tables]
-        for label, rows in zip(labels_of(results), own, strict=True):
-            some = [row for key, row in rows.items() if all(key in other for other in own if other)]
-            fine = [row for row in some if "error" not in row]
-            if some:
-                found.setdefault(track, []).append(Rating(label, track, fine, len(some) - len(fine)))
-    return found
-
-
-def labels_of(results: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return what each result is called: its controller, the gains that were set, a number for twins."""
-    labels: list[str] = []
-    for entry in (result["entry"] for result in results):
-        changed = ", ".join(f"{name} {value}" for name, value in entry["set"].items())
-        label = f"{entry['label']} ({changed})" if changed else str(entry["label"])
-        twins = sum(each == label or each.startswith(f"{label} #") for each in labels)
-        labels.append(f"{label} #{twins + 1}" if twins else label)
-    return labels
-
-
-def number(value: float | None, form: str = ".3g") -> str:
-    return NOTHING if value is None or not np.isfinite(value) else f"{value:{form}}"
-
-
-HEAD = (  # columns of a track's table; `NOTES` say what they are
-    *("Controller", "Knows", "Runs", "Gap, %", "95 %", "Mean", "Worst", "To 5 %, s", "∫J / J_ref, s"),
-    *("Path, m", "Work, J", "Contacts", "At rest", "Rest, s", "B/s", "µs/s"),
+HEAD = (
+    "Controller",
+    "Knows",
+    "Runs",
+    "Gap, %",
+    "95 %",
+    "Mean",
+    "Worst",
+    "To 5 %, s",
+    "∫J / J_ref, s",
+    "Path, m",
+    "Work, J",
+    "Contacts",
+    "At rest",
+    "Rest, s",
+    "B/s",
+    "µs/s",
 )
-_SHORT = ("Runs", "Gap, %", "95 %", "Worst", "To 5 %, s", "Path, m", "Contacts", "At rest", "B/s", "µs/s")
+"""Columns of the table of a track. `NOTES` explain them."""
+_SUMMARY_COLUMNS = (
+    "Runs",
+    "Gap, %",
+    "95 %",
+    "Worst",
+    "To 5 %, s",
+    "Path, m",
+    "Contacts",
+    "At rest",
+    "B/s",
+    "µs/s",
+)
 NOTES = (
     "Gap: J / J_ref − 1 at the end, the median over runs with its 95 % interval (bootstrap that draws whole "
     "maps), mean and worst; J_ref is the best placement known, no proven optimum, so gaps may be too small; "
@@ -95,47 +57,239 @@ NOTES = (
 )
 
 
-def rating_row(rating: Rating, knows: str) -> tuple[str, ...]:
-    """Return the cells of one entry's row under `HEAD`."""
-    gap, gaps = rating.gap, rating.values("gap")
-    runs = str(len(rating.rows)) + (f" (+{rating.failed} failed)" if rating.failed else "")
-    if len(gaps) < len(rating.rows):
-        runs += f", {len(rating.rows) - len(gaps)} without gap"
-    bounds, (share, rest) = rating.values("gap_to_bound"), rating.at_rest()
-    surely = f" (≤ {100.0 * float(np.median(bounds)):.1f})" if len(bounds) == len(gaps) > 0 else ""
-    integrals = [
-        row["mean_distance_over_run_m"] / (row["mean_distance_m"] / (1.0 + row["gap"]))
-        for row in rating.rows
-        if row["gap"] is not None
-    ]
-    duration = suite.TRACKS[rating.track].duration
-    integral = float(np.median(integrals)) * duration if integrals else None
-    touched = sum(row["contacts"] > 0 for row in rating.rows)
+@dataclass(frozen=True)
+class Rating:
+    """One controller on one track, over its runs that all results of the track have in common.
+
+    Parameters
+    ----------
+    label : str
+        Label of the controller.
+    track : str
+    rows : sequence of Mapping
+        Its runs that did not fail.
+    failed : int
+        Number of its runs that failed.
+    """
+
+    label: str
+    track: str
+    rows: Sequence[Mapping[str, Any]]
+    failed: int
+
+    def get_values(self, figure: str) -> Array:
+        """Return the known values of a figure, (m,)."""
+        return np.array([row[figure] for row in self.rows if row[figure] is not None], dtype=float)
+
+    def compute_median(self, figure: str) -> float:
+        """Return the median of a figure over the runs; nan if no run has a value."""
+        values = self.get_values(figure)
+        return float(np.median(values)) if len(values) else float("nan")
+
+    @property
+    def gap(self) -> Interval:
+        """Median gap to the reference placement."""
+        maps = [row["map"] for row in self.rows if row["gap"] is not None]
+        if not maps:
+            return Interval(np.nan, np.nan, np.nan)
+        return bootstrap(self.get_values("gap"), "median", maps)
+
+    def compute_rest(self) -> tuple[float, float | None]:
+        """Compute how often and how soon the robots came to rest.
+
+        Returns
+        -------
+        fraction : float
+            Fraction of the runs that are at rest at the end.
+        time : float or None
+            Median time to rest by Kaplan and Meier, s. None if most runs did not come to rest.
+        """
+        rest_times = self.get_values("settled_at_s").tolist()
+        fraction = len(rest_times) / len(self.rows)
+        if not rest_times:
+            return fraction, None
+        censored = [suite.TRACKS[self.track].duration] * (len(self.rows) - len(rest_times))
+        median = median_time(rest_times, censored)
+        return fraction, median if np.isfinite(median) else None
+
+    def compute_rate(self, figure: str) -> float:
+        """Return the median of a figure for each robot and second of simulation time."""
+        track = suite.TRACKS[self.track]
+        return self.compute_median(figure) / (track.robots * track.duration)
+
+
+def build_ratings(results: Sequence[Mapping[str, Any]]) -> dict[str, list[Rating]]:
+    """Build the ratings of all results by track.
+
+    A track is rated over the runs that every result with this track has.
+
+    Parameters
+    ----------
+    results : sequence of Mapping
+        As returned by `robocov_app.benchmark.results.read_result`.
+
+    Returns
+    -------
+    dict
+        Ratings by track, in the order of the results.
+    """
+    labels = label_results(results)
+    ratings: dict[str, list[Rating]] = {}
+    for track in suite.TRACKS:
+        tables = [_index_rows(result, track) for result in results]
+        tables_with_track = [table for table in tables if table]
+        for label, table in zip(labels, tables, strict=True):
+            common = [row for key, row in table.items() if all(key in other for other in tables_with_track)]
+            if not common:
+                continue
+            rows = [row for row in common if "error" not in row]
+            rating = Rating(label, track, rows, failed=len(common) - len(rows))
+            ratings.setdefault(track, []).append(rating)
+    return ratings
+
+
+def _index_rows(result: Mapping[str, Any], track: str) -> dict[tuple[str, int], Mapping[str, Any]]:
+    return {(row["map"], row["seed"]): row for row in result["rows"] if row["track"] == track}
+
+
+def label_results(results: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Return a unique label for each result: its controller, the gains that were set, and a number if needed.
+
+    Parameters
+    ----------
+    results : iterable of Mapping
+
+    Returns
+    -------
+    list of str
+    """
+    labels: list[str] = []
+    for result in results:
+        entry = result["entry"]
+        label = str(entry["label"])
+        if entry["set"]:
+            gains = ", ".join(f"{name} {value}" for name, value in entry["set"].items())
+            label = f"{label} ({gains})"
+        twins = sum(other == label or other.startswith(f"{label} #") for other in labels)
+        labels.append(f"{label} #{twins + 1}" if twins else label)
+    return labels
+
+
+def format_number(value: float | None, form: str = ".3g") -> str:
+    """Return a number as text; a dash for None and for values that are not finite."""
+    if value is None or not np.isfinite(value):
+        return NO_VALUE
+    return f"{value:{form}}"
+
+
+def build_rating_row(rating: Rating, information: str) -> tuple[str, ...]:
+    """Build the row of a rating in the table of its track.
+
+    Parameters
+    ----------
+    rating : Rating
+    information : str
+        The information that the controller uses.
+
+    Returns
+    -------
+    tuple of str
+        Cells under `HEAD`.
+    """
+    gap = rating.gap
+    gaps = rating.get_values("gap")
+    mean_gap = 100.0 * float(np.mean(gaps)) if len(gaps) else None
+    worst_gap = 100.0 * float(np.max(gaps)) if len(gaps) else None
+    fraction_at_rest, rest_time = rating.compute_rest()
+    contacts = sum(row["contacts"] > 0 for row in rating.rows)
     return (
-        *(rating.label, knows, runs, number(100.0 * gap.estimate, ".1f") + surely),
-        NOTHING if np.isnan(gap.low) else f"{100.0 * gap.low:.1f} to {100.0 * gap.high:.1f}",
-        *(number(100.0 * float(of(gaps)) if len(gaps) else None, ".1f") for of in (np.mean, np.max)),
-        *(number(rating.median("near_final_s"), ".0f"), number(integral, ".0f")),
-        *(number(rating.median("path_length_m"), ".1f"), number(rating.median("work_J"), ".0f")),
-        *(f"{touched} of {len(rating.rows)}", f"{share:.0%}", number(rest, ".0f")),
-        *(number(rating.rate("told_bytes"), ".0f"), number(1e6 * rating.rate("deciding_s"), ".0f")),
+        rating.label,
+        information,
+        _format_runs(rating, len(gaps)),
+        format_number(100.0 * gap.estimate, ".1f") + _format_bound(rating, len(gaps)),
+        NO_VALUE if np.isnan(gap.low) else f"{100.0 * gap.low:.1f} to {100.0 * gap.high:.1f}",
+        format_number(mean_gap, ".1f"),
+        format_number(worst_gap, ".1f"),
+        format_number(rating.compute_median("near_final_s"), ".0f"),
+        format_number(_compute_cost_integral(rating), ".0f"),
+        format_number(rating.compute_median("path_length_m"), ".1f"),
+        format_number(rating.compute_median("work_J"), ".0f"),
+        f"{contacts} of {len(rating.rows)}",
+        f"{fraction_at_rest:.0%}",
+        format_number(rest_time, ".0f"),
+        format_number(rating.compute_rate("told_bytes"), ".0f"),
+        format_number(1e6 * rating.compute_rate("deciding_s"), ".0f"),
     )
 
 
-def family_rows(ratings: Sequence[Rating]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return head and rows of the median gaps, in percent, of each entry by families of maps."""
+def _format_runs(rating: Rating, gaps: int) -> str:
+    text = str(len(rating.rows))
+    if rating.failed:
+        text += f" (+{rating.failed} failed)"
+    if gaps < len(rating.rows):
+        text += f", {len(rating.rows) - gaps} without gap"
+    return text
+
+
+def _format_bound(rating: Rating, gaps: int) -> str:
+    """Return the median gap to the certified bounds, in brackets, if all bounds are known."""
+    gaps_to_bound = rating.get_values("gap_to_bound")
+    if not gaps or len(gaps_to_bound) != gaps:
+        return ""
+    return f" (≤ {100.0 * float(np.median(gaps_to_bound)):.1f})"
+
+
+def _compute_cost_integral(rating: Rating) -> float | None:
+    """Return the median integral of J / J_ref over a run, s; None if no reference is known."""
+    ratios = []
+    for row in rating.rows:
+        if row["gap"] is not None:
+            reference_cost = row["mean_distance_m"] / (1.0 + row["gap"])
+            ratios.append(row["mean_distance_over_run_m"] / reference_cost)
+    if not ratios:
+        return None
+    return float(np.median(ratios)) * suite.TRACKS[rating.track].duration
+
+
+def build_family_rows(ratings: Sequence[Rating]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Build a table of the median gaps by families of maps, in percent.
+
+    Parameters
+    ----------
+    ratings : sequence of Rating
+
+    Returns
+    -------
+    head : tuple of str
+    rows : list of tuple of str
+        One row for each rating.
+    """
     families = list(dict.fromkeys(suite.FAMILY_OF[row["map"]] for rating in ratings for row in rating.rows))
-    rows = []
+    table = []
     for rating in ratings:
-        parts = [[row for row in rating.rows if suite.FAMILY_OF[row["map"]] == family] for family in families]
-        gaps = (replace(rating, rows=part).median("gap") for part in parts)
-        rows.append((rating.label, *(number(100.0 * gap, ".1f") for gap in gaps)))
-    return ("Controller", *families), rows
+        cells = [rating.label]
+        for family in families:
+            rows = [row for row in rating.rows if suite.FAMILY_OF[row["map"]] == family]
+            gap = replace(rating, rows=rows).compute_median("gap")
+            cells.append(format_number(100.0 * gap, ".1f"))
+        table.append(tuple(cells))
+    return ("Controller", *families), table
 
 
-def summary_rows(result: Mapping[str, Any]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def build_summary_rows(result: Mapping[str, Any]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Build a short table of one result, with one row for each track.
+
+    Parameters
+    ----------
+    result : Mapping
+
+    Returns
+    -------
+    head : tuple of str
+    rows : list of tuple of str
+    """
     rows = []
-    for track, ratings in ratings_of([result]).items():
-        cells = dict(zip(HEAD, rating_row(ratings[0], ""), strict=True))
-        rows.append((track, *(cells[name] for name in _SHORT)))
-    return ("Track", *_SHORT), rows
+    for track, ratings in build_ratings([result]).items():
+        cells = dict(zip(HEAD, build_rating_row(ratings[0], ""), strict=True))
+        rows.append((track, *(cells[name] for name in _SUMMARY_COLUMNS)))
+    return ("Track", *_SUMMARY_COLUMNS), rows

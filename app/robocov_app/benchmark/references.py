@@ -1,7 +1,8 @@
-"""The best placements for the maps of the suite, searched for in parallel and kept in its file."""
+"""Reference placements and certified lower bounds for the maps of the suite, stored in its file."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -13,95 +14,189 @@ from robocov.environment import Environment
 from robocov.files.writing import replace_file
 from robocov.mapfile import from_json, to_json
 from robocov_app.benchmark import suite
-from robocov_app.replication.references import Question, searched
+from robocov_app.evaluation.reference_search import ReferencePlacement, ReferenceQuery, answer_queries
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.progress import show_progress
 from robocov_app.toolkit.worker import Line
 
-RESTARTS, SEED = 24, 0
-PRECISION = 0.002  # of the certified lower bounds
-_DIGITS = 4  # after the point of positions, in metres
+RESTARTS = 24
+SEED = 0
+BOUND_PRECISION = 0.002
+"""Relative precision of the certified lower bounds."""
+_POSITION_DIGITS = 4
+"""Decimal places of positions, in meters."""
 
 
-def wanted_references() -> Iterator[tuple[str, int, float]]:
-    """Return map, team size and moment (s) of every reference: with obstacles that move, those of the end."""
-    moments: dict[tuple[str, int], float] = {}
-    for track in suite.TRACKS.values():
-        for wanted in product(track.maps, range(track.survivors, track.robots + 1)):
-            moments.setdefault(wanted, track.duration)
-    return ((name, robots, time) for (name, robots), time in moments.items())
+def list_references() -> Iterator[tuple[str, int, float]]:
+    """Yield the map, team size and time of every reference placement of the suite.
 
-
-def make_references(path: Path, *, workers: int, quiet: bool, stop: Interruption) -> tuple[int, int]:
-    """Search for all references, and bounds, that a file lacks; return how many it has, and still lacks.
-
-    Whatever ends it, the same call goes on. A map whose hash is not that of the file loses its references.
+    Yields
+    ------
+    tuple of str, int and float
+        Map, number of robots, and time in s. Where obstacles move, they are taken at this time: the end of
+        the runs.
     """
-    maps: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))["maps"] if path.exists() else {}
-    for name in suite.FAMILY_OF:
-        own = suite.hash_of(suite.made_map(name))
-        if maps.get(name, {}).get("sha256") != own:
-            maps[name] = {"sha256": own, "family": suite.FAMILY_OF[name], "references": {}}
-    wanted: dict[str, tuple[dict[str, Any], str, Environment]] = {
-        f"{name} {robots}": (maps[name]["references"], str(robots), suite.made_map(name).at(time))
-        for name, robots, time in wanted_references()
+    times: dict[tuple[str, int], float] = {}
+    for track in suite.TRACKS.values():
+        sizes = range(track.survivors, track.robots + 1)
+        for name, robots in product(track.maps, sizes):
+            times.setdefault((name, robots), track.duration)
+    for (name, robots), time in times.items():
+        yield name, robots, time
+
+
+@dataclass(frozen=True)
+class _ReferenceSlot:
+    """Place of one reference in the document of the suite's file."""
+
+    references: dict[str, Any]
+    """References of the map by team size. The answers are written here."""
+    robots: int
+    environment: Environment
+
+    @property
+    def reference(self) -> dict[str, Any]:
+        """The stored reference, empty if there is none yet."""
+        return self.references.get(str(self.robots), {})  # type: ignore[no-any-return]
+
+
+def compute_references(path: Path, *, workers: int, quiet: bool, stop: Interruption) -> tuple[int, int]:
+    """Compute all reference placements and lower bounds that a file of the suite lacks.
+
+    The file is saved after each answer, so an interrupted search is resumed by the next call. A map whose
+    hash is not that in the file loses its references.
+
+    Parameters
+    ----------
+    path : Path
+        A file of the suite. It is created if it does not exist.
+    workers : int
+        Maximum number of processes.
+    quiet : bool
+        Show no progress.
+    stop : Interruption
+
+    Returns
+    -------
+    tuple of int
+        Number of references and bounds in the file, and number of those still missing.
+    """
+    maps = _load_maps(path)
+    slots = {
+        f"{name} {robots}": _ReferenceSlot(maps[name]["references"], robots, suite.build_map(name).at(time))
+        for name, robots, time in list_references()
     }
-
-    def found(key: str) -> dict[str, Any]:
-        held, robots, _ = wanted[key]
-        return held.get(robots, {})  # type: ignore[no-any-return]
-
-    searches = [key for key in wanted if not found(key)]
-    bounds = [key for key in wanted if found(key).get("lower_bound_m") is None]
-    left = total = len(searches) + len(bounds)
-    _save(path, maps)
+    missing_references = [key for key, slot in slots.items() if not slot.reference]
+    missing_bounds = [key for key, slot in slots.items() if slot.reference.get("lower_bound_m") is None]
+    left = total = len(missing_references) + len(missing_bounds)
+    _save_maps(path, maps)
     with show_progress("references", total, quiet=quiet) as update:
 
-        def kept() -> None:
+        def report_answer() -> None:
             nonlocal left
             left -= 1
-            _save(path, maps)
+            _save_maps(path, maps)
             update(total - left)
 
-        how = (suite.RADIUS, suite.LATTICE, RESTARTS, SEED)
-        questions = {key: Question(to_json(wanted[key][2]), int(wanted[key][1]), *how) for key in searches}
-        for key, answer in searched(questions, workers, stop) if questions else ():
-            held, robots, environment = wanted[key]
-            places = np.round(answer.positions, _DIGITS)  # the cost is that of the places as they stand there
-            result = CoverageCost(environment, suite.LATTICE)(places)
-            mean, uncovered = result.mean_distance, result.uncovered_area
-            held[robots] = {"mean_distance_m": mean, "uncovered_area_m2": uncovered}
-            held[robots] |= {"agreement": answer.agreement, "lower_bound_m": None}
-            held[robots]["positions_m"] = places.tolist()
-            kept()
-        asked = {key: (to_json(wanted[key][2]), found(key)["positions_m"]) for key in bounds if found(key)}
-        for key, bound in searched(asked, workers, stop, f"{__name__}:Bounding") if asked else ():
-            found(key)["lower_bound_m"] = bound
-            kept()
-    return 2 * len(wanted) - left, left
+        searched = {key: slots[key] for key in missing_references}
+        _search_references(searched, workers, stop, report_answer)
+        bounded = {key: slots[key] for key in missing_bounds if slots[key].reference}
+        _compute_bounds(bounded, workers, stop, report_answer)
+    return 2 * len(slots) - left, left
 
 
-class Bounding:
-    """Computes certified lower bounds in a process of its own."""
+def _search_references(
+    slots: Mapping[str, _ReferenceSlot], workers: int, stop: Interruption, report_answer: Callable[[], None]
+) -> None:
+    if not slots:
+        return
+    queries = {
+        key: ReferenceQuery(
+            to_json(slot.environment),
+            slot.robots,
+            radius=suite.ROBOT_RADIUS_M,
+            lattice=suite.LATTICE,
+            restarts=RESTARTS,
+            seed=SEED,
+        )
+        for key, slot in slots.items()
+    }
+    for key, answer in answer_queries(queries, workers, stop):
+        slots[key].references[str(slots[key].robots)] = _build_reference(slots[key].environment, answer)
+        report_answer()
+
+
+def _build_reference(environment: Environment, placement: ReferencePlacement) -> dict[str, Any]:
+    # The cost is that of the rounded positions, so that it can be recomputed from the file.
+    positions = np.round(placement.positions, _POSITION_DIGITS)
+    result = CoverageCost(environment, suite.LATTICE)(positions)
+    return {
+        "mean_distance_m": result.mean_distance,
+        "uncovered_area_m2": result.uncovered_area,
+        "agreement": placement.agreement,
+        "lower_bound_m": None,
+        "positions_m": positions.tolist(),
+    }
+
+
+def _compute_bounds(
+    slots: Mapping[str, _ReferenceSlot], workers: int, stop: Interruption, report_answer: Callable[[], None]
+) -> None:
+    if not slots:
+        return
+    queries = {key: (to_json(slot.environment), slot.reference["positions_m"]) for key, slot in slots.items()}
+    for key, bound in answer_queries(queries, workers, stop, f"{__name__}:LowerBoundService"):
+        slots[key].reference["lower_bound_m"] = bound
+        report_answer()
+
+
+class LowerBoundService:
+    """Worker service that computes certified lower bounds of the mean distance."""
 
     failing = "the bound failed"
 
     def __call__(self, questions: list[tuple[dict[str, Any], list[list[float]]]], line: Line) -> float:
-        """Return the least mean distance that any placement may have, m; takes up to some minutes."""
+        """Return a lower bound of the mean distance of any placement, m. This may take minutes."""
         from robocov.lower_bound import compute_lower_bound
 
         document, positions = questions[-1]
-        how: Any = {"radius": suite.RADIUS, "lattice": suite.LATTICE, "precision": PRECISION}
-        return compute_lower_bound(from_json(document), np.array(positions), **how).mean_distance
+        bound = compute_lower_bound(
+            from_json(document),
+            np.array(positions),
+            radius=suite.ROBOT_RADIUS_M,
+            lattice=suite.LATTICE,
+            precision=BOUND_PRECISION,
+        )
+        return bound.mean_distance
 
 
-def _save(path: Path, maps: Mapping[str, Any]) -> None:
-    how = {"lattice": suite.LATTICE, "restarts": RESTARTS, "seed": SEED, "radius_m": suite.RADIUS}
-    how["precision"] = PRECISION
+def _load_maps(path: Path) -> dict[str, Any]:
+    """Return the maps of a file of the suite, with new entries for those that are missing or changed."""
+    maps: dict[str, Any] = {}
+    if path.exists():
+        maps = json.loads(path.read_text(encoding="utf-8"))["maps"]
+    for name, family in suite.FAMILY_OF.items():
+        map_hash = suite.compute_map_hash(suite.build_map(name))
+        if maps.get(name, {}).get("sha256") != map_hash:
+            maps[name] = {"sha256": map_hash, "family": family, "references": {}}
+    return maps
+
+
+def _save_maps(path: Path, maps: Mapping[str, Any]) -> None:
+    """Write a file of the suite, with one line for each map."""
+    search = {
+        "lattice": suite.LATTICE,
+        "restarts": RESTARTS,
+        "seed": SEED,
+        "radius_m": suite.ROBOT_RADIUS_M,
+        "precision": BOUND_PRECISION,
+    }
     lines = []
     for name in suite.FAMILY_OF:
-        own = dict(sorted(maps[name]["references"].items(), key=lambda item: int(item[0])))
-        lines.append(f"{json.dumps(name)}: {json.dumps({**maps[name], 'references': own})}")
-    head = json.dumps({"format": "robocov-benchmark-suite", "version": suite.VERSION, "search": how})[:-1]
+        by_size = sorted(maps[name]["references"].items(), key=lambda item: int(item[0]))
+        entry = {**maps[name], "references": dict(by_size)}
+        lines.append(f"{json.dumps(name)}: {json.dumps(entry)}")
+    head = json.dumps({"format": "robocov-benchmark-suite", "version": suite.VERSION, "search": search})
+    text = head.removesuffix("}") + ', "maps": {\n' + ",\n".join(lines) + "\n}}\n"
     with replace_file(path) as part:
-        part.write_text(head + ', "maps": {\n' + ",\n".join(lines) + "\n}}\n", encoding="utf-8")
+        part.write_text(text, encoding="utf-8")

@@ -1,7 +1,7 @@
-"""The frozen suite, version 1: its maps by families, its tracks, and the references of its file.
+"""The frozen suite, version 1: its maps by families, its tracks, and the reference placements of its file.
 
-The file ``suite-v1.json`` holds the SHA-256 of every map, so that a changed generator is noticed, and the
-best placements that were found for it. Robots begin at the first start of a map, drawn by seed.
+The file ``suite-v1.json`` contains the SHA-256 of every map, so that a changed generator is noticed, and the
+best placements that were found for it. Robots start at the first start of a map, drawn by seed.
 """
 
 import hashlib
@@ -17,142 +17,291 @@ from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, describe_unknown_name
 from robocov.generator import GENERATORS, generate_map
 from robocov.mapfile import load_map, to_json
-from robocov_app.benchmark.drawn import KINDS, drawn_map
-from robocov_app.replication.studies import with_hot_spots
+from robocov_app.benchmark.floor_plans import FLOOR_PLANS, build_floor_plan
+from robocov_app.evaluation.hot_spots import add_hot_spots
 from robocov_app.sweep.study import Study, StudyMap
 
 VERSION = "v1"
-FILE = Path(__file__).parent / f"suite-{VERSION}.json"
-LATTICE = 128  # sites along a side for all costs and references
-RADIUS = 0.1  # m, of the robots
-TEAM = 6
-_FIRST = 7001  # seed of the first map of a kind; those of tuning begin at 1
+SUITE_FILE = Path(__file__).parent / f"suite-{VERSION}.json"
+LATTICE = 128
+"""Sites along a side of the lattice for all costs and reference placements."""
+ROBOT_RADIUS_M = 0.1
+TEAM_SIZE = 6
+_FIRST_SEED = 7001
+"""Seed of the first map of a kind. The seeds of the tuning maps start at 1."""
+_COST_RATE_HZ = 2.0
 _BUNDLED = (
-    *("blocks-a", "blocks-b", "cave", "corridor", "courtyard", "gaps", "l-shape", "museum", "office"),
-    *("rooms", "trap", "warehouse"),
+    "blocks-a",
+    "blocks-b",
+    "cave",
+    "corridor",
+    "courtyard",
+    "gaps",
+    "l-shape",
+    "museum",
+    "office",
+    "rooms",
+    "trap",
+    "warehouse",
 )
-_LARGE: dict[str, Any] = {"obstacles": 24, "side": 20.0}  # of the maps for large teams
+_LARGE_OBSTACLES = 24
+_LARGE_SIDE_M = 20.0
 _LARGE_KINDS = ("polygons", "blocks", "rooms", "caves")
 
 
-def _numbered(kind: str, count: int, first: int = _FIRST) -> tuple[str, ...]:
-    return tuple(f"{kind}-{seed}" for seed in range(first, first + count))
+def _list_names(kind: str, count: int, first_seed: int = _FIRST_SEED) -> tuple[str, ...]:
+    return tuple(f"{kind}-{seed}" for seed in range(first_seed, first_seed + count))
 
 
-FAMILIES: Mapping[str, tuple[str, ...]] = {  # maps of the ideal track
+FAMILIES: Mapping[str, tuple[str, ...]] = {
     "bundled": _BUNDLED,
-    **{kind: _numbered(kind, 7) for kind in GENERATORS},
-    **{kind: _numbered(kind, 6) for kind in KINDS if kind != "traffic"},
+    **{kind: _list_names(kind, 7) for kind in GENERATORS},
+    **{kind: _list_names(kind, 6) for kind in FLOOR_PLANS if kind != "traffic"},
 }
-_DRAWN = [kind for kind in FAMILIES if kind != "bundled"]
-_OTHERS: Mapping[str, tuple[str, ...]] = {  # of other tracks; those of tuning are for choosing gains alone
-    "density": tuple(f"dense-{each}" for kind in _DRAWN for each in _numbered(kind, 1)),
-    "moving": ("forklifts", *_numbered("traffic", 5)),
-    "large": tuple(f"large-{each}" for kind in _LARGE_KINDS for each in _numbered(kind, 2)),
-    "tuning": tuple(name for kind in _DRAWN for name in _numbered(kind, 2, first=1)),
+"""Maps of the ideal track by family."""
+_GENERATED_FAMILIES = [kind for kind in FAMILIES if kind != "bundled"]
+OTHER_FAMILIES: Mapping[str, tuple[str, ...]] = {
+    "density": tuple(f"dense-{name}" for kind in _GENERATED_FAMILIES for name in _list_names(kind, 1)),
+    "moving": ("forklifts", *_list_names("traffic", 5)),
+    "large": tuple(f"large-{name}" for kind in _LARGE_KINDS for name in _list_names(kind, 2)),
+    "tuning": tuple(name for kind in _GENERATED_FAMILIES for name in _list_names(kind, 2, first_seed=1)),
 }
-FAMILY_OF = {name: family for family, names in {**FAMILIES, **_OTHERS}.items() for name in names}
-_CORE = tuple(name for names in FAMILIES.values() for name in names[:3])
+"""Maps of the other tracks by family. Those of tuning serve to choose gains and do not count."""
+FAMILY_OF = {name: family for family, names in {**FAMILIES, **OTHER_FAMILIES}.items() for name in names}
+"""The family of each map of the suite."""
+_CORE_MAPS = tuple(name for names in FAMILIES.values() for name in names[:3])
 
 
 @dataclass(frozen=True)
 class Track:
-    """Differences from the ideal track, where six robots hear each other everywhere."""
+    """A set of runs, defined by its differences from the ideal track.
+
+    On the ideal track six robots communicate without any limit, and nothing goes wrong.
+
+    Parameters
+    ----------
+    summary : str
+        The difference in a few words.
+    maps : tuple of str
+    seeds : tuple of int
+        Seeds of the starts.
+    robots : int
+    duration : float
+        Duration of a run, s.
+    changes : Mapping
+        Options of the study that differ from those of the ideal track.
+    failures : tuple of (int, float)
+        Index of each robot that fails, and the time of its failure, s.
+    """
 
     summary: str
-    maps: tuple[str, ...] = _CORE
+    maps: tuple[str, ...] = _CORE_MAPS
     seeds: tuple[int, ...] = (0,)
-    robots: int = TEAM
+    robots: int = TEAM_SIZE
     duration: float = DEFAULT_DURATION_S
-    changes: Mapping[str, Any] = field(default_factory=dict)  # of the study
-    failures: tuple[tuple[int, float], ...] = ()  # robot, and when it fails, s
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    failures: tuple[tuple[int, float], ...] = ()
 
     @property
     def survivors(self) -> int:
+        """Number of robots that still work at the end."""
         return self.robots - len(self.failures)
 
 
-_FAILURES = ((0, 15.0), (3, 30.0))  # indices, and seconds
+_FAILURES = ((0, 15.0), (3, 30.0))
 _LOSSY = {"loss": 0.3, "delay": 0.5, "message_rate": 2.0}
-TRACKS: Mapping[str, Track] = {  # `RATED` are those that count
-    "ideal": Track("nothing goes wrong", sum(FAMILIES.values(), ()), (0, 1)),
+TRACKS: Mapping[str, Track] = {
+    "ideal": Track(
+        "nothing goes wrong",
+        maps=tuple(name for names in FAMILIES.values() for name in names),
+        seeds=(0, 1),
+    ),
     "short-range": Track("robots hear each other up to 3 m", changes={"communication_range": 3.0}),
     "lossy": Track("2 messages a second, 0.5 s late, 30 % lost", changes={"conditions": _LOSSY}),
     "noisy": Track("positions with noise of 0.1 m", changes={"conditions": {"position_noise": 0.1}}),
     "unicycle": Track("robots on two wheels turn before they drive", changes={"kinematics": "unicycle"}),
     "failures": Track("two of six robots fail, after 15 and 30 s", failures=_FAILURES),
-    "density": Track("two hot spots count 20 times as much", _OTHERS["density"]),
-    "moving": Track("obstacles move", _OTHERS["moving"]),
-    "large-team": Track("24 robots on 20 x 20 m", _OTHERS["large"], robots=24, duration=90.0),
+    "density": Track("two hot spots count 20 times as much", OTHER_FAMILIES["density"]),
+    "moving": Track("obstacles move", OTHER_FAMILIES["moving"]),
+    "large-team": Track("24 robots on 20 x 20 m", OTHER_FAMILIES["large"], robots=24, duration=90.0),
     "one-robot": Track("one robot", robots=1),
-    "tuning": Track("as ideal, for choosing gains: no result", _OTHERS["tuning"]),
+    "tuning": Track("as ideal, for choosing gains: no result", OTHER_FAMILIES["tuning"]),
 }
-RATED = tuple(name for name in TRACKS if name != "tuning")
-QUICK = ("ideal", "short-range")  # of ``--quick``: the first map of each family, with the first seed
+"""All tracks by name. Those in `RATED_TRACKS` count."""
+RATED_TRACKS = tuple(name for name in TRACKS if name != "tuning")
+QUICK_TRACKS = ("ideal", "short-range")
+"""Tracks of ``--quick``, each with the first map of each family and the first seed."""
 
 
-def heading(track: str) -> str:
+def format_heading(track: str) -> str:
+    """Return the name of a track as a heading, for example "Large team"."""
     return track.capitalize().replace("-", " ")
 
 
 @cache
-def made_map(name: str) -> Environment:
-    """Return the map of a name as it is made here and now; raises ParameterError for an unknown one."""
+def build_map(name: str) -> Environment:
+    """Build a map of the suite with the generators of this installation.
+
+    Parameters
+    ----------
+    name : str
+        Name of the map, as in `FAMILY_OF`.
+
+    Returns
+    -------
+    Environment
+        The map. It may differ from the frozen one, see `load_suite_map`.
+
+    Raises
+    ------
+    ParameterError
+        If the suite has no such map.
+    """
     if name not in FAMILY_OF:
         raise ParameterError(f"--maps: {describe_unknown_name('map of the benchmark', name, FAMILY_OF)}")
     kind, _, seed = name.removeprefix("dense-").removeprefix("large-").rpartition("-")
     if name.startswith("dense-"):
-        return with_hot_spots(StudyMap(name, made_map(f"{kind}-{seed}")), int(seed)).environment
+        plain = build_map(f"{kind}-{seed}")
+        return add_hot_spots(plain, int(seed))
     if name.startswith("large-"):
-        return generate_map(int(seed), kind=kind, **_LARGE)
+        return generate_map(int(seed), kind=kind, obstacles=_LARGE_OBSTACLES, side=_LARGE_SIDE_M)
     if kind in GENERATORS and name not in _BUNDLED:
         return generate_map(int(seed), kind=kind)
-    return drawn_map(kind, int(seed)) if kind in KINDS else load_map(name)
+    if kind in FLOOR_PLANS:
+        return build_floor_plan(kind, int(seed))
+    return load_map(name)
 
 
-def hash_of(environment: Environment) -> str:
+def compute_map_hash(environment: Environment) -> str:
+    """Return the SHA-256 of a map's content, without the version of its file format."""
     document = {**to_json(environment), "$schema": None}
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 
 @cache
-def frozen() -> Mapping[str, Mapping[str, Any]]:
-    """Return what the suite's file says of each map: its ``sha256``, and its ``references`` by team sizes."""
-    return dict(json.loads(FILE.read_text(encoding="utf-8"))["maps"])
+def load_frozen_maps() -> Mapping[str, Mapping[str, Any]]:
+    """Return the entries of the suite's file by map: its ``sha256`` and its ``references`` by team size."""
+    return dict(json.loads(SUITE_FILE.read_text(encoding="utf-8"))["maps"])
 
 
-def suite_map(name: str) -> Environment:
-    """Return a map of the suite; raises InputError where it is not the one that was frozen."""
-    environment = made_map(name)
-    if name not in frozen() or hash_of(environment) != frozen()[name]["sha256"]:
-        changed = f"it is not the one of suite {VERSION}: its file or its generator has changed"
-        raise InputError(f"map {name}: {changed}; expected the map whose hash is in {FILE.name}")
+def load_suite_map(name: str) -> Environment:
+    """Return a map of the suite that is identical to the frozen one.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    Environment
+
+    Raises
+    ------
+    ParameterError
+        If the suite has no such map.
+    InputError
+        If its hash differs from the frozen one.
+    """
+    environment = build_map(name)
+    frozen_maps = load_frozen_maps()
+    if name not in frozen_maps or compute_map_hash(environment) != frozen_maps[name]["sha256"]:
+        raise InputError(
+            f"map {name}: expected the map of suite {VERSION}, whose hash is in {SUITE_FILE.name}, "
+            "got another one. Its file or its generator has changed."
+        )
     return environment
 
 
-def chosen(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> dict[str, tuple[str, ...]]:
-    """Return the maps of each track that are wanted, by default all; raises ParameterError."""
-    if unknown := [name for name in tracks if name not in TRACKS]:
-        raise ParameterError(f"--track: {describe_unknown_name('track', unknown[0], TRACKS)}")
+def select_maps(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> dict[str, tuple[str, ...]]:
+    """Select the maps to run on each track.
+
+    Parameters
+    ----------
+    tracks : sequence of str
+        Names of tracks. None: all that count, or with `quick` those in `QUICK_TRACKS`.
+    maps : sequence of str
+        Names of maps. None: all maps of each track.
+    quick : bool
+        If no maps are given, use the first map of each family only.
+
+    Returns
+    -------
+    dict
+        Maps by track. Tracks without any map are left out.
+
+    Raises
+    ------
+    ParameterError
+        If a track or map is unknown, or no track has any of the maps.
+    """
+    for name in tracks:
+        if name not in TRACKS:
+            raise ParameterError(f"--track: {describe_unknown_name('track', name, TRACKS)}")
     for name in maps:
-        made_map(name)
-    found = {}
-    for name in tracks or (QUICK if quick else RATED):
-        own = TRACKS[name].maps
-        if quick and not maps:  # the first of each family
-            own = tuple({FAMILY_OF[each]: each for each in reversed(own)}.values())[::-1]
-        found[name] = tuple(each for each in own if not maps or each in maps)
-    if not any(found.values()):
-        raise ParameterError(f"--maps: expected a map of {', '.join(found)}, got {', '.join(maps)}")
-    return {name: own for name, own in found.items() if own}
+        build_map(name)
+    default_tracks = QUICK_TRACKS if quick else RATED_TRACKS
+    selection = {}
+    for name in tracks or default_tracks:
+        track_maps = TRACKS[name].maps
+        if maps:
+            track_maps = tuple(each for each in track_maps if each in maps)
+        elif quick:
+            track_maps = _select_first_of_families(track_maps)
+        if track_maps:
+            selection[name] = track_maps
+    if not selection:
+        expected = ", ".join(tracks or default_tracks)
+        raise ParameterError(f"--maps: expected a map of {expected}, got {', '.join(maps)}")
+    return selection
 
 
-def study_of(
-    name: str, maps: Sequence[StudyMap], controller: str, seeds: Sequence[int], folder: Path, **more: Any
+def _select_first_of_families(maps: Sequence[str]) -> tuple[str, ...]:
+    first: dict[str, str] = {}
+    for name in maps:
+        first.setdefault(FAMILY_OF[name], name)
+    return tuple(first.values())
+
+
+def build_study(
+    track_name: str,
+    maps: Sequence[StudyMap],
+    controller: str,
+    *,
+    gains: Mapping[str, Mapping[str, Any]],
+    seeds: Sequence[int],
+    folder: Path,
 ) -> Study:
-    track = TRACKS[name]
-    changes: dict[str, Any] = {"robots": (track.robots,), "duration": track.duration, "radius": RADIUS}
-    changes |= {"lattice": LATTICE, "cost_hz": 2.0, "record_hz": 0.0, "metrics": True, **track.changes}
+    """Build the sweep of one controller on one track.
+
+    Parameters
+    ----------
+    track_name : str
+    maps : sequence of StudyMap
+    controller : str
+        Name of a controller, or ``FILE.py:CLASS``.
+    gains : Mapping
+        Gains that differ from the defaults, by controller.
+    seeds : sequence of int
+    folder : Path
+        Folder that a relative path of the controller's file starts from.
+
+    Returns
+    -------
+    Study
+    """
+    track = TRACKS[track_name]
+    options: dict[str, Any] = {
+        "robots": (track.robots,),
+        "duration": track.duration,
+        "radius": ROBOT_RADIUS_M,
+        "lattice": LATTICE,
+        "cost_hz": _COST_RATE_HZ,
+        "record_hz": 0.0,
+        "metrics": True,
+        **track.changes,
+    }
     if track.failures:
-        changes["conditions"] = {"fail": " ".join(f"{robot + 1}@{time:g}" for robot, time in track.failures)}
-    return Study(tuple(maps), (controller,), seeds=seeds, folder=folder, **changes, **more)
+        # Study files count robots from 1.
+        failures = [f"{robot + 1}@{time:g}" for robot, time in track.failures]
+        options["conditions"] = {"fail": " ".join(failures)}
+    return Study(tuple(maps), (controller,), gains, seeds=seeds, folder=folder, **options)

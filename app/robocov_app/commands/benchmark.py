@@ -92,24 +92,26 @@ def command(options: Arguments) -> int:
 
 
 def _run(options: Arguments) -> int:
-    from robocov_app.benchmark.running import RESULT, Contender, Selection, run_benchmark
+    from robocov_app.benchmark.rated_controller import RatedController, Selection
+    from robocov_app.benchmark.results import RESULT_FILE
+    from robocov_app.benchmark.running import run_benchmark
 
     assert options.controller is not None
-    contender = Contender(options.controller, parse_gains(options.set))
+    controller = RatedController(options.controller, parse_gains(options.set))
     selection, out = Selection(options.quick, options.track, options.maps), options.out or Path("benchmark")
     where: dict[str, Any] = {"workers": options.workers, "scheduler": options.scheduler}
     with Interruption() as stop:
-        result = run_benchmark(contender, selection, out, stop=stop, quiet=options.json, **where)
+        result = run_benchmark(controller, selection, out, stop=stop, quiet=options.json, **where)
     if result is None:
         print_answer(options, {"out": str(out), "interrupted": True}, "stopped; the same command goes on")
         return INTERRUPTED
     runs, failed = len(result["rows"]), sum("error" in row for row in result["rows"])
     if not options.json:
-        from robocov_app.benchmark.ratings import summary_rows
+        from robocov_app.benchmark.ratings import build_summary_rows
 
-        (first, *others), rows = summary_rows(result)
+        (first, *others), rows = build_summary_rows(result)
         print_table([(first, BOLD), *((name, RIGHT) for name in others)], rows)
-    words = f"{format_count(runs, 'run')}, {failed} failed; written to {out / RESULT}"
+    words = f"{format_count(runs, 'run')}, {failed} failed; written to {out / RESULT_FILE}"
     print_answer(options, {"out": str(out), "runs": runs, "failed": failed}, words)
     return FAILED if failed else 0
 
@@ -119,14 +121,14 @@ def _suite(options: Arguments) -> int:
 
     if options.json:
         tracks = {name: {"maps": track.maps, "seeds": track.seeds} for name, track in suite.TRACKS.items()}
-        print_answer(options, {"version": suite.VERSION, "tracks": tracks, "quick": suite.QUICK})
+        print_answer(options, {"version": suite.VERSION, "tracks": tracks, "quick": suite.QUICK_TRACKS})
         return 0
     rows = []
     for name, track in suite.TRACKS.items():
         counts = len(track.maps), len(track.maps) * len(track.seeds), track.robots
         rows.append((name, *map(str, counts), track.summary))
     columns = [("Track", BOLD), ("Maps", RIGHT), ("Runs", RIGHT), ("Robots", RIGHT), ("", {})]
-    print_table(columns, rows, title=f"Suite {suite.VERSION}; --quick takes {', '.join(suite.QUICK)}")
+    print_table(columns, rows, title=f"Suite {suite.VERSION}; --quick takes {', '.join(suite.QUICK_TRACKS)}")
     echo()
     families = [(name, ", ".join(own)) for name, own in suite.FAMILIES.items()]
     print_table([("Family", BOLD), ("Maps", {})], families)
@@ -134,13 +136,13 @@ def _suite(options: Arguments) -> int:
 
 
 def _verify(options: Arguments) -> int:
-    from robocov_app.benchmark.running import verify
+    from robocov_app.benchmark.verification import verify_result
     from robocov_app.sweep.executors import processors
 
     how: dict[str, Any] = {"controller": options.controller, "sample": options.sample, "seed": options.seed}
     with Interruption() as stop:
         how |= {"workers": options.workers or processors(), "stop": stop, "quiet": options.json}
-        count, found = verify(options.paths[0], **how)
+        count, found = verify_result(options.paths[0], **how)
         if stop.requested:
             return INTERRUPTED
     verdict = format_count(len(found), "difference") if found else "all alike, bit for bit"
@@ -151,15 +153,15 @@ def _verify(options: Arguments) -> int:
 
 def _page(options: Arguments) -> int:
     from robocov.files.writing import replace_file
-    from robocov_app.benchmark.page import page_of
-    from robocov_app.benchmark.running import bundled_results, read_result
+    from robocov_app.benchmark.page import build_page
+    from robocov_app.benchmark.results import load_bundled_results, read_result
     from robocov_app.commands.report import check_target
 
     target = options.out or Path("benchmark.html")
     check_target(target, overwrite=False)
     results = [read_result(path) for path in options.paths]
-    results += [] if options.alone else bundled_results(results)
-    data = page_of(results, options.title).encode("utf-8", "replace")
+    results += [] if options.alone else load_bundled_results(results)
+    data = build_page(results, options.title).encode("utf-8", "replace")
     with replace_file(target) as part:
         part.write_bytes(data)
     answer = {"path": str(target), "bytes": len(data), "entries": len(results)}
@@ -169,14 +171,14 @@ def _page(options: Arguments) -> int:
 
 def _references(options: Arguments) -> int:
     from robocov_app.benchmark import suite
-    from robocov_app.benchmark.references import make_references
+    from robocov_app.benchmark.references import compute_references
     from robocov_app.sweep.executors import processors
 
-    target, workers = options.out or suite.FILE, options.workers or processors()
+    target, workers = options.out or suite.SUITE_FILE, options.workers or processors()
     if target.is_dir():
         raise InputError(f"--out: {target}: expected a file for the references, got a folder")
     with Interruption() as stop:
-        held, left = make_references(target, workers=workers, quiet=options.json, stop=stop)
+        held, left = compute_references(target, workers=workers, quiet=options.json, stop=stop)
     answer = {"path": str(target), "references_and_bounds": held, "left": left}
     print_answer(options, answer, f"{target}: {held} references and bounds, {left} left")
     return INTERRUPTED if left else 0

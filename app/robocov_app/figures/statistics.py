@@ -4,10 +4,10 @@ Runs on one map are alike: resampling them one by one would make the intervals t
 are given, whole clusters are drawn (Field and Welsh, 2007); intervals are percentiles.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,12 @@ from robocov.arrays import Array, IntArray
 
 LEVEL = 0.95  # of all intervals
 RESAMPLES = 4000  # bootstrap samples: the ends of a 95 % interval then vary by about a fortieth of its width
+MIN_BOOTSTRAP_MAPS = 5
+"""Number of maps from which a bootstrap has enough different resamples, 126, for a 95 % interval."""
 _AT_ONCE = 1_000_000  # values that are looked at together
+
+_Item = TypeVar("_Item")
+_Key = TypeVar("_Key")
 
 
 @dataclass(frozen=True)
@@ -143,3 +148,30 @@ def spread(values: ArrayLike) -> float:
     """Return the coefficient of variation: the deviation (of a sample) by the mean, of two or more values."""
     sample = np.asarray(values, dtype=float)
     return float(sample.std(ddof=1)) / float(sample.mean())
+
+
+def group_by(items: Iterable[_Item], key: Callable[[_Item], _Key]) -> dict[_Key, list[_Item]]:
+    """Group items by a key.
+
+    Unlike `itertools.groupby`, items with the same key need not be adjacent.
+
+    Parameters
+    ----------
+    items : iterable
+    key : callable
+        Returns the key of an item.
+
+    Returns
+    -------
+    dict
+        Items by key. Keys and items are in the order of the input.
+
+    Examples
+    --------
+    >>> group_by(["lloyd", "rapf", "rpf", "atlas"], len)
+    {5: ['lloyd', 'atlas'], 4: ['rapf'], 3: ['rpf']}
+    """
+    groups: dict[_Key, list[_Item]] = {}
+    for item in items:
+        groups.setdefault(key(item), []).append(item)
+    return groups

@@ -22,7 +22,15 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.controllers import get_information, load_controller_class
-from robocov_app.figures.statistics import Interval, bootstrap, bootstrap_by, median_time, share, spread
+from robocov_app.figures.statistics import (
+    Interval,
+    bootstrap,
+    bootstrap_by,
+    group_by,
+    median_time,
+    share,
+    spread,
+)
 from robocov_app.figures.statistics import holm as adjusted_by_holm
 from robocov_app.replication import contenders as laws
 from robocov_app.replication.contenders import LABELS, OURS, OWN, PAPER, TARGETS, TEAMS, Contender
@@ -30,7 +38,6 @@ from robocov_app.replication.outcomes import EARLY, FIRST_MINUTE, Comparison, Ga
 from robocov_app.replication.plan import CONVEX_KINDS, Plan
 from robocov_app.replication.results import BeyondResults, Degradation
 from robocov_app.replication.step_times import StepTimes
-from robocov_app.report.groups import parted
 
 Verdict: TypeAlias = Literal["holds", "holds partly", "does not hold", "undecided"]
 
@@ -547,7 +554,7 @@ def _other_gains(outcomes: Outcomes) -> str:
 def _variation_by_start(outcomes: Outcomes, law: str) -> tuple[Array, list[str]]:
     """Return the variation of the final cost over several starts, (k,), and the map of each value."""
     finals = zip(outcomes.scenarios, outcomes.of(law, "final"), strict=True)
-    groups = parted(finals, lambda pair: (pair[0].map, pair[0].seed))
+    groups = group_by(finals, lambda pair: (pair[0].map, pair[0].seed))
     several = {name: [final for _, final in pairs] for name, pairs in groups.items() if len(pairs) > 1}
     return np.array([spread(own) for own in several.values()]), [name for name, _ in several]
 

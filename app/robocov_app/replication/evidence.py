@@ -10,13 +10,12 @@ import numpy as np
 
 from robocov.controllers import get_gain_values, get_information, load_controller_class, make_controller
 from robocov.controllers.gains import format_value
-from robocov_app.figures.statistics import Interval, bootstrap, median_time
+from robocov_app.figures.statistics import Interval, bootstrap, group_by, median_time
 from robocov_app.replication.claims import amount, capitalised, share_above_zero
 from robocov_app.replication.contenders import ASSETS, OWN, Contender
 from robocov_app.replication.outcomes import Comparison, GainOutcomes, Outcomes
 from robocov_app.replication.results import IDEAL, BeyondResults, Degradation
 from robocov_app.replication.studies import AXES, WORSE
-from robocov_app.report.groups import parted
 
 WORST_MAPS = 3  # so many maps are named on which a controller does worst
 MEDIANS = ("final", "over_run", "path", "work")  # of a law, in a table
@@ -104,7 +103,7 @@ def ranked_rows(results: BeyondResults) -> list[LawRow]:
 
 
 def evidence(results: BeyondResults, rows: Iterable[LawRow]) -> list[Evidence]:
-    own = parted(rows, lambda row: row.contender.controller)
+    own = group_by(rows, lambda row: row.contender.controller)
     return [
         Evidence(
             account_of(name),

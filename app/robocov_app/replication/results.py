@@ -20,7 +20,7 @@ from robocov.files.writing import replace_file
 from robocov.metrics import CostHistory
 from robocov.metrics.results import read_results
 from robocov.record import Record
-from robocov_app.figures.statistics import Interval, bootstrap
+from robocov_app.figures.statistics import MIN_BOOTSTRAP_MAPS, Interval, bootstrap
 from robocov_app.replication import contenders as laws
 from robocov_app.replication import outcomes as reached
 from robocov_app.replication import studies
@@ -30,7 +30,6 @@ from robocov_app.replication.plan import PARTITION_SEED, ROBOTS, Plan
 from robocov_app.replication.references import References, find_references
 from robocov_app.replication.step_times import UNKNOWN, StepTimes, step_times
 from robocov_app.replication.studies import BASELINE_GAINS
-from robocov_app.report.groups import FEW_MAPS
 from robocov_app.sweep import worker
 from robocov_app.sweep.executors import LocalPool
 from robocov_app.sweep.ledger import Ledger, opened
@@ -384,7 +383,7 @@ def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
         ratios = {key: costs[key] / by[key] for key in by if key in costs}
         names = [name for name, _ in ratios]
         # of few maps runs are drawn one by one: the interval is then of these maps alone
-        clusters = names if len(set(names)) >= FEW_MAPS else None
+        clusters = names if len(set(names)) >= MIN_BOOTSTRAP_MAPS else None
         ratio = bootstrap([*ratios.values()], clusters=clusters) if ratios else UNKNOWN
         label = str(load_controller_class(controller).label)
         found.append(Degradation(axis, value, controller, label, ratio, len(ratios)))

@@ -16,11 +16,11 @@ import shapely
 
 from robocov.controllers import CONTROLLERS
 from robocov.controllers.gains import Value
-from robocov.density import Gaussian, Gaussians
 from robocov.environment import DiscStart, Environment, StartSpec, UniformStart
 from robocov.errors import StartError
 from robocov.generator import generate_map
 from robocov.mapfile import load_map
+from robocov_app.evaluation.hot_spots import add_hot_spots
 from robocov_app.replication import contenders as laws
 from robocov_app.replication.contenders import Contender
 from robocov_app.replication.plan import CONVEX, CONVEX_KINDS, KINDS, ROBOTS, TEAM, UNSEEN, Plan
@@ -30,7 +30,6 @@ from robocov_app.sweep.study import Study, StudyMap
 RADII = (0.8, 0.6, 0.45)  # m, of the discs of clustered starts; the first that fits is taken
 TIGHT = 0.35  # m, of the disc of "tight": it has room for the centres of six robots, and hardly more
 SIDE = 10.0  # m, of the square in which regions are drawn by chance
-HOT_SPOTS = 2  # Gaussians drawn by chance on a map: in the middle of one a place counts 20 times as much
 _POINTS, _LEAST_AREA, _LEAST_WIDTH = 9, 40.0, 5.0
 
 # which runs the figures show: (map, starts, contenders); "paper" is the same on both maps, "other" figure 8's
@@ -105,14 +104,6 @@ def convex_region(seed: int) -> StudyMap:
     return StudyMap(region.name, with_kinds_of_starts(region, CONVEX_KINDS))
 
 
-def with_hot_spots(each: StudyMap, seed: int) -> StudyMap:
-    """Return a map with a density drawn by chance: Gaussians of 1 m in the free space, over a floor of 1."""
-    start = replace(each.environment, starts={"uniform": UniformStart()}).start("uniform")
-    places = start.sample(HOT_SPOTS, seed=seed, radius=0.3).tolist()
-    peaks = tuple(Gaussian((round(x, 2), round(y, 2)), weight=20.0, sigma=1.0) for x, y in places)
-    return StudyMap(each.name, replace(each.environment, density=Gaussians(peaks, floor=1.0)))
-
-
 def with_kinds_of_starts(environment: Environment, kinds: Iterable[str] = KINDS) -> Environment:
     """Return the map with the study's starts in place of its own; StartError where no disc fits."""
     return replace(environment, starts={kind: _start(environment, kind) for kind in kinds})
@@ -162,7 +153,10 @@ def baseline_maps(plan: Plan) -> tuple[StudyMap, ...]:
 
 
 def density_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    return tuple(map(with_hot_spots, generated_maps(plan.beyond.maps), plan.beyond.maps))
+    maps = []
+    for each, seed in zip(generated_maps(plan.beyond.maps), plan.beyond.maps, strict=True):
+        maps.append(StudyMap(each.name, add_hot_spots(each.environment, seed)))
+    return tuple(maps)
 
 
 def contest(

@@ -12,6 +12,7 @@ from markupsafe import Markup, escape
 
 from robocov import __version__
 from robocov.text import escape_controls
+from robocov_app.figures.statistics import MIN_BOOTSTRAP_MAPS
 from robocov_app.figures.styles import MARKS
 from robocov_app.report import facts, plots, replay, tables
 from robocov_app.report import groups as grouped
@@ -113,7 +114,11 @@ def template(name: str) -> Template:
     tight: Any = {"trim_blocks": True, "lstrip_blocks": True}
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **tight)
     environment.filters["short"] = _shortened
-    limits = {"most_maps": MOST_MAPS, "most_panels": plots.MOST_PANELS, "few_maps": grouped.FEW_MAPS}
+    limits = {
+        "most_maps": MOST_MAPS,
+        "most_panels": plots.MOST_PANELS,
+        "few_maps": MIN_BOOTSTRAP_MAPS,
+    }
     environment.globals |= {**limits, "negligible": grouped.NEGLIGIBLE}
     environment.globals |= {"facts": facts, "tables": tables, "map_picture": map_picture}
     return environment.get_template(name)

@@ -6,13 +6,19 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter, itemgetter
-from typing import Literal, NamedTuple, TypeAlias, TypeVar
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from robocov.arrays import Array
 from robocov.controllers.gains import Value, format_value
-from robocov_app.figures.statistics import Interval, bootstrap, mean_with_t_interval
+from robocov_app.figures.statistics import (
+    MIN_BOOTSTRAP_MAPS,
+    Interval,
+    bootstrap,
+    group_by,
+    mean_with_t_interval,
+)
 from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
 from robocov_app.report.results import Entry, Gains, Result, Setting
 from robocov_app.sweep.study import parameter_text
@@ -23,13 +29,10 @@ TUNED = " (tuned)"  # stands behind a controller's label where its gains were ch
 _DIRECT = 12  # letters that a gain and its value may take in a label
 MOST_COMPARED = 4  # groups up to which each is compared with each; of more, each with the first
 MOST_SAID = 6  # comparisons that the first words tell
-FEW_MAPS = 5  # a bootstrap over fewer maps has too few different samples for a 95 % interval (126 of five)
 NEGLIGIBLE = 0.001  # part by which a cost has to differ to be called better or worse
 MOST_RUNS = 50  # runs of a result that a page shows as pictures
 
 Verdict: TypeAlias = Literal["better", "worse", "undecided"]
-T = TypeVar("T")
-K = TypeVar("K")
 Scales: TypeAlias = Mapping[Entry, float]  # what the costs of runs are divided by
 
 
@@ -47,19 +50,11 @@ class Group:
 
 
 def variants(result: Result) -> list[Group]:
-    found = parted(result.fine, lambda entry: (entry.controller, entry.gains))
+    found = group_by(result.fine, lambda entry: (entry.controller, entry.gains))
     suffixes: dict[tuple[str, Gains], str] = {}
-    for sets in parted(found, itemgetter(0)).values():
+    for sets in group_by(found, itemgetter(0)).values():
         suffixes |= dict(zip(sets, _suffixes([gains for _, gains in sets]), strict=True))
     return [Group(f"{runs[0].label}{suffixes[key]}", *key, tuple(runs)) for key, runs in found.items()]
-
-
-def parted(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
-    """Return items by a key, keys and items in their order."""
-    found: dict[K, list[T]] = {}
-    for item in items:
-        found.setdefault(key(item), []).append(item)
-    return found
 
 
 def labels(result: Result) -> dict[Entry, str]:
@@ -93,7 +88,7 @@ def styles(result: Result) -> dict[str, CurveStyle]:
 
 def by_controller(result: Result) -> list[Group]:
     groups = []
-    for controller, entries in parted(result.fine, lambda entry: entry.controller).items():
+    for controller, entries in group_by(result.fine, lambda entry: entry.controller).items():
         gains = {entry.gains for entry in entries}
         one = gains.pop() if len(gains) == 1 else None
         groups.append(Group(entries[0].label, controller, one, tuple(entries)))
@@ -122,7 +117,7 @@ def setting_label(result: Result, setting: Setting) -> str:
 def medians(result: Result, part_of: Callable[[Entry], object] = attrgetter("setting")) -> Scales:
     """Return for each run the median of the final mean distances of all runs in its part of a result, m."""
     found: dict[Entry, float] = {}
-    for part in parted((entry for entry in result.fine if np.isfinite(entry.final)), part_of).values():
+    for part in group_by((entry for entry in result.fine if np.isfinite(entry.final)), part_of).values():
         found |= dict.fromkeys(part, float(np.median([entry.final for entry in part])))
     return found
 
@@ -142,8 +137,8 @@ def scaled(entry: Entry, scales: Scales) -> float:
 def dependences(result: Result) -> dict[str, list[str]]:
     """Return the gains that take several values, by name, with the controllers that they vary in."""
     every = ((name, entry.controller, value) for entry in result.fine for name, value in entry.gains)
-    levels = parted(every, itemgetter(0, 1)).items()
-    varying = parted((key for key, values in levels if len(set(values)) > 1), itemgetter(0))
+    levels = group_by(every, itemgetter(0, 1)).items()
+    varying = group_by((key for key, values in levels if len(set(values)) > 1), itemgetter(0))
     return {name: [controller for _, controller in keys] for name, keys in varying.items()}
 
 
@@ -201,7 +196,7 @@ class Comparison:
         if total > 1:
             # an interval over a few maps would be narrow where those maps happen to agree
             few = f"{ratio.estimate:.3f} over {total} maps only"
-            text = few if total < FEW_MAPS else f"{ratio_text(ratio)} over {total} maps"
+            text = few if total < MIN_BOOTSTRAP_MAPS else f"{ratio_text(ratio)} over {total} maps"
             return f"{names}: {self.tally()}; ratio {text}."
         if self.pairs == 1:
             return f"{names}: ratio {ratio_text(ratio)} in the only pair."
@@ -223,7 +218,7 @@ def comparisons(groups: Sequence[Group]) -> list[Comparison]:
 def compared(first: Group, second: Group) -> Comparison | None:
     both = first.entries, second.entries
     a, b = ({entry.case: entry for entry in own if 0.0 < entry.final < np.inf} for own in both)
-    cases = parted((entry for case, entry in a.items() if case in b), lambda entry: entry.map)
+    cases = group_by((entry for case, entry in a.items() if case in b), lambda entry: entry.map)
     if not cases:
         return None
     maps = []
@@ -232,7 +227,7 @@ def compared(first: Group, second: Group) -> Comparison | None:
         right = np.array([b[entry.case].final for entry in entries])
         # runs of other teams from the same start and seed are no further evidence
         effects = zip(entries, np.log(left / right).tolist(), strict=True)
-        seeds = parted(effects, lambda pair: (pair[0].start, pair[0].seed)).values()
+        seeds = group_by(effects, lambda pair: (pair[0].start, pair[0].seed)).values()
         effect = mean_with_t_interval([float(np.mean([each for _, each in pairs])) for pairs in seeds])
         maps.append(MapPairs(name, left, right, _exp(effect)))
     ratio = maps[0].ratio
@@ -244,7 +239,7 @@ def compared(first: Group, second: Group) -> Comparison | None:
 def compared_groups(result: Result) -> tuple[list[Group], str]:
     """Return the groups that are compared, variants of one controller or tuned controllers; and how."""
     apart = variants(result)
-    by = parted(apart, lambda group: group.controller)
+    by = group_by(apart, lambda group: group.controller)
     if len(by) < 2 or len(by) == len(apart):
         every = "Every set of gains is compared by itself; none was chosen."
         return apart, every if len(by) < len(apart) else ""
@@ -258,7 +253,7 @@ def compared_groups(result: Result) -> tuple[list[Group], str]:
         words = "There is one case only, too few to choose gains fairly: the first of each take part."
         return [groups[0] for groups in by.values()], words
     scales, groups, chosen_gains = medians(result), [], []
-    tried: dict[object, list[Entry]] = parted(result.entries, lambda entry: (entry.controller, entry.gains))
+    tried: dict[object, list[Entry]] = group_by(result.entries, lambda entry: (entry.controller, entry.gains))
     for controller, own in by.items():
         if len(own) == 1:
             groups += own
@@ -308,7 +303,7 @@ def chosen(result: Result, most: int = MOST_RUNS, panes: int = 4) -> Choice:
         )
         every = f"{len(entries)} runs"
         found: set[Entry] = set()
-        for own in parted(entries, lambda entry: entry.map).values():
+        for own in group_by(entries, lambda entry: entry.map).values():
             found |= _telling(result, own)
         words = f"on each map {what}."
         if len(found) > most:
@@ -327,7 +322,7 @@ def _telling(result: Result, entries: Sequence[Entry]) -> set[Entry]:
     scales = medians(result)
     known = (entry for entry in entries if np.isfinite(scaled(entry, scales)))
     found = set(_middle_case(_best_variants(result, entries), scales))
-    for own in parted(known, lambda entry: entry.controller).values():
+    for own in group_by(known, lambda entry: entry.controller).values():
         costs = [scaled(entry, scales) for entry in own]
         found |= {own[int(np.argmin(costs))], own[int(np.argmax(costs))]}
     return found
@@ -348,6 +343,6 @@ def _middle_case(groups: Sequence[Group], scales: Scales) -> tuple[Entry, ...]:
         known = [entry for entry in group.entries if np.isfinite(scaled(entry, scales))]
         order = sorted(known, key=lambda entry: scaled(entry, scales))
         ranked += [(abs(k - (len(order) - 1) / 2) / len(order), entry) for k, entry in enumerate(order)]
-    cases = parted(ranked, lambda pair: pair[1].case).values()
+    cases = group_by(ranked, lambda pair: pair[1].case).values()
     nearest = min(cases, key=lambda case: (-len(case), sum(rank for rank, _ in case)), default=[])
     return tuple(entry for _, entry in nearest)

@@ -9,8 +9,9 @@ import numpy as np
 
 from robocov.controllers.gains import format_value
 from robocov.errors import format_count
+from robocov_app.figures.statistics import group_by
 from robocov_app.report import groups as grouped
-from robocov_app.report.groups import Comparison, Group, gain_text, parted, ratio_text, setting_label
+from robocov_app.report.groups import Comparison, Group, gain_text, ratio_text, setting_label
 from robocov_app.report.results import RESTARTS, Entry, Result
 
 NOTHING = "–"  # stands where there is no number
@@ -36,7 +37,7 @@ Column: TypeAlias = tuple[str, Callable[[Sequence[Entry]], str]]  # head, and te
 def controllers_table(result: Result) -> Table:
     groups = grouped.shown_groups(result)
     known = {group.controller for group in groups}
-    failed = parted(result.failed, lambda entry: entry.controller).items()
+    failed = group_by(result.failed, lambda entry: entry.controller).items()
     lost = [Group(own[0].label, name, None, tuple(own[:1])) for name, own in failed if name not in known]
     return _gains_table("Controllers and their gains", [*groups, *lost], result)
 
@@ -203,7 +204,7 @@ def _quartiles(values: Sequence[float], decimals: int, nothing: str = NOTHING) -
 
 def _ranges_text(group: Group, result: Result) -> str:
     parts = []
-    gains = parted((gain for entry in group.entries for gain in entry.gains), itemgetter(0))
+    gains = group_by((gain for entry in group.entries for gain in entry.gains), itemgetter(0))
     for name, own in gains.items():
         every = [value for _, value in own]
         numbers = [value for value in every if isinstance(value, int | float)]

@@ -23,19 +23,17 @@ from hypothesis import strategies as st
 from swept import HEAD, PULL, InProcess
 
 from robocov_app.benchmark import ratings, suite
-from robocov_app.benchmark.page import Point, label_places, page_of, pareto_front
-from robocov_app.benchmark.running import (
+from robocov_app.benchmark.page import ParetoPoint, build_page, find_pareto_front, place_labels
+from robocov_app.benchmark.rated_controller import RatedController, Selection
+from robocov_app.benchmark.results import (
     ENTRIES,
-    RESULT,
-    TRACKS,
-    Contender,
-    Selection,
-    bundled_results,
-    rated,
+    RESULT_FILE,
+    compute_gaps,
+    load_bundled_results,
     read_result,
-    run_benchmark,
-    verify,
 )
+from robocov_app.benchmark.running import TRACKS_FOLDER, run_benchmark
+from robocov_app.benchmark.verification import verify_result
 from robocov_app.cli import main
 from robocov_app.figures.styles import styles_of
 from robocov_app.terminal.interruption import Interruption
@@ -50,26 +48,26 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
         track = replace(suite.TRACKS[name], duration=1.0, seeds=(0,))
         monkeypatch.setitem(suite.TRACKS, name, track)  # type: ignore[arg-type]
     monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", InProcess)
-    monkeypatch.setattr("robocov_app.benchmark.running.LocalPool", InProcess)
+    monkeypatch.setattr("robocov_app.benchmark.verification.LocalPool", InProcess)
 
 
 def ran(out: Path, controller: str = "rapf", *tracks: str, **gains: float) -> dict[str, Any]:
     selection = Selection(tracks=tracks or ("ideal",), maps=MAPS)
     with Interruption() as stop:
-        result = run_benchmark(Contender(controller, gains), selection, out, stop=stop, quiet=True)
+        result = run_benchmark(RatedController(controller, gains), selection, out, stop=stop, quiet=True)
     assert result is not None
     return result
 
 
 def checked(out: Path, **how: Any) -> tuple[int, list[str]]:
     with Interruption() as stop:
-        return verify(out, stop=stop, quiet=True, **how)
+        return verify_result(out, stop=stop, quiet=True, **how)
 
 
 def forged(out: Path, change: Any) -> None:
-    result = json.loads((out / RESULT).read_text())
+    result = json.loads((out / RESULT_FILE).read_text())
     change(result)
-    (out / RESULT).write_text(json.dumps(result))
+    (out / RESULT_FILE).write_text(json.dumps(result))
 
 
 @pytest.mark.usefixtures("short")
@@ -81,7 +79,7 @@ def test_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (track, name) for track in ("ideal", "lossy") for name in MAPS
     ]
     for row in result["rows"]:
-        best = suite.frozen()[row["map"]]["references"]["6"]["mean_distance_m"]
+        best = suite.load_frozen_maps()[row["map"]]["references"]["6"]["mean_distance_m"]
         assert row["gap"] == row["mean_distance_m"] / best - 1.0 > 0.0
         assert row["told_bytes"] == pytest.approx(6 * 20 * (60 if row["track"] == "ideal" else 2))
         assert row["deciding_s"] > 0.0
@@ -99,24 +97,24 @@ def test_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_built_in_entries_are_whole() -> None:
     """Each holds every run of all tracks that count, with gaps that follow from its costs."""
-    results = bundled_results()
+    results = load_bundled_results()
     assert {"rapf", "lloyd", "rpf", "oracle"} <= {result["entry"]["controller"] for result in results}
     runs = {
-        (name, each, seed) for name, maps, seeds in Selection().parts() for each in maps for seed in seeds
+        (name, each, seed) for name, maps, seeds in Selection().list_runs() for each in maps for seed in seeds
     }
     for result in results:
         assert {(row["track"], row["map"], row["seed"]) for row in result["rows"]} == runs
         for row in result["rows"]:
-            assert "error" in row or row.items() >= rated(row["track"], row["map"], row).items()
+            assert "error" in row or row.items() >= compute_gaps(row["track"], row["map"], row).items()
     # who gives a result of the same controller has it on the page in the place of the built-in one
-    assert len(bundled_results(results[:1])) == len(results) - 1
+    assert len(load_bundled_results(results[:1])) == len(results) - 1
 
 
 @pytest.mark.slow
 def test_built_in_entries_are_what_comes_out() -> None:
     path = ENTRIES / "rapf.json.gz"
     with Interruption() as stop:
-        count, found = verify(path, sample=2, seed=3, workers=2, quiet=True, stop=stop)
+        count, found = verify_result(path, sample=2, seed=3, workers=2, quiet=True, stop=stop)
     assert count == 2
     # other processors' libraries of linear algebra may round the last bit differently
     for words in found:
@@ -130,8 +128,8 @@ PLACE = st.tuples(st.floats(100, 500), st.floats(80, 280), st.text("abcde", min_
 
 @given(st.lists(PLACE, min_size=2, max_size=4))
 def test_labels_of_few_points_stay_apart(given_points: list[tuple[float, float, str]]) -> None:
-    points = [Point(styles_of(["rapf"])[0], name, x, y, True) for x, y, name in given_points]
-    middles = label_places(np.array([(x, y) for x, y, _ in given_points]), points)
+    points = [ParetoPoint(styles_of(["rapf"])[0], name, x, y, True) for x, y, name in given_points]
+    middles = place_labels(np.array([(x, y) for x, y, _ in given_points]), [each.label for each in points])
     half = np.array([(3.0 * len(each.label), 6.5) for each in points])
     for k, j in combinations(range(len(points)), 2):
         apart = np.abs(middles[k] - middles[j]) - half[k] - half[j]
@@ -150,7 +148,7 @@ def test_the_oracle_is_delivered_as_a_file(tmp_path: Path) -> None:
 def test_the_oracle_arrives_though_its_robots_meet_in_corridors(tmp_path: Path) -> None:
     selection = Selection(tracks=("ideal",), maps=("mazes-7006",))
     with Interruption() as stop:
-        result = run_benchmark(Contender("oracle", {}), selection, tmp_path, stop=stop, quiet=True)
+        result = run_benchmark(RatedController("oracle", {}), selection, tmp_path, stop=stop, quiet=True)
     assert result is not None and max(row["gap"] for row in result["rows"]) < 1e-3
 
 
@@ -158,7 +156,7 @@ def test_the_oracle_arrives_though_its_robots_meet_in_corridors(tmp_path: Path) 
 def test_what_is_forged_is_found(tmp_path: Path) -> None:
     out = tmp_path / "out"
     ran(out)
-    honest = (out / RESULT).read_text()
+    honest = (out / RESULT_FILE).read_text()
     for change, words in (
         (lambda result: result["rows"][1].update(work_J=1.0), "blocks-b, seed 0: work_J: expected"),
         (lambda result: result["rows"][0].update(gap=0.01), "blocks-a, seed 0: gap: expected"),
@@ -166,7 +164,7 @@ def test_what_is_forged_is_found(tmp_path: Path) -> None:
         (lambda result: result["rows"][0].update(seed=7), "seed 7: a row of a run that was not selected"),
         (lambda result: result["versions"].update(numpy="1.0"), "made with numpy 1.0 instead of"),
     ):
-        (out / RESULT).write_text(honest)
+        (out / RESULT_FILE).write_text(honest)
         forged(out, change)
         assert any(words in each for each in checked(out, sample=9)[1]), words
 
@@ -178,7 +176,7 @@ def test_code_in_a_file_is_verified_only_if_it_is_named_and_the_same(
     mine, out = tmp_path / "mine.py", tmp_path / "out"
     mine.write_text(HEAD + PULL)
     ran(out, f"{mine}:Mine")
-    assert str(tmp_path) not in (out / RESULT).read_text()
+    assert str(tmp_path) not in (out / RESULT_FILE).read_text()
     assert "pass --controller FILE.py:CLASS" in complaint(capsys, "benchmark", "verify", str(out))
     assert checked(out, controller=f"{mine}:Mine", sample=1) == (1, [])
     mine.write_text(HEAD + PULL + "\n# changed\n")
@@ -190,7 +188,7 @@ def test_code_in_a_file_is_verified_only_if_it_is_named_and_the_same(
 def test_damaged_results_are_one_clear_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     ran(out)
-    honest = json.loads((out / RESULT).read_text())
+    honest = json.loads((out / RESULT_FILE).read_text())
     for part in ("", "entry", "selection", "rows"):
         for name in honest["rows"][0] if part == "rows" else honest[part] if part else honest:
             for value in (None, {"x": []}):
@@ -199,8 +197,8 @@ def test_damaged_results_are_one_clear_line(tmp_path: Path, capsys: pytest.Captu
                 whole.pop(name)
                 whole |= {} if value is None else {name: value}
                 if value is None or name not in ("gains", "set", "entry", "selection", "versions"):
-                    (out / RESULT).write_text(json.dumps(damaged))
-                    assert str(out / RESULT) in complaint(capsys, "benchmark", "verify", str(out)), name
+                    (out / RESULT_FILE).write_text(json.dumps(damaged))
+                    assert str(out / RESULT_FILE) in complaint(capsys, "benchmark", "verify", str(out)), name
 
 
 @pytest.mark.usefixtures("short")
@@ -240,7 +238,7 @@ def test_bad_input(
 @given(st.lists(st.tuples(st.sampled_from([1.0, 2.0, 5.0, 9.0]), st.booleans()), min_size=1, max_size=12))
 def test_the_median_of_rest_is_kaplan_and_meiers(runs: list[tuple[float, bool]]) -> None:
     rows = [{"settled_at_s": time if rested else None} for time, rested in runs]
-    share, median = ratings.Rating("", "ideal", rows, 0).at_rest()
+    share, median = ratings.Rating("", "ideal", rows, 0).compute_rest()
     # all that did not rest are censored at the end, so the curve is the plain share of those still moving
     times = sorted(row["settled_at_s"] for row in rows if row["settled_at_s"] is not None)
     wanted = next(
@@ -252,7 +250,7 @@ def test_the_median_of_rest_is_kaplan_and_meiers(runs: list[tuple[float, bool]])
 
 @given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=1, max_size=12))
 def test_nobody_beats_the_front(points: list[tuple[int, int]]) -> None:
-    front = {points[k] for k in pareto_front(points)}
+    front = {points[k] for k in find_pareto_front(points)}
     beaten = {(x, y) for x, y in points if any(u <= x and v <= y and (u, v) != (x, y) for u, v in points)}
     assert front == set(points) - beaten
 
@@ -274,12 +272,12 @@ def test_what_is_killed_goes_on(tmp_path: Path) -> None:
     maps = ("blocks-a", "blocks-b", "polygons-7001", "polygons-7002", "plants-7001", "yards-7001")
     command = [*COMMAND, *words, *maps, "--out", str(tmp_path / "killed")]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        runs, end = tmp_path / "killed" / TRACKS / "one-robot" / "runs", time.monotonic() + 120.0
+        runs, end = tmp_path / "killed" / TRACKS_FOLDER / "one-robot" / "runs", time.monotonic() + 120.0
         while not (runs.is_dir() and any(not each.name.startswith(".") for each in runs.iterdir())):
             assert time.monotonic() < end and process.poll() is None
             time.sleep(0.02)
         process.kill()
-    assert not (tmp_path / "killed" / RESULT).exists()
+    assert not (tmp_path / "killed" / RESULT_FILE).exists()
     assert main([*words, *maps, "--out", str(tmp_path / "killed")]) == 0
     assert main([*words, *maps, "--out", str(tmp_path / "whole")]) == 0
     killed, whole = (
@@ -328,7 +326,7 @@ def test_the_page_in_a_browser(browser: Browser, tmp_path: Path) -> None:
         entry |= {"source_sha256": None}
         results.append({"entry": entry, "rows": rows, "method": ["As told."], "versions": {"numpy": "2"}})
     page = tmp_path / "page.html"
-    page.write_text(page_of(results, "A <test> of names"), encoding="utf-8")
+    page.write_text(build_page(results, "A <test> of names"), encoding="utf-8")
     for width in (1280, 390):
         browser.open(page, width)
         assert browser.complaints() == []

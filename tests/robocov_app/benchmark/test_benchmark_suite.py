@@ -15,8 +15,8 @@ from robocov.errors import InputError, ParameterError
 from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov_app.benchmark import suite
-from robocov_app.benchmark.oracle import Oracle, assigned
-from robocov_app.benchmark.references import wanted_references
+from robocov_app.benchmark.oracle import Oracle, assign_goals
+from robocov_app.benchmark.references import list_references
 
 SOME = ("rooms", "forklifts", "blocks-7001", "homes-7001", "traffic-7002", "dense-yards-7001")
 WALLED = Environment(
@@ -28,11 +28,11 @@ WALLED = Environment(
 
 
 def frozen_hashes(names: tuple[str, ...]) -> dict[str, str]:
-    return {name: suite.frozen()[name]["sha256"] for name in names}
+    return {name: suite.load_frozen_maps()[name]["sha256"] for name in names}
 
 
 def made_hashes(names: tuple[str, ...]) -> dict[str, str]:
-    return {name: suite.hash_of(suite.made_map(name)) for name in names}
+    return {name: suite.compute_map_hash(suite.build_map(name)) for name in names}
 
 
 def test_some_maps_are_still_the_frozen_ones() -> None:
@@ -43,45 +43,45 @@ def test_some_maps_are_still_the_frozen_ones() -> None:
 def test_all_maps_are_still_the_frozen_ones() -> None:
     names = tuple(suite.FAMILY_OF)
     assert made_hashes(names) == frozen_hashes(names)
-    assert set(suite.frozen()) == set(names)
+    assert set(suite.load_frozen_maps()) == set(names)
 
 
 def test_a_changed_map_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    changed = replace(suite.made_map("rooms"), name="rooms, a little different")
-    monkeypatch.setattr(suite, "made_map", lambda name: changed)
-    with pytest.raises(InputError, match="map rooms: it is not the one of suite v1"):
-        suite.suite_map("rooms")
+    changed = replace(suite.build_map("rooms"), name="rooms, a little different")
+    monkeypatch.setattr(suite, "build_map", lambda name: changed)
+    with pytest.raises(InputError, match="map rooms: expected the map of suite v1"):
+        suite.load_suite_map("rooms")
 
 
 def test_what_the_suite_promises() -> None:
     assert len(suite.FAMILIES) >= 6
     assert len(suite.TRACKS["ideal"].maps) >= 60
     tuning = set(suite.TRACKS["tuning"].maps)
-    assert all(tuning.isdisjoint(suite.TRACKS[name].maps) for name in suite.RATED)
-    families = {**suite.FAMILIES, **suite._OTHERS}
+    assert all(tuning.isdisjoint(suite.TRACKS[name].maps) for name in suite.RATED_TRACKS)
+    families = {**suite.FAMILIES, **suite.OTHER_FAMILIES}
     assert sum(map(len, families.values())) == len(suite.FAMILY_OF), "each map is in one family"
-    for name, robots, _ in wanted_references():
-        assert len(suite.frozen()[name]["references"][str(robots)]["positions_m"]) == robots
+    for name, robots, _ in list_references():
+        assert len(suite.load_frozen_maps()[name]["references"][str(robots)]["positions_m"]) == robots
 
 
 def test_a_reference_has_the_cost_that_it_tells() -> None:
     for name, robots in (("rooms-7001", "4"), ("dense-yards-7001", "6")):
-        told = suite.frozen()[name]["references"][robots]
-        result = CoverageCost(suite.suite_map(name), suite.LATTICE)(np.array(told["positions_m"]))
+        told = suite.load_frozen_maps()[name]["references"][robots]
+        result = CoverageCost(suite.load_suite_map(name), suite.LATTICE)(np.array(told["positions_m"]))
         assert result.mean_distance == pytest.approx(told["mean_distance_m"], rel=1e-12)
 
 
 def test_names_that_are_unknown() -> None:
     with pytest.raises(ParameterError, match="--track: unknown track 'ideel': did you mean 'ideal'"):
-        suite.chosen(["ideel"], [], quick=False)
+        suite.select_maps(["ideel"], [], quick=False)
     with pytest.raises(ParameterError, match="--maps: unknown map of the benchmark 'room'"):
-        suite.chosen([], ["room"], quick=False)
+        suite.select_maps([], ["room"], quick=False)
     with pytest.raises(ParameterError, match="--maps: expected a map of ideal, got forklifts"):
-        suite.chosen(["ideal"], ["forklifts"], quick=False)
+        suite.select_maps(["ideal"], ["forklifts"], quick=False)
 
 
 def test_quick_has_one_map_of_each_family() -> None:
-    for maps in suite.chosen([], [], quick=True).values():
+    for maps in suite.select_maps([], [], quick=True).values():
         assert [suite.FAMILY_OF[name] for name in maps] == list(suite.FAMILIES)
 
 
@@ -91,7 +91,7 @@ def test_the_oracle_assigns_as_brute_force_does() -> None:
     for _ in range(5):
         places, goals = rng.uniform((0.2, 0.2), (3.8, 2.8), (2, 4, 2)) * 1.0
         far = planner.paths.compute_distances(*(np.clip(each, 0.2, (1.8, 2.8)) for each in (places, goals)))
-        found = assigned(planner, *(np.clip(each, 0.2, (1.8, 2.8)) for each in (places, goals)))
+        found = assign_goals(planner, *(np.clip(each, 0.2, (1.8, 2.8)) for each in (places, goals)))
         best = min(itertools.permutations(range(4)), key=lambda order: (far[range(4), order] ** 2).sum())
         assert found.tolist() == list(best)
 
@@ -105,5 +105,5 @@ def test_the_oracle_walks_round_walls_and_heeds_who_has_failed() -> None:
     middle = record.positions[int(8.9 * 60)]
     assert min(np.abs(middle - goals).max(), np.abs(middle[::-1] - goals).max()) < 0.05
     assert np.abs(record.positions[-1] - [goals[1], (0.5, 0.5)]).max() < 0.05
-    with pytest.raises(ParameterError, match="the map does not tell the best placement"):
+    with pytest.raises(ParameterError, match="expected a map with the best placement"):
         Simulation(WALLED, Oracle(), starts, Team.homogeneous(2))

@@ -9,7 +9,7 @@ import pytest
 
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.ratings import Rating
-from robocov_app.benchmark.running import ENTRIES, read_result
+from robocov_app.benchmark.results import ENTRIES, read_result
 
 PAGE = Path(__file__).parents[3] / "app/handbook/controllers.md"
 
@@ -25,19 +25,19 @@ def line(law: str, track: str) -> str:
         medians[name] = np.median(gaps)
     above = sum(median > 0.05 for median in medians.values())
     touched = sum(row["contacts"] > 0 for row in rows)
-    gap, way = 100.0 * rating.gap.estimate, rating.median("path_length_m")
+    gap, way = 100.0 * rating.gap.estimate, rating.compute_median("path_length_m")
     cells = f"{gap:.1f}", f"{above} of {len(medians)}", f"{touched} of {len(rows)}"
-    rest = 100.0 * rating.at_rest()[0]
+    rest = 100.0 * rating.compute_rest()[0]
     return f"| `{law}` | {' | '.join(cells)} | {rest:.0f} | {way:.1f} |"
 
 
 RIVALS = ("rapf", "frontier-median", "greedy-submodular")
 ROWS = [
-    *((law, track) for track in suite.RATED for law in ("atlas", "atlas-shared")),
+    *((law, track) for track in suite.RATED_TRACKS for law in ("atlas", "atlas-shared")),
     *((law, track) for track in ("ideal", "short-range", "large-team") for law in RIVALS),
 ]
 
 
 @pytest.mark.parametrize(("law", "track"), ROWS)
 def test_rows_are_those_of_the_entries(law: str, track: str) -> None:
-    assert f"| {suite.heading(track)} {line(law, track)}\n" in PAGE.read_text(encoding="utf-8")
+    assert f"| {suite.format_heading(track)} {line(law, track)}\n" in PAGE.read_text(encoding="utf-8")

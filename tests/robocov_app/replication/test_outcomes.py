@@ -13,6 +13,7 @@ from tiny_paper import TINY
 from robocov.controllers import get_gain_values, make_controller
 from robocov.mapfile import load_map
 from robocov.metrics import CostHistory
+from robocov_app.evaluation.reference_search import ReferencePlacement
 from robocov_app.replication import results, studies
 from robocov_app.replication.contenders import LLOYD, RAPF_SHARED, RPF_SHARED, of_paper
 from robocov_app.replication.evidence import gains_text
@@ -25,12 +26,11 @@ from robocov_app.replication.outcomes import (
     read_gain_outcomes,
     read_outcomes,
 )
-from robocov_app.replication.references import Reference
 from robocov_app.replication.results import read_degradations
 from robocov_app.sweep.ledger import _check_sum
 from robocov_app.sweep.sweeping import sweep
 
-REFERENCES = {"blocks-a": Reference(1.5, ((1.0, 1.0),), 1.0)}
+REFERENCES = {"blocks-a": ReferencePlacement(1.5, ((1.0, 1.0),), 1.0)}
 SAME = of_paper("rapf-best", RAPF_SHARED.gains)
 CONTENDERS = (RAPF_SHARED, SAME, RPF_SHARED, LLOYD)
 

@@ -9,9 +9,10 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment, UniformStart
 from robocov.errors import OutputError
 from robocov.mapfile import to_json
+from robocov_app.evaluation.reference_search import ReferencePlacement, ReferenceQuery
 from robocov_app.replication import references
 from robocov_app.replication.plan import QUICK
-from robocov_app.replication.references import Question, Reference, find_references
+from robocov_app.replication.references import find_references
 from robocov_app.sweep.study import StudyMap
 from robocov_app.terminal.interruption import Interruption
 
@@ -58,10 +59,10 @@ def test_what_is_there_is_not_searched_for_again(tmp_path):
 def test_starts_are_no_part_of_the_question():
     def question(starts):
         shape = Environment(HALL.name, HALL.boundary, (), starts)
-        return Question(to_json(shape), 3, 0.1, 16, 2).digest
+        return ReferenceQuery(to_json(shape), 3, 0.1, 16, 2).digest
 
     assert question({"spread": UniformStart()}) == question({})
-    assert question({}) != Question(to_json(SQUARE), 3, 0.1, 16, 2).digest
+    assert question({}) != ReferenceQuery(to_json(SQUARE), 3, 0.1, 16, 2).digest
 
 
 @pytest.mark.slow
@@ -82,4 +83,4 @@ def test_whoever_stops_need_not_wait(tmp_path):
 
 
 def test_answers_are_values():
-    assert Reference(1.0, ((0.0, 1.0),), 0.5) == Reference(1.0, ((0.0, 1.0),), 0.5)
+    assert ReferencePlacement(1.0, ((0.0, 1.0),), 0.5) == ReferencePlacement(1.0, ((0.0, 1.0),), 0.5)

@@ -1,0 +1,323 @@
+"""Maps of the benchmark that resemble real places: homes, offices, yards, plants, traffic.
+
+Lengths are in meters. Coordinates are whole centimeters, which are the same on every processor.
+"""
+
+import itertools
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TypeAlias
+
+import numpy as np
+import shapely
+
+from robocov.arrays import Array
+from robocov.environment import (
+    CircleObstacle,
+    DiscStart,
+    Environment,
+    Obstacle,
+    ObstaclePath,
+    PolygonObstacle,
+    Ring,
+    WallObstacle,
+)
+from robocov.errors import MapError, ParameterError
+from robocov.mapfile import from_json, to_json
+
+FloorPlan: TypeAlias = tuple[Ring, list[Obstacle]]
+"""Boundary and obstacles of a map."""
+_SEED_ORDER = ("homes", "offices", "plants", "traffic", "yards")
+"""Position of each kind in the seeds. New kinds are appended: the seeds of the others depend on it."""
+_MAX_ATTEMPTS = 400
+_MIN_PASSAGE_M = 0.6
+_INNER_WALL_M = 0.12
+_START_RADIUS_M = 0.6
+_MIN_BLOCKED_FRACTION = 0.04
+_MIN_WALL_PIECE_M = 0.15
+
+
+def build_floor_plan(kind: str, seed: int) -> Environment:
+    """Build a random map of a kind.
+
+    Plans are drawn until one is in one piece, has no narrow passage, and is blocked sufficiently.
+
+    Parameters
+    ----------
+    kind : str
+        Name of a kind in `FLOOR_PLANS`.
+    seed : int
+
+    Returns
+    -------
+    Environment
+        The map, with a start named "entry" near its lower left corner.
+
+    Raises
+    ------
+    ParameterError
+        If no plan of this seed is suitable.
+    """
+    for attempt in range(_MAX_ATTEMPTS):
+        rng = np.random.default_rng([_SEED_ORDER.index(kind), seed, attempt])
+        boundary, obstacles = FLOOR_PLANS[kind](rng)
+        plan = Environment(f"{kind} {seed}", boundary, tuple(obstacles))
+        if not _is_connected(plan) or not _is_blocked_enough(plan):
+            continue
+        start = _find_entry(plan)
+        if start is None:
+            continue
+        document = to_json(Environment(plan.name, plan.boundary, plan.obstacles, {"entry": start}))
+        with suppress(MapError):
+            return from_json(document, plan.name)
+    raise ParameterError(
+        f"map {kind}-{seed}: no plan of {_MAX_ATTEMPTS} is in one piece; expected another seed"
+    )
+
+
+def _is_connected(plan: Environment) -> bool:
+    """Return whether the free space is in one piece, also without its narrow passages."""
+    wide_space = plan.free.buffer(-_MIN_PASSAGE_M / 2.0, quad_segs=16)
+    return len(plan.free.geoms) == 1 and isinstance(wide_space, shapely.Polygon)
+
+
+def _is_blocked_enough(plan: Environment) -> bool:
+    blocked_area = sum(obstacle.polygon.area for obstacle in plan.obstacles)
+    return bool(blocked_area >= _MIN_BLOCKED_FRACTION * plan.area)
+
+
+def _find_entry(plan: Environment) -> DiscStart | None:
+    """Return the start disc nearest to the lower left corner, None if there is no space for it."""
+    centers = plan.static.free.buffer(-_START_RADIUS_M - 0.01)
+    if centers.is_empty:
+        return None
+    lower_left = shapely.Point(plan.region.bounds[:2])
+    x, y = shapely.shortest_line(centers, lower_left).coords[0]
+    return DiscStart((round(x, 2), round(y, 2)), _START_RADIUS_M)
+
+
+def _round_points(points: Array | list[tuple[float, float]]) -> Ring:
+    return tuple((round(float(x), 2), round(float(y), 2)) for x, y in points)
+
+
+def _build_box(left: float, bottom: float, right: float, top: float) -> Ring:
+    return _round_points([(left, bottom), (right, bottom), (right, top), (left, top)])
+
+
+def _build_block(x: float, y: float, width: float, height: float) -> Obstacle:
+    return PolygonObstacle(_build_box(x, y, x + width, y + height))
+
+
+def _build_rotated_block(center: Array, width: float, height: float, angle: float) -> Obstacle:
+    corners = np.array([(-width, -height), (width, -height), (width, height), (-width, height)]) / 2.0
+    along = np.array([np.cos(angle), np.sin(angle)])
+    across = [-along[1], along[0]]
+    return PolygonObstacle(_round_points(center + corners @ np.array([along, across])))
+
+
+def _build_circle(center: Array, radius: float) -> Obstacle:
+    return CircleObstacle(_round_points(center[None])[0], round(radius, 2))
+
+
+def _build_wall_with_door(
+    offset: float, start: float, end: float, *, door: float, width: float, is_vertical: bool
+) -> list[Obstacle]:
+    """Return the two pieces of a wall next to its door. Short pieces are left out.
+
+    Parameters
+    ----------
+    offset : float
+        x of a vertical wall, y of a horizontal one.
+    start, end : float
+        Ends of the wall along its direction.
+    door, width : float
+        Middle and width of the door.
+    is_vertical : bool
+    """
+    walls: list[Obstacle] = []
+    for low, high in ((start, door - width / 2.0), (door + width / 2.0, end)):
+        if high - low <= _MIN_WALL_PIECE_M:
+            continue
+        ends = [(low, offset), (high, offset)]
+        if is_vertical:
+            ends = [(offset, low), (offset, high)]
+        walls.append(WallObstacle(_round_points(ends), _INNER_WALL_M))
+    return walls
+
+
+def _build_home(rng: np.random.Generator) -> FloorPlan:
+    """Draw a flat: a rectangle that is divided repeatedly, a door in each wall, some furniture."""
+    width = rng.uniform(10.0, 14.0)
+    height = rng.uniform(8.0, 11.0)
+    walls: list[Obstacle] = []
+    furniture: list[Obstacle] = []
+
+    def divide(left: float, bottom: float, right: float, top: float) -> None:
+        is_wide = right - left > top - bottom
+        low, high = (left, right) if is_wide else (bottom, top)
+        if high - low < rng.uniform(4.6, 6.4):
+            furnish(left, bottom, right, top)
+            return
+        split = low + (high - low) * rng.uniform(0.38, 0.62)
+        start, end = (bottom, top) if is_wide else (left, right)
+        door = rng.uniform(start + 0.8, end - 0.8)
+        door_width = rng.uniform(0.8, 1.1)
+        walls.extend(
+            _build_wall_with_door(split, start, end, door=door, width=door_width, is_vertical=is_wide)
+        )
+        if is_wide:
+            divide(left, bottom, split, top)
+            divide(split, bottom, right, top)
+        else:
+            divide(left, bottom, right, split)
+            divide(left, split, right, top)
+
+    def furnish(left: float, bottom: float, right: float, top: float) -> None:
+        """Place one piece of furniture in a corner of a room that is large enough."""
+        block_width = rng.uniform(0.5, 1.6)
+        block_depth = rng.uniform(0.4, 0.9)
+        if right - left > block_width + 2.2 and top - bottom > block_depth + 2.2:
+            x = left + 0.06 if rng.random() < 0.5 else right - 0.06 - block_width
+            y = bottom + 0.06 if rng.random() < 0.5 else top - 0.06 - block_depth
+            furniture.append(_build_block(x, y, block_width, block_depth))
+
+    divide(0.0, 0.0, width, height)
+    return _build_box(0.0, 0.0, width, height), [*walls, *furniture]
+
+
+def _build_office(rng: np.random.Generator) -> FloorPlan:
+    """Draw an office floor: offices on one side of a corridor, an open space with desks on the other."""
+    width = rng.uniform(16.0, 20.0)
+    height = rng.uniform(10.0, 12.0)
+    low = height * rng.uniform(0.48, 0.56)
+    high = low + rng.uniform(1.4, 1.9)
+    obstacles: list[Obstacle] = []
+    partitions = np.linspace(0.0, width, int(rng.integers(5, 8)))
+    partitions[1:-1] += rng.uniform(-0.4, 0.4, len(partitions) - 2)
+    for left, right in itertools.pairwise(partitions.tolist()):
+        door = rng.uniform(left + 0.7, right - 0.7)
+        obstacles += _build_wall_with_door(high, left, right, door=door, width=0.9, is_vertical=False)
+        if right < width:
+            obstacles.append(WallObstacle(_round_points([(right, high), (right, height)]), _INNER_WALL_M))
+        if rng.random() < 0.6:
+            obstacles.append(PolygonObstacle(_build_box(left + 0.06, height - 0.7, left + 1.2, height)))
+    left_door = width * rng.uniform(0.15, 0.35)
+    right_door = width * rng.uniform(0.65, 0.85)
+    middle = width / 2.0
+    obstacles += _build_wall_with_door(low, 0.0, middle, door=left_door, width=1.2, is_vertical=False)
+    obstacles += _build_wall_with_door(low, middle, width, door=right_door, width=1.2, is_vertical=False)
+    for x in np.arange(2.2, width - 2.5, rng.uniform(2.9, 3.6)):
+        for y in (1.3, low - 1.9):
+            if rng.random() < 0.85:
+                obstacles.append(_build_block(x, y, 1.6, 0.8))
+    return _build_box(0.0, 0.0, width, height), obstacles
+
+
+def _remove_near_shapes(shapes: list[Obstacle], gap: float) -> list[Obstacle]:
+    """Return shapes that are at least a gap apart: of two that are nearer, the first stays."""
+    spaced: list[Obstacle] = []
+    for shape in shapes:
+        if all(shape.polygon.distance(other.polygon) >= gap for other in spaced):
+            spaced.append(shape)
+    return spaced
+
+
+def _build_yard(rng: np.random.Generator) -> FloorPlan:
+    """Draw a park: a convex piece of land with houses, a pond, hedges and trees."""
+    angle = np.sort((np.arange(7) + rng.uniform(-0.25, 0.25, 7)) * 2.0 * np.pi / 7.0)
+    corners = np.column_stack([10.0 + 9.0 * np.cos(angle), 8.0 + 7.5 * np.sin(angle)])
+    hull = shapely.orient_polygons(shapely.convex_hull(shapely.MultiPoint(corners)))
+    boundary = _round_points(np.asarray(hull.exterior.coords)[:-1])
+
+    builders = [_build_house] * 5 + [_build_pond] + [_build_hedge] * 6 + [_build_tree] * 14
+    shapes = [build(rng) for build in builders]
+    land = shapely.Polygon(boundary)
+    inside = [shape for shape in shapes if land.contains(shape.polygon)]
+    clear = [shape for shape in inside if land.exterior.distance(shape.polygon) > 0.7]
+    return boundary, _remove_near_shapes(clear, 0.7)
+
+
+def _draw_yard_point(rng: np.random.Generator) -> Array:
+    return np.array([rng.uniform(3.0, 17.0), rng.uniform(2.5, 13.5)])
+
+
+def _build_house(rng: np.random.Generator) -> Obstacle:
+    center = _draw_yard_point(rng)
+    width = rng.uniform(2.0, 3.6)
+    depth = rng.uniform(1.6, 2.6)
+    return _build_rotated_block(center, width, depth, rng.uniform(0.0, np.pi))
+
+
+def _build_pond(rng: np.random.Generator) -> Obstacle:
+    angles = np.linspace(0.0, 2.0 * np.pi, 14, endpoint=False)
+    radius = rng.uniform(0.9, 1.5) * (1.0 + 0.2 * np.sin(2.0 * angles + rng.uniform(0.0, 6.0)))
+    shore = radius[:, None] * np.column_stack([1.4 * np.cos(angles), np.sin(angles)])
+    return PolygonObstacle(_round_points(_draw_yard_point(rng) + shore))
+
+
+def _build_hedge(rng: np.random.Generator) -> Obstacle:
+    start = _draw_yard_point(rng)
+    angle = rng.uniform(0.0, np.pi)
+    along = np.array((np.cos(angle), np.sin(angle)))
+    across = np.array((-np.sin(angle), np.cos(angle)))
+    corner = np.array([0.0 * along, along, along + across])
+    return WallObstacle(_round_points(start + rng.uniform(1.4, 2.4) * corner), 0.3)
+
+
+def _build_tree(rng: np.random.Generator) -> Obstacle:
+    center = _draw_yard_point(rng)
+    return _build_circle(center, rng.uniform(0.2, 0.45))
+
+
+def _build_plant(rng: np.random.Generator) -> FloorPlan:
+    """Draw a factory hall: rows of racks, machines, a partition with a gate, columns."""
+    width = rng.uniform(15.0, 19.0)
+    height = rng.uniform(10.0, 13.0)
+    split = width * rng.uniform(0.48, 0.58)
+    gate = rng.uniform(2.0, height - 2.0)
+    gate_width = rng.uniform(1.4, 2.2)
+    obstacles = _build_wall_with_door(split, 0.0, height, door=gate, width=gate_width, is_vertical=True)
+    for y in np.arange(2.0, height - 1.4, rng.uniform(1.9, 2.4)):
+        left = rng.uniform(1.2, 2.2)
+        right = split - rng.uniform(1.2, 1.8)
+        obstacles.append(PolygonObstacle(_build_box(left, y, right, y + 0.7)))
+    shapes: list[Obstacle] = []
+    for number in range(30):
+        center = np.array([rng.uniform(split + 1.6, width - 1.4), rng.uniform(1.4, height - 1.4)])
+        if number % 3 == 2:
+            shapes.append(_build_circle(center, rng.uniform(0.2, 0.7)))
+            continue
+        block_width = rng.uniform(0.8, 2.0)
+        block_depth = rng.uniform(0.6, 1.2)
+        shapes.append(_build_rotated_block(center, block_width, block_depth, rng.choice([0.0, 0.6, 1.2])))
+    machines = _remove_near_shapes(shapes, 0.9)[:7]
+    return _build_box(0.0, 0.0, width, height), [*obstacles, *machines]
+
+
+def _build_traffic(rng: np.random.Generator) -> FloorPlan:
+    """Draw a hall with shelves, and two or three vehicles that drive back and forth in its aisles."""
+    width = 16.0
+    height = 11.0
+    obstacles: list[Obstacle] = []
+    left = rng.uniform(4.2, 5.0)
+    right = width - rng.uniform(2.2, 3.0)
+    for y in (3.0, 7.2):
+        middle = rng.uniform(8.2, 9.8)
+        for start, end in ((left, middle - 0.8), (middle + 0.8, right)):
+            obstacles.append(PolygonObstacle(_build_box(start, y, end, y + rng.uniform(0.8, 1.3))))
+    vehicles = int(rng.integers(2, 4))
+    for y in (5.7, 9.6, 1.5)[:vehicles]:
+        ends = _round_points([(rng.uniform(4.0, 5.0), y), (rng.uniform(11.5, 14.0), y)])
+        path = ObstaclePath(ends, round(rng.uniform(0.2, 0.4), 2), "back-and-forth")
+        obstacles.append(CircleObstacle(ends[0], round(rng.uniform(0.3, 0.45), 2), path=path))
+    return _build_box(0.0, 0.0, width, height), obstacles
+
+
+FLOOR_PLANS: dict[str, Callable[[np.random.Generator], FloorPlan]] = {
+    "homes": _build_home,
+    "offices": _build_office,
+    "yards": _build_yard,
+    "plants": _build_plant,
+    "traffic": _build_traffic,
+}
+"""Functions that draw a plan, by the name of its kind."""

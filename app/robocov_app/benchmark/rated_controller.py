@@ -1,0 +1,147 @@
+"""The controller that the benchmark rates, and the runs that are selected for it."""
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robocov.controllers import get_information, make_controller
+from robocov.controllers.gains import Value
+from robocov.environment import Environment
+from robocov.errors import ParameterError
+from robocov_app.benchmark import suite
+from robocov_app.benchmark.results import find_reference
+from robocov_app.sweep.study import Study, StudyMap
+
+ORACLE = "oracle"
+"""Name of the controller that knows the reference placements, see `robocov_app.benchmark.oracle`."""
+_ORACLE_FILE = "oracle.py"
+_ORACLE_NAME = f"{_ORACLE_FILE}:Oracle"
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Selection of runs of the suite.
+
+    Parameters
+    ----------
+    quick : bool
+        Use two tracks only, with the first map of each family and the first seed.
+    tracks, maps : tuple of str
+        Names of tracks and maps. If empty, all of them are used.
+    """
+
+    quick: bool = False
+    tracks: tuple[str, ...] = ()
+    maps: tuple[str, ...] = ()
+
+    def list_runs(self) -> Iterator[tuple[str, tuple[str, ...], tuple[int, ...]]]:
+        """Yield each selected track with its maps and seeds.
+
+        Raises
+        ------
+        ParameterError
+            If a track or map is unknown.
+        """
+        for track, maps in suite.select_maps(self.tracks, self.maps, quick=self.quick).items():
+            seeds = suite.TRACKS[track].seeds
+            if self.quick:
+                seeds = seeds[:1]
+            yield track, maps, seeds
+
+
+@dataclass(frozen=True)
+class RatedController:
+    """A controller that is rated.
+
+    Parameters
+    ----------
+    controller : str
+        Name of a controller, ``FILE.py:CLASS``, or "oracle".
+    gains : Mapping
+        Gains that differ from the defaults.
+    """
+
+    controller: str
+    gains: Mapping[str, Value]
+
+    def build_studies(self, selection: Selection) -> Iterator[tuple[str, Study]]:
+        """Yield each selected track with the sweep of its runs.
+
+        Raises
+        ------
+        ParameterError
+            If the controller, one of its gains, a track or a map is unknown or invalid.
+        InputError
+            If a map of the suite has changed.
+        """
+        is_oracle = self.controller == ORACLE
+        name = self.controller
+        folder = Path()
+        if is_oracle:
+            name = _ORACLE_NAME
+            folder = Path(__file__).parent
+        # Check the controller first: building the maps takes seconds.
+        try:
+            make_controller(str(folder / name) if is_oracle else name, dict(self.gains))
+        except ParameterError as error:
+            raise ParameterError(f"--controller: {error}") from None
+        gains = {name: dict(self.gains)} if self.gains else {}
+        for track, names, seeds in selection.list_runs():
+            maps = []
+            for map_name in names:
+                environment = suite.load_suite_map(map_name)
+                if is_oracle:
+                    environment = _add_placements(environment, track, map_name)
+                maps.append(StudyMap(map_name, environment))
+            yield (
+                track,
+                suite.build_study(track, maps, name, gains=gains, seeds=seeds, folder=folder),
+            )
+
+    def describe(self, study: Study) -> dict[str, Any]:
+        """Describe the controller for a result.
+
+        Parameters
+        ----------
+        study : Study
+            One of the sweeps of the controller.
+
+        Returns
+        -------
+        dict
+            Name, label, information, all gains, the gains that were set, and for a controller in a file the
+            SHA-256 of its source code.
+        """
+        name = study.controllers[0]
+        controller_class = study.kind(name)
+        source = study.sources.get(name)
+        source_hash = None
+        if source is not None:
+            texts = [source.text, *(module.text for module in source.modules.values())]
+            source_hash = hashlib.sha256("\0".join(texts).encode()).hexdigest()
+        return {
+            "controller": self.controller.rpartition("/")[2],
+            "label": getattr(controller_class, "label", controller_class.__name__),
+            "information": get_information(controller_class),
+            "gains": dict(study.gains_of(name).choices[0]),
+            "set": dict(self.gains),
+            "source_sha256": source_hash,
+        }
+
+
+def _add_placements(environment: Environment, track_name: str, map_name: str) -> Environment:
+    """Return a map with the reference placements for the oracle, a new one after each failure of a robot."""
+    track = suite.TRACKS[track_name]
+    working = list(range(track.robots))
+    stages = []
+    time = 0.0
+    for failed_robot, failure_time in (*track.failures, (-1, np.inf)):
+        positions = find_reference(map_name, len(working))["positions_m"]
+        stages.append([time, working, positions])
+        working = [robot for robot in working if robot != failed_robot]
+        time = failure_time
+    return replace(environment, extra={**environment.extra, "oracle": stages})

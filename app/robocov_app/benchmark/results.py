@@ -1,0 +1,240 @@
+"""Results of the benchmark: their rows, gaps and files."""
+
+import gzip
+import hashlib
+import json
+import zlib
+from collections.abc import Mapping, Sequence
+from operator import itemgetter
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from robocov.errors import InputError, quote
+from robocov.files.strictjson import parse_json, read_bytes
+from robocov_app.benchmark import suite
+from robocov_app.sweep.ledger import Entry
+from robocov_app.sweep.study import Task
+from robocov_app.sweep.worker import Outcome
+
+RESULT_FILE = "result.json"
+ENTRIES = Path(__file__).parent / "entries"
+"""Folder of the results of the built-in controllers, compressed by ``gzip -9 -n``."""
+RESULT_FORMAT = {"format": "robocov-benchmark", "version": 1}
+FIGURES = (
+    "mean_distance_m",
+    "mean_distance_over_run_m",
+    "uncovered_area_m2",
+    "near_final_s",
+    "settled_at_s",
+    "path_length_m",
+    "work_J",
+    "contacts",
+    "min_clearance_m",
+    "stuck_robots",
+)
+"""Figures of a run that a row contains, in addition to its effort and its gap."""
+_SAME_AREA_M2 = 1e-6
+"""Maximum difference between uncovered areas of the same free space."""
+Row: TypeAlias = dict[str, Any]
+"""One run of a result: its track, map and seed, and its figures or its error."""
+
+
+def find_reference(map_name: str, robots: int) -> Mapping[str, Any]:
+    """Return the reference placement for a map of the suite.
+
+    Parameters
+    ----------
+    map_name : str
+    robots : int
+        Size of the team.
+
+    Returns
+    -------
+    Mapping
+        The entry of the suite's file, with ``positions_m``, ``mean_distance_m`` and ``lower_bound_m``.
+
+    Raises
+    ------
+    InputError
+        If the file has no such reference.
+    """
+    references = suite.load_frozen_maps().get(map_name, {}).get("references", {})
+    reference = references.get(str(robots))
+    if reference is None:
+        raise InputError(
+            f"map {map_name}: no reference for a team of {robots}; "
+            "`robocov benchmark references` makes those that are missing"
+        )
+    return dict(reference)
+
+
+def build_row(track: str, task: Task, run: Entry | Outcome, effort: bytes) -> Row:
+    """Build the row of a run.
+
+    Parameters
+    ----------
+    track : str
+    task : Task
+    run : Entry or Outcome
+        The figures of the run, or its error.
+    effort : bytes
+        Content of its ``effort.json``.
+
+    Returns
+    -------
+    dict
+    """
+    head: Row = {"track": track, "map": task.map, "seed": task.seed}
+    if run.error is not None:
+        return {**head, "error": run.error}
+    figures = {name: run.figures[name] for name in FIGURES}
+    return {**head, **figures, **json.loads(effort), **compute_gaps(track, task.map, figures)}
+
+
+def compute_gaps(track: str, map_name: str, figures: Mapping[str, Any]) -> dict[str, float | None]:
+    """Compute the gaps of a run to the reference placement and to the certified lower bound.
+
+    Parameters
+    ----------
+    track, map_name : str
+    figures : Mapping
+        Figures of the run.
+
+    Returns
+    -------
+    dict
+        ``gap``: J / J_ref - 1, and ``gap_to_bound``: the same with the bound in place of J_ref. Both are
+        None if the team covered another area than that of the reference. ``gap_to_bound`` is also None if
+        there is no bound.
+    """
+    reference = find_reference(map_name, suite.TRACKS[track].survivors)
+    if abs(figures["uncovered_area_m2"] - reference["uncovered_area_m2"]) > _SAME_AREA_M2:
+        return {"gap": None, "gap_to_bound": None}
+    cost = figures["mean_distance_m"]
+    bound = reference["lower_bound_m"]
+    gap_to_bound = cost / bound - 1.0 if bound else None
+    return {"gap": cost / reference["mean_distance_m"] - 1.0, "gap_to_bound": gap_to_bound}
+
+
+def identify_suite() -> dict[str, str]:
+    """Return the version of the suite, and a SHA-256 of its maps and reference costs.
+
+    The lower bounds are not part of the hash: results do not depend on them.
+    """
+    costs = {}
+    for name, entry in suite.load_frozen_maps().items():
+        by_size = {size: reference["mean_distance_m"] for size, reference in entry["references"].items()}
+        costs[name] = [entry["sha256"], by_size]
+    digest = hashlib.sha256(json.dumps(costs, sort_keys=True).encode()).hexdigest()
+    return {"version": suite.VERSION, "sha256": digest}
+
+
+def describe_method() -> list[str]:
+    """Return the method of the benchmark, and what its figures mean, in sentences."""
+    return [
+        f"Maps, starts, seeds and tracks are those of suite {suite.VERSION}, whose maps have hashes.",
+        f"J is the mean geodesic distance to the nearest robot on {suite.LATTICE} x {suite.LATTICE} sites, "
+        "weighed by the density of a map, with obstacles where they are at that moment and robots that work.",
+        "The gap is J / J_ref - 1 at the end; J_ref is the lowest of 24 searches for the best placement with "
+        "the whole map known, for as many robots as work at the end. It is an upper bound of the optimum.",
+        "near_final_s: from when on J stays within 5 % of its end. settled_at_s: from when on no robot gets "
+        "5 cm in any 4 s. path_length_m: mean over robots. work_J: integral of |F v|, all robots.",
+        "told_bytes: 20 bytes (position and number) a robot and control period, or message; where maps are "
+        "shared also 5 bytes for each cell that has changed on its map, whoever it knows it from, and by "
+        "atlas-shared 28 bytes (number, position, time) for each other robot that it knows of, at each plan.",
+        "deciding_s: processor time of the control law alone, all robots; it depends on the machine.",
+    ]
+
+
+def read_result(path: Path) -> dict[str, Any]:
+    """Read a result of the benchmark.
+
+    Parameters
+    ----------
+    path : Path
+        A file, which may be compressed (``.gz``), or a folder that contains ``result.json``.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    InputError
+        If the file is missing or damaged, no result of the benchmark, or one of another suite.
+    """
+    path = path / RESULT_FILE if path.is_dir() else path
+    data = read_bytes(path)
+    if path.suffix == ".gz":
+        try:
+            data = gzip.decompress(data)
+        except (OSError, EOFError, zlib.error) as error:
+            raise InputError(f"{path}: cannot be unpacked: {error}") from None
+    result = parse_json(data, str(path))
+    if not isinstance(result, dict) or {name: result.get(name) for name in RESULT_FORMAT} != RESULT_FORMAT:
+        raise InputError(f"{path}: expected a result of robocov benchmark")
+    if result.get("suite") != identify_suite():
+        raise InputError(
+            f"{path}: suite: expected that of {suite.SUITE_FILE.name} here, got {result.get('suite')}"
+        )
+    _check_head(result, path)
+    for k, row in enumerate(result["rows"]):
+        _check_row(row, f"{path}: rows[{k}]")
+    return result
+
+
+_HEAD_TYPES = {"entry": dict, "selection": dict, "versions": dict, "rows": list, "method": list}
+_ENTRY_TYPES = {
+    "controller": str,
+    "label": str,
+    "information": str,
+    "gains": dict,
+    "set": dict,
+    "source_sha256": str | None,
+}
+_SELECTION_TYPES = {"quick": bool, "tracks": list, "maps": list}
+_RUN_TYPES = {"track": str, "map": str, "seed": int}
+_FAILED_ROW_TYPES = {**_RUN_TYPES, "error": str}
+_ROW_TYPES = {
+    **_RUN_TYPES,
+    **dict.fromkeys((*FIGURES, "gap", "gap_to_bound", "told_bytes", "deciding_s"), int | float | None),
+}
+
+
+def _check_head(result: dict[str, Any], path: Path) -> None:
+    _require_types(result, _HEAD_TYPES, path)
+    _require_types(result["entry"], _ENTRY_TYPES, f"{path}: entry")
+    _require_types(result["selection"], _SELECTION_TYPES, f"{path}: selection")
+
+
+def _check_row(row: Any, place: str) -> None:
+    has_failed = isinstance(row, dict) and "error" in row
+    _require_types(row, _FAILED_ROW_TYPES if has_failed else _ROW_TYPES, place)
+    if row["track"] not in suite.TRACKS or row["map"] not in suite.FAMILY_OF:
+        raise InputError(f"{place}: {row['track']} on {row['map']} is no run of the suite")
+
+
+def _require_types(values: Any, types: Mapping[str, Any], place: object) -> None:
+    for name, expected in types.items():
+        if not isinstance(values, dict) or name not in values:
+            raise InputError(f"{place}: {name}: missing, expected a whole result")
+        if not isinstance(values[name], expected):
+            raise InputError(f"{place}: {name}: expected another kind of value, got {quote(values[name])}")
+
+
+def load_bundled_results(others: Sequence[Mapping[str, Any]] = ()) -> list[dict[str, Any]]:
+    """Return the results of the built-in controllers, without those that other results replace.
+
+    Parameters
+    ----------
+    others : sequence of Mapping
+        Results. A built-in result of the same controller, gains and source is left out.
+
+    Returns
+    -------
+    list of dict
+    """
+    identify = itemgetter("controller", "set", "source_sha256")
+    replaced = [identify(result["entry"]) for result in others]
+    bundled = [read_result(path) for path in sorted(ENTRIES.glob("*.json.gz"))]
+    return [result for result in bundled if identify(result["entry"]) not in replaced]

@@ -1,0 +1,1 @@
+"""Shared inputs of the benchmark and of the paper's replication: reference placements, random densities."""

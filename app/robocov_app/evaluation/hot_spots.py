@@ -1,0 +1,38 @@
+"""Random densities: two Gaussian peaks in the free space of a map."""
+
+from dataclasses import replace
+
+from robocov.density import Gaussian, Gaussians
+from robocov.environment import Environment, UniformStart
+
+HOT_SPOTS = 2
+"""Number of peaks on a map."""
+PEAK_WEIGHT = 20.0
+"""Weight of a peak, relative to the floor of 1."""
+PEAK_SIGMA_M = 1.0
+_FLOOR = 1.0
+_CLEARANCE_M = 0.3
+
+
+def add_hot_spots(environment: Environment, seed: int) -> Environment:
+    """Return a copy of a map with a random density of Gaussian peaks over a constant floor.
+
+    Parameters
+    ----------
+    environment : Environment
+    seed : int
+        Seed of the centers of the peaks, which are drawn uniformly in the free space.
+
+    Returns
+    -------
+    Environment
+        The map with its new density. Everything else is unchanged.
+    """
+    start = replace(environment, starts={"uniform": UniformStart()}).start("uniform")
+    centers = start.sample(HOT_SPOTS, seed=seed, radius=_CLEARANCE_M).tolist()
+    peaks = []
+    for x, y in centers:
+        # Whole centimeters are the same on every processor.
+        center = (round(x, 2), round(y, 2))
+        peaks.append(Gaussian(center, weight=PEAK_WEIGHT, sigma=PEAK_SIGMA_M))
+    return replace(environment, density=Gaussians(tuple(peaks), floor=_FLOOR))

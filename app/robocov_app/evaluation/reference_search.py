@@ -1,0 +1,159 @@
+"""Searches for the best placement on a map, in processes of their own.
+
+A reference placement is the best of many descents with the whole map known. Its mean distance J_ref is what
+the gap J / J_ref - 1 of a controller is measured by.
+"""
+
+import hashlib
+import json
+import subprocess
+import threading
+from collections.abc import Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from robocov.errors import OutputError
+from robocov.mapfile import from_json
+from robocov_app.terminal.interruption import Interruption
+from robocov_app.toolkit import worker
+
+REFERENCE_FORMAT = "robocov-reference 1"
+"""Part of every digest. Change it whenever the search gives other results."""
+_POLL_INTERVAL_S = 0.2
+"""Time between two checks for an interruption."""
+
+
+@dataclass(frozen=True)
+class ReferenceQuery:
+    """Inputs of a search for a reference placement.
+
+    Parameters
+    ----------
+    document : Mapping
+        The map as JSON.
+    robots : int
+    radius : float
+        Radius of a robot, m.
+    lattice : int
+        Sites along a side of the lattice on which the cost is computed.
+    restarts : int
+        Number of descents, of which the best counts.
+    seed : int
+    """
+
+    document: Mapping[str, Any]
+    robots: int
+    radius: float
+    lattice: int
+    restarts: int
+    seed: int = 0
+
+    @property
+    def digest(self) -> str:
+        """Hash of all inputs. The starts of the map are ignored: the placement does not depend on them."""
+        inputs = {**asdict(self), "document": {**self.document, "starts": None}}
+        text = f"{REFERENCE_FORMAT}{json.dumps(inputs, sort_keys=True)}"
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class ReferencePlacement:
+    """The best placement that was found with the whole map known.
+
+    Parameters
+    ----------
+    mean_distance : float
+        Its coverage cost, m.
+    positions : tuple of (x, y)
+        One position for each robot, m.
+    agreement : float
+        Fraction of the restarts whose cost is within 0.5 % of the best.
+    """
+
+    mean_distance: float
+    positions: tuple[tuple[float, float], ...]
+    agreement: float
+
+
+class ReferenceSearch:
+    """Worker service that answers a `ReferenceQuery` with a `ReferencePlacement`."""
+
+    failing = "the search failed"
+
+    def __call__(self, questions: list[ReferenceQuery], line: worker.Line) -> ReferencePlacement:
+        """Return the best placement for the last query."""
+        from robocov.optimum import find_optimum
+
+        query = questions[-1]
+        best = find_optimum(
+            from_json(dict(query.document)),
+            query.robots,
+            radius=query.radius,
+            lattice=query.lattice,
+            restarts=query.restarts,
+            seed=query.seed,
+        )
+        positions = tuple((x, y) for x, y in best.positions.tolist())
+        return ReferencePlacement(float(best.mean_distance), positions, float(best.compute_agreement()))
+
+
+def answer_queries(
+    queries: Mapping[str, Any],
+    workers: int,
+    stop: Interruption,
+    service: str = f"{__name__}:ReferenceSearch",
+) -> Iterator[tuple[str, Any]]:
+    """Yield the answers of a worker service as they arrive, until all are there or `stop` is requested.
+
+    Parameters
+    ----------
+    queries : Mapping
+        The queries by name.
+    workers : int
+        Maximum number of processes.
+    stop : Interruption
+        When it is requested, running searches are ended and their answers are lost.
+    service : str
+        The service as ``package.module:Class``.
+
+    Yields
+    ------
+    tuple of str and Any
+        Name of a query, and its answer.
+
+    Raises
+    ------
+    OutputError
+        If a search fails or its process ends.
+    """
+    processes: list[subprocess.Popen[bytes]] = []
+    thread_state = threading.local()
+
+    def start_process() -> None:
+        thread_state.process = worker.started(service)
+        processes.append(thread_state.process)
+
+    def answer_query(name: str) -> tuple[str, Any]:
+        reply = worker.asked(thread_state.process, queries[name])
+        if reply is None:
+            raise OutputError(f"references: the process that searched for that of {name} has ended")
+        if reply.answer is None:
+            raise OutputError(f"reference of map {name!r}: {reply.trouble}")
+        return name, reply.answer
+
+    pool = ThreadPoolExecutor(min(workers, len(queries)), initializer=start_process)
+    try:
+        pending = {pool.submit(answer_query, name) for name in queries}
+        while pending and not stop.requested:
+            done, pending = wait(pending, timeout=_POLL_INTERVAL_S, return_when=FIRST_COMPLETED)
+            for future in done:
+                yield future.result()
+    finally:
+        # A search takes seconds or minutes. After an interruption nobody should have to wait for it.
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.kill()
+        pool.shutdown()
+        for process in processes:
+            worker.ended(process)
