@@ -42,7 +42,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         elif (body := child.child("body")) is not None:
             position = body.numbers("position", count=3, default="0,0,0")
             _place(child, position, body.numbers("orientation", count=3, default="0,0,0"), shapes)
-    return shapes.foreign_map(path.stem, "An arena of ARGoS, imported.", solid=True, world=world)
+    return shapes.build_foreign_map(path.stem, "An arena of ARGoS, imported.", solid=True, world=world)
 
 
 def _distribute(element: Element, shapes: Shapes) -> None:
@@ -78,7 +78,7 @@ def _place(element: Element, position: Array, turn: Array, shapes: Shapes) -> No
     """Add a body at a position, m, turned about z, y, x, degrees."""
     tag = element.tag
     labels = [element.attributes.get("id", tag), tag]
-    if not shapes.wants(labels):
+    if not shapes.accept(labels):
         return
     if tag not in ("box", "cylinder"):
         shapes.robots.append((float(position[0]), float(position[1])))

@@ -2,7 +2,7 @@
 
 Closed outlines (polylines, circles, ellipses, closed splines, filled quadrilaterals) are solid, but for the
 boundary; lines, arcs and open polylines are walls as wide as they are drawn, or as the option ``thickness``.
-Names are those of layers and blocks: see `Shapes.foreign_map`. Blocks are carried out wherever they are
+Names are those of layers and blocks: see `Shapes.build_foreign_map`. Blocks are carried out wherever they are
 inserted. Layers that are off or frozen, texts, dimensions and what has a third dimension are left out; so are
 hatches without the option ``hatches``. Curves become lines that stay within a millimetre. The option
 ``scale`` overrules the unit of the header; one of them is needed.
@@ -167,7 +167,7 @@ class DxfDrawing:
                 self._draw(single.virtual_entities(), layer, (*blocks, str(entity.dxf.name)))
         elif kind == "MLINE":
             self._draw(entity.virtual_entities(), layer, blocks)
-        elif not shapes.wants(labels):
+        elif not shapes.accept(labels):
             return
         elif kind == "POINT":
             shapes.add_point(self._metres([entity.dxf.location])[0], at=at)
@@ -196,7 +196,7 @@ class DxfDrawing:
     def _metres(self, points: Sequence[Any]) -> Array:
         """Return points of the drawing as (k, 2) m; third coordinates are told of."""
         heights = np.array([point[2] if len(point) > 2 else 0.0 for point in points])
-        self.shapes.leave_heights(heights[heights != 0.0])
+        self.shapes.tally.add_heights(heights[heights != 0.0])
         return flat(points) * self.scale
 
     def _require_near(self, points: Array) -> None:
@@ -291,7 +291,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     DxfDrawing(document, shapes, scale).draw()
     shapes.join_lines()
     files.require_shapes(len(shapes.lines) + len(shapes.outlines), where)
-    return shapes.foreign_map(files.name_of_map(path), "Imported from DXF.", solid=True)
+    return shapes.build_foreign_map(files.name_of_map(path), "Imported from DXF.", solid=True)
 
 
 def _document(path: Path, where: str) -> Any:

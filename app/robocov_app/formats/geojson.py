@@ -1,6 +1,6 @@
 """GeoJSON (RFC 7946), in degrees or metres.
 
-What polygons and lines are is found out as in `Shapes.foreign_map`; the properties ``name``, ``kind`` and
+Polygons and lines are interpreted as in `Shapes.build_foreign_map`; the properties ``name``, ``kind`` and
 ``id`` of a feature name its shapes. Coordinates are longitude and latitude (RFC 7946, section 4) and are
 projected to metres, if that makes a map of at most 10 km; else they are metres. The member ``crs`` of the
 older standard is obeyed, as is a member ``units`` (``metres`` or ``degrees``), which `robocov export` writes;
@@ -72,7 +72,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     named, text = document.get("name"), document.get("description")
     name = to_one_line(named if isinstance(named, str) and named.strip() else path.stem)[:80]
     text = to_one_line(text)[:1000] if isinstance(text, str) else "Imported from GeoJSON."
-    return shapes.foreign_map(name or "map", text, solid=False)
+    return shapes.build_foreign_map(name or "map", text, solid=False)
 
 
 def _as_list(content: bytes, suffix: str) -> bytes | None:
@@ -204,10 +204,10 @@ class FigureCollector:
             raise self.file.refused(at, value, "a list of rings")
         else:
             rings = [self._points(ring, (*at, k), 1) for k, ring in enumerate(value)]
-            self.figures.append(self.shapes.polygon(rings, labels, format_path(at), whole))
+            self.figures.append(self.shapes.build_polygon(rings, labels, format_path(at), whole))
 
     def _points(self, value: Any, at: Steps, least: int) -> Array:
-        return self.shapes.flat(self.file.positions(value, at, least, 2, 4))
+        return self.shapes.drop_heights(self.file.positions(value, at, least, 2, 4))
 
     def _see_system(self, holder: dict[str, Any], at: Steps) -> None:
         """Keep the reference system that an object names, as GeoJSON did before RFC 7946."""

@@ -13,7 +13,8 @@ from robocov.errors import MapError, format_count, to_one_line
 from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.files import JsonFile
-from robocov_app.formats.geometry.polygons import CrossingCounter, find_enclosed_area
+from robocov_app.formats.geometry.crossings import CrossingCounter
+from robocov_app.formats.geometry.enclosed_area import find_enclosed_area
 
 _MIN_HOLE = 1e-4  # holes smaller than this, in m², come of rounding
 
@@ -37,7 +38,8 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     repeated = len(vertices) - len(ring)
     if len(ring) < 3:
         raise MapError(f"{file.where}: verts: expected at least 3 different points, got {len(ring)}")
-    area, reason, _ = find_enclosed_area([ring], crossings=CrossingCounter(file.where))
+    enclosed = find_enclosed_area([ring], crossings=CrossingCounter(file.where))
+    area, reason = enclosed.area, enclosed.invalidity
     if area.is_empty:
         raise MapError(f"{file.where}: verts: expected an outline with an area, got 0 m²")
     repaired = [f"{repeated} repeated vertices taken out"] if repeated else []

@@ -19,7 +19,9 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array
 from robocov.errors import MapError, ParameterError, format_count, quote
 from robocov_app.formats.base import ForeignMap
-from robocov_app.formats.geometry.polygons import CrossingCounter, find_enclosed_area, to_multipolygon, unite
+from robocov_app.formats.geometry.crossings import CrossingCounter
+from robocov_app.formats.geometry.enclosed_area import find_enclosed_area
+from robocov_app.formats.geometry.polygons import to_multipolygon, unite
 from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry, WallLine
 from robocov_app.formats.geometry.snapping import close_gaps, compute_default_snap
 
@@ -94,7 +96,7 @@ def build_floor(shapes: Shapes, figures: Sequence[IndoorFigure], name: str, text
     MapError
         When there is no space with an area, or there are too many shapes.
     """
-    wanted = [each for each in figures if shapes.wants(each.figure.labels)]
+    wanted = [each for each in figures if shapes.accept(each.figure.labels)]
     openings = [each.figure for each in wanted if each.role == "opening"]
     spaces: list[MultiPolygon] = []
     outlines: list[BaseGeometry] = []
@@ -128,17 +130,16 @@ def build_floor(shapes: Shapes, figures: Sequence[IndoorFigure], name: str, text
     shapes.join_lines()
     _add_obstacles(shapes, wanted, floor)
     shapes.notes.append(f"{format_count(len(spaces), 'space')}, {format_count(len(openings), 'opening')}")
-    foreign = shapes.foreign_map(name, text, solid=True, world=floor)
+    foreign = shapes.build_foreign_map(name, text, solid=True, world=floor)
     if joined.number:
         return replace(foreign, repaired=(*foreign.repaired, joined.describe()))
     return foreign
 
 
 def _area(figure: SourceGeometry, shapes: Shapes) -> MultiPolygon:
-    shapes.count(sum(map(len, figure.rings)))
+    shapes.count_vertices(sum(map(len, figure.rings)))
     rings = [np.round(ring, 6) for ring in figure.rings]
-    area, _, _ = find_enclosed_area(rings, figure.rule, CrossingCounter(shapes.where))
-    return area
+    return find_enclosed_area(rings, figure.rule, CrossingCounter(shapes.where)).area
 
 
 def _has_length(line: Array) -> bool:

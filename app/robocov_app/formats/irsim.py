@@ -53,7 +53,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         width, height = (size / light.shape[::-1]).tolist()
         free = outline_free_cells(light, (width, height), (float(corner[0]), float(corner[1])), where)
         shapes.cell = max(width, height)
-        shapes.count(count_polygon_vertices(free))
+        shapes.count_vertices(count_polygon_vertices(free))
     drawer = _ShapeDrawer(shapes)
     count = moving = 0
     for kind in ("robot", "obstacle"):
@@ -73,7 +73,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
                 x, y, turn = states[min(k, len(states) - 1)][:3]
                 if kind == "robot":
                     shapes.robots.append((float(x), float(y)))
-                elif shapes.wants(labels):
+                elif shapes.accept(labels):
                     if group["unobstructed"].text().lower() in _TRUE:
                         shapes.leave_out(kind, "that nothing collides with")
                         continue
@@ -84,7 +84,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         words = "with kinematics taken as standing where the file has them"
         shapes.notes.append(f"{format_count(moving, 'obstacle')} {words}")
     name = world["name"].text() or path.stem
-    return shapes.foreign_map(name, "A world of IR-SIM, imported.", solid=True, world=free)
+    return shapes.build_foreign_map(name, "A world of IR-SIM, imported.", solid=True, world=free)
 
 
 def _picture(world: _Node, path: Path, shapes: Shapes) -> BoolArray:

@@ -85,7 +85,7 @@ def _read_outdoors(data: OsmData, shapes: Shapes, name: str) -> ForeignMap:
     gates = sum(node.tags.get("barrier") in _GATES for node in data.nodes.values())
     if gates:
         shapes.notes.append(f"{format_count(gates, 'gate')} taken as closed")
-    return shapes.foreign_map(name, _TEXT, solid=True)
+    return shapes.build_foreign_map(name, _TEXT, solid=True)
 
 
 def _find_outdoors(data: OsmData, shapes: Shapes) -> Iterator[SourceGeometry]:

@@ -34,7 +34,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     for number, rings in enumerate(polygons, start=1):
         shapes.add_outline([ring * scale for ring in rings], at=f"polygon {number}")
     shapes.notes = [f"a unit is {scale:g} m" + ("" if options.scale else " (the file says none; --scale)")]
-    return shapes.foreign_map(name_of_map(path), "Imported from rings.", solid=False, overlap=True)
+    return shapes.build_foreign_map(name_of_map(path), "Imported from rings.", solid=False, overlap=True)
 
 
 def _polygons(file: JsonFile, shapes: Shapes) -> list[list[Array]]:
@@ -46,13 +46,13 @@ def _polygons(file: JsonFile, shapes: Shapes) -> list[list[Array]]:
         return [ring(each, (*at, k)) for k, each in enumerate(value)]
 
     def ring(value: Any, at: Steps) -> Array:
-        return shapes.flat(file.positions(value, at, 1, 2, 3))
+        return shapes.drop_heights(file.positions(value, at, 1, 2, 3))
 
     def flat_ring(value: Any, at: Steps, size: int) -> Array:
         if not isinstance(value, list) or len(value) % size or len(value) < 3 * size:
             raise file.refused(at, value, f"at least 3 times {size} numbers")
         pairs = [value[k : k + size] for k in range(0, len(value), size)]
-        return shapes.flat(file.positions(pairs, at, 3, size, size))
+        return shapes.drop_heights(file.positions(pairs, at, 3, size, size))
 
     document = inner = file.document
     if isinstance(document, dict):

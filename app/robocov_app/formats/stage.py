@@ -113,7 +113,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         source = found.source
     shapes.cell = max((room.cell for room in rooms if room.cell is not None), default=None)
     name = world.root.text("name") or path.stem
-    foreign = shapes.foreign_map(name, "A world of Stage, imported.", solid=True, world=free)
+    foreign = shapes.build_foreign_map(name, "A world of Stage, imported.", solid=True, world=free)
     return replace(foreign, boundary_source=source) if source else foreign
 
 
@@ -219,7 +219,7 @@ class _World:
             here = frame @ self._pose(entity, "pose")
             if entity.type not in ("model", "position"):
                 self.shapes.leave_out(to_one_line(entity.type)[:30])
-            elif not self.shapes.wants(labels):
+            elif not self.shapes.accept(labels):
                 continue
             elif entity.type == "position":
                 self.shapes.robots.append((float(here[0, 2]), float(here[1, 2])))
@@ -271,7 +271,7 @@ class _World:
         if "bitmap" in entity.properties:
             file = self._named(entity.text("bitmap"), "picture", f"{entity.at}: bitmap")
             free, columns, rows = self._bitmap(file)
-            self.shapes.count(count_polygon_vertices(free))
+            self.shapes.count_vertices(count_polygon_vertices(free))
             cell = float(max(size[0] / columns, size[1] / rows))
             self.rooms.append(_Room(box, shapely.transform(free, placed), labels, cell))
             if rings:

@@ -106,7 +106,7 @@ class _Map:
         for layer, ids in grids:
             solid |= self._solid(layer, ids, tiles)
         self._add_objects([layer for layer in layers if layer.element.tag != "layer"], anything=not grids)
-        shapes.require_known_names()
+        shapes.labels.require_known_names()
         if not (solid.any() or shapes.outlines or shapes.lines or shapes.pillars):
             names = summarize_names([quote(layer.labels[0]) for layer in layers if layer.labels])
             nothing = "nothing is solid by properties, collision objects or names of layers"
@@ -114,9 +114,9 @@ class _Map:
             raise MapError(f"{where}: {nothing}, {wanted}")
         width, height = (self.pixel * self.tile).tolist()
         world = outline_free_cells(~solid, (width, height), (0.0, 0.0), where)
-        shapes.count(count_polygon_vertices(world))
+        shapes.count_vertices(count_polygon_vertices(world))
         shapes.cell = max(width, height) if solid.any() else None
-        return shapes.foreign_map(self.path.stem, "A map of Tiled, imported.", solid=True, world=world)
+        return shapes.build_foreign_map(self.path.stem, "A map of Tiled, imported.", solid=True, world=world)
 
     def _tiles(self) -> dict[int, _Tile]:
         found: dict[int, _Tile] = {}
@@ -157,14 +157,18 @@ class _Map:
             if element.tag not in ("layer", "objectgroup", "group"):
                 continue
             names = (*filter(None, map(element.attributes.get, ("name", "class"))), *labels)
-            found = shapes.seen(names)
+            found = shapes.labels.register(names)
             shifted = offset + [_number(element, key) for key in ("offsetx", "offsety")]
-            says = wall or (_says_solid(element, names) if shapes.only is None else bool(shapes.only & found))
-            if shapes.skip & found:
+            says = wall or (
+                _says_solid(element, names)
+                if shapes.labels.only is None
+                else bool(shapes.labels.only & found)
+            )
+            if shapes.labels.skip & found:
                 shapes.leave_out("layer", "by the names that were asked for")
             elif element.tag == "group":
                 yield from self._layers(element, names, shifted, wall=says)
-            elif element.tag == "objectgroup" or shapes.only is None or says:
+            elif element.tag == "objectgroup" or shapes.labels.only is None or says:
                 yield _Layer(element, names, shifted, says)
 
     def _grids(self, layers: list[_Layer]) -> list[tuple[_Layer, _IDs]]:
@@ -267,8 +271,8 @@ class _Map:
             for element in layer.element.children:
                 given = [element.attributes.get(key, "") for key in ("name", "class", "type")]
                 labels = (*filter(None, given), *layer.labels)
-                found = shapes.seen(labels)
-                if element.tag != "object" or shapes.skip & found:
+                found = shapes.labels.register(labels)
+                if element.tag != "object" or shapes.labels.skip & found:
                     continue
                 kind, points = _figure(element)
                 points = points + layer.offset
@@ -276,7 +280,7 @@ class _Map:
                 if kind and any(_START.fullmatch(_plain(label)) for label in given):
                     x, y = self._metres(points.mean(axis=0)).tolist()
                     shapes.robots.append((x, y))
-                elif says if shapes.only is None else shapes.only & found:
+                elif says if shapes.labels.only is None else shapes.labels.only & found:
                     self._add(element, kind, points, labels)
                 else:
                     shapes.leave_out("object", "not solid by name or property (--only NAME takes it)")

@@ -6,7 +6,7 @@ Polygons are free space, all of them together, whether they overlap or lie in ea
 obstacles, also where another polygon overlaps them: JuPedSim unites accessible areas, and then takes out what
 is excluded (``build_geometry`` in the manual, https://www.jupedsim.org). Only a polygon that lies wholly in a
 hole is free there, as in a MULTIPOLYGON. Where there are only lines they are walls. The option ``outlines``
-says it otherwise; see `Shapes.foreign_map`. Coordinates are metres, unless a prefix ``SRID=...;`` names
+says it otherwise; see `Shapes.build_foreign_map`. Coordinates are metres, unless a prefix ``SRID=...;`` names
 another system.
 """
 
@@ -28,9 +28,9 @@ from robocov.files.json_positions import find_line_and_column
 from robocov.files.writing import replace_file
 from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import MAX_DEPTH, name_of_map, read_text
+from robocov_app.formats.geometry.crossings import CrossingCounter
 from robocov_app.formats.geometry.polygons import (
     DEFAULT_DIGITS,
-    CrossingCounter,
     format_decimal,
     list_rings,
     snap_to_grid,
@@ -157,7 +157,7 @@ class WktText:
 
     def _polygon(self, measured: bool, place: str, whole: str = "") -> None:
         if rings := [self._points(measured, 1) for _ in self._items()]:
-            self._figures.append(self.shapes.polygon(rings, (), place, whole))
+            self._figures.append(self.shapes.build_polygon(rings, (), place, whole))
 
     def _points(self, measured: bool, least: int) -> Array:
         """Read points in brackets; return them as (k, 2)."""
@@ -189,7 +189,7 @@ class WktText:
         if not (np.abs(array) < _BEYOND).all():
             self._refuse("expected finite numbers", match.start())
         if array.shape[1] > 2 and not (measured and array.shape[1] == 3):
-            self.shapes.leave_heights(array[:, 2])
+            self.shapes.tally.add_heights(array[:, 2])
         return array[:, :2]
 
     def _skip_space(self) -> int:
@@ -228,7 +228,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         shapes.options = replace(options, outlines="free")
         figures = _exclude_holes(figures, shapes)
     shapes.add_all(figures)
-    return shapes.foreign_map(name_of_map(path), "Imported from WKT.", solid=False, overlap=True)
+    return shapes.build_foreign_map(name_of_map(path), "Imported from WKT.", solid=False, overlap=True)
 
 
 def _exclude_holes(figures: list[SourceGeometry], shapes: Shapes) -> list[SourceGeometry]:

@@ -14,7 +14,8 @@ from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
 from robocov_app.formats.base import ForeignMap
 from robocov_app.formats.geometry.conversion import build_environment
-from robocov_app.formats.geometry.polygons import build_boundary, round_polygons
+from robocov_app.formats.geometry.map_layout import build_boundary
+from robocov_app.formats.geometry.polygons import round_polygons
 from robocov_app.formats.geometry.shaping import Shaping
 from robocov_app.formats.geometry.starts import find_roomiest_point
 

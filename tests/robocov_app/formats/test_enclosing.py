@@ -37,7 +37,7 @@ def shapes(*areas: Any, lines: Any = (), points: Any = (), **options: Any) -> Sh
 
 
 def taken(found: Shapes, solid: bool = True) -> ForeignMap:
-    return found.foreign_map(name="plan", text="", solid=solid)
+    return found.build_foreign_map(name="plan", description="", solid=solid)
 
 
 def test_the_largest_outline_that_holds_the_rest_is_the_boundary() -> None:
@@ -162,10 +162,10 @@ def test_only_what_was_asked_for() -> None:
 
 def test_what_is_nothing_is_told() -> None:
     found = shapes(HALL, [[0, 0], [1, 0], [2, 0]], lines=[[[1, 1], [1, 1]]])
-    found.leave_heights(np.array([np.nan, 2.0, 3.5]))
+    found.tally.add_heights(np.array([np.nan, 2.0, 3.5]))
     found.leave_out("text", count=2)
     found.leave_out("empty geometry", count=2)
-    found.mended["ring", "closed"] += 2
+    found.tally.mended["ring", "closed"] += 2
     foreign = taken(found)
     assert foreign.dropped == (
         "2 empty geometries",

@@ -10,15 +10,14 @@ from hypothesis import strategies as st
 from shapely import Polygon, box
 
 from robocov.errors import MapError
-from robocov_app.formats.geometry.polygons import (
+from robocov_app.formats.geometry.crossings import (
     MAX_CROSSINGS,
     CrossingCounter,
     extract_edges,
     extract_sides,
-    find_enclosed_area,
-    to_multipolygon,
-    unite,
 )
+from robocov_app.formats.geometry.enclosed_area import find_enclosed_area
+from robocov_app.formats.geometry.polygons import to_multipolygon, unite
 
 _RING = st.lists(st.tuples(st.integers(0, 12), st.integers(0, 12)), min_size=3, max_size=9)
 
@@ -34,7 +33,9 @@ def windings(ring: np.ndarray, x: float, y: float) -> float:
 @given(st.lists(_RING, min_size=1, max_size=3), st.sampled_from(["evenodd", "nonzero"]))
 def test_fills_are_what_angles_say(rings: list[list[tuple[int, int]]], rule: str) -> None:
     arrays = [np.array(ring, dtype=float) for ring in rings]
-    area, reason, _ = find_enclosed_area(arrays, rule)  # type: ignore[arg-type]
+    enclosed = find_enclosed_area(arrays, rule)  # type: ignore[arg-type]
+    area = enclosed.area
+    reason = enclosed.invalidity
     assert area.is_valid
     assert reason is None
     # irrational places are on no edge
@@ -50,9 +51,12 @@ def test_fills_are_what_angles_say(rings: list[list[tuple[int, int]]], rule: str
 @given(st.lists(_RING, min_size=1, max_size=3))
 def test_holes_are_taken_out_of_the_outline(rings: list[list[tuple[int, int]]]) -> None:
     arrays = [np.array(ring, dtype=float) for ring in rings]
-    area, reason, lost = find_enclosed_area(arrays)
+    enclosed = find_enclosed_area(arrays)
+    area = enclosed.area
+    reason = enclosed.invalidity
+    lost = enclosed.lost_holes
     assert area.is_valid
-    outer = find_enclosed_area(arrays[:1])[0]
+    outer = find_enclosed_area(arrays[:1]).area
     assert area.difference(outer).area < 1e-9
     for hole in arrays[1:]:
         if Polygon(hole).is_valid:
@@ -64,23 +68,25 @@ def test_holes_are_taken_out_of_the_outline(rings: list[list[tuple[int, int]]]) 
 
 
 def test_a_bow_tie_is_both_of_its_halves() -> None:
-    area, reason, _ = find_enclosed_area([np.array([[0, 0], [4, 4], [4, 0], [0, 4]], dtype=float)])
+    enclosed = find_enclosed_area([np.array([[0, 0], [4, 4], [4, 0], [0, 4]], dtype=float)])
+    area = enclosed.area
+    reason = enclosed.invalidity
     assert reason == "Self-intersection[2 2]"
     assert area.area == 8.0
 
 
 def test_halves_that_share_an_edge_are_one() -> None:
     ring = np.array([[1, 0], [2, 2], [2, 0], [1, 0], [2, 2], [0, 0]], dtype=float)
-    area, _, _ = find_enclosed_area([ring])
+    area = find_enclosed_area([ring]).area
     assert area.is_valid and len(area.geoms) == 1
 
 
 def test_what_has_no_area_is_empty() -> None:
     line = np.array([[0, 0], [4, 0], [0, 0]], dtype=float)
     for rule in ("holes", "evenodd", "nonzero"):
-        assert find_enclosed_area([line], rule)[0].is_empty
-        assert find_enclosed_area([np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])], rule)[0].is_empty
-        assert find_enclosed_area([], rule)[0].is_empty
+        assert find_enclosed_area([line], rule).area.is_empty
+        assert find_enclosed_area([np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])], rule).area.is_empty
+        assert find_enclosed_area([], rule).area.is_empty
 
 
 @pytest.mark.slow
@@ -124,10 +130,12 @@ def test_holes_that_take_nothing_out_are_counted() -> None:
         [(20, 0), (21, 0), (21, 1)],
     ]
     rings = [np.array(ring) for ring in (outer.coords, hole.coords, *nothing)]
-    area, _, lost = find_enclosed_area(rings)
+    enclosed = find_enclosed_area(rings)
+    area = enclosed.area
+    lost = enclosed.lost_holes
     assert area.area == 80
     assert lost == {"of fewer than three points": 2, "without an area": 1, "outside of their outline": 1}
-    assert find_enclosed_area(rings[:4])[2] == {"of fewer than three points": 2}
+    assert find_enclosed_area(rings[:4]).lost_holes == {"of fewer than three points": 2}
 
 
 def test_edges_and_parts() -> None:
@@ -145,7 +153,9 @@ def test_edges_and_parts() -> None:
 def test_no_part_is_lost_where_edges_are_almost_on_each_other() -> None:
     # without a grid GEOS 3.14 loses the triangle on the right
     slim = Polygon([(0, 0), (1, 0), (-40, 764)])
-    bow, reason, _ = find_enclosed_area([np.array([(0, 0), (1, 161), (1, 0), (-40, 764)], dtype=float)])
+    enclosed = find_enclosed_area([np.array([(0, 0), (1, 161), (1, 0), (-40, 764)], dtype=float)])
+    bow = enclosed.area
+    reason = enclosed.invalidity
     assert reason is not None
     both = unite([slim, bow])
     assert shapely.distance(both, shapely.Point(1, 161)) < 1e-5
@@ -156,7 +166,7 @@ def test_no_part_is_lost_where_edges_are_almost_on_each_other() -> None:
 @settings(max_examples=60, deadline=None)
 @given(st.lists(_RING, min_size=1, max_size=5))
 def test_a_union_covers_what_it_is_of(rings: list[list[tuple[int, int]]]) -> None:
-    areas = [find_enclosed_area([np.array(ring, dtype=float)], "nonzero")[0] for ring in rings]
+    areas = [find_enclosed_area([np.array(ring, dtype=float)], "nonzero").area for ring in rings]
     both = unite(areas)
     assert both.area >= max(area.area for area in areas) - 1e-6
     for area in areas:

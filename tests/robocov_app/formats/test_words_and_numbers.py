@@ -12,9 +12,11 @@ from robocov_app.formats.base import square_metres
 from robocov_app.formats.files import parse_yaml
 from robocov_app.formats.geometry.corners import sharpen_corners
 from robocov_app.formats.geometry.curves import flatten_beziers
-from robocov_app.formats.geometry.polygons import Rule, build_boundary, find_enclosed_area, format_decimal
+from robocov_app.formats.geometry.enclosed_area import Rule, find_enclosed_area
+from robocov_app.formats.geometry.import_tally import format_plural
+from robocov_app.formats.geometry.map_layout import build_boundary
+from robocov_app.formats.geometry.polygons import format_decimal
 from robocov_app.formats.geometry.rasterize import _iterate_smaller_sizes
-from robocov_app.formats.geometry.shapes import _pluralize
 from robocov_app.formats.geometry.vectorize import _format_share, trace_outline
 from robocov_app.formats.preview import _number
 from robocov_app.formats.svg.path import parse_declarations, parse_path
@@ -30,7 +32,7 @@ def test_numbers_are_written_so_that_they_are_read_easily() -> None:
     )
     assert (_format_share(1, 100_000), _format_share(500, 1000)) == ("<0.1 %", "50 %")
     assert (_number(1761234.5), _number(35.2789)) == ("1\u202f761\u202f234", "35.28")
-    assert (_pluralize(2, "empty geometry"), _pluralize(2, "box")) == ("2 empty geometries", "2 boxes")
+    assert (format_plural(2, "empty geometry"), format_plural(2, "box")) == ("2 empty geometries", "2 boxes")
 
 
 def test_finer_cells_are_of_round_sizes() -> None:
@@ -62,7 +64,7 @@ def test_few_points_are_enough_for_a_flat_curve() -> None:
 @pytest.mark.parametrize(("rule", "area"), [("holes", 12.0), ("evenodd", 12.0), ("nonzero", 16.0)])
 def test_a_square_in_a_square(rule: Rule, area: float) -> None:
     square = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
-    assert find_enclosed_area([square, 1 + square / 2], rule)[0].area == area
+    assert find_enclosed_area([square, 1 + square / 2], rule).area.area == area
 
 
 def test_the_outline_of_a_room_is_its_boundary() -> None:

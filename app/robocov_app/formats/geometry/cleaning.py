@@ -1,8 +1,8 @@
-"""Removal of hairs from a free space, and by how much two free spaces differ.
+"""Removal of hairs from a free space, and the deviation between two free spaces.
 
 A hair is a slit in the free space, or a spur of it, that is thinner than the decimals of a map but longer
-than walls may move. Rounding would close it without a word, and the report would say that a wall moved by its
-length. So hairs are taken out first, and counted.
+than walls may move. Rounding would silently close it, and the report would say that a wall moved by its
+length. So hairs are removed first, and counted.
 """
 
 from collections.abc import Sequence
@@ -15,15 +15,28 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import GRID_M
-from robocov_app.formats.geometry.polygons import buffer_with_mitres, extract_sides, to_multipolygon, unite
+from robocov_app.formats.geometry.crossings import extract_sides
+from robocov_app.formats.geometry.polygons import buffer_with_mitres, to_multipolygon, unite
 
-_DIGITS = 9  # of distances in metres: what is less comes of rounding
-_OVERLAP_M = 2 * GRID_M  # by how much what is filled or cut reaches beyond a hair
-_MAX_SAMPLES = 4_000  # places along walls whose distances are measured
+_DIGITS = 9
+"""Decimals of distances in meters; smaller ones are rounding errors."""
+_OVERLAP_M = 2 * GRID_M
+"""Distance by which fillings and cuts extend beyond a hair."""
+_MAX_SAMPLES = 4_000
+"""Number of points along walls whose distances are measured."""
 
 
 class Cleaned(NamedTuple):
-    """A free space without hairs; the number of these, and the area that they covered, m²."""
+    """A free space without hairs.
+
+    Attributes
+    ----------
+    free : MultiPolygon, m
+    number : int
+        Number of hairs that were removed.
+    area : float, m²
+        Their area.
+    """
 
     free: MultiPolygon
     number: int = 0
@@ -31,31 +44,41 @@ class Cleaned(NamedTuple):
 
 
 class Deviation(NamedTuple):
-    """How two free spaces differ: the area that changed sides, m², and how far walls moved at most, m."""
+    """Difference of two free spaces.
+
+    Attributes
+    ----------
+    area : float, m²
+        Area that is free in one of them only.
+    distance : float, m
+        Maximum distance by which walls have moved.
+    """
 
     area: float
     distance: float
 
 
 def remove_hairs(free: MultiPolygon, width: float, length: float) -> Cleaned:
-    """Remove what is thinner and longer than given.
+    """Remove slits and spurs that are thinner than a width and longer than a length.
 
     Parameters
     ----------
-    free : MultiPolygon, m, valid
-    width : float, m
-        Slits and spurs that are narrower are hairs,
-    length : float, m
-        if they are longer than this.
+    free : MultiPolygon, m
+        Must be valid.
+    width, length : float, m
 
     Returns
     -------
     Cleaned
     """
     slits = _select_long(shapely.difference(_close(free, width), free), length)
-    filled = free if not len(slits) else _round(unite([free, *_grow(slits)]))
+    filled = free
+    if len(slits):
+        filled = _round_to_grid(unite([free, *_grow(slits)]))
     spurs = _select_long(shapely.difference(filled, _open(filled, width)), length)
-    cleaned = filled if not len(spurs) else _round(shapely.difference(filled, unite(_grow(spurs))))
+    cleaned = filled
+    if len(spurs):
+        cleaned = _round_to_grid(shapely.difference(filled, unite(_grow(spurs))))
     if cleaned.is_empty:
         return Cleaned(free)
     area = float(shapely.area(slits).sum() + shapely.area(spurs).sum())
@@ -63,7 +86,7 @@ def remove_hairs(free: MultiPolygon, width: float, length: float) -> Cleaned:
 
 
 def measure_deviation(before: MultiPolygon, after: MultiPolygon) -> Deviation:
-    """Measure by how much walls moved: the Hausdorff distance between them, at vertices and along edges.
+    """Measure the Hausdorff distance between the walls of two free spaces, at vertices and along edges.
 
     Parameters
     ----------
@@ -74,17 +97,17 @@ def measure_deviation(before: MultiPolygon, after: MultiPolygon) -> Deviation:
     Deviation
     """
     distance = 0.0
-    for one, other in ((before, after), (after, before)):
-        points = shapely.points(_sample_walls(one))
-        walls = STRtree(shapely.linestrings(extract_sides(other)))
-        _, away = walls.query_nearest(points, return_distance=True, all_matches=False)
-        distance = max(distance, float(away.max()))
+    for first, second in ((before, after), (after, before)):
+        points = shapely.points(_sample_walls(first))
+        walls = STRtree(shapely.linestrings(extract_sides(second)))
+        _, distances = walls.query_nearest(points, return_distance=True, all_matches=False)
+        distance = max(distance, float(distances.max()))
     area = float(shapely.symmetric_difference(before, after).area)
     return Deviation(area, round(distance, _DIGITS))
 
 
 def _sample_walls(area: MultiPolygon) -> Array:
-    """Return places on the walls of an area: its vertices, and some along long edges."""
+    """Return points on the walls of an area, (n, 2) m: its vertices, and some along long edges."""
     vertices = shapely.get_coordinates(area)
     spare = _MAX_SAMPLES - len(vertices)
     if spare > 0:
@@ -93,7 +116,7 @@ def _sample_walls(area: MultiPolygon) -> Array:
 
 
 def _select_long(geometry: BaseGeometry, length: float) -> Array:
-    """Return the polygons of a geometry that are longer than so many metres."""
+    """Return the polygons of a geometry that are longer than a length in meters."""
     pieces = np.array(to_multipolygon(geometry).geoms, dtype=object)
     x, y, right, top = shapely.bounds(pieces).reshape(-1, 4).T
     is_rounding = shapely.area(pieces) < 1e-3 * GRID_M * shapely.length(pieces)
@@ -101,21 +124,20 @@ def _select_long(geometry: BaseGeometry, length: float) -> Array:
 
 
 def _close(area: BaseGeometry, width: float) -> BaseGeometry:
-    return _offset(_offset(area, width / 2), -width / 2)
+    """Fill what is narrower than a width in meters."""
+    closed: BaseGeometry = buffer_with_mitres(buffer_with_mitres(area, width / 2), -width / 2)
+    return closed
 
 
 def _open(area: BaseGeometry, width: float) -> BaseGeometry:
-    return _offset(_offset(area, -width / 2), width / 2)
-
-
-def _offset(area: BaseGeometry, distance: float) -> BaseGeometry:
-    grown: BaseGeometry = buffer_with_mitres(area, distance)
-    return grown
+    """Remove what is narrower than a width in meters."""
+    opened: BaseGeometry = buffer_with_mitres(buffer_with_mitres(area, -width / 2), width / 2)
+    return opened
 
 
 def _grow(pieces: Array) -> Sequence[BaseGeometry]:
     return list(buffer_with_mitres(pieces, _OVERLAP_M))
 
 
-def _round(area: BaseGeometry) -> MultiPolygon:
+def _round_to_grid(area: BaseGeometry) -> MultiPolygon:
     return to_multipolygon(shapely.set_precision(area, GRID_M))

@@ -10,7 +10,7 @@ from shapely import MultiPolygon, Polygon
 from robocov.arrays import BoolArray
 from robocov.errors import MapError, format_count
 from robocov_app.formats.base import square_metres
-from robocov_app.formats.geometry.polygons import extract_sides
+from robocov_app.formats.geometry.crossings import extract_sides
 from robocov_app.formats.geometry.shaping import Conversion
 from robocov_app.formats.geometry.validity import MAX_CRUMB_M2
 

@@ -14,7 +14,6 @@ from robocov_app.formats.base import Primitive
 from robocov_app.formats.geometry.cleaning import Deviation, measure_deviation
 from robocov_app.formats.geometry.polygons import (
     buffer_with_mitres,
-    build_boundary,
     fill_holes,
     list_polygons,
     round_polygons,
@@ -94,6 +93,51 @@ def build_layout(
     if outer is not None:
         solid = _remove_slivers(solid, shapely.difference(outer, read), drawing.tolerance)
     return MapLayout(boundary, solid, [], measure_deviation(before, free))
+
+
+def build_boundary(
+    free: MultiPolygon, base: Polygon | None, *, hull: bool, margin: float, digits: int
+) -> tuple[Polygon, list[Polygon]]:
+    """Build a boundary around a free space.
+
+    Parameters
+    ----------
+    free : MultiPolygon, m
+    base : Polygon or None, m
+        The boundary, whose holes do not count. None for the outline of the free space, or for the convex hull
+        of several parts.
+    hull : bool
+        Whether the boundary is the convex hull of that.
+    margin : float, m
+        Thickness of the solid margin around it.
+    digits : int
+        Number of decimals of coordinates.
+
+    Returns
+    -------
+    boundary : Polygon, m
+    solid : list of Polygon, m
+        What is solid inside the boundary.
+    """
+    parts = list(free.geoms)
+    if base is None and len(parts) == 1 and not hull and margin == 0.0:
+        return Polygon(parts[0].exterior), [Polygon(hole) for hole in parts[0].interiors]
+    if base is not None:
+        # The boundary is rounded first: where it coincides with the free space, it does so afterwards, too.
+        rounded = fill_holes(round_polygons(base, digits))
+        boundary = fill_holes(round_polygons(shapely.union(rounded, free), digits))
+    elif len(parts) > 1:
+        boundary = free.convex_hull
+    else:
+        boundary = Polygon(parts[0].exterior)
+    if hull:
+        boundary = boundary.convex_hull
+    if margin > 0.0:
+        boundary = fill_holes(boundary.buffer(margin, join_style="mitre", mitre_limit=2.0))
+    boundary = fill_holes(round_polygons(boundary, digits))
+    if not shapely.covers(boundary, free):  # A hair of the free space was rounded away.
+        boundary = fill_holes(round_polygons(shapely.union(boundary, free), digits))
+    return boundary, list_polygons(round_polygons(shapely.difference(boundary, free), digits))
 
 
 def build_polygon_obstacles(solid: list[Polygon], conversion: Conversion) -> list[PolygonObstacle]:

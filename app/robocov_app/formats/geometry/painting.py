@@ -1,32 +1,34 @@
-"""What the paint of a drawing stands for: which filled shapes are floors, and what they leave below them."""
+"""Paint of drawings: which filled shapes are floors, and which areas they leave of the shapes below them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from robocov.arrays import BoolArray
 from robocov.environment import GRID_M
 from robocov_app.formats.colours import DARK, PALE, Colour, luminance
-from robocov_app.formats.geometry.polygons import find_enclosed_area, to_multipolygon, unite
+from robocov_app.formats.geometry.enclosed_area import find_enclosed_area
+from robocov_app.formats.geometry.polygons import to_multipolygon, unite
 
-_ROOM_SHARE = 0.5  # of the smallest fill with something on it: the size of a room
+_MIN_ROOM_SHARE = 0.5
+"""Pale fills of this fraction of the area of the smallest evident floor have the size of a room."""
 
 
 @dataclass(frozen=True, eq=False)
 class PaintLayer:
-    """Something that is painted.
+    """A painted area.
 
     Attributes
     ----------
     area : shapely geometry, m
     order : float
-        Higher is painted later, above what is lower.
+        Layers of a higher order are painted later, on top of lower ones.
     colour : Colour or None
-        As it is seen on white; None where it is not known.
+        Color as it is seen on white; None where it is not known.
     """
 
     area: BaseGeometry
@@ -35,60 +37,67 @@ class PaintLayer:
 
 
 def is_dark(colour: Colour | None) -> bool:
+    """Return whether a color is known and dark."""
     return colour is not None and luminance(colour) < DARK
 
 
 def is_pale(colour: Colour | None) -> bool:
+    """Return whether a color is known and pale."""
     return colour is not None and luminance(colour) >= PALE
 
 
 def find_evident_floors(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> list[bool]:
-    """Return which filled shapes are floors by what is painted on them.
+    """Decide which filled shapes are floors by what is painted on them.
 
-    Nobody paints furniture and walls onto a pale obstacle. So where one pale fill has something darker on it,
-    fills of its colour are floors, and pale ones of the size of a room are, too: rooms often have different
-    colours.
+    Furniture and walls are not painted onto a pale obstacle. So a pale fill with something darker on it is a
+    floor, and so are fills of its color, and pale fills of the size of a room: rooms often have different
+    colors.
 
     Parameters
     ----------
-    fills : sequence of Coat
-    marks : sequence of Coat
-        All that is painted; what is not pale among it counts.
+    fills : sequence of PaintLayer
+    marks : sequence of PaintLayer
+        Everything that is painted; pale marks do not count.
+
+    Returns
+    -------
+    list of bool
+        One for each fill.
     """
-    evident = _find_marked(fills, marks)
-    if not evident.any():
+    is_marked = _find_marked(fills, marks)
+    if not is_marked.any():
         return [False] * len(fills)
-    colours = {fills[k].colour for k in np.flatnonzero(evident).tolist()}
+    colours = {fills[k].colour for k in np.flatnonzero(is_marked).tolist()}
     sizes = shapely.area([fill.area for fill in fills])
-    room = _ROOM_SHARE * sizes[evident].min()
+    min_size = _MIN_ROOM_SHARE * sizes[is_marked].min()
     return [
-        is_pale(fill.colour) and (fill.colour in colours or size >= room)
+        is_pale(fill.colour) and (fill.colour in colours or size >= min_size)
         for fill, size in zip(fills, sizes.tolist(), strict=True)
     ]
 
 
-def _find_marked(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> NDArray[np.bool_]:
+def _find_marked(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> BoolArray:
     """Return which fills are pale and have something on them that is not."""
-    found = np.zeros(len(fills), dtype=bool)
+    is_marked = np.zeros(len(fills), dtype=bool)
     darker = [mark for mark in marks if mark.colour is not None and not is_pale(mark.colour)]
     if not darker:
-        return found
+        return is_marked
     tree = shapely.STRtree([mark.area for mark in darker])
     order = np.array([mark.order for mark in darker])
     for k, fill in enumerate(fills):
         if is_pale(fill.colour):
-            on_it = tree.query(fill.area, "covers")
-            found[k] = (order[on_it] > fill.order).any()
-    return found
+            on_fill = tree.query(fill.area, "covers")
+            is_marked[k] = (order[on_fill] > fill.order).any()
+    return is_marked
 
 
 def uncover(solids: Sequence[PaintLayer], floors: Sequence[PaintLayer]) -> list[BaseGeometry]:
-    """Return solids without the floors that are painted above them."""
+    """Return the areas of solids without the floors that are painted on top of them, m."""
     if not floors:
         return [solid.area for solid in solids]
     tree = shapely.STRtree([floor.area for floor in floors])
     order = np.array([floor.order for floor in floors])
-    left = []
+    areas = []
     for solid in solids:
         above = tree.query(solid.area, "intersects")
         above = above[order[above] > solid.order]
@@ -97,14 +106,20 @@ def uncover(solids: Sequence[PaintLayer], floors: Sequence[PaintLayer]) -> list[
             covers = unite([floors[k].area for k in above])
             area = shapely.difference(area, covers, grid_size=GRID_M)
         if not area.is_empty:
-            left.append(area)
-    return left
+            areas.append(area)
+    return areas
 
 
-def alternate(areas: Sequence[BaseGeometry]) -> tuple[MultiPolygon, MultiPolygon]:
-    """Return what lies in an odd number of areas, and what lies in some of them, but an even number."""
+def split_alternating(areas: Sequence[BaseGeometry]) -> tuple[MultiPolygon, MultiPolygon]:
+    """Split the union of areas by the number of areas that overlap.
+
+    Returns
+    -------
+    odd, even : MultiPolygon, m
+        What lies in an odd number of areas, and in an even number of at least two.
+    """
     parts = shapely.get_parts(shapely.get_parts(areas))
     rings = [shapely.get_coordinates(ring)[:-1] for ring in shapely.get_rings(parts)]
-    odd, _, _ = find_enclosed_area(rings, "evenodd")
+    odd = find_enclosed_area(rings, "evenodd").area
     whole = unite([Polygon(part.exterior) for part in parts])
     return odd, to_multipolygon(shapely.difference(whole, odd, grid_size=GRID_M))

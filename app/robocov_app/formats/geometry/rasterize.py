@@ -17,7 +17,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, format_count
 from robocov_app.formats.base import ExportReport
 from robocov_app.formats.files import MAX_CELLS
-from robocov_app.formats.geometry.polygons import extract_sides
+from robocov_app.formats.geometry.crossings import extract_sides
 
 DEFAULT_CELL_M = 0.05  # side of a cell in metres where none is given: what maps of robots mostly have
 _LEAST = math.pi * DEFAULT_RADIUS_M**2  # parts of the free space without room for a robot do not count, m²

@@ -1,6 +1,5 @@
-"""The shapes of a drawing in metres: closed outlines, lines, points; and the map that they stand for."""
+"""Collection of the shapes that a reader finds in a file, and the map that they stand for."""
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -11,326 +10,331 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle
-from robocov.errors import MapError, ParameterError, describe_unknown_name, format_count
+from robocov.errors import MapError
 from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
 from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, Painted, ReadOptions
 from robocov_app.formats.colours import UNPAINTED, ColourKey, Paint, count_colours, name_colour
-from robocov_app.formats.geometry.figures import (
+from robocov_app.formats.geometry.boundary_search import find_surrounding
+from robocov_app.formats.geometry.crossings import CrossingCounter
+from robocov_app.formats.geometry.drawings import Boundary, Drawing
+from robocov_app.formats.geometry.enclosed_area import Rule, find_enclosed_area
+from robocov_app.formats.geometry.import_tally import ImportTally
+from robocov_app.formats.geometry.interpretation import interpret
+from robocov_app.formats.geometry.label_filter import LabelFilter
+from robocov_app.formats.geometry.shape_types import (
     BOUNDARY,
     ClosedOutline,
     SourceGeometry,
     WallLine,
     get_obstacle_name,
 )
-from robocov_app.formats.geometry.interpretation import Boundary, Drawing, find_surrounding, interpret
-from robocov_app.formats.geometry.polygons import CrossingCounter, Rule, find_enclosed_area
 
 __all__ = ["BOUNDARY", "ClosedOutline", "Shapes", "SourceGeometry", "WallLine"]
-THICKNESS = 0.1  # width of walls that are drawn as lines without one, in metres
-_EVEN = 1e-6  # relative width by which a shape may be thinner by rounding
-_SHOWN = 20  # names that are listed where one is wrong
+DEFAULT_THICKNESS_M = 0.1
+"""Width of walls that are drawn as lines without a width."""
+_MAX_RELATIVE_THINNING = 1e-6
+"""Relative width by which rounding may make a shape thinner."""
 _DIGITS = 9
+"""Decimals of coordinates: shapes smaller than a nanometer have no size."""
 
 
 class Shapes:
-    """Shapes that a reader has found in the file `where`: checked, counted, chosen by name.
+    """The shapes of a file, checked, counted, and selected by name.
 
-    `pillars` are obstacles whatever outlines are. `left_out`, `mended`: counts of what is no part of the map
-    or was put right, and why. `labels`: as compared and as written. `robots`, `notes`, `cell`: of a
-    `ForeignMap`.
+    Parameters
+    ----------
+    where : str
+        The file, for messages.
+    options : ReadOptions
+
+    Attributes
+    ----------
+    outlines : list of ClosedOutline
+    lines : list of WallLine
+    pillars : list of CircleObstacle
+        Obstacles whatever outlines are.
+    labels : LabelFilter
+    tally : ImportTally
+    vertices : int
+        Number of vertices read.
+    thickness : float, m
+        Width of lines without a width.
+    robots, notes, cell, page
+        See `ForeignMap`.
     """
 
     def __init__(self, where: str, options: ReadOptions) -> None:
-        self.where, self.options = where, options
+        self.where = where
+        self.options = options
         self.outlines: list[ClosedOutline] = []
         self.lines: list[WallLine] = []
         self.pillars: list[CircleObstacle] = []
+        self.labels = LabelFilter(where, options)
+        self.tally = ImportTally()
         self.vertices = 0
-        self.left_out: Counter[tuple[str, str]] = Counter()
-        self.mended: Counter[tuple[str, str]] = Counter()
-        self.labels: dict[str, str] = {}
-        self.only = None if options.only is None else set(map(str.casefold, options.only))
-        self.skip = set(map(str.casefold, options.skip or ()))
+        self.thickness = DEFAULT_THICKNESS_M if options.thickness is None else options.thickness
         self.robots: list[tuple[float, float]] = []
         self.notes: list[str] = []
         self.cell: float | None = None
         self.page: Polygon | None = None
-        self.thickness = THICKNESS if options.thickness is None else options.thickness
-        self._heights: list[Array] = []
-        self._met: list[str] = []
         self._crossings = CrossingCounter(where)
 
-    def wants(self, labels: Iterable[str]) -> bool:
-        """Return whether something with these labels is asked for; what is not is counted."""
-        found = self.seen(labels)
-        wanted = (self.only is None or bool(self.only & found)) and not self.skip & found
-        if not wanted:
+    def accept(self, labels: Iterable[str]) -> bool:
+        """Return whether a shape with these labels is read; else it is counted as left out."""
+        is_accepted = self.labels.accepts(labels)
+        if not is_accepted:
             self.leave_out("shape", "by the names that were asked for")
-        return wanted
+        return is_accepted
 
-    def seen(self, labels: Iterable[str]) -> set[str]:
-        """Return labels as they are compared, and keep what the file calls them."""
-        found = {label.casefold(): label for label in labels}
-        self.labels |= found
-        return set(found)
-
-    def add_all(self, figures: Iterable[SourceGeometry]) -> None:
-        for figure in figures:
-            self.add(figure)
+    def add_all(self, geometries: Iterable[SourceGeometry]) -> None:
+        """Add geometries whose coordinates are meters, and join their lines."""
+        for geometry in geometries:
+            self.add(geometry)
         self.join_lines()
 
-    def add(self, figure: SourceGeometry) -> None:
-        """Add a geometry whose coordinates are metres; MapError where one is out of range."""
-        if not self.wants(figure.labels):
+    def add(self, geometry: SourceGeometry) -> None:
+        """Add a geometry whose coordinates are meters. Raises MapError if one is out of range."""
+        if not self.accept(geometry.labels):
             return
-        if figure.kind == "point":
-            self.add_point(figure.rings[0][0], figure.labels, at=figure.at)
-        elif figure.kind == "line":
-            width = figure.width if figure.width and self.options.thickness is None else self.thickness
-            self.add_line(WallLine(figure.rings[0], width, figure.labels), at=figure.at)
+        if geometry.kind == "point":
+            self.add_point(geometry.rings[0][0], geometry.labels, at=geometry.at)
+        elif geometry.kind == "line":
+            width = self.thickness
+            if geometry.width and self.options.thickness is None:
+                width = geometry.width
+            self.add_line(WallLine(geometry.rings[0], width, geometry.labels), at=geometry.at)
         else:
-            self.add_outline(figure.rings, figure.labels, rule=figure.rule, at=figure.at, whole=figure.whole)
+            self.add_outline(
+                geometry.rings,
+                geometry.labels,
+                rule=geometry.rule,
+                at=geometry.at,
+                whole=geometry.whole,
+            )
 
     def add_outline(
-        self, rings: Sequence[Array], labels: Sequence[str] = (), *,
-        rule: Rule = "holes", at: str = "", thing: str = "outline", whole: str = "", paint: Paint = UNPAINTED,
-    ) -> bool:  # fmt: skip
-        """Add the area of rings, (k, 2) m; without one the `thing`, if it has a name, is counted."""
-        rings = self._checked(rings, at)
-        area, reason, lost = find_enclosed_area(rings, rule, self._crossings)
-        for why, count in lost.items():
-            self.leave_out("hole", why, count)
-        if reason is not None:
-            self._met.append(f"{at}: {reason}" if at else reason)
-        if not area.is_empty:
-            self._keep_outline(ClosedOutline(area, tuple(labels), whole=whole), paint)
-        elif thing:
-            self.leave_out(thing, "without an area")
-        return not area.is_empty
+        self,
+        rings: Sequence[Array],
+        labels: Sequence[str] = (),
+        *,
+        rule: Rule = "holes",
+        at: str = "",
+        thing: str = "outline",
+        whole: str = "",
+        paint: Paint = UNPAINTED,
+    ) -> bool:
+        """Add the area that rings enclose.
 
-    def _keep_outline(self, outline: ClosedOutline, paint: Paint) -> None:
-        order = len(self.outlines) + len(self.lines)
-        self.outlines.append(replace(outline, colour=paint.colour, role=paint.role, order=order))
+        Parameters
+        ----------
+        rings : sequence of (k, 2) arrays, m
+        labels : sequence of str
+        rule : str
+            See `polygons.find_enclosed_area`.
+        at : str
+            Position in the file, for messages.
+        thing : str
+            What is counted as left out if the rings enclose no area; may be empty.
+        whole : str
+            See `SourceGeometry`.
+        paint : Paint
 
-    def add_edges(self, lines: Sequence[WallLine]) -> None:
-        """Keep the stroke of the outline that was added last; it counts only if the outline is free."""
-        last = self.outlines[-1]
-        self.outlines[-1] = replace(last, edges=tuple(replace(line, order=last.order) for line in lines))
-
-    def drop_thin_outlines(self, width: float) -> None:
-        """Drop outlines that are nowhere as wide as a width in metres, and count them."""
-        if not width > 0.0 or not self.outlines:
-            return
-        areas = [outline.area for outline in self.outlines]
-        is_thin = shapely.is_empty(shapely.buffer(areas, -width / 2 * (1.0 - _EVEN), quad_segs=4))
-        if is_thin.any():
-            self.leave_out("shape", f"thinner than {width:.3g} m (--min-stroke)", int(is_thin.sum()))
-            self.outlines = [each for each, goes in zip(self.outlines, is_thin, strict=True) if not goes]
-
-    def note_colours(self, key: ColourKey) -> None:
-        """Note how often colours with a declared role occur, and which ones there are where none does."""
-        painted: list[ClosedOutline | WallLine] = [*self.outlines, *self.lines]
-        painted += [edge for outline in self.outlines for edge in outline.edges]
-        for role in ("free", "solid"):
-            declared = [colour for colour, its in key.entries if its == role]
-            found = [each for each in painted if each.role == role]
-            if found:
-                counts = count_colours(each.colour for each in found)
-                self.notes.append(f"painted as {role}: {counts} (--{role}-colour)")
-            elif declared:
-                known = count_colours(each.colour for each in painted)
-                there = f"; there are {known}" if known else ""
-                names = ", ".join(map(name_colour, declared))
-                self.notes.append(f"nothing is painted {names} (--{role}-colour){there}")
-
-    def add_line(self, line: WallLine, *, at: str = "") -> None:
-        (points,) = self._checked([line.points], at)
-        width = max(line.width, 0.0)
-        files.require_length(width, ": ".join(filter(None, (self.where, at, "width"))), 0.0)
-        if width < MIN_SIZE_M:
-            self.mended["line", f"thinner than {1000 * MIN_SIZE_M:g} mm, made as wide"] += 1
-            width = MIN_SIZE_M
-        if not (points[1:] != points[:-1]).any():
-            self.leave_out("line", "without a length")
-        else:
-            order = len(self.outlines) + len(self.lines)
-            self.lines.append(replace(line, points=points, width=width, order=order))
-
-    def join_lines(self) -> None:
-        """Join lines of the same width and labels whose ends meet, so that their corners are whole."""
-        alike: dict[tuple[float, tuple[str, ...]], list[LineString]] = {}
-        for line in self.lines:
-            alike.setdefault((line.width, line.labels), []).append(LineString(line.points))
-        self.lines = [
-            WallLine(np.asarray(joined.coords), width, labels)
-            for (width, labels), lines in alike.items()
-            for joined in shapely.get_parts(shapely.line_merge(shapely.MultiLineString(lines)))
-        ]
+        Returns
+        -------
+        bool
+            Whether the rings enclose an area.
+        """
+        enclosed = find_enclosed_area(self._check_rings(rings, at), rule, self._crossings)
+        for reason, count in enclosed.lost_holes.items():
+            self.leave_out("hole", reason, count)
+        if enclosed.invalidity is not None:
+            self.tally.add_self_crossing(enclosed.invalidity, at)
+        if enclosed.area.is_empty:
+            if thing:
+                self.leave_out(thing, "without an area")
+            return False
+        self._store_outline(ClosedOutline(enclosed.area, tuple(labels), whole=whole), paint)
+        return True
 
     def add_circle(
         self,
-        centre: Array,
+        center: Array,
         radius: float,
         labels: Sequence[str] = (),
         *,
         at: str = "",
         paint: Paint = UNPAINTED,
     ) -> None:
-        self._checked([centre + np.array([[-radius, -radius], [radius, radius]])], at)
-        circle = CircleObstacle((float(centre[0]), float(centre[1])), radius, get_obstacle_name(labels))
-        (ring,) = self._checked([np.asarray(circle.polygon.exterior.coords)[:-1]], at)
-        self._keep_outline(ClosedOutline(MultiPolygon([Polygon(ring)]), tuple(labels), circle), paint)
+        """Add a disc with a center, (2,) m, and a radius, m."""
+        self._check_rings([center + np.array([[-radius, -radius], [radius, radius]])], at)
+        circle = CircleObstacle((float(center[0]), float(center[1])), radius, get_obstacle_name(labels))
+        (ring,) = self._check_rings([np.asarray(circle.polygon.exterior.coords)[:-1]], at)
+        self._store_outline(ClosedOutline(MultiPolygon([Polygon(ring)]), tuple(labels), circle), paint)
+
+    def _store_outline(self, outline: ClosedOutline, paint: Paint) -> None:
+        self.outlines.append(
+            replace(outline, colour=paint.colour, role=paint.role, order=self._get_next_order())
+        )
+
+    def _get_next_order(self) -> int:
+        return len(self.outlines) + len(self.lines)
+
+    def add_edges(self, lines: Sequence[WallLine]) -> None:
+        """Add the stroke of the outline that was added last; it counts only if the outline is free."""
+        last = self.outlines[-1]
+        edges = tuple(replace(line, order=last.order) for line in lines)
+        self.outlines[-1] = replace(last, edges=edges)
+
+    def add_line(self, line: WallLine, *, at: str = "") -> None:
+        """Add a wall. Raises MapError if a coordinate or the width is out of range."""
+        (points,) = self._check_rings([line.points], at)
+        width = max(line.width, 0.0)
+        place = ": ".join(filter(None, (self.where, at, "width")))
+        files.require_length(width, place, 0.0)
+        if width < MIN_SIZE_M:
+            self.tally.mended["line", f"thinner than {1000 * MIN_SIZE_M:g} mm, made as wide"] += 1
+            width = MIN_SIZE_M
+        if not (points[1:] != points[:-1]).any():
+            self.leave_out("line", "without a length")
+            return
+        self.lines.append(replace(line, points=points, width=width, order=self._get_next_order()))
 
     def add_point(self, point: Array, labels: Sequence[str] = (), *, at: str = "") -> None:
-        ((x, y),) = self._checked([point[None]], at)[0].tolist()
+        """Add a point, (2,) m, which is a pillar if the option ``pillar`` is given."""
+        ((x, y),) = self._check_rings([point[None]], at)[0].tolist()
         if self.options.pillar is None:
             self.leave_out("point", "(--pillar RADIUS makes pillars of them)")
         else:
             self.pillars.append(CircleObstacle((x, y), self.options.pillar, get_obstacle_name(labels)))
 
-    def polygon(
+    def join_lines(self) -> None:
+        """Join lines of the same width and labels whose ends meet, so that their corners are whole."""
+        groups: dict[tuple[float, tuple[str, ...]], list[LineString]] = {}
+        for line in self.lines:
+            groups.setdefault((line.width, line.labels), []).append(LineString(line.points))
+        self.lines = []
+        for (width, labels), paths in groups.items():
+            merged = shapely.line_merge(shapely.MultiLineString(paths))
+            for path in shapely.get_parts(merged):
+                self.lines.append(WallLine(np.asarray(path.coords), width, labels))
+
+    def drop_thin_outlines(self, width: float) -> None:
+        """Drop outlines that are nowhere as wide as a width in meters, and count them."""
+        if not width > 0.0 or not self.outlines:
+            return
+        areas = [outline.area for outline in self.outlines]
+        inset = width / 2 * (1.0 - _MAX_RELATIVE_THINNING)
+        is_thin = shapely.is_empty(shapely.buffer(areas, -inset, quad_segs=4))
+        if is_thin.any():
+            self.leave_out("shape", f"thinner than {width:.3g} m (--min-stroke)", int(is_thin.sum()))
+            self.outlines = [
+                outline for outline, thin in zip(self.outlines, is_thin, strict=True) if not thin
+            ]
+
+    def build_polygon(
         self, rings: Iterable[Array], labels: tuple[str, ...], at: str, whole: str = ""
     ) -> SourceGeometry:
-        """Return a polygon of a format that closes rings; those that are not closed are counted."""
+        """Build a polygon of a format that requires closed rings; rings that are not closed are counted."""
         rings = tuple(rings)
-        if unclosed := sum(bool((ring[0] != ring[-1]).any()) for ring in rings):
-            self.mended["ring", "closed: the last point was not the first"] += unclosed
+        unclosed = sum(bool((ring[0] != ring[-1]).any()) for ring in rings)
+        if unclosed:
+            self.tally.mended["ring", "closed: the last point was not the first"] += unclosed
         return SourceGeometry("polygon", rings, labels, at, whole=whole)
 
-    def flat(self, points: Array) -> Array:
-        """Return (k, 2) of points, whose third coordinates are counted."""
-        self.leave_heights(points[:, 2:3])
+    def drop_heights(self, points: Array) -> Array:
+        """Return points without their third coordinates, (k, 2), and count these."""
+        self.tally.add_heights(points[:, 2:3])
         return points[:, :2]
 
-    def leave_heights(self, heights: Array) -> None:
-        """Count third coordinates, which no map has; nan is none."""
-        self._heights.append(heights[~np.isnan(heights)])
-
-    def leave_out(self, thing: str, why: str = "", count: int = 1) -> None:
-        self.left_out[thing, why] += count
+    def leave_out(self, kind: str, reason: str = "", count: int = 1) -> None:
+        """Count things that are no part of the map, for the report."""
+        self.tally.left_out[kind, reason] += count
 
     @property
     def geometries(self) -> list[BaseGeometry]:
         """All outlines and lines, m."""
-        return [
-            *(outline.area for outline in self.outlines),
-            *(LineString(line.points) for line in self.lines),
-        ]
+        areas = [outline.area for outline in self.outlines]
+        return [*areas, *(LineString(line.points) for line in self.lines)]
 
-    @property
-    def repaired(self) -> tuple[str, ...]:
-        told = [
-            f"{format_count(count, thing)} {what}" for (thing, what), count in sorted(self.mended.items())
-        ]
-        if len(self._met) == 1:
-            told.append(f"the outline met itself: {self._met[0]}")
-        elif self._met:
-            told.append(f"{len(self._met)} outlines met themselves, the first: {self._met[0]}")
-        return tuple(told)
-
-    @property
-    def dropped(self) -> tuple[str, ...]:
-        left = sorted(self.left_out.items())
-        told = [f"{_pluralize(count, thing)} {why}".strip() for (thing, why), count in left]
-        heights = np.concatenate([*self._heights, np.empty(0)])
-        if len(heights):
-            span = f"z from {heights.min():.4g} to {heights.max():.4g}"
-            told.append(f"{format_count(len(heights), 'third coordinate')}, {span}")
-        return tuple(told)
-
-    def require_known_names(self) -> None:
-        """Raise ParameterError on a name of the options that the file has not; it names the nearest."""
-        options = self.options
-        boundary = () if options.boundary is None else (options.boundary,)
-        for name, labels in (("boundary", boundary), ("only", options.only), ("skip", options.skip)):
-            for label in labels or ():
-                if label.casefold() not in self.labels:
-                    known = list(self.labels.values())[:_SHOWN]
-                    what = describe_unknown_name("name", label, known) if known else "no shape has a name"
-                    raise ParameterError(f"{self.where}: {name}: {what}")
-
-    def count(self, vertices: int) -> None:
-        self.vertices += vertices
+    def count_vertices(self, number: int) -> None:
+        """Count vertices. Raises MapError if the file has too many."""
+        self.vertices += number
         files.require_vertices(self.vertices, self.where)
 
-    def _checked(self, rings: Sequence[Array], at: str) -> list[Array]:
-        """Count the points of rings, and return them to a nanometre: next to nothing is nothing."""
-        self.count(sum(map(len, rings)))
+    def _check_rings(self, rings: Sequence[Array], at: str) -> list[Array]:
+        """Count and round the points of rings. Raises MapError if a coordinate is out of range."""
+        self.count_vertices(sum(map(len, rings)))
         for ring in rings:
-            good = np.abs(ring) <= MAX_COORDINATE_M  # nan is not good either
-            if not good.all():
-                x, y = ring[int(np.argmin(good.all(axis=1)))].tolist()
+            is_valid = np.abs(ring) <= MAX_COORDINATE_M  # False for nan, too
+            if not is_valid.all():
+                x, y = ring[int(np.argmin(is_valid.all(axis=1)))].tolist()
                 place = f"{self.where}: {at}" if at else self.where
-                wanted = f"expected coordinates from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} m"
-                raise MapError(f"{place}: {wanted}, got a point at [{x:g}, {y:g}] m")
+                expected = f"expected coordinates from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} m"
+                raise MapError(f"{place}: {expected}, got a point at [{x:g}, {y:g}] m")
         return [np.round(ring, _DIGITS) + 0.0 for ring in rings]
 
-    def foreign_map(
-        self, name: str, text: str, *, solid: bool, overlap: bool = False, world: MultiPolygon | None = None
+    def build_foreign_map(
+        self,
+        name: str,
+        description: str,
+        *,
+        solid: bool,
+        overlap: bool = False,
+        world: MultiPolygon | None = None,
     ) -> ForeignMap:
-        """Return the map that the shapes of a file stand for.
-
-        The rules are those of `robocov_app.formats.geometry.interpretation`.
+        """Build the map that the shapes stand for, by the rules of `geometry.interpretation`.
 
         Parameters
         ----------
-        name, text : str
-            Name and description of the map.
+        name, description : str
         solid : bool
-            Whether closed outlines are solid unless the option ``outlines`` says it. Otherwise they are free
+            Whether closed outlines are solid unless the option ``outlines`` is given. Otherwise they are free
             space, except for those that lie in a larger one.
         overlap : bool
             Outlines may overlap and are all free, as JuPedSim's accessible areas.
         world : MultiPolygon or None, m
-            What is free before the shapes stand in it, if the format says so.
+            The free space without the shapes, if the format defines it.
 
         Raises
         ------
         MapError
             If there are no shapes, if the boundary has no area, or if they cross too often.
         ParameterError
-            If a name in the options is none of the file's.
+            If the options contain a name that the file does not have.
         """
-        self.require_known_names()
+        self.labels.require_known_names()
         if world is None and not self.outlines and not self.lines:
-            dropped = f" ({'; '.join(self.dropped)} left out)" if self.dropped else ""
-            raise MapError(f"{self.where}: no closed outline and no line{dropped}, expected a drawing")
-        found = interpret(self._to_drawing(world), solid=solid, overlap=overlap)
-        if found.outside:
-            self.leave_out("shape", "outside of the boundary", found.outside)
+            omissions = "; ".join(self.tally.describe_omissions())
+            left_out = f" ({omissions} left out)" if omissions else ""
+            reason = f"no closed outline and no line{left_out}, expected a drawing"
+            raise MapError(f"{self.where}: {reason}")
+        result = interpret(self._build_drawing(world), solid=solid, overlap=overlap)
+        if result.outside:
+            self.leave_out("shape", "outside of the boundary", result.outside)
         return ForeignMap(
             name=name,
-            description=text,
-            free=found.free,
-            boundary=found.boundary,
-            has_named_boundary=found.has_named_boundary,
-            boundary_source=found.boundary_source,
+            description=description,
+            free=result.free,
+            boundary=result.boundary,
+            has_named_boundary=result.has_named_boundary,
+            boundary_source=result.boundary_source,
             vertices_read=self.vertices,
             cell=self.cell,
-            primitives=found.primitives,
+            primitives=result.primitives,
             robots=tuple(self.robots),
-            repaired=(*self.repaired, *found.repaired),
-            dropped=self.dropped,
-            notes=(*self.notes, *found.notes),
-            page=found.page,
-            painted=self._list_painted(),
+            repaired=(*self.tally.describe_repairs(), *result.repaired),
+            dropped=self.tally.describe_omissions(),
+            notes=(*self.notes, *result.notes),
+            page=result.page,
+            painted=_list_painted(self),
         )
 
-    def _list_painted(self) -> tuple[Painted, ...]:
-        """Return what has a colour, the lowest first."""
-        coats = [outline.coat for outline in self.outlines if outline.colour is not None]
-        lines = [*self.lines, *(edge for outline in self.outlines for edge in outline.edges)]
-        coats += [line.coat for line in lines if line.colour is not None]
-        # of one order are a fill and its own stroke, which is above
-        coats.sort(key=lambda coat: coat.order)
-        return tuple(Painted(coat.area, coat.colour) for coat in coats if coat.colour is not None)
-
     def find_surrounding(self) -> Boundary:
-        """Return what the shapes enclose as walls, else a rectangle around them."""
-        return find_surrounding(self._to_drawing(None))
+        """Find the outer edge of the shapes as walls, else build a rectangle around them."""
+        return find_surrounding(self._build_drawing(None))
 
-    def _to_drawing(self, world: MultiPolygon | None) -> Drawing:
+    def _build_drawing(self, world: MultiPolygon | None) -> Drawing:
         return Drawing(
             where=self.where,
             outlines=self.outlines,
@@ -342,8 +346,31 @@ class Shapes:
         )
 
 
-def _pluralize(count: int, thing: str) -> str:
-    """Return how many things there are, also of nouns in y and x."""
-    if count != 1 and thing.endswith(("y", "x")):
-        return f"{count} {thing[:-1]}ies" if thing[-1] == "y" else f"{count} {thing}es"
-    return format_count(count, thing)
+def note_colours(shapes: Shapes, key: ColourKey) -> None:
+    """Note how often colors with a declared role occur, and which colors there are if none of them does."""
+    painted: list[ClosedOutline | WallLine] = [*shapes.outlines, *shapes.lines, *_list_edges(shapes)]
+    for role in ("free", "solid"):
+        declared = [colour for colour, its_role in key.entries if its_role == role]
+        matches = [shape for shape in painted if shape.role == role]
+        if matches:
+            counts = count_colours(shape.colour for shape in matches)
+            shapes.notes.append(f"painted as {role}: {counts} (--{role}-colour)")
+        elif declared:
+            known = count_colours(shape.colour for shape in painted)
+            others = f"; there are {known}" if known else ""
+            names = ", ".join(map(name_colour, declared))
+            shapes.notes.append(f"nothing is painted {names} (--{role}-colour){others}")
+
+
+def _list_edges(shapes: Shapes) -> list[WallLine]:
+    return [edge for outline in shapes.outlines for edge in outline.edges]
+
+
+def _list_painted(shapes: Shapes) -> tuple[Painted, ...]:
+    """Return everything that has a color, the lowest first."""
+    layers = [outline.paint_layer for outline in shapes.outlines if outline.colour is not None]
+    lines = [*shapes.lines, *_list_edges(shapes)]
+    layers += [line.paint_layer for line in lines if line.colour is not None]
+    # A fill and its own stroke, which is on top, have the same order; the sort keeps theirs.
+    layers.sort(key=lambda layer: layer.order)
+    return tuple(Painted(layer.area, layer.colour) for layer in layers if layer.colour is not None)

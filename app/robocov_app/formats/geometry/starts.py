@@ -9,9 +9,9 @@ from shapely import MultiPolygon, Polygon, STRtree
 from robocov.arrays import Array
 from robocov.environment import MIN_START_GAP_RADII, DiscStart, PointsStart, StartSpec, UniformStart
 from robocov.errors import MapError, format_count
+from robocov_app.formats.geometry.crossings import extract_sides
 from robocov_app.formats.geometry.free_parts import MAX_FILE_ROBOTS
 from robocov_app.formats.geometry.narrow_gaps import count_ray_crossings
-from robocov_app.formats.geometry.polygons import extract_sides
 from robocov_app.formats.geometry.shaping import Conversion
 
 _MAX_SQUARES = 1024

@@ -1,6 +1,6 @@
 """SVG drawings, read (filled shapes are areas, unfilled strokes are walls) and written (at true scale).
 
-Filled shapes are areas, by their fill rule: solid, but for the boundary (see `Shapes.foreign_map`; names are
+Filled shapes are areas, by their fill rule: solid, except for the boundary (see `Shapes`; names are
 ids, classes and the labels of Inkscape's layers, of the shape and the groups around it). Shapes that are only
 stroked are walls as wide as the stroke, or as the option ``thickness``, cut where they turn more sharply than
 their mitre limit. Colours mean nothing. What is hidden, text and pictures are left out.
@@ -32,11 +32,13 @@ from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, Writ
 from robocov_app.formats.colours import Paint, read_colour
 from robocov_app.formats.files import MAX_VERTICES, name_of_map, require_shapes
 from robocov_app.formats.geometry.curves import CURVE_TOLERANCE_M, flatten_arc
+from robocov_app.formats.geometry.enclosed_area import Rule
 from robocov_app.formats.geometry.frames import transform_points
-from robocov_app.formats.geometry.polygons import Rule, compute_free_area, format_decimal
+from robocov_app.formats.geometry.polygons import compute_free_area, format_decimal
 from robocov_app.formats.geometry.primitives import transform_numbers
 from robocov_app.formats.geometry.rasterize import describe_unsupported
-from robocov_app.formats.geometry.shapes import Shapes, WallLine
+from robocov_app.formats.geometry.shape_types import PenStroke
+from robocov_app.formats.geometry.shapes import Shapes, WallLine, note_colours
 from robocov_app.formats.svg import path as paths
 from robocov_app.formats.svg.path import build_affine, compose, compute_stretch, parse_length, parse_numbers
 from robocov_app.formats.xml_tree import DEEPEST, MOST_ELEMENTS, Element, read_xml_tree
@@ -79,12 +81,12 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
             raise MapError(f"{shapes.where}: expected at least {_SMALLEST:g} m, got {found}: {hint}")
     own = "at its own scale" if options.scale is None else f"a unit is {options.scale:g} m"
     shapes.notes = [own, *drawing.notes()]
-    shapes.note_colours(drawing.key)
+    note_colours(shapes, drawing.key)
     texts = {
         each.tag: to_one_line(" ".join(each.text.split())) for each in root.children if each.text.strip()
     }
     name = texts.get("title", "")[:80] or name_of_map(path)
-    return shapes.foreign_map(name, texts.get("desc", "")[:1000] or "Imported from SVG.", solid=True)
+    return shapes.build_foreign_map(name, texts.get("desc", "")[:1000] or "Imported from SVG.", solid=True)
 
 
 def _page(given: dict[str, str], scale: float | None) -> tuple[Array, float, float]:
@@ -287,7 +289,7 @@ class _Drawing:
     def _shape(self, element: Element, place: _Place) -> None:
         style, at = place.style, f"line {element.line}"
         visible = style["visibility"].lower() not in ("hidden", "collapse")
-        if visible and not self.shapes.wants(place.labels):
+        if visible and not self.shapes.accept(place.labels):
             return
         filled = paths.is_painted(style, "fill") and element.tag != "line"
         stroked = paths.is_painted(style, "stroke")
@@ -389,7 +391,7 @@ class _Drawing:
                 cap=_CAPS.get(style["stroke-linecap"].lower(), "flat"),
                 join=_JOINS.get(style["stroke-linejoin"].lower(), "mitre"),
                 mitre_limit=limit[0] if limit and limit[0] >= 1.0 else 4.0,
-                stretched=(path, own, place.matrix) if is_stretched else None,
+                stretched=PenStroke(path, own, place.matrix) if is_stretched else None,
                 colour=paint.colour,
                 role=paint.role,
             )

@@ -1,0 +1,147 @@
+"""Areas enclosed by rings, by the rules of polygons with holes and of filled paths."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from robocov.arrays import Array, BoolArray
+from robocov.environment import GRID_M
+from robocov_app.formats.geometry.crossings import CrossingCounter, extract_edges
+from robocov_app.formats.geometry.polygons import make_valid, to_multipolygon, unite
+
+Rule: TypeAlias = Literal["holes", "evenodd", "nonzero"]
+"""Other rings are holes in the first one, or one of SVG's ``fill-rule``."""
+_MAX_RAY_PAIRS = 500_000
+"""Number of pairs of a ray and an edge compared at once, which bounds the memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class EnclosedArea:
+    """The area that rings enclose.
+
+    Attributes
+    ----------
+    area : MultiPolygon, m
+        Valid, the largest part first; empty if the rings enclose nothing.
+    invalidity : str or None
+        Why the rings of a polygon with holes were invalid, and where.
+    lost_holes : dict of str to int
+        Number of holes that take nothing away, by the reason.
+    """
+
+    area: MultiPolygon
+    invalidity: str | None = None
+    lost_holes: dict[str, int] = field(default_factory=dict)
+
+
+def find_enclosed_area(
+    rings: Sequence[Array], rule: Rule = "holes", crossings: CrossingCounter | None = None
+) -> EnclosedArea:
+    """Find the area that rings enclose.
+
+    Parameters
+    ----------
+    rings : sequence of (k, 2) arrays, m
+        Closed or not.
+    rule : "holes", "evenodd" or "nonzero"
+    crossings : CrossingCounter or None
+        Crossings in the file so far.
+
+    Returns
+    -------
+    EnclosedArea
+
+    Raises
+    ------
+    MapError
+        If the file has too many crossings.
+    """
+    crossings = CrossingCounter() if crossings is None else crossings
+    has_three = [_has_three_points(ring) for ring in rings]
+    if not any(has_three) or (rule == "holes" and not has_three[0]):
+        return EnclosedArea(MultiPolygon())
+    lost: Counter[str] = Counter()
+    if rule == "holes":
+        lost["of fewer than three points"] = has_three[1:].count(False)
+    rings = [ring for ring, is_usable in zip(rings, has_three, strict=True) if is_usable]
+    plain = Polygon(rings[0], rings[1:])
+    if (rule == "holes" or len(rings) == 1) and plain.is_valid:
+        return EnclosedArea(to_multipolygon(plain), lost_holes=+lost)
+    lines = [shapely.linearrings(ring) for ring in rings]
+    crossings.add(lines)
+    if rule != "holes":
+        return EnclosedArea(_fill(lines, rule))
+    area = _subtract_holes(rings, lost)
+    invalidity: str | None = None
+    if not area.is_empty:
+        invalidity = shapely.is_valid_reason(plain)
+    return EnclosedArea(area, invalidity, +lost)
+
+
+def _has_three_points(ring: Array) -> bool:
+    """Return whether a ring has three different points; ten times as fast as sorting them."""
+    others = ring[(ring != ring[:1]).any(axis=1)]
+    return bool((others != others[:1]).any())
+
+
+def _subtract_holes(rings: Sequence[Array], lost: Counter[str]) -> MultiPolygon:
+    """Return the first ring without the others, and count those that take nothing away."""
+    areas = [make_valid(Polygon(ring)) for ring in rings]
+    # The parts of rings that run along themselves may share an edge.
+    areas = [area if area.is_valid else shapely.union_all([area]) for area in areas]
+    outer = areas[0]
+    holes = [area for area in map(to_multipolygon, areas[1:]) if not area.is_empty]
+    lost["without an area"] += len(areas) - 1 - len(holes)
+    shapely.prepare(outer)
+    lost["outside of their outline"] += int((~shapely.intersects(outer, holes)).sum())
+    if not holes:
+        return to_multipolygon(outer)
+    return to_multipolygon(shapely.difference(outer, unite(holes)))
+
+
+def _fill(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
+    """Return the area that closed lines fill by a rule for paths."""
+    faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(shapely.union_all(lines))))
+    if not len(faces):
+        return MultiPolygon()
+    inside = shapely.get_coordinates(shapely.point_on_surface(faces))
+    edges = extract_edges(lines)
+    tree = shapely.STRtree(shapely.box(*edges.min(axis=1).T, *edges.max(axis=1).T))
+    chunk = max(_MAX_RAY_PAIRS // len(edges), 1)
+    is_filled = [
+        _find_filled(inside[start : start + chunk], edges, tree, rule)
+        for start in range(0, len(inside), chunk)
+    ]
+    faces = faces[np.concatenate(is_filled)]
+    try:
+        return to_multipolygon(shapely.coverage_union_all(faces))
+    except shapely.GEOSException:  # Rounding has folded very thin faces over others.
+        return to_multipolygon(shapely.union_all(faces, grid_size=GRID_M))
+
+
+def _find_filled(points: Array, edges: Array, tree: shapely.STRtree, rule: Rule) -> BoolArray:
+    """Return which points, (m, 2), are filled.
+
+    These are the points that the edges wind around, or, by evenodd, from which a ray to the right crosses
+    an odd number of edges.
+    """
+    far = np.column_stack([np.full(len(points), edges[..., 0].max() + 1.0), points[:, 1]])
+    rays = shapely.linestrings(np.stack([points, far], axis=1))
+    ray, near = tree.query(rays)
+    point = points[ray]
+    start = edges[near, 0]
+    end = edges[near, 1]
+    is_upward = (start[:, 1] <= point[:, 1]) & (point[:, 1] < end[:, 1])
+    is_downward = (end[:, 1] <= point[:, 1]) & (point[:, 1] < start[:, 1])
+    left = (end[:, 0] - start[:, 0]) * (point[:, 1] - start[:, 1])
+    left = left - (point[:, 0] - start[:, 0]) * (end[:, 1] - start[:, 1])
+    sign = np.where(is_upward & (left > 0), 1, np.where(is_downward & (left < 0), -1, 0))
+    if rule == "evenodd":
+        return np.asarray(np.bincount(ray, np.abs(sign), len(points)) % 2 == 1)
+    return np.asarray(np.bincount(ray, sign, len(points)) != 0)

@@ -1,0 +1,58 @@
+"""Selection of shapes by their names, ids, classes and layers."""
+
+from collections.abc import Iterable
+
+from robocov.errors import ParameterError, describe_unknown_name
+from robocov_app.formats.base import ReadOptions
+
+_MAX_LISTED_NAMES = 20
+
+
+class LabelFilter:
+    """The options ``only`` and ``skip``, and the labels that a file contains.
+
+    Attributes
+    ----------
+    only : set of str, or None
+        Labels that are read, in lower case; None for all.
+    skip : set of str
+        Labels that are left out, in lower case.
+    """
+
+    def __init__(self, where: str, options: ReadOptions) -> None:
+        self.only: set[str] | None = None
+        if options.only is not None:
+            self.only = set(map(str.casefold, options.only))
+        self.skip = set(map(str.casefold, options.skip or ()))
+        self._where = where
+        self._options = options
+        self._known: dict[str, str] = {}
+
+    def register(self, labels: Iterable[str]) -> set[str]:
+        """Remember labels of the file, and return them as they are compared, in lower case."""
+        folded = {label.casefold(): label for label in labels}
+        self._known |= folded
+        return set(folded)
+
+    def accepts(self, labels: Iterable[str]) -> bool:
+        """Remember labels of the file, and return whether a shape with these labels is read."""
+        folded = self.register(labels)
+        if self.only is not None and not self.only & folded:
+            return False
+        return not self.skip & folded
+
+    def require_known_names(self) -> None:
+        """Raise ParameterError if the options contain a name that the file does not have."""
+        options = self._options
+        boundary = () if options.boundary is None else (options.boundary,)
+        given = {"boundary": boundary, "only": options.only or (), "skip": options.skip or ()}
+        for option, names in given.items():
+            for name in names:
+                if name.casefold() not in self._known:
+                    raise ParameterError(f"{self._where}: {option}: {self._describe_unknown(name)}")
+
+    def _describe_unknown(self, name: str) -> str:
+        known = list(self._known.values())[:_MAX_LISTED_NAMES]
+        if not known:
+            return "no shape has a name"
+        return describe_unknown_name("name", name, known)
