@@ -1,8 +1,11 @@
 """`robocov paper`."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -11,113 +14,220 @@ from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
 from robocov_app.terminal.output import BOLD, RIGHT, echo, print_answer, print_table
 
+if TYPE_CHECKING:
+    from robocov_app.replication.claims import Claim
+    from robocov_app.replication.plan import Plan
+    from robocov_app.replication.results import BeyondResults, Forecast, PaperResults, RunnerOptions
+
+FAILED = 1
+"""Exit status of a study with failed runs."""
+
 
 @dataclass
 class Arguments(JsonOption):
-    """Run the paper's figures 1 to 8 and test its claims over many maps, starts and seeds.
+    """Reproduce the paper's figures 1 to 8 and test its claims on many maps, starts and seeds.
 
-    The folder gets index.html, a page with every figure beside what the paper claims of it and a plain
-    verdict on every claim; beyond.html, with every registered controller side by side and what the paper
-    leaves to others; figures/ as PNG, SVG and PDF; claims.json; and studies/, all runs and their tables. How
-    long it takes is told before it begins. Ctrl-C keeps what is done, and the same command goes
-    on from there.
+    The folder contains index.html, a page with each figure next to the paper's claim about it and a plain
+    verdict on each claim; beyond.html, with all registered controllers side by side and the questions that
+    the paper leaves open; figures/ as PNG, SVG and PDF; claims.json; and studies/, all runs and their tables.
+    The command first prints how long it will take. Ctrl-C keeps finished runs; the same command resumes.
 
     Example: robocov paper --quick --out paper
     """
 
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")]
-    """Folder for the results; one that holds a part of the same study is gone on with."""
+    """Folder for the results; an unfinished study in it is resumed."""
     quick: bool = False
-    """A small study of some minutes, to see that all is well; the full one takes two hours or more."""
+    """Run a small study of some minutes as a check; the full one takes two hours or more."""
     figures_only: bool = False
     """Only the figures, without the claims."""
     without_beyond: bool = False
-    """Leave out what goes beyond the paper."""
+    """Leave out the part that goes beyond the paper."""
     beyond_only: bool = False
-    """Only the figures and what goes beyond the paper: pages and claims.json leave the paper's claims out."""
+    """Only the figures and the part beyond the paper; pages and claims.json leave the paper's claims out."""
     workers: int | None = None
-    """Processes; by default one a processor."""
+    """Number of processes on this machine; by default one per processor."""
     scheduler: str | None = None
-    """Address of a Dask scheduler, as in tcp://host:8786, whose workers do the runs."""
+    """Address of a Dask scheduler whose workers do the runs, as in tcp://host:8786."""
     keep_versions: bool = False
-    """Use runs that other versions of robocov, numpy, scipy, shapely or pymunk have done."""
+    """Reuse runs of other versions of robocov, numpy, scipy, shapely or pymunk."""
 
     def __post_init__(self) -> None:
         if self.workers is not None:
             require_number("--workers", self.workers, 1, 1024)
-        if len(self.parts) > 1:
-            raise InputError(f"{self.parts[0]} and {self.parts[1]}: expected one of them")
+        if len(self.selection) > 1:
+            raise InputError(f"{self.selection[0]} and {self.selection[1]}: expected one of them")
 
     @property
-    def parts(self) -> list[str]:
+    def selection(self) -> list[str]:
+        """The options that were given to select parts of the study."""
         names = ("figures_only", "without_beyond", "beyond_only")
         return [f"--{name.replace('_', '-')}" for name in names if getattr(self, name)]
 
+    @property
+    def includes_claims(self) -> bool:
+        """Whether the paper's claims are tested."""
+        return not (self.figures_only or self.beyond_only)
+
+    @property
+    def includes_beyond(self) -> bool:
+        """Whether the part beyond the paper is included."""
+        return not (self.figures_only or self.without_beyond)
+
+
+@dataclass
+class _Outcome:
+    """Results of the selected parts of the study."""
+
+    paper: PaperResults | None
+    beyond: BeyondResults | None
+    figure_runs: int
+    claims: list[Claim]
+
+    @property
+    def failed(self) -> int:
+        """Number of failed runs."""
+        return sum(results.failed for results in (self.paper, self.beyond) if results is not None)
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        runs = self.figure_runs if self.paper is None else self.paper.runs
+        return runs if self.beyond is None else runs + self.beyond.runs
+
 
 def command(options: Arguments) -> int:
-    from robocov_app.replication import claims, pages, results
+    """Run `robocov paper`, and return its exit status."""
     from robocov_app.replication.plan import FULL, QUICK
     from robocov_app.replication.results import Interrupted, RunnerOptions, forecast, open_folder
     from robocov_app.sweep.executors import processors
-    from robocov_app.sweep.sweeping import duration
 
     plan = QUICK if options.quick else FULL
-    out, quiet = options.out, options.json
+    out = options.out
     open_folder(out, plan)
-    with_claims = not (options.figures_only or options.beyond_only)
-    with_beyond = not (options.figures_only or options.without_beyond)
-    found, more = list[Any](), tuple[Any, ...]()  # claims
-    paper = beyond = None
-    with Interruption() as stop:
-        workers, scheduler = options.workers or processors(), options.scheduler
-        runner = RunnerOptions(workers, scheduler, quiet, stop, options.keep_versions)
-        if not quiet:
-            expected = forecast(out, plan, workers, claims=with_claims, beyond=with_beyond)
-            words, done = f"all {expected.runs:,} runs are there", expected.runs - expected.left
-            if expected.left:
-                there = f", {done:,} of them there already" if done else ""
-                each = ", ".join(f"{law} {seconds:.2f} s" for law, seconds in expected.each.items())
-                long = f"{duration(expected.seconds)} on {workers} processes"
-                if scheduler:
-                    long = f"{duration(expected.seconds * workers)} of computing, on a Dask cluster"
-                words = f"{expected.runs:,} runs{there}, about {long} (measured: {each} a run)"
-                words += "; Ctrl-C keeps what is done"
-            echo(f"paper ({plan.name}): {words}", to_stderr=True, flush=True)
-        try:
-            if with_claims:
-                paper = results.run_paper(out, plan, runner)
-                found = claims.paper_claims(paper.convex, paper.claims, paper.gains)
-                pages.save_claims(out, found)
-            runs = paper.figures if paper else results.run_figures(out, plan, runner)
-            if with_beyond:
-                beyond = results.run_beyond(out, plan, runner, paper)
-                more = claims.beyond_claims(beyond)
-                pages.save_claims(out, (*found, *more))
-            first = results.partition_record()
-            images = pages.save_paper_figures(out, runs, first, paper, quiet=quiet)
-            if beyond is not None:
-                drawn = pages.save_beyond_figures(out, beyond, quiet=quiet)
-                pages.save(out / pages.BEYOND_PAGE, pages.beyond_page(drawn, beyond))
-            pages.save(out / pages.PAGE, pages.paper_page(plan, images, runs, first, paper, found, more))
-        except Interrupted:
-            again = " ".join(["--out", str(out), *["--quick"] * options.quick, *options.parts])
-            print_answer(
-                options, {"out": str(out), "interrupted": True}, f"stopped; to go on: robocov paper {again}"
+    with Interruption() as interruption:
+        workers = options.workers or processors()
+        runner = RunnerOptions(
+            workers=workers,
+            scheduler=options.scheduler,
+            quiet=options.json,
+            stop=interruption,
+            keep_versions=options.keep_versions,
+        )
+        if not options.json:
+            expected = forecast(
+                out, plan, workers, claims=options.includes_claims, beyond=options.includes_beyond
             )
-            return INTERRUPTED
-    failed, verdicts = sum(part.failed for part in (paper, beyond) if part), (*found, *more)
-    if verdicts and not quiet:
-        fold, rows = {"overflow": "fold"}, []
-        for claim in verdicts:
-            measured = f"{claim.criteria[0].text}: {claim.criteria[0].found}" if claim.criteria else "–"
-            rows.append((claim.claim, claim.verdict, measured, str(claim.runs)))
-        print_table([("claim", fold), ("verdict", BOLD), ("measured", fold), ("runs", RIGHT)], rows)
-    written = ["index.html", *["beyond.html"] * with_beyond, *["claims.json"] * bool(verdicts)]
-    lines = [f"saved in {out}/: {', '.join(written)}, figures/, studies/"]
-    if failed:
-        lines += [f"{format_count(failed, 'run')} failed: the column error in studies/*/results.csv says why"]
-    answer = {"out": str(out), "plan": plan.name, "interrupted": False}
-    answer["runs"] = (paper.runs if paper else len(runs)) + (beyond.runs if beyond else 0)
-    answer |= {"failed": failed, "page": str(out / "index.html")}
-    print_answer(options, answer | {"claims": [claim.to_json() for claim in verdicts]}, *lines)
-    return int(failed > 0)
+            text = _describe_forecast(expected, workers, on_cluster=bool(options.scheduler))
+            echo(f"paper ({plan.name}): {text}", to_stderr=True, flush=True)
+        try:
+            outcome = _run_study(options, plan, runner)
+        except Interrupted:
+            return _print_interruption(options)
+    _print_outcome(options, plan, outcome)
+    return FAILED if outcome.failed else 0
+
+
+def _describe_forecast(expected: Forecast, workers: int, *, on_cluster: bool) -> str:
+    """Return the number of runs and the expected time as text."""
+    from robocov_app.sweep.sweeping import duration
+
+    if not expected.left:
+        return f"all {expected.runs:,} runs are done"
+    finished = expected.runs - expected.left
+    reused = f", {finished:,} of them done already" if finished else ""
+    seconds_per_run = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in expected.each.items())
+    time = f"{duration(expected.seconds)} on {workers} processes"
+    if on_cluster:
+        time = f"{duration(expected.seconds * workers)} of computing, on a Dask cluster"
+    return (
+        f"{expected.runs:,} runs{reused}, about {time} (measured: {seconds_per_run} a run); "
+        "Ctrl-C keeps finished runs"
+    )
+
+
+def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcome:
+    """Do the selected parts of the study, and write their claims, figures and pages.
+
+    Raises
+    ------
+    robocov_app.replication.results.Interrupted
+        If the user stops the study.
+    """
+    from robocov_app.replication import claims, pages, results
+
+    out = options.out
+    paper: PaperResults | None = None
+    beyond: BeyondResults | None = None
+    paper_claims: list[Claim] = []
+    beyond_claims: list[Claim] = []
+    if options.includes_claims:
+        paper = results.run_paper(out, plan, runner)
+        paper_claims = claims.paper_claims(paper.convex, paper.claims, paper.gains)
+        pages.save_claims(out, paper_claims)
+    figure_runs = results.run_figures(out, plan, runner) if paper is None else paper.figures
+    if options.includes_beyond:
+        beyond = results.run_beyond(out, plan, runner, paper)
+        beyond_claims = list(claims.beyond_claims(beyond))
+        pages.save_claims(out, (*paper_claims, *beyond_claims))
+    first = results.partition_record()
+    images = pages.save_paper_figures(out, figure_runs, first, paper, quiet=options.json)
+    if beyond is not None:
+        beyond_images = pages.save_beyond_figures(out, beyond, quiet=options.json)
+        pages.save(out / pages.BEYOND_PAGE, pages.beyond_page(beyond_images, beyond))
+    page = pages.paper_page(plan, images, figure_runs, first, paper, paper_claims, beyond_claims)
+    pages.save(out / pages.PAGE, page)
+    return _Outcome(
+        paper=paper,
+        beyond=beyond,
+        figure_runs=len(figure_runs),
+        claims=[*paper_claims, *beyond_claims],
+    )
+
+
+def _print_interruption(options: Arguments) -> int:
+    """Print how to resume an interrupted study, and return the exit status."""
+    words = ["robocov", "paper", "--out", str(options.out)]
+    if options.quick:
+        words.append("--quick")
+    words += options.selection
+    message = f"Interrupted. Partial results are in {options.out}/. To resume: {' '.join(words)}"
+    print_answer(options, {"out": str(options.out), "interrupted": True}, message)
+    return INTERRUPTED
+
+
+def _print_outcome(options: Arguments, plan: Plan, outcome: _Outcome) -> None:
+    """Print the verdicts and the written files."""
+    if outcome.claims and not options.json:
+        _print_claims(outcome.claims)
+    pages = ["index.html"]
+    if options.includes_beyond:
+        pages.append("beyond.html")
+    if outcome.claims:
+        pages.append("claims.json")
+    lines = [f"saved in {options.out}/: {', '.join(pages)}, figures/, studies/"]
+    if outcome.failed:
+        failed_runs = format_count(outcome.failed, "run")
+        lines.append(f"{failed_runs} failed; see the column error in studies/*/results.csv")
+    answer = {
+        "out": str(options.out),
+        "plan": plan.name,
+        "interrupted": False,
+        "runs": outcome.runs,
+        "failed": outcome.failed,
+        "page": str(options.out / "index.html"),
+        "claims": [claim.to_json() for claim in outcome.claims],
+    }
+    print_answer(options, answer, *lines)
+
+
+def _print_claims(claims: Sequence[Claim]) -> None:
+    """Print the table of verdicts."""
+    fold: dict[str, Any] = {"overflow": "fold"}
+    rows = []
+    for claim in claims:
+        measured = "–"
+        if claim.criteria:
+            measured = f"{claim.criteria[0].text}: {claim.criteria[0].found}"
+        rows.append((claim.claim, claim.verdict, measured, str(claim.runs)))
+    print_table([("claim", fold), ("verdict", BOLD), ("measured", fold), ("runs", RIGHT)], rows)

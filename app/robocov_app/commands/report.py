@@ -1,11 +1,13 @@
 """`robocov report`."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -17,111 +19,193 @@ from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import echo, print_answer
 from robocov_app.terminal.progress import show_progress
 
-SESSION = ".robocov"
+if TYPE_CHECKING:
+    from robocov_app.report.results import Result
+
+_SESSION_SUFFIX = ".robocov"
 
 
 @dataclass
 class Arguments(JsonOption):
-    """One HTML page of runs, comparisons, sweeps and sessions, with interactive replay; it needs no network.
+    """Build one HTML page of runs, comparisons, sweeps and sessions, with interactive replay; works offline.
 
     Example: robocov report sweeps/rooms --out rooms.html
     """
 
     folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="DIR [DIR ...]")]
-    """Folders of runs, comparisons and sweeps, and sessions of the window (all branches); a section each."""
+    """Folders of runs, comparisons and sweeps, and session files (all branches); one section each."""
     out: Path | None = None
     """The page; by default report.html in the (first) folder."""
     overwrite: bool = False
-    """Replace a file that is no report; an earlier report is replaced anyway."""
+    """Replace a file that is not a report; an earlier report is always replaced."""
     title: str | None = None
-    """What stands above; by default what was run."""
+    """Page title; by default a description of the runs."""
     theme: Literal["auto", "light", "dark"] = "auto"
     """Colours; auto follows the reader's preference."""
     optimum: bool = False
-    """Search for the best placement on each map, some seconds each; those found before are used anyway."""
+    """Search for the best placement on each map, some seconds each; cached ones are always used."""
 
 
 def command(options: Arguments) -> None:
+    """Run `robocov report`."""
     if not options.folders:
         raise ParameterError("DIR: expected the folder of a run, a comparison or a sweep")
     first = options.folders[0]
-    target = options.out or (first.with_suffix(".html") if first.suffix == SESSION else first / REPORT_FILE)
-    if options.out is not None or first.suffix == SESSION:
+    is_session = first.suffix == _SESSION_SUFFIX
+    default_target = first.with_suffix(".html") if is_session else first / REPORT_FILE
+    target = options.out or default_target
+    if options.out is not None or is_session:
         check_target(target, overwrite=options.overwrite)
     with TemporaryDirectory(prefix="robocov-") as temporary:
-        parts = [part for path in options.folders for part in parts_of(path, Path(temporary))]
-        write_report(options, parts, target, Path(temporary))
+        scratch = Path(temporary)
+        sections = [section for path in options.folders for section in _find_sections(path, scratch)]
+        _write_report(options, sections, target, scratch)
 
 
-def parts_of(path: Path, temporary: Path) -> list[tuple[Path, str]]:
-    """Return folders of results with words on each: of a story its parts, of a session all of them."""
+def _find_sections(path: Path, scratch: Path) -> list[tuple[Path, str]]:
+    """Return the result folders at a path, each with its description.
+
+    A session is simulated first, into the scratch folder. A story has one folder for each of its parts.
+    """
     from robocov_app.viewer.headless import story_folders
 
-    if path.suffix != SESSION:
+    if path.suffix != _SESSION_SUFFIX:
         return story_folders(path)
     from robocov_app.commands import run
 
-    words = run.Arguments(map=str(path), out=temporary / path.stem, all_branches=True, json=True)
-    with Interruption() as stop:
-        stories = [Path(answer["out"]) for answer in run.save_branches(words, stop)]
-    return [part for story in stories for part in story_folders(story)]
+    run_options = run.Arguments(map=str(path), out=scratch / path.stem, all_branches=True, json=True)
+    with Interruption() as interruption:
+        stories = [Path(answer["out"]) for answer in run.save_branches(run_options, interruption)]
+    return [section for story in stories for section in story_folders(story)]
 
 
-def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: Path, scratch: Path) -> None:
-    """Gather the results of folders, and write the page; words tell which part of a story one is.
-
-    Results in the `scratch` folder are called by their path in it: they are gone afterwards.
-    """
-
-    def called(folder: Path) -> str:
-        return str(folder.relative_to(scratch) if folder.is_relative_to(scratch) else folder)
-
+def _write_report(
+    options: Arguments, sections: Sequence[tuple[Path, str]], target: Path, scratch: Path
+) -> None:
+    """Gather the results, write the page, and print the answer."""
     from robocov_app.report.document import report
-    from robocov_app.report.results import gathered, with_references
+    from robocov_app.report.results import gathered
 
-    results = [replace(gathered(folder), part=words) for folder, words in parts]
+    results = [replace(gathered(folder), part=description) for folder, description in sections]
     check_target(target, overwrite=options.overwrite)
-    for k, result in enumerate(results):  # reading all takes 10 ms a run
-        quiet = options.json or result.kind != "sweep"
-        with show_progress("runs read", len(result.fine), quiet=quiet) as update:
-            results[k] = result.readable(update)
-    damaged = [(result.folder, each) for result in results for each in result.damaged]
-    if not any(result.entries for result in results):
-        folder, each = damaged[0]
-        raise InputError(f"{folder}: {each.folder}: {each.reason}; no run is left to report")
-    for folder, each in () if options.json else damaged:
-        echo(f"robocov: warning: {folder}: {each.folder} is left out: {each.reason}", to_stderr=True)
-    for k, result in enumerate(results):
-        quiet, total = options.json or not options.optimum, len({entry.setting for entry in result.fine})
-        with show_progress("searching", total, quiet=quiet) as update:
-            results[k] = with_references(result, search=options.optimum, tell=update)
+    results = _read_runs(options, results)
+    _check_damaged_runs(options, results)
+    results = _add_references(options, results)
     page = report(results, title=options.title, theme=options.theme)
     data = page.html.encode("utf-8", "replace")
-    with ExitStack() as stack:
-        if target == options.folders[0] / REPORT_FILE and results[0].kind != "sweep":
-            more = stack.enter_context(extend_result(options.folders[0]))
-            more.claim_file(REPORT_FILE)
-            stack.enter_context(replace_file(more.staging / REPORT_FILE)).write_bytes(data)
-        else:
-            stack.enter_context(replace_file(target)).write_bytes(data)
-    counts, lines = [], []
-    for (folder, _), result, shown in zip(parts, results, page.shown, strict=True):
-        runs, failed, lost = len(result.fine), len(result.failed), [each._asdict() for each in result.damaged]
-        count = {"folder": called(folder), "kind": result.kind, "runs": runs, "failed": failed}
-        counts.append(count | {"damaged": lost, "missing": result.missing, "shown": shown})
-        words = [f"{called(result.folder)}: {result.kind} of {format_count(runs, 'run')}"]
-        words += [f"{failed} failed"] * bool(failed) + [f"{len(lost)} cannot be read"] * bool(lost)
-        words += [f"{result.missing} of {result.wanted} missing"] * bool(result.missing)
-        lines.append(", ".join(words))
+    # The report in the folder of a run is registered as one of its files, so that it is replaced with it.
+    is_in_run_folder = target == options.folders[0] / REPORT_FILE and results[0].kind != "sweep"
+    _write_page(data, target, options.folders[0] if is_in_run_folder else None)
+    counts = []
+    lines = []
+    for (folder, _), result, shown in zip(sections, results, page.shown, strict=True):
+        counts.append(_count_runs(result, _name_folder(folder, scratch), shown))
+        lines.append(_describe_result(result, _name_folder(result.folder, scratch)))
     answer = {"path": str(target), "bytes": len(data), "results": counts}
     print_answer(options, answer, *lines, f"written to {target} ({len(data) / 1e6:.2f} MB)")
 
 
+def _read_runs(options: Arguments, results: Sequence[Result]) -> list[Result]:
+    """Read all runs, about 10 ms each, and return the results with unreadable runs marked as damaged."""
+    read_results = []
+    for result in results:
+        is_quiet = options.json or result.kind != "sweep"
+        with show_progress("runs read", len(result.fine), quiet=is_quiet) as update:
+            read_results.append(result.readable(update))
+    return read_results
+
+
+def _check_damaged_runs(options: Arguments, results: Sequence[Result]) -> None:
+    """Print a warning for each damaged run.
+
+    Raises
+    ------
+    InputError
+        If all runs are damaged.
+    """
+    damaged_runs = [(result.folder, run) for result in results for run in result.damaged]
+    if not any(result.entries for result in results):
+        folder, run = damaged_runs[0]
+        raise InputError(f"{folder}: {run.folder}: {run.reason}; no run is left to report")
+    if options.json:
+        return
+    for folder, run in damaged_runs:
+        echo(f"robocov: warning: {folder}: {run.folder} is left out: {run.reason}", to_stderr=True)
+
+
+def _add_references(options: Arguments, results: Sequence[Result]) -> list[Result]:
+    """Return the results with the best placements, from the cache or by a search."""
+    from robocov_app.report.results import with_references
+
+    complete_results = []
+    for result in results:
+        settings = {entry.setting for entry in result.fine}
+        is_quiet = options.json or not options.optimum
+        with show_progress("searching", len(settings), quiet=is_quiet) as update:
+            complete_results.append(with_references(result, search=options.optimum, tell=update))
+    return complete_results
+
+
+def _write_page(data: bytes, target: Path, run_folder: Path | None) -> None:
+    """Write the page; if it is in the folder of a run, as one of its files."""
+    with ExitStack() as stack:
+        if run_folder is not None:
+            result = stack.enter_context(extend_result(run_folder))
+            result.claim_file(REPORT_FILE)
+            target = result.staging / REPORT_FILE
+        stack.enter_context(replace_file(target)).write_bytes(data)
+
+
+def _name_folder(folder: Path, scratch: Path) -> str:
+    """Return the path of a folder, relative to the scratch folder if it is in there."""
+    return str(folder.relative_to(scratch) if folder.is_relative_to(scratch) else folder)
+
+
+def _count_runs(result: Result, folder: str, shown: int) -> dict[str, Any]:
+    """Return the numbers of runs in a section of the page, for programs."""
+    return {
+        "folder": folder,
+        "kind": result.kind,
+        "runs": len(result.fine),
+        "failed": len(result.failed),
+        "damaged": [run._asdict() for run in result.damaged],
+        "missing": result.missing,
+        "shown": shown,
+    }
+
+
+def _describe_result(result: Result, folder: str) -> str:
+    """Return the numbers of runs in a section of the page as text."""
+    texts = [f"{folder}: {result.kind} of {format_count(len(result.fine), 'run')}"]
+    if result.failed:
+        texts.append(f"{len(result.failed)} failed")
+    if result.damaged:
+        texts.append(f"{len(result.damaged)} cannot be read")
+    if result.missing:
+        texts.append(f"{result.missing} of {result.wanted} missing")
+    return ", ".join(texts)
+
+
 def check_target(target: Path, *, overwrite: bool) -> None:
-    """Raise InputError or OutputError, before any work is done, where no page may be written."""
+    """Check, before any work is done, that a page may be written.
+
+    Parameters
+    ----------
+    target : Path
+        File of the page. An earlier report may be replaced in any case.
+    overwrite : bool
+        Whether a file that is not a report may be replaced.
+
+    Raises
+    ------
+    InputError
+        If the file exists and may not be replaced.
+    OutputError
+        If its folder does not exist.
+    """
     resolve_target(target)
     if not target.parent.is_dir():
         raise OutputError(f"{target}: cannot be written: there is no folder {target.parent}")
     if target.exists() and not overwrite and not is_report(target):
-        wanted = "choose another --out or pass --overwrite"
-        raise InputError(f"{target}: the file is no report of robocov; {wanted}")
+        way_out = "choose another --out or pass --overwrite"
+        raise InputError(f"{target}: the file is no report of robocov; {way_out}")

@@ -1,8 +1,10 @@
 """`robocov sweep`."""
 
+from __future__ import annotations
+
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -12,17 +14,22 @@ from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
 from robocov_app.terminal.output import print_answer
 
+if TYPE_CHECKING:
+    from robocov_app.sweep.study import Study
+    from robocov_app.sweep.sweeping import Rehearsal, Totals
+
 FAILED = 1
+"""Exit status of a sweep with failed runs."""
 
 
 @dataclass
 class Arguments(JsonOption):
-    """Many runs in parallel: every combination of what a study file lists, each done once.
+    """Run a parameter study in parallel: every combination of the values in a study file, each once.
 
-    The folder holds results.csv, one row a run, and a folder of each run.
-    Whatever ends a sweep, the same command goes on where it was. Runs whose files were damaged, and runs
-    of other versions or of other code of your controllers, are done again. For the same map and seed every
-    controller begins in the same places. The exit status is 1 when runs have failed.
+    The folder contains results.csv, with one row per run, and a folder for each run.
+    After any interruption, the same command resumes the sweep. Runs with damaged files, of other versions, or
+    of changed code of your controllers are run again. For the same map and seed, all controllers start from
+    the same positions. The exit status is 1 if runs have failed.
 
     A study file: maps = ["rooms", "mine.json"], controllers = ["rapf", "rpf"], seeds = 20, and under
     [gains.rapf] k_rep = [0.1, 1.0]; robots, starts, duration and [team] as the options of robocov run.
@@ -31,21 +38,21 @@ class Arguments(JsonOption):
     """
 
     study: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STUDY.toml")]
-    """The study file."""
+    """Study file."""
     out: Path | None = None
     """Folder for the results; by default the study file's name without its suffix."""
     workers: int | None = None
-    """Processes on this machine; by default one a processor."""
+    """Number of processes on this machine; by default one per processor."""
     scheduler: str | None = None
-    """Address of a Dask scheduler, as in tcp://host:8786, whose workers do the runs."""
+    """Address of a Dask scheduler whose workers do the runs, as in tcp://host:8786."""
     parquet: bool = False
-    """Write the table as results.parquet too (pip install "robocov[parquet]")."""
+    """Write the table as results.parquet, too (pip install "robocov[parquet]")."""
     retry_failed: bool = False
-    """Do runs again that have failed."""
+    """Run failed runs again."""
     keep_versions: bool = False
-    """Use runs that other versions of robocov, numpy, scipy, shapely or pymunk have done."""
+    """Reuse runs of other versions of robocov, numpy, scipy, shapely or pymunk."""
     dry_run: bool = False
-    """Count the runs, do one, estimate time and disk space for all, and write nothing."""
+    """Count the runs, do one, estimate the time and disk space of all, and write nothing."""
 
     def __post_init__(self) -> None:
         if self.workers is not None:
@@ -55,50 +62,114 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> int:
+    """Run `robocov sweep`, and return its exit status."""
     if options.parquet:
         import_optional("pyarrow", "parquet")
-    from robocov_app.sweep.executors import Cluster, processors
     from robocov_app.sweep.study_file import read_study
-    from robocov_app.sweep.sweeping import duration, rehearsed, sweep
 
-    study, out = read_study(options.study), options.out or Path(options.study.stem)
-    again: dict[str, Any] = {"retry_failed": options.retry_failed, "keep_versions": options.keep_versions}
+    study = read_study(options.study)
+    out = options.out or Path(options.study.stem)
     if options.dry_run:
-        workers = options.workers or processors()
-        if options.scheduler is not None:
-            with Cluster(options.scheduler) as cluster:
-                workers = max(1, cluster.threads)
-        rehearsal = rehearsed(study, out, workers=workers, **again)
-        lines = [f"{name:<20} {count:>7}" for name, count in rehearsal.axes.items()]
-        done = rehearsal.runs - rehearsal.left
-        lines += [f"{'runs':<20} {rehearsal.runs:>7}" + f"   ({done} of them done already)" * bool(done)]
-        lines += rehearsal.notes
-        if rehearsal.error is not None:
-            lines += [f"the run that was tried, {rehearsal.run}, failed: {rehearsal.error}"]
-        each, all_ = rehearsal.bytes_a_run / 1e3, rehearsal.bytes / 1e6
-        lines += [f"a run takes {rehearsal.seconds_a_run:.2f} s and {each:.0f} kB"]
-        words = f"{duration(rehearsal.seconds)} on {format_count(workers, 'worker')}; {all_:.0f} MB in all"
-        lines += [f"all that is left: about {words}"]
-        print_answer(options, {"out": str(out), "workers": workers, **asdict(rehearsal)}, *lines)
+        _rehearse(options, study, out)
         return 0
-    where: dict[str, Any] = {"workers": options.workers, "scheduler": options.scheduler}
-    how: dict[str, Any] = {**where, **again, "parquet": options.parquet, "quiet": options.json}
-    totals, runs = sweep(study, out, **how), len(study)
-    lines = [f"{totals.done} runs done" + f", {totals.reused} were there already" * bool(totals.reused)]
-    if totals.failed:
-        lines += [f"{totals.failed} of {runs} runs failed:"]
-        lines += [f"  {run}: {error}" for run, error in totals.errors.items()]
-        lines += ["--retry-failed does them again; the column error says why each has failed"]
-    if len(totals.versions) > 1:
-        lines += ["the table has runs of different versions:"]
-        lines += [f"  {count} of {versions}" for versions, count in totals.versions.items()]
-    if totals.interrupted:
-        rest = runs - totals.done - totals.failed - totals.reused
-        lines += [f"stopped, {rest} runs are left: the same command goes on; what was done is in {out}/"]
-        if not totals.table_replaced:
-            lines += ["the table stays as it was: it is replaced when all runs are done"]
-    else:
-        parquet = out / "results.parquet"
-        lines += [f"the table is {out / 'results.csv'}" + f", and as Parquet {parquet}" * parquet.exists()]
+    return _sweep(options, study, out)
+
+
+def _rehearse(options: Arguments, study: Study, out: Path) -> None:
+    """Do one run of the study, and print an estimate for all."""
+    from robocov_app.sweep.sweeping import rehearsed
+
+    workers = _count_workers(options)
+    rehearsal = rehearsed(
+        study,
+        out,
+        workers=workers,
+        retry_failed=options.retry_failed,
+        keep_versions=options.keep_versions,
+    )
+    answer = {"out": str(out), "workers": workers, **asdict(rehearsal)}
+    print_answer(options, answer, *_describe_rehearsal(rehearsal, workers))
+
+
+def _count_workers(options: Arguments) -> int:
+    """Return the number of runs that are done at the same time."""
+    from robocov_app.sweep.executors import Cluster, processors
+
+    if options.scheduler is None:
+        return options.workers or processors()
+    with Cluster(options.scheduler) as cluster:
+        return max(1, cluster.threads)
+
+
+def _describe_rehearsal(rehearsal: Rehearsal, workers: int) -> list[str]:
+    """Return the estimate of a sweep as lines of text."""
+    from robocov_app.sweep.sweeping import duration
+
+    lines = [f"{name:<20} {count:>7}" for name, count in rehearsal.axes.items()]
+    finished = rehearsal.runs - rehearsal.left
+    note = f"   ({finished} of them done already)" if finished else ""
+    lines.append(f"{'runs':<20} {rehearsal.runs:>7}{note}")
+    lines += rehearsal.notes
+    if rehearsal.error is not None:
+        lines.append(f"the trial run, {rehearsal.run}, failed: {rehearsal.error}")
+    lines.append(f"a run takes {rehearsal.seconds_a_run:.2f} s and {rehearsal.bytes_a_run / 1e3:.0f} kB")
+    lines.append(
+        f"all remaining runs: about {duration(rehearsal.seconds)} on {format_count(workers, 'worker')}; "
+        f"{rehearsal.bytes / 1e6:.0f} MB in all"
+    )
+    return lines
+
+
+def _sweep(options: Arguments, study: Study, out: Path) -> int:
+    """Do the runs of the study, print their totals, and return the exit status."""
+    from robocov_app.sweep.sweeping import sweep
+
+    totals = sweep(
+        study,
+        out,
+        workers=options.workers,
+        scheduler=options.scheduler,
+        retry_failed=options.retry_failed,
+        keep_versions=options.keep_versions,
+        parquet=options.parquet,
+        quiet=options.json,
+    )
+    runs = len(study)
+    lines = _describe_totals(totals, runs)
+    lines += _describe_interruption(totals, runs, out) if totals.interrupted else [_describe_tables(out)]
     print_answer(options, {"out": str(out), "runs": runs, **asdict(totals)}, *lines)
-    return INTERRUPTED if totals.interrupted else FAILED if totals.failed else 0
+    if totals.interrupted:
+        return INTERRUPTED
+    return FAILED if totals.failed else 0
+
+
+def _describe_totals(totals: Totals, runs: int) -> list[str]:
+    """Return the totals of a sweep as lines of text."""
+    reused = f", {totals.reused} reused" if totals.reused else ""
+    lines = [f"{totals.done} runs done{reused}"]
+    if totals.failed:
+        lines.append(f"{totals.failed} of {runs} runs failed:")
+        lines += [f"  {run}: {error}" for run, error in totals.errors.items()]
+        lines.append("--retry-failed runs them again; the column error has the reasons")
+    if len(totals.versions) > 1:
+        lines.append("the table has runs of different versions:")
+        lines += [f"  {count} of {versions}" for versions, count in totals.versions.items()]
+    return lines
+
+
+def _describe_interruption(totals: Totals, runs: int, out: Path) -> list[str]:
+    """Return what is left of an interrupted sweep as lines of text."""
+    left = runs - totals.done - totals.failed - totals.reused
+    lines = [
+        f"Interrupted with {left} runs left. Partial results are in {out}/. Run the same command to resume."
+    ]
+    if not totals.table_replaced:
+        lines.append("The earlier table is kept until all runs are done.")
+    return lines
+
+
+def _describe_tables(out: Path) -> str:
+    """Return the paths of the written tables as a line of text."""
+    parquet = out / "results.parquet"
+    suffix = f", and as Parquet {parquet}" if parquet.exists() else ""
+    return f"the table is {out / 'results.csv'}{suffix}"

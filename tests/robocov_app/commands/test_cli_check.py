@@ -56,9 +56,8 @@ def test_the_lines_are_in_the_answer_for_programs(file: Path, capsys: pytest.Cap
     assert main(["check", str(file), str(file.parent / "none.json"), "--json"]) == 2
     row, none = json.loads(capsys.readouterr().out)["maps"]
     assert (row["line"], row["column"]) == (7, 39)
-    assert (
-        row["error"].startswith(f"{file}:7:39: obstacles[1]: unknown key") and "(and 3 more)" in row["error"]
-    )
+    assert row["error"].startswith(f"{file}:7:39: obstacles[1]: unknown key")
+    assert "(and 3 more)" in row["error"]
     second = row["mistakes"][1]
     assert {key: second[key] for key in ("path", "line", "column")} == {
         "path": "obstacles[0].radius",
@@ -71,7 +70,7 @@ def test_the_lines_are_in_the_answer_for_programs(file: Path, capsys: pytest.Cap
     assert none["error"] == f"{file.parent / 'none.json'}: no such file"
 
 
-def test_what_is_too_much_to_be_listed_is_counted(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_mistakes_beyond_the_limit_are_counted(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file.write_text(GOOD.replace("[0, 6]]", "[0, 6]" + ", [1]" * 30 + "]"))
     assert main(["check", str(file)]) == 2
     lines = capsys.readouterr().err.splitlines()
@@ -79,19 +78,19 @@ def test_what_is_too_much_to_be_listed_is_counted(file: Path, capsys: pytest.Cap
     assert lines[-1] == f"robocov: error: {file}: and 10 more mistakes"
 
 
-def saves(*steps: Any) -> Any:
-    """Return what stands for the watched changes: the files, after each step was taken."""
+def simulate_saves(*steps: Any) -> Any:
+    """Return a replacement of `watch_files` that yields the first file after each step."""
 
-    def changes(paths: list[Path]) -> Iterator[tuple[Path, ...]]:
+    def watch_files(paths: list[Path]) -> Iterator[tuple[Path, ...]]:
         yield tuple(paths)
         for step in steps:
             step()
             yield (paths[0],)
 
-    return changes
+    return watch_files
 
 
-def test_differences_are_to_the_last_valid_state(
+def test_changes_are_marked_since_the_last_valid_state(
     file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     steps = [
@@ -99,7 +98,7 @@ def test_differences_are_to_the_last_valid_state(
         lambda: file.write_text(BAD),
         lambda: file.write_text(GOOD.replace("0.5}", "0.7}")),
     ]
-    monkeypatch.setattr(check, "changes", saves(*steps))
+    monkeypatch.setattr(check, "watch_files", simulate_saves(*steps))
     assert main(["check", "--watch", str(file), "square"]) == 0
     said = capsys.readouterr()
     assert said.err == ""
@@ -116,7 +115,7 @@ def test_differences_are_to_the_last_valid_state(
 def test_for_programs_each_check_is_an_object_on_a_line(
     file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(check, "changes", saves(lambda: file.write_text(BAD)))
+    monkeypatch.setattr(check, "watch_files", simulate_saves(lambda: file.write_text(BAD)))
     assert main(["check", "--watch", str(file), "square", "--json"]) == 0
     rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [(row["map"], row["valid"]) for row in rows] == [
@@ -129,45 +128,47 @@ def test_for_programs_each_check_is_an_object_on_a_line(
 
 def test_a_bundled_map_is_watched_at_its_file(monkeypatch: pytest.MonkeyPatch) -> None:
     watched: list[Path] = []
-    monkeypatch.setattr(check, "changes", lambda paths: watched.extend(paths) or iter(()))
+    monkeypatch.setattr(check, "watch_files", lambda paths: watched.extend(paths) or iter(()))
     assert main(["check", "--watch", "rooms", "no such", "there/none.json"]) == 0
     assert watched == [list_bundled_maps()["rooms"], Path("no such"), Path("there/none.json")]
 
 
-def read_until(stream: int, wanted: bytes, seconds: float = 30.0) -> bytes:
-    found, deadline = b"", time.monotonic() + seconds
-    while wanted not in found:
+def read_until(stream: int, expected: bytes, seconds: float = 30.0) -> bytes:
+    """Read a stream until it contains some bytes."""
+    content = b""
+    deadline = time.monotonic() + seconds
+    while expected not in content:
         left = deadline - time.monotonic()
-        assert left > 0, found
+        assert left > 0, content
         if select.select([stream], [], [], left)[0]:
-            found += os.read(stream, 65536)
-    return found
+            content += os.read(stream, 65536)
+    return content
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("terminal", [False, True])
 @pytest.mark.slow
 def test_watching_from_outside(file: Path, terminal: bool) -> None:
-    ours, theirs = pty.openpty() if terminal else os.pipe()
+    reader, writer = pty.openpty() if terminal else os.pipe()
     process = subprocess.Popen(
-        [*COMMAND, "check", "--watch", str(file)], stdout=theirs, stderr=subprocess.PIPE, text=True
+        [*COMMAND, "check", "--watch", str(file)], stdout=writer, stderr=subprocess.PIPE, text=True
     )
-    os.close(theirs)
+    os.close(writer)
     try:
-        first = read_until(ours, b"Ctrl-C ends" if terminal else b"narrowest gap")
+        first = read_until(reader, b"Ctrl-C ends" if terminal else b"narrowest gap")
         assert (b"\x1b[2J" in first) == terminal
-        began = time.monotonic()
+        start = time.monotonic()
         fresh = file.with_suffix(".new")
         fresh.write_text(BAD)
         fresh.replace(file)
-        said = read_until(ours, b"missing, expected")
-        assert time.monotonic() - began < 10.0
-        assert b"mine.json:6:52: obstacles[0].radius: expected a number" in said
+        output = read_until(reader, b"missing, expected")
+        assert time.monotonic() - start < 10.0
+        assert b"mine.json:6:52: obstacles[0].radius: expected a number" in output
         process.send_signal(signal.SIGINT)
         _, complaints = process.communicate(timeout=30)
     finally:
         process.kill()
-        os.close(ours)
+        os.close(reader)
     assert process.returncode == 130
     assert complaints == "robocov: stopped\n"
 
@@ -180,16 +181,16 @@ def test_watching_costs_next_to_nothing(file: Path) -> None:
     ) as process:
         assert process.stdout is not None
         read_until(process.stdout.fileno(), b"narrowest gap")
-        before = _seconds_of(process.pid)
+        before = _read_processor_seconds(process.pid)
         time.sleep(2.0)
-        used = _seconds_of(process.pid) - before
+        used = _read_processor_seconds(process.pid) - before
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=30)
     assert used < 0.2
 
 
-def _seconds_of(pid: int) -> float:
-    """Return the seconds of processors that a process has used so far."""
+def _read_processor_seconds(pid: int) -> float:
+    """Return the processor time that a process has used, s."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:

@@ -110,7 +110,7 @@ def test_a_run_in_other_rooms_has_no_gap(tmp_path: Path, capsys: pytest.CaptureF
     assert row["uncovered_area_m2"] == 0.0
     assert row["runs"][0]["gap"] is None
     assert main(["optimum", "--run", str(out), *FAST]) == 0
-    assert "other rooms than the best covers" in capsys.readouterr().out
+    assert "covers other rooms than the best placement" in capsys.readouterr().out
 
 
 @pytest.mark.slow
@@ -142,8 +142,11 @@ def test_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (("square", "--radius", "6"), "robots: expected at most about 0, as many as fit with radius 6 m in"),
         (("rooms", "--plot", "a.jpg"), "'.jpg'"),
         (("--run", "nowhere"), "nowhere: not the folder of a run"),
-        (("--run", "x", "--robots", "3"), "--robots: 3, but with --run it is that of the run"),
-        (("--run", "x", "--radius", "0.2"), "--radius: 0.2, but with --run"),
+        (
+            ("--run", "x", "--robots", "3"),
+            "--robots: cannot be combined with --run, which gives its value; got 3",
+        ),
+        (("--run", "x", "--radius", "0.2"), "--radius: cannot be combined with --run"),
         (("rooms", "--positions", "."), ".: expected a file, got a folder"),
     ],
 )

@@ -43,7 +43,7 @@ def test_a_sweep_answers_in_words(study: Path, capsys: pytest.CaptureFixture[str
     assert not (out / "results.parquet").exists()
     assert said.err.splitlines()[-1].startswith("sweep: 8 of 8 runs, ")
     assert main(["sweep", str(study), "--out", str(out)]) == 0
-    assert capsys.readouterr().out.startswith("0 runs done, 8 were there already\n")
+    assert capsys.readouterr().out.startswith("0 runs done, 8 reused\n")
     pytest.importorskip("pyarrow")
     assert main(["sweep", str(study), "--out", str(out), "--parquet"]) == 0
     assert capsys.readouterr().out.endswith(f"/results.csv, and as Parquet {out}/results.parquet\n")
@@ -82,7 +82,7 @@ def test_failures_are_told_each_time_and_are_an_exit_status(
     words = ["sweep", str(study), "--out", str(study.parent / "out"), "--workers", "1"]
     for again, count in (
         ([], "8 runs done"),
-        ([], "0 runs done, 8 were there already"),
+        ([], "0 runs done, 8 reused"),
         (["--retry-failed"], ""),
     ):
         assert main([*words, *again]) == 1
@@ -91,7 +91,7 @@ def test_failures_are_told_each_time_and_are_an_exit_status(
         assert said[1] == "8 of 16 runs failed:"
         assert said[2].startswith("  room-rapf-900-corner-0-")
         assert ": start 'corner': room for about 45 robots" in said[2]
-        assert said[3].startswith("--retry-failed does them again")
+        assert said[3].startswith("--retry-failed runs them again")
     assert main([*words, "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert (found["done"], found["failed"], found["reused"]) == (0, 8, 8)
@@ -109,7 +109,7 @@ def test_a_dry_run_writes_nothing(study: Path, capsys: pytest.CaptureFixture[str
     said = capsys.readouterr().out
     assert "gains of rpf               2\n" in said
     assert "runs                       8\n" in said
-    assert "all that is left: about" in said
+    assert "all remaining runs: about" in said
     assert sorted(study.parent.rglob("*")) == before
 
     study.write_text(STUDY.replace("robots = 3", "robots = 900"))

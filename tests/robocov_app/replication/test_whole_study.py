@@ -313,8 +313,8 @@ class TestStopping:
         assert process.returncode == 130
         first = told.splitlines()[0]
         assert first.startswith("paper (quick): 114 runs, about ")
-        assert "on 2 processes (measured: rapf 0." in first and "Ctrl-C keeps what is done" in first
-        assert f"to go on: robocov paper --out {out} --quick --without-beyond" in said
+        assert "on 2 processes (measured: rapf 0." in first and "Ctrl-C keeps finished runs" in first
+        assert f"To resume: robocov paper --out {out} --quick --without-beyond" in said
         kept = finished_runs(out)
         assert 12 <= kept < 114
 

@@ -418,12 +418,12 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(
         said, complaints = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130, complaints
     assert "Traceback" not in complaints
-    assert "the same command goes on" in said
+    assert "Run the same command to resume." in said
     count = len(done(out))
     assert 5 <= count < 60
     assert f"{count} runs done" in said
-    assert f"stopped, {60 - count} runs are left" in said
+    assert f"Interrupted with {60 - count} runs left. Partial results are in {out}/." in said
     assert len(rows(out)) == count
     assert main(["sweep", str(file), "--out", str(out), "--workers", "2"]) == 0
-    assert f"{count} were there already" in capsys.readouterr().out
+    assert f"{count} reused" in capsys.readouterr().out
     assert tables(out) == expected

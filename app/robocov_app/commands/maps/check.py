@@ -2,7 +2,7 @@
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,151 +17,224 @@ from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.file_watching import watch_files
 from robocov_app.terminal.output import create_console, echo, print_answer
 
-_LISTED = 5  # components whose areas are told
+_MAX_LISTED_COMPONENTS = 5
+"""Maximum number of components whose areas are printed."""
+_INVALID = 2
+"""Exit status if a map is not valid."""
 
 
 @dataclass
 class Arguments(JsonOption):
-    """Validate maps; print area, free area, vertices, components and the narrowest gap of each.
+    """Validate maps, and print area, free area, vertices, components and the narrowest gap of each.
 
-    The exit status is 2 when one of them is not a valid map. Each mistake is named with its line and
-    column, as in mine.json:14:9. Warnings (a gap that is narrower than a robot, say) do not make a map
-    invalid.
+    The exit status is 2 if one of them is not a valid map. Errors are reported with line and column, as in
+    mine.json:14:9. Warnings, such as a gap narrower than a robot, do not make a map invalid.
 
-    With --watch the maps are checked again whenever they are saved, until Ctrl-C; what is not as it was
-    before is told. With --json as well, each check is one JSON object on a line.
+    With --watch the maps are checked again whenever they are saved, until Ctrl-C, and changes since the last
+    valid state are marked. With --json as well, each check is one JSON object on a line.
 
     Example: robocov check mine.json rooms
     """
 
     files: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="MAP ...")] = ()
-    """Map files, or names of bundled maps."""
+    """Paths of map files, or names of bundled maps."""
     watch: bool = False
     """Check again at each save."""
 
 
 def command(options: Arguments) -> int:
+    """Run `robocov check`, and return its exit status."""
     if not options.files:
         raise InputError("check: expected at least one map file")
     if options.watch:
-        watch(options)
+        _watch(options)
         return 0
     rows = []
     for name in options.files:
-        outcome = _outcome(name)
-        valid = isinstance(outcome, MapReport)
-        rows.append(_row(name, outcome))
-        if valid and not options.json:
-            echo(f"{name}: valid", *_lines(outcome), sep="\n")
-        for line in () if valid or options.json else _lines(outcome):
-            echo(f"robocov: error: {line}", to_stderr=True)
+        outcome = _check(name)
+        rows.append(_build_row(name, outcome))
+        if not options.json:
+            _print_outcome(name, outcome)
     print_answer(options, {"maps": rows}, indent=1)
-    return 0 if all(row["valid"] for row in rows) else 2
+    return 0 if all(row["valid"] for row in rows) else _INVALID
 
 
-def watch(options: Arguments) -> None:
-    """Check again at each save, and say what has changed since the map was last valid; Ctrl-C ends it."""
-    names, output = {}, create_console()
-    for name in options.files:
-        try:
-            names[find_map_file(name)] = name
-        except MapError:
-            names[Path(name)] = name
-    outcomes: dict[str, MapReport | InputError] = {}
-    valid: dict[str, MapReport] = {}
-    for changed in watch_files(list(names)):
-        former = dict(valid)
-        fresh = {names[path]: _outcome(names[path]) for path in changed}
-        outcomes |= fresh
-        valid |= {name: each for name, each in fresh.items() if isinstance(each, MapReport)}
-        if options.json:
-            for name, outcome in fresh.items():
-                echo(json.dumps(_row(name, outcome)), flush=True)
-            continue
-        if output.is_terminal:
-            output.clear()
-        for name, outcome in fresh.items():
-            _show(output, f"{time.strftime('%H:%M:%S')}  {name}", outcome, former.get(name))
-        if output.is_terminal:
-            for name in (each for each in outcomes if each not in fresh):
-                _show(output, name, outcomes[name])
-            output.print("watching; Ctrl-C ends", style="dim")
-        output.file.flush()
-
-
-def _show(out: Console, title: str, outcome: MapReport | InputError, former: MapReport | None = None) -> None:
-    told, colour = ("valid", "green") if isinstance(outcome, MapReport) else ("invalid", "red")
-    out.print(f"{title}: {told}", style=f"bold {colour}", soft_wrap=True)
-    for line in _lines(outcome, former):
-        out.print(line, soft_wrap=True)
-
-
-def _outcome(name: str) -> MapReport | InputError:
+def _check(name: str) -> MapReport | InputError:
+    """Return the report on a map, or the error that makes it invalid."""
     try:
         return check_map(load_map(name))
     except InputError as error:
         return error
 
 
-def _row(name: str, outcome: MapReport | InputError) -> dict[str, Any]:
+def _print_outcome(name: str, outcome: MapReport | InputError) -> None:
+    """Print the report on a map; errors go to standard error."""
+    lines = _format_outcome(outcome)
+    if isinstance(outcome, MapReport):
+        echo(f"{name}: valid", *lines, sep="\n")
+        return
+    for line in lines:
+        echo(f"robocov: error: {line}", to_stderr=True)
+
+
+def _watch(options: Arguments) -> None:
+    """Check again at each save, and print the changes since the last valid state, until Ctrl-C."""
+    names = _find_watched_files(options.files)
+    console = create_console()
+    outcomes: dict[str, MapReport | InputError] = {}
+    valid_reports: dict[str, MapReport] = {}
+    for changed_paths in watch_files(list(names)):
+        new_outcomes = {names[path]: _check(names[path]) for path in changed_paths}
+        outcomes.update(new_outcomes)
+        if options.json:
+            for name, outcome in new_outcomes.items():
+                echo(json.dumps(_build_row(name, outcome)), flush=True)
+        else:
+            _display_outcomes(console, outcomes, new_outcomes, valid_reports)
+        valid_reports.update(
+            {name: outcome for name, outcome in new_outcomes.items() if isinstance(outcome, MapReport)}
+        )
+
+
+def _find_watched_files(names: tuple[str, ...]) -> dict[Path, str]:
+    """Return the names of the maps by their files, which need not exist yet."""
+    files = {}
+    for name in names:
+        try:
+            files[find_map_file(name)] = name
+        except MapError:
+            files[Path(name)] = name
+    return files
+
+
+def _display_outcomes(
+    console: Console,
+    outcomes: Mapping[str, MapReport | InputError],
+    new_outcomes: Mapping[str, MapReport | InputError],
+    previous_reports: Mapping[str, MapReport],
+) -> None:
+    """Display new outcomes with their changes; a terminal also shows those of the other maps."""
+    if console.is_terminal:
+        console.clear()
+    clock_time = time.strftime("%H:%M:%S")
+    for name, outcome in new_outcomes.items():
+        _display(console, f"{clock_time}  {name}", outcome, previous_reports.get(name))
+    if console.is_terminal:
+        for name, outcome in outcomes.items():
+            if name not in new_outcomes:
+                _display(console, name, outcome)
+        console.print("watching; Ctrl-C ends", style="dim")
+    console.file.flush()
+
+
+def _display(
+    console: Console, title: str, outcome: MapReport | InputError, previous: MapReport | None = None
+) -> None:
+    """Display the outcome of one map."""
+    is_valid = isinstance(outcome, MapReport)
+    verdict = "valid" if is_valid else "invalid"
+    color = "green" if is_valid else "red"
+    console.print(f"{title}: {verdict}", style=f"bold {color}", soft_wrap=True)
+    for line in _format_outcome(outcome, previous):
+        console.print(line, soft_wrap=True)
+
+
+def _build_row(name: str, outcome: MapReport | InputError) -> dict[str, Any]:
+    """Build the answer for programs about one map."""
     if isinstance(outcome, MapReport):
         return {"map": name, "valid": True, **outcome.to_dict()}
     row: dict[str, Any] = {"map": name, "valid": False, "error": str(outcome)}
     if isinstance(outcome, MapError):
-        row |= {"line": outcome.line, "column": outcome.column}
+        row["line"] = outcome.line
+        row["column"] = outcome.column
         row["mistakes"] = [
-            {"path": format_path(each.path), "text": each.text, "line": each.line, "column": each.column}
-            for each in outcome.mistakes
+            {
+                "path": format_path(mistake.path),
+                "text": mistake.text,
+                "line": mistake.line,
+                "column": mistake.column,
+            }
+            for mistake in outcome.mistakes
         ]
         row["mistakes_not_listed"] = outcome.unlisted
     return row
 
 
-def _lines(outcome: MapReport | InputError, former: MapReport | None = None) -> Iterator[str]:
+def _format_outcome(outcome: MapReport | InputError, previous: MapReport | None = None) -> Iterator[str]:
     """Yield the lines of a report, or one for each mistake, in the order of the file."""
     if isinstance(outcome, MapReport):
-        yield from report_lines(outcome, former)
+        yield from format_report(outcome, previous)
     elif not isinstance(outcome, MapError) or not outcome.mistakes:
         yield str(outcome)
     else:
-        for mistake in sorted(outcome.mistakes, key=lambda each: (each.line or 0, each.column or 0)):
+        mistakes = sorted(outcome.mistakes, key=lambda mistake: (mistake.line or 0, mistake.column or 0))
+        for mistake in mistakes:
             yield mistake.format_message(outcome.where)
         if outcome.unlisted:
             yield f"{outcome.where}: and {outcome.unlisted} more mistakes"
 
 
-def report_lines(report: MapReport, former: MapReport | None = None) -> Iterator[str]:
-    """Yield the lines of a report, with what was otherwise in one before the map was changed."""
-    former = report if former is None else former
-    rows, was, told = _rows(report), _rows(former), []
-    for title, value in rows.items():
-        told.append((title, value if was.get(title) == value else f"{value}, was {was.get(title, 'none')}"))
-    told += [(title, f"none, was {value}") for title, value in was.items() if title not in rows]
+def format_report(report: MapReport, previous: MapReport | None = None) -> Iterator[str]:
+    """Yield the lines of a report, and mark what changed since the previous report.
+
+    Parameters
+    ----------
+    report : MapReport
+    previous : MapReport or None
+        Report on the map before it was changed; by default nothing is marked.
+
+    Yields
+    ------
+    str
+    """
+    if previous is None:
+        previous = report
+    lines = _mark_changed_rows(_format_rows(report), _format_rows(previous))
     for warning in report.warnings:
-        told.append(("warning", warning if warning in former.warnings else f"{warning} (new)"))
-    told += [("no longer", warning) for warning in former.warnings if warning not in report.warnings]
-    width = max(len(title) for title, _ in told)
-    for title, value in told:
+        suffix = "" if warning in previous.warnings else " (new)"
+        lines.append(("warning", f"{warning}{suffix}"))
+    lines += [("no longer", warning) for warning in previous.warnings if warning not in report.warnings]
+    width = max(len(title) for title, _ in lines)
+    for title, value in lines:
         yield f"  {title:<{width}}  {value}"
 
 
-def _rows(report: MapReport) -> dict[str, str]:
-    areas = [f"{area:.6g} m²" for area in report.components[:_LISTED]]
-    areas += ["..."] * (len(report.components) > _LISTED)
-    gap = "none"
-    if report.narrowest_gap is not None:
-        (a, b), (c, d) = report.narrowest_gap.between
-        gap = f"{report.narrowest_gap.width:.3f} m, between [{a:.4g}, {b:.4g}] and [{c:.4g}, {d:.4g}]"
+def _mark_changed_rows(rows: Mapping[str, str], previous_rows: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Return the titles and values of both reports; changed values with the previous ones."""
+    lines = []
+    for title, value in rows.items():
+        previous_value = previous_rows.get(title, "none")
+        lines.append((title, value if value == previous_value else f"{value}, was {previous_value}"))
+    for title, previous_value in previous_rows.items():
+        if title not in rows:
+            lines.append((title, f"none, was {previous_value}"))
+    return lines
+
+
+def _format_rows(report: MapReport) -> dict[str, str]:
+    """Return the titles and values of a report."""
+    areas = [f"{area:.6g} m²" for area in report.components[:_MAX_LISTED_COMPONENTS]]
+    if len(report.components) > _MAX_LISTED_COMPONENTS:
+        areas.append("...")
     rows = {
         "name": report.name,
         "area": f"{report.area:.6g} m²",
         "free area": f"{report.free_area:.6g} m² ({report.free_fraction:.1%})",
         "obstacles": f"{report.obstacles}, with {report.vertices} vertices (boundary included)",
         "components": f"{len(report.components)} ({', '.join(areas)})",
-        "narrowest gap": gap,
+        "narrowest gap": _format_narrowest_gap(report),
     }
     if report.density is not None and report.density_range is not None:
         low, high = report.density_range
         rows["density"] = f"{report.density}, {low:.4g} to {high:.4g}, mean {report.mean_density:.4g}"
-    starts = {f"start {each.name}": f"{each.kind}, room for about {each.capacity}" for each in report.starts}
-    return rows | starts
+    for start in report.starts:
+        rows[f"start {start.name}"] = f"{start.kind}, room for about {start.capacity}"
+    return rows
+
+
+def _format_narrowest_gap(report: MapReport) -> str:
+    if report.narrowest_gap is None:
+        return "none"
+    (x1, y1), (x2, y2) = report.narrowest_gap.between
+    width = report.narrowest_gap.width
+    return f"{width:.3f} m, between [{x1:.4g}, {y1:.4g}] and [{x2:.4g}, {y2:.4g}]"

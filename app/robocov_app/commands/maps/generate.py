@@ -1,10 +1,12 @@
 """`robocov generate`."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeAlias
 
 import tyro
 
@@ -25,84 +27,110 @@ from robocov_app.commands.options import FigureOptions
 from robocov_app.terminal.output import check_output_file, echo, print_answer
 from robocov_app.terminal.progress import show_progress
 
+if TYPE_CHECKING:
+    from robocov_app.sweep.study import StudyMap
+
 KindName: TypeAlias = Literal["polygons", "blocks", "rooms", "mazes", "caves"]
-MOST = 10_000  # maps that are generated in one call at most
-_SIDE = 10.0
-_SETTLED = ("kind", "seed", "obstacles", "area", "gap", "side", "width", "height", "count")
-"""Options that say what maps are like, and how many; a study has settled them."""
+"""Kinds of generated maps."""
+MAX_MAPS = 10_000
+"""Maximum number of maps that are generated in one call."""
+_DEFAULT_SIDE_M = 10.0
+_FIXED_BY_STUDY = ("kind", "seed", "obstacles", "area", "gap", "side", "width", "height", "count")
+"""Options about the kind and the number of maps, which a study of the paper fixes."""
 
 
 @dataclass
 class Arguments(FigureOptions):
-    """Make random maps, by a seed: the same words give the same map.
+    """Generate random maps from a seed; the same options give the same map.
 
     The kinds are polygons (scattered obstacles), blocks (a town), rooms (a building), mazes and caves. The
-    free space of each is one piece, no passage of it is narrower than the gap, and it has the starts
-    corner, centre and uniform. Without --out the map is printed.
+    free space is connected, no passage is narrower than the gap, and the starts are corner, centre and
+    uniform. Without --out the map is printed.
 
-    With --count the maps of as many seeds, one after the other, go to a folder.
-    With --study the maps go there that robocov paper draws by chance, with its starts.
+    --count writes the maps of consecutive seeds to a folder.
+    --study writes the random maps of robocov paper to a folder, with its starts.
     --plot draws the maps on one sheet.
 
     Example: robocov generate --kind rooms --seed 3 --obstacles 8 --area 0.2 --gap 0.6 --out map.json
     """
 
     kind: KindName = "polygons"
-    """What the map is like."""
+    """Kind of map."""
     seed: int = 0
-    """A whole number; with --count that of the first map."""
+    """Seed of the map; with --count that of the first map."""
     obstacles: int | None = None
-    """How many obstacles, blocks or rooms; of mazes about how many cells, of caves chambers."""
+    """Number of obstacles, blocks or rooms; approximate number of cells of a maze, or chambers of a cave."""
     area: float | None = None
-    """Blocked area, as a part of the map's; what suits the kind by default."""
+    """Blocked fraction of the area; the default depends on the kind."""
     gap: float = 0.6
-    """Least width of every passage in metres."""
-    side: float = _SIDE
-    """Side of a square map in metres."""
+    """Minimum width of passages, m."""
+    side: float = _DEFAULT_SIDE_M
+    """Side of a square map, m."""
     width: float | None = None
-    """Width of a map that is no square, in metres; with --height."""
+    """Width of a rectangular map, m; with --height."""
     height: float | None = None
-    """Height of a map that is no square, in metres; with --width."""
+    """Height of a rectangular map, m; with --width."""
     count: int | None = None
-    """How many maps to put in a folder."""
+    """Number of maps to write to a folder."""
     study: Literal["full", "quick"] | None = None
-    """The maps of robocov paper, or of robocov paper --quick, in place of all the options above."""
+    """Maps of robocov paper, or of robocov paper --quick, instead of all the options above."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="MAP.json")] = None
-    """The file to write; with --count and --study the folder."""
+    """File to write; with --count and --study the folder."""
     overwrite: bool = False
-    """Replace earlier maps of the same names."""
+    """Replace earlier maps with the same names."""
 
     def __post_init__(self) -> None:
-        for field in fields(Arguments) if self.study is not None else ():
-            value = getattr(self, field.name)
-            if field.name in _SETTLED and value != field.default:
-                raise InputError(f"--{field.name}: {value}, but --study says what its maps are like")
+        if self.study is not None:
+            self._check_study_options()
         if self.count is not None:
-            require_number("--count", self.count, 1, MOST)
+            require_number("--count", self.count, 1, MAX_MAPS)
         if (self.width is None) != (self.height is None):
             given, missing = ("width", "height") if self.height is None else ("height", "width")
             raise InputError(f"--{given}: requires --{missing}")
-        if self.side != _SIDE and self.width is not None:
-            raise InputError(f"--side: {self.side:g}, but --width and --height say how large the map is")
+        if self.side != _DEFAULT_SIDE_M and self.width is not None:
+            raise InputError(f"--side: cannot be combined with --width and --height, got {self.side:g}")
         super().__post_init__()
+
+    def _check_study_options(self) -> None:
+        """Reject the options that a study fixes."""
+        for field in fields(Arguments):
+            value = getattr(self, field.name)
+            if field.name in _FIXED_BY_STUDY and value != field.default:
+                message = f"cannot be combined with --study, which gives its value; got {value}"
+                raise InputError(f"--{field.name}: {message}")
+
+    @property
+    def writes_folder(self) -> bool:
+        """Whether the maps are written to a folder."""
+        return self.count is not None or self.study is not None
+
+
+class _MapTask(NamedTuple):
+    """Name of a map, the function that builds it, and its seed in a series."""
+
+    name: str
+    build: Callable[[], Environment]
+    seed: int | None = None
 
 
 def command(options: Arguments) -> None:
-    out, several = options.out, bool(options.count or options.study)
-    check_out(out, folder=several, overwrite=options.overwrite)
-    jobs, rows = jobs_of(options), []
-    made: list[Environment] = []
-    with show_progress("generating", len(jobs), quiet=options.json or not several) as update:
-        for number, (name, make) in enumerate(jobs, start=1):
-            path = out / f"{name}.json" if out is not None and several else out
-            if path is not None and several:
-                _require_map(path)
-            try:
-                environment = make()
-            except ParameterError as error:  # its messages begin with the name of the parameter
-                of_seed = "" if options.count is None else f" (seed {options.seed + number - 1})"
-                raise ParameterError(f"--{error}{of_seed}") from None
-            made.append(environment)
+    """Run `robocov generate`."""
+    out = options.out
+    if options.writes_folder:
+        _prepare_folder(out, overwrite=options.overwrite)
+    elif out is not None:
+        _check_file(out, overwrite=options.overwrite)
+    tasks = _list_tasks(options)
+    environments = []
+    rows = []
+    is_quiet = options.json or not options.writes_folder
+    with show_progress("generating", len(tasks), quiet=is_quiet) as update:
+        for number, task in enumerate(tasks, start=1):
+            path = out / f"{task.name}.json" if out is not None and options.writes_folder else out
+            if path is not None and options.writes_folder:
+                _check_replaced_map(path)
+            environment = _build_map(task)
+            environments.append(environment)
             if path is None:
                 echo(dump_map(environment), end="")
             else:
@@ -110,61 +138,103 @@ def command(options: Arguments) -> None:
                 rows.append({"file": str(path), **check_map(environment).to_dict()})
             update(number)
     if options.plot is not None:
-        from robocov_app.figures.files import save_figure
-        from robocov_app.figures.runs import plot_maps
-
-        save_figure(plot_maps(made, options.theme), options.plot)
+        _save_sheet(options, options.plot, environments)
     if out is not None:
-        print_answer(options, {"out": str(out), "maps": rows}, *map(_facts, rows), indent=1)
+        print_answer(options, {"out": str(out), "maps": rows}, *map(_describe_map, rows), indent=1)
 
 
-def _facts(row: dict[str, Any]) -> str:
+def _build_map(task: _MapTask) -> Environment:
+    """Build a map; errors name the option, and the seed in a series."""
+    try:
+        return task.build()
+    except ParameterError as error:
+        # The message begins with the name of the parameter.
+        suffix = "" if task.seed is None else f" (seed {task.seed})"
+        raise ParameterError(f"--{error}{suffix}") from None
+
+
+def _save_sheet(options: Arguments, path: Path, environments: list[Environment]) -> None:
+    """Draw the maps on one sheet."""
+    from robocov_app.figures.files import save_figure
+    from robocov_app.figures.runs import plot_maps
+
+    save_figure(plot_maps(environments, options.theme), path)
+
+
+def _describe_map(row: dict[str, Any]) -> str:
+    """Return the properties of a map as a line of text."""
     gap = row["narrowest_gap_m"]
-    facts = [f"{row['file']}: {row['free_area_m2']:.4g} of {row['area_m2']:.4g} m² free"]
-    facts += ["no passage" if gap is None else f"narrowest gap {gap:.3f} m"]
-    return ", ".join([*facts, format_count(row["obstacles"], "obstacle"), f"{row['vertices']} vertices"])
+    passages = "no passage" if gap is None else f"narrowest gap {gap:.3f} m"
+    obstacles = format_count(row["obstacles"], "obstacle")
+    free_area = f"{row['free_area_m2']:.4g} of {row['area_m2']:.4g} m² free"
+    return f"{row['file']}: {free_area}, {passages}, {obstacles}, {row['vertices']} vertices"
 
 
-def check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
-    if folder:
-        if out is None:
-            raise InputError("--out: required with --count and --study, as the folder of the maps")
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-            used = any(out.iterdir())
-        except OSError as error:
-            raise OutputError(f"{out}: cannot be used for maps: {describe_error(error)}") from error
-        if used and not overwrite:
-            raise InputError(f"{out}: the folder is not empty; choose another --out or pass --overwrite")
-    elif out is not None:
-        if out.is_dir() or not out.name:
-            wanted = "expected the name of a file (--count makes a folder)"
-            raise InputError(f"--out: {wanted}, got {str(out)!r}")
-        check_output_file(out, "another --out", overwrite=overwrite)
+def _prepare_folder(folder: Path | None, *, overwrite: bool) -> None:
+    """Create the folder of the maps, and check that it may be used."""
+    if folder is None:
+        raise InputError("--out: required with --count and --study, as the folder of the maps")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        is_empty = not any(folder.iterdir())
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be used for maps: {describe_error(error)}") from error
+    if not is_empty and not overwrite:
+        raise InputError(f"{folder}: the folder is not empty; choose another --out or pass --overwrite")
 
 
-def _require_map(path: Path) -> None:
-    if resolve_target(path).exists():
-        try:
-            load_map(path)
-        except MapError:
-            why = "is no map of robocov, so --overwrite leaves it alone; choose another --out"
-            raise InputError(f"{path}: {why}") from None
+def _check_file(path: Path, *, overwrite: bool) -> None:
+    """Check that the file of a single map may be written."""
+    if path.is_dir() or not path.name:
+        raise InputError(f"--out: expected the name of a file (--count makes a folder), got {str(path)!r}")
+    check_output_file(path, "another --out", overwrite=overwrite)
 
 
-def jobs_of(options: Arguments) -> list[tuple[str, Callable[[], Environment]]]:
-    """Return names of maps, and what makes them: of the seeds, or of a study of the paper."""
-    if options.study is None:
-        from robocov.generator import generate_map
+def _check_replaced_map(path: Path) -> None:
+    """Check that a file which would be replaced is a map of robocov."""
+    if not resolve_target(path).exists():
+        return
+    try:
+        load_map(path)
+    except MapError:
+        reason = "is no map of robocov, so --overwrite leaves it alone; choose another --out"
+        raise InputError(f"{path}: {reason}") from None
 
-        names = "kind", "obstacles", "area", "gap", "side", "width", "height"
-        words = {name: getattr(options, name) for name in names}
-        seeds = range(options.seed, options.seed + (options.count or 1))
-        kind, digits = options.kind, len(str(seeds[-1]))
-        return [(f"{kind}-{seed:0{digits}}", partial(generate_map, seed, **words)) for seed in seeds]
+
+def _list_tasks(options: Arguments) -> list[_MapTask]:
+    """List the maps to build: those of the seeds, or those of a study of the paper."""
+    if options.study is not None:
+        return _list_study_tasks(is_quick=options.study == "quick")
+    from robocov.generator import generate_map
+
+    names = ("kind", "obstacles", "area", "gap", "side", "width", "height")
+    parameters = {name: getattr(options, name) for name in names}
+    seeds = range(options.seed, options.seed + (options.count or 1))
+    digits = len(str(seeds[-1]))
+    return [
+        _MapTask(
+            name=f"{options.kind}-{seed:0{digits}}",
+            build=partial(generate_map, seed, **parameters),
+            seed=None if options.count is None else seed,
+        )
+        for seed in seeds
+    ]
+
+
+def _list_study_tasks(*, is_quick: bool) -> list[_MapTask]:
+    """List the random maps of a study of the paper."""
     from robocov_app.replication.plan import FULL, QUICK
     from robocov_app.replication.studies import claim_maps, convex_maps, generated_maps
 
-    plan = FULL if options.study == "full" else QUICK
-    maps, bundled = (*claim_maps(plan), *generated_maps(plan.tuning), *convex_maps(plan)), list_bundled_maps()
-    return [(each.name, partial(replace, each.environment)) for each in maps if each.name not in bundled]
+    plan = QUICK if is_quick else FULL
+    study_maps = [*claim_maps(plan), *generated_maps(plan.tuning), *convex_maps(plan)]
+    bundled_maps = list_bundled_maps()
+    return [
+        _MapTask(study_map.name, partial(_get_environment, study_map))
+        for study_map in study_maps
+        if study_map.name not in bundled_maps
+    ]
+
+
+def _get_environment(study_map: StudyMap) -> Environment:
+    return study_map.environment
