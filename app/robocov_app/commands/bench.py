@@ -8,7 +8,7 @@ import platform
 from dataclasses import dataclass
 from importlib.metadata import version
 from itertools import groupby
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import tyro
 
@@ -18,34 +18,55 @@ from robocov_app.terminal.output import RIGHT, create_console, echo, print_answe
 from robocov_app.terminal.progress import report_compilation, show_progress
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from robocov_app.bench.measure import Row
 
-PARTS = {
-    # part: title, module, its function
-    "step": ("A step of RAPF on campus", "step", "cases"),
-    "maps": ("The exact coverage cost on maps", "cost", "map_cases"),
-    "cost": ("The exact coverage cost in a unit square with random obstacles", "cost", "cases"),
-    "learning": (
-        "Learning environments on rooms, with the exact cost in the reward of each step", "learning", "cases"
-    ),
-    "sweep": ("A sweep of short runs on three maps, processor time", "processes", "cases"),
-    "render": ("Pictures of 1280 x 720", "render", "cases"),
-    "window": ("The window of 1280 x 720 on rooms, in use", "window", "cases"),
-    "start": ("Until a command begins", "processes", "start_cases"),
-}  # fmt: skip
 
+class Part(NamedTuple):
+    """A part of the measurements.
+
+    Attributes
+    ----------
+    title : str
+        Title of its table.
+    module : str
+        Name of a module in `robocov_app.bench`.
+    function : str
+        Name of the module's function that returns the cases.
+    """
+
+    title: str
+    module: str
+    function: str = "cases"
+
+
+PARTS = {
+    "step": Part("A step of RAPF on campus", "step"),
+    "maps": Part("The exact coverage cost on maps", "cost", "map_cases"),
+    "cost": Part("The exact coverage cost in a unit square with random obstacles", "cost"),
+    "learning": Part(
+        "Learning environments on rooms, with the exact cost in the reward of each step", "learning"
+    ),
+    "sweep": Part("A sweep of short runs on three maps, processor time", "processes"),
+    "render": Part("Pictures of 1280 x 720", "render"),
+    "window": Part("The window of 1280 x 720 on rooms, in use", "window"),
+    "start": Part("Until a command begins", "processes", "start_cases"),
+}
+"""The parts by name, in the order in which they are measured."""
 PartName = Literal["step", "maps", "cost", "learning", "sweep", "render", "window", "start", "all"]
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""Names of the parts, for the command line."""
+_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_PACKAGES = ("numpy", "scipy", "shapely", "pymunk", "pygame-ce")
+"""Packages whose versions are printed."""
 
 
 @dataclass
 class Arguments(FigureOptions):
-    """Measure speed, as ratios to yardsticks that are taken in turn with it, on one thread.
+    """Measure speed on one thread, as ratios to yardsticks that are timed in alternation.
 
-    Times on a shared machine mean little; ratios of medians taken in one run hold. The yardstick of
-    the cost is scikit-fmm: pip install 'robocov[bench]'. All takes a minute or two.
+    Times on a shared machine mean little; ratios of medians from the same run are stable. The yardstick of
+    the cost is scikit-fmm: pip install 'robocov[bench]'. All parts take a minute or two.
 
     Example: robocov bench step
     """
@@ -57,69 +78,157 @@ class Arguments(FigureOptions):
 
 
 def command(options: Arguments) -> None:
-    for name in THREADS:  # read when numpy is loaded, which telling of compiling does
+    """Run `robocov bench`."""
+    # These variables are read when numpy is loaded, which `report_compilation` does.
+    for name in _THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
     report_compilation()
-    parts = list(PARTS) if options.part == "all" else [options.part]
-    if options.part == "all" and importlib.util.find_spec("gymnasium") is None:
-        parts.remove("learning")
-    modules = {part: importlib.import_module(f"robocov_app.bench.{PARTS[part][1]}") for part in parts}
-    if "cost" in parts and not modules["cost"].has_yardstick():
-        missing = "scikit-fmm, the yardstick of the cost, is not installed: pip install 'robocov[bench]'"
-        if options.part == "cost":
-            raise ParameterError(missing)
-        echo(f"robocov: {missing}", to_stderr=True)
-    cases = [case for part in parts for case in getattr(modules[part], PARTS[part][2])(quick=options.quick)]
-    rows, stopped = [], None
-    try:
-        with show_progress("measuring", len(cases), quiet=options.json) as update:
-            for done, case in enumerate(cases, start=1):
-                rows.extend(case())
-                update(done)
-    except KeyboardInterrupt as error:
-        stopped = error
+    cases = _collect_cases(options.part, is_quick=options.quick)
+    rows: list[Row] = []
+    interruption = _measure(cases, rows, quiet=options.json)
     if options.plot is not None and rows:
         from robocov_app.bench.plot import save_ratios
         from robocov_app.render.theme import theme_named
 
         save_ratios(rows, options.plot, theme_named(options.theme))
-    packages = {name: version(name) for name in ("numpy", "scipy", "shapely", "pymunk", "pygame-ce")}
-    machine: dict[str, Any] = {"python": platform.python_version(), "system": platform.system()}
-    machine |= {"processor": platform.machine(), "cores": os.cpu_count(), "packages": packages}
+    machine = _describe_machine()
     print_answer(options, {"machine": machine, "rows": [row.to_dict() for row in rows]}, indent=1)
     if not options.json:
-        print_tables(rows)
-        out, told = create_console(), ", ".join(f"{name} {number}" for name, number in packages.items())
-        out.print("before: about the ratio when nothing was compiled (commit 8838167)")
-        out.print(f"Python {machine['python']}, {machine['system']}, {machine['cores']} cores; {told}")
-    if stopped is not None:
-        raise stopped
+        _print_tables(rows)
+        _print_machine(machine)
+    if interruption is not None:
+        raise interruption
 
 
-def print_tables(rows: Sequence[Row]) -> None:
-    numbers = [(title, RIGHT) for title in ("time", "yardstick", "ratio", "before", "goal")]
-    columns = [("", {}), ("", {}), *numbers, ("", {"no_wrap": True}), ("", {})]
-    for part, group in groupby(rows, key=lambda row: row.part):
-        cells, former = [], ""
-        for row in group:
-            words = row.case or row.name
-            case = "" if words == former else words, row.name if row.case else ""
-            times = (duration(each) for each in (row.seconds, row.yardstick_seconds))
-            ratios = ("" if each is None else f"{each:.2f}" for each in (row.ratio, row.before))
-            yardstick = "" if row.yardstick is None else f"/ {row.yardstick}"
-            cells.append((*case, *times, *ratios, goals(row), yardstick, row.note))
-            former = words
-        print_table(columns, cells, title=PARTS[part][0])
+def _collect_cases(part_name: PartName, *, is_quick: bool) -> list[Callable[[], Sequence[Row]]]:
+    """Collect the measurements of a part, or of all.
+
+    Raises
+    ------
+    ParameterError
+        If the yardstick of the part is not installed.
+    """
+    names: list[str] = list(PARTS) if part_name == "all" else [part_name]
+    if part_name == "all" and importlib.util.find_spec("gymnasium") is None:
+        names.remove("learning")
+    modules = {name: importlib.import_module(f"robocov_app.bench.{PARTS[name].module}") for name in names}
+    if "cost" in names and not modules["cost"].has_yardstick():
+        message = "scikit-fmm, the yardstick of the cost, is not installed: pip install 'robocov[bench]'"
+        if part_name == "cost":
+            raise ParameterError(message)
+        echo(f"robocov: {message}", to_stderr=True)
+    cases = []
+    for name, module in modules.items():
+        list_cases = getattr(module, PARTS[name].function)
+        cases += list_cases(quick=is_quick)
+    return cases
+
+
+def _measure(
+    cases: Sequence[Callable[[], Sequence[Row]]], rows: list[Row], *, quiet: bool
+) -> KeyboardInterrupt | None:
+    """Append the results of the cases to the rows, and return the exception if the user interrupts it."""
+    try:
+        with show_progress("measuring", len(cases), quiet=quiet) as update:
+            for number, case in enumerate(cases, start=1):
+                rows.extend(case())
+                update(number)
+    except KeyboardInterrupt as error:
+        return error
+    return None
+
+
+def _describe_machine() -> dict[str, Any]:
+    """Return the versions, the processor and the system, for programs."""
+    return {
+        "python": platform.python_version(),
+        "system": platform.system(),
+        "processor": platform.machine(),
+        "cores": os.cpu_count(),
+        "packages": {name: version(name) for name in _PACKAGES},
+    }
+
+
+def _print_machine(machine: dict[str, Any]) -> None:
+    console = create_console()
+    packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
+    console.print("before: about the ratio when nothing was compiled (commit 8838167)")
+    console.print(f"Python {machine['python']}, {machine['system']}, {machine['cores']} cores; {packages}")
+
+
+def _print_tables(rows: Sequence[Row]) -> None:
+    """Print a table for each part."""
+    columns: list[tuple[str, Any]] = [("", {}), ("", {})]
+    columns += [(title, RIGHT) for title in ("time", "yardstick", "ratio", "before", "goal")]
+    columns += [("", {"no_wrap": True}), ("", {})]
+    for part_name, part_rows in groupby(rows, key=lambda row: row.part):
+        cells = []
+        previous_case = ""
+        for row in part_rows:
+            case = row.case or row.name
+            cells.append(
+                (
+                    "" if case == previous_case else case,
+                    row.name if row.case else "",
+                    *_format_measurement(row),
+                )
+            )
+            previous_case = case
+        print_table(columns, cells, title=PARTS[part_name].title)
         echo()
 
 
-def goals(row: Row) -> str:
-    wanted = [] if row.goal is None or row.ratio is None else [f"{row.goal:.3g}"]
-    wanted += [] if row.goal_seconds is None else [duration(row.goal_seconds)]
-    return ", ".join(wanted) + " missed" * (row.met is False)
+def _format_measurement(row: Row) -> list[str]:
+    """Return the cells with the figures of a row."""
+    return [
+        format_duration(row.seconds),
+        format_duration(row.yardstick_seconds),
+        "" if row.ratio is None else f"{row.ratio:.2f}",
+        "" if row.before is None else f"{row.before:.2f}",
+        format_goals(row),
+        "" if row.yardstick is None else f"/ {row.yardstick}",
+        row.note,
+    ]
 
 
-def duration(seconds: float | None) -> str:
+def format_goals(row: Row) -> str:
+    """Format the goals of a measurement, and whether they are missed.
+
+    Parameters
+    ----------
+    row : Row
+
+    Returns
+    -------
+    str
+        Empty without goals.
+    """
+    goals = []
+    if row.goal is not None and row.ratio is not None:
+        goals.append(f"{row.goal:.3g}")
+    if row.goal_seconds is not None:
+        goals.append(format_duration(row.goal_seconds))
+    suffix = " missed" if row.met is False else ""
+    return ", ".join(goals) + suffix
+
+
+def format_duration(seconds: float | None) -> str:
+    """Format a duration.
+
+    Parameters
+    ----------
+    seconds : float or None
+
+    Returns
+    -------
+    str
+        Empty for None.
+
+    Examples
+    --------
+    >>> format_duration(0.012), format_duration(2.5)
+    ('12.0 ms', '2.50 s')
+    """
     if seconds is None:
         return ""
     if seconds < 1e-3:

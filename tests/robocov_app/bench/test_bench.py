@@ -75,14 +75,14 @@ def test_a_goal_is_met_or_missed(goal, goal_seconds, met):
     row = Row("step", "one step", {"robots": 6}, 0.4, "yardstick", 0.2, goal, goal_seconds)
     assert row.ratio == 2.0
     assert row.met is met
-    assert ("missed" in bench.goals(row)) == (met is False)
+    assert ("missed" in bench.format_goals(row)) == (met is False)
     assert list(row.to_dict()) == KEYS
 
 
 def test_without_a_yardstick_there_is_no_ratio_to_want():
     row = Row("cost", "evaluated", {"lattice": 128, "robots": 6}, 0.4, goal=1.0)
     assert (row.ratio, row.met) == (None, None)
-    assert bench.goals(row) == ""
+    assert bench.format_goals(row) == ""
     assert row.case == "128 x 128, 6 robots"
 
 
@@ -246,7 +246,12 @@ def test_every_word_of_the_plot_is_inside_and_alone(rows, tmp_path, monkeypatch)
             assert apart, (texts[k].get_text(), texts[boxes.index(other)].get_text())
 
 
-def test_times_are_told_in_the_unit_that_suits_them():
-    from robocov_app.commands.bench import duration
+def test_durations_have_a_suitable_unit():
+    from robocov_app.commands.bench import format_duration
 
-    assert [duration(each) for each in (0.00031, 0.012, 2.5, None)] == ["310 µs", "12.0 ms", "2.50 s", ""]
+    assert [format_duration(seconds) for seconds in (0.00031, 0.012, 2.5, None)] == [
+        "310 µs",
+        "12.0 ms",
+        "2.50 s",
+        "",
+    ]
