@@ -15,9 +15,9 @@ from robocov.files.writing import replace_file
 from robocov.mapfile import from_json, to_json
 from robocov_app.benchmark import suite
 from robocov_app.evaluation.reference_search import ReferencePlacement, ReferenceQuery, answer_queries
+from robocov_app.jobs.messages import Line
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.progress import show_progress
-from robocov_app.toolkit.worker import Line
 
 RESTARTS = 24
 SEED = 0

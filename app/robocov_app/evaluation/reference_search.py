@@ -15,8 +15,9 @@ from typing import Any
 
 from robocov.errors import OutputError
 from robocov.mapfile import from_json
+from robocov_app.jobs.messages import Line
+from robocov_app.jobs.processes import ask_process, end_process
 from robocov_app.terminal.interruption import Interruption
-from robocov_app.toolkit import worker
 
 REFERENCE_FORMAT = "robocov-reference 1"
 """Part of every digest. Change it whenever the search gives other results."""
@@ -81,7 +82,7 @@ class ReferenceSearch:
 
     failing = "the search failed"
 
-    def __call__(self, questions: list[ReferenceQuery], line: worker.Line) -> ReferencePlacement:
+    def __call__(self, questions: list[ReferenceQuery], line: Line) -> ReferencePlacement:
         """Return the best placement for the last query."""
         from robocov.optimum import find_optimum
 
@@ -130,19 +131,19 @@ def answer_queries(
     processes: list[subprocess.Popen[bytes]] = []
     thread_state = threading.local()
 
-    def start_process() -> None:
-        thread_state.process = worker.started(service)
+    def start_thread_process() -> None:
+        thread_state.process = start_process(service)
         processes.append(thread_state.process)
 
     def answer_query(name: str) -> tuple[str, Any]:
-        reply = worker.asked(thread_state.process, queries[name])
+        reply = ask_process(thread_state.process, queries[name])
         if reply is None:
             raise OutputError(f"references: the process that searched for that of {name} has ended")
         if reply.answer is None:
             raise OutputError(f"reference of map {name!r}: {reply.trouble}")
         return name, reply.answer
 
-    pool = ThreadPoolExecutor(min(workers, len(queries)), initializer=start_process)
+    pool = ThreadPoolExecutor(min(workers, len(queries)), initializer=start_thread_process)
     try:
         pending = {pool.submit(answer_query, name) for name in queries}
         while pending and not stop.requested:
@@ -156,4 +157,4 @@ def answer_queries(
             process.kill()
         pool.shutdown()
         for process in processes:
-            worker.ended(process)
+            end_process(process)

@@ -19,10 +19,11 @@ from typing import Any, NamedTuple, Self, TypeAlias
 
 from robocov.errors import InputError, OutputError
 from robocov.optional_imports import import_optional
+from robocov_app.jobs.messages import READY, receive
+from robocov_app.jobs.processes import ask_process, end_process, start_process
 from robocov_app.sweep.study import Task
 from robocov_app.sweep.worker import Outcome, failed, perform
 from robocov_app.terminal.supervision import describe_status
-from robocov_app.toolkit.worker import READY, asked, ended, receive, started
 
 _ENDS = 2  # workers that may end through a task before it counts as failed
 _IN_A_ROW = 20  # workers that may end one after the other without a finished run in between
@@ -193,7 +194,7 @@ class _Worker:
         if process is None or process.poll() is not None:
             process = self._begun()
         self.complaints.truncate(0)  # what it says of this task, and does not grow for ever
-        reply = asked(process, task)
+        reply = ask_process(process, task)
         if reply is not None and isinstance(reply.answer, Outcome):
             return reply.answer
         status, said = self.end()
@@ -209,7 +210,7 @@ class _Worker:
             with self._starting:
                 if self._stopped:
                     break
-                process = started("robocov_app.sweep.worker:Performing", stderr=self.complaints)
+                process = start_process("robocov_app.sweep.worker:Performing", stderr=self.complaints)
                 self._process = process
             assert process.stdout
             if receive(process.stdout) == READY:
@@ -222,7 +223,7 @@ class _Worker:
 
     def end(self) -> tuple[int, str]:
         """Make sure that the process has ended; return its status and its last words."""
-        status = 0 if self._process is None else ended(self._process)
+        status = 0 if self._process is None else end_process(self._process)
         self._process = None
         self.complaints.seek(0)
         return status, self.complaints.read()[-_LAST_WORDS:].decode(errors="replace")

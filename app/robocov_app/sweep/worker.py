@@ -24,10 +24,10 @@ from robocov.planning.discovered_map import DiscoveredMap
 from robocov.record import Record, list_versions
 from robocov.scenario import Scenario
 from robocov.simulation import Simulation
+from robocov_app.jobs.messages import Line
 from robocov_app.runs.execution import build_cost_table
 from robocov_app.sweep.study import Task, conditions_of, source_json, team_of
 from robocov_app.terminal.output import format_csv, format_json, replace_non_finite
-from robocov_app.toolkit.worker import Line
 
 _REMEMBERED = 4  # maps whose costs a worker keeps; tasks come map by map
 _TIDY = 1000  # steps after which garbage is collected in a long run

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-from robocov_app.toolkit.autosave import flush_all
+from robocov_app.storage.autosave import flush_all
 
 _LOOP_GRACE_S = 0.7  # for the loop to notice that the process is to end
 _CLOSING_GRACE_S = 3.0  # in all, once it has, for closing films and saving settings

@@ -15,8 +15,9 @@ from robocov.defaults import DEFAULT_LATTICE
 from robocov.environment import Environment
 from robocov.errors import InputError, RobocovError
 from robocov.kernel_compilation import call_cost_kernels, compile_kernels
+from robocov_app.jobs.messages import Line, Wire
+from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 from robocov_app.render.distance_field import Field, FieldLattice
-from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, Worker
 
 _PAUSE = 0.05  # seconds between two words on how far a map is
 _Sites: TypeAlias = tuple[Sites, Array, Array | None]  # with corners and weights: what all results share
@@ -100,7 +101,7 @@ class Costs:
                 self._ready = answer is not None
                 self.state = "" if self._ready else f"no cost: {worker.trouble}"
             elif answer is None:
-                if not worker.lives:
+                if not worker.is_alive:
                     self._prepare()  # it is started again; not if it dies of that too
             elif self._pane is not None and isinstance(answer, Known):
                 if asked is None or not asked.aside:

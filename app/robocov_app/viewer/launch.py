@@ -10,11 +10,16 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from robocov.defaults import DEFAULT_LATTICE
 from robocov_app.render.picture import standard_layers
+from robocov_app.storage.autosave import find_draft_folder
+from robocov_app.storage.settings import (
+    find_settings_file,
+    load_settings,
+    merge_changed_settings,
+    save_settings,
+)
 from robocov_app.terminal.output import echo
-from robocov_app.toolkit.autosave import autosave_folder
 from robocov_app.toolkit.faults import FaultLog
 from robocov_app.toolkit.layout import SMALLEST
-from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
 from robocov_app.toolkit.window import display, fitting, screen_scale
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
@@ -72,8 +77,8 @@ class Launcher:
         keeper = None
         try:
             with display(headless=self._alone, otherwise=NO_DISPLAY):
-                file = None if self._alone else settings_file()
-                settings, trouble = loaded(Settings, file)
+                file = None if self._alone else find_settings_file()
+                settings, trouble = load_settings(Settings, file)
                 window = self._opened(settings)
                 window.viewer.say(trouble)
                 if found := recoverable(self._drafts):
@@ -84,7 +89,7 @@ class Launcher:
                 try:
                     yield window
                     ended = self._settings_of(window, settings)
-                    save_settings(changed_settings(settings, begun, ended), file)
+                    save_settings(merge_changed_settings(settings, begun, ended), file)
                 finally:
                     window.viewer.workspace.close()
                     window.viewer.costs.close()
@@ -104,7 +109,7 @@ class Launcher:
         """The folder for drafts; None if none are kept."""
         if self.headless:
             return None
-        return autosave_folder(self.folder if self.served else None)
+        return find_draft_folder(self.folder if self.served else None)
 
     def _opened(self, settings: Settings) -> Window:
         self._usual = {layer.name for layer in standard_layers() if layer.default}

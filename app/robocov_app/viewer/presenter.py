@@ -10,10 +10,10 @@ from robocov.controllers.gains import Value
 from robocov.environment import Point
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.mapfile import list_bundled_maps, load_map, save_map
+from robocov_app.storage.autosave import Draft
+from robocov_app.storage.regular_files import require_regular_file
 from robocov_app.terminal.output import find_free_path
-from robocov_app.toolkit.autosave import Record
 from robocov_app.toolkit.faults import describe_os_error
-from robocov_app.toolkit.opening import require_regular_file
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
@@ -285,7 +285,7 @@ class Presenter:
         self._note_recent(path)
         self.say(f"session opened: {path}")
 
-    def recover(self, work: Record | None = None) -> str:
+    def recover(self, work: Draft | None = None) -> str:
         """Go on with a session that was left behind, by default the newest."""
         found = recoverable(self._kept_in) if work is None else (work,)
         if not found:

@@ -12,8 +12,8 @@ from robocov.environment import Point
 from robocov.errors import RobocovError
 from robocov_app.render.picture import standard_layers
 from robocov_app.render.theme import theme_named
+from robocov_app.storage.autosave import Draft, remove_draft
 from robocov_app.terminal.output import find_free_path
-from robocov_app.toolkit.autosave import Record, remove_draft
 from robocov_app.toolkit.command import Command, Commands, draw_keys, palette
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Option, Question, file_choice, list_choice
 from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, SLIP, WHEEL, show_cursor, wheel_notches
@@ -490,7 +490,7 @@ class Window(BaseWindow):
         answers = [Answer("Lesson 1", partial(go_on, lesson=True)), Answer("Just let me play", go_on)]
         self.dialogs.ask(Question("Welcome to robocov", words, answers, go_on))
 
-    def offer_recovery(self, found: Sequence[Record]) -> None:
+    def offer_recovery(self, found: Sequence[Draft]) -> None:
         """Ask whether to go on with what windows left behind, the newest first; until then the team waits."""
         viewer, session, newest = self.viewer, self.viewer.session, found[0]
         playing, session.playing = session.playing, False

@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 from robocov.errors import RobocovError
 from robocov.optional_imports import import_optional
-from robocov_app.toolkit.autosave import FOLDER as DRAFTS
+from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
 
 
 class LiveWindow:

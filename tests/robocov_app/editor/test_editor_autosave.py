@@ -15,7 +15,7 @@ from robocov.errors import MapError
 from robocov_app.editor.edits.create import circle_drawn
 from robocov_app.editor.model.document import KIND, Autosave, content, recoverable, state_of, write_sketch
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.toolkit.autosave import Autosaver, remove_draft
+from robocov_app.storage.autosave import Autosaver, remove_draft
 
 SKETCH = Sketch("Hall", boundary=HALL)
 

@@ -25,9 +25,9 @@ from robocov_app.editor.ui.commands import run_typed
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.launch import editor_window, offer
 from robocov_app.editor.ui.window import EditorWindow
-from robocov_app.toolkit.autosave import FOLDER as DRAFTS
+from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
+from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.toolkit.dialogs import Choice, Question
-from robocov_app.toolkit.settings import FOLDER
 
 
 @pytest.fixture
@@ -230,7 +230,7 @@ def test_a_map_is_never_saved_under_another_formats_suffix(hands: Hands, tmp_pat
 
 @pytest.fixture
 def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv(FOLDER, str(tmp_path / "settings"))
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "settings"))
     monkeypatch.setenv(DRAFTS, str(tmp_path / "drafts"))
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     return tmp_path

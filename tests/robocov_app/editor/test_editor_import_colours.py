@@ -14,7 +14,7 @@ from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.import_sheet import declared_colours, find_role, give_role, make_sheet, next_role
 from robocov_app.editor.ui.importing import Importing
 from robocov_app.formats import IMPORTERS, ReadOptions
-from robocov_app.toolkit.worker import DirectWorker
+from robocov_app.jobs.workers import DirectWorker
 
 SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="10000mm" height="6000mm" viewBox="0 0 10 6">
 <rect width="10" height="6" fill="#c8c8c8"/>

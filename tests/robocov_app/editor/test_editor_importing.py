@@ -16,8 +16,8 @@ from robocov_app.editor.edits.properties import titled
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.importing import Importing, options_of
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping
+from robocov_app.jobs.workers import DirectWorker, LatestWorker
 from robocov_app.toolkit.dialogs import Question
-from robocov_app.toolkit.worker import DirectWorker, LatestWorker
 
 PATIENCE = 60.0
 

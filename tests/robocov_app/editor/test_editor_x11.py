@@ -18,9 +18,9 @@ from robocov.mapfile import load_map
 from robocov_app.editor.canvas.canvas import MARGIN
 from robocov_app.render.annotations import STRIP
 from robocov_app.render.camera import Camera
-from robocov_app.toolkit.autosave import FOLDER as DRAFTS
+from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
+from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.toolkit.layout import laid_out
-from robocov_app.toolkit.settings import FOLDER
 
 pytestmark = MARKS
 
@@ -38,7 +38,7 @@ def display() -> Iterator[str]:
 def edited(display: str, folder: Path, *words: object) -> Iterator[Hands]:
     size = f"{SIZE[0]}x{SIZE[1]}"
     command = [*COMMAND, "edit", *words, "--folder", folder, "--size", size, "--scale", "1"]
-    places = {FOLDER: str(folder / "settings"), DRAFTS: str(folder / "drafts")}
+    places = {FOLDER_VARIABLE: str(folder / "settings"), DRAFTS: str(folder / "drafts")}
     with run_window(display, folder, command, **places) as hands:
         hands.shot()  # now it listens
         yield hands

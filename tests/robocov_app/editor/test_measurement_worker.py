@@ -11,7 +11,7 @@ from robocov_app.editor.edits import properties, transform
 from robocov_app.editor.model.measurement import MeasurementWire, Measuring, measure, measurement_worker
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.toolkit.worker import Line
+from robocov_app.jobs.messages import Line
 
 PATIENCE = 60.0
 """Seconds after which nothing will come any more."""

@@ -17,8 +17,8 @@ from robocov_app.editor.edits.create import circle_drawn
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.document import Document, recoverable
 from robocov_app.editor.model.selection import Selection
+from robocov_app.jobs.workers import LatestWorker
 from robocov_app.toolkit.input import wheel_notches
-from robocov_app.toolkit.worker import LatestWorker
 
 posix_only = pytest.mark.skipif(sys.platform == "win32", reason="pipes and links")
 
@@ -132,7 +132,7 @@ def test_a_process_that_cannot_be_started_is_reported(monkeypatch: pytest.Monkey
     def refuse(service: str) -> None:
         raise OSError(11, "Resource temporarily unavailable")
 
-    monkeypatch.setattr("robocov_app.toolkit.worker.started", refuse)
+    monkeypatch.setattr("robocov_app.jobs.workers.start_process", refuse)
     worker = LatestWorker[object]("slow_service:Slow", "works")
     worker.put(1)
     assert not worker.busy and worker.poll() is None

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from robocov_app.toolkit.autosave import recoverable
+from robocov_app.storage.autosave import find_drafts
 from robocov_app.toolkit.termination import ending_on_signals, is_ending
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals")
@@ -22,7 +22,7 @@ HANG_LIMIT_S = 30.0
 PROGRAM = """
 import sys, time
 from pathlib import Path
-from robocov_app.toolkit.autosave import Autosaver
+from robocov_app.storage.autosave import Autosaver
 from robocov_app.toolkit.termination import ending_on_signals, is_ending
 
 def be_busy():
@@ -69,7 +69,7 @@ def program(folder: Path, main: str, *, prefix: tuple[str, ...] = ()) -> Iterato
 
 
 def works_in(folder: Path) -> list[object]:
-    return [record.content["work"] for record in recoverable(folder, KIND, lambda record: record)]
+    return [record.content["work"] for record in find_drafts(folder, KIND, lambda record: record)]
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])

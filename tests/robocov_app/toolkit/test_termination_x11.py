@@ -14,8 +14,8 @@ from called import COMMAND
 from served_window import served
 from x11_hands import MARKS, Hands, invisible_display, run_window
 
-from robocov_app.toolkit.autosave import FOLDER as DRAFTS
-from robocov_app.toolkit.settings import FOLDER
+from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
+from robocov_app.storage.settings import FOLDER_VARIABLE
 
 pytestmark = MARKS
 
@@ -32,7 +32,7 @@ def environment_in(folder: Path, *, is_cold: bool) -> dict[str, str]:
     """Return environment variables; with empty caches everything has to be compiled first."""
     (folder / "settings").mkdir()
     (folder / "settings/window.json").write_text("{}")  # not the first start, at which a lesson is offered
-    found = {FOLDER: str(folder / "settings"), DRAFTS: str(folder / "drafts")}
+    found = {FOLDER_VARIABLE: str(folder / "settings"), DRAFTS: str(folder / "drafts")}
     if is_cold:
         found |= {"NUMBA_CACHE_DIR": str(folder / "kernels"), "ROBOCOV_CACHE": str(folder / "cache")}
     return found

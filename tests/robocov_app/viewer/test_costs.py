@@ -12,8 +12,8 @@ from touched_run import HALL
 
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
+from robocov_app.jobs.workers import DirectWorker
 from robocov_app.render.distance_field import Field
-from robocov_app.toolkit.worker import DirectWorker
 from robocov_app.viewer import costs as module
 from robocov_app.viewer.costs import Costs, CostService
 
@@ -53,7 +53,7 @@ class StubWorker:
     """Answers when it is told to."""
 
     def __init__(self) -> None:
-        self.asked, self.busy, self.lives, self.progress, self.trouble = [], False, True, None, ""
+        self.asked, self.busy, self.is_alive, self.progress, self.trouble = [], False, True, None, ""
         self._service, self._answer = DirectWorker(CostService(), module._CostWire()), None
 
     def put(self, question) -> None:
@@ -66,7 +66,7 @@ class StubWorker:
         self.busy = False
 
     def die(self) -> None:
-        self._answer, self.trouble, self.busy, self.lives = None, "it has ended", False, False
+        self._answer, self.trouble, self.busy, self.is_alive = None, "it has ended", False, False
 
     def poll(self):
         answer, self._answer = self._answer, None

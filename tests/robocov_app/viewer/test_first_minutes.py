@@ -13,9 +13,9 @@ from touched_run import HALL, RAPF, begun, stepped
 from robocov.mapfile import save_map
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import text_width
-from robocov_app.toolkit.autosave import FOLDER as DRAFTS
+from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
+from robocov_app.storage.settings import FOLDER_VARIABLE, find_settings_file, load_settings
 from robocov_app.toolkit.dialogs import Choice, Question
-from robocov_app.toolkit.settings import FOLDER, loaded, settings_file
 from robocov_app.toolkit.window import display
 from robocov_app.viewer import launch as opening
 from robocov_app.viewer.launch import Launcher, Settings
@@ -168,7 +168,7 @@ def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) ->
 
 def opened_for_a_person(monkeypatch: pytest.MonkeyPatch, folder: Path, **options: object) -> Launcher:
     """Return how a window opens that somebody would watch, on a display that nobody sees."""
-    monkeypatch.setenv(FOLDER, str(folder))
+    monkeypatch.setenv(FOLDER_VARIABLE, str(folder))
     monkeypatch.setattr(opening, "display", lambda headless, otherwise: display(headless=True))
     return Launcher(begun(RAPF), "hall", folder, lattice=8, **options)  # type: ignore[arg-type]
 
@@ -296,7 +296,7 @@ def test_recent_sessions_are_remembered(monkeypatch: pytest.MonkeyPatch, tmp_pat
     with opened_for_a_person(monkeypatch, tmp_path).window() as window:
         window.viewer.save_session(tmp_path / "mine.robocov")
         window.viewer.suggests = False
-    settings, _ = loaded(Settings, settings_file())
+    settings, _ = load_settings(Settings, find_settings_file())
     assert settings.recent == (str(tmp_path / "mine.robocov"),) and not settings.suggests
     with opened_for_a_person(monkeypatch, tmp_path).window() as window:
         assert window.viewer.recent == [str(tmp_path / "mine.robocov")] and not window.viewer.suggests

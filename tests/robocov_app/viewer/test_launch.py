@@ -19,7 +19,7 @@ from touched_run import begun
 
 from robocov_app.cli import main
 from robocov_app.commands.demo import Arguments, session_of
-from robocov_app.toolkit.settings import FOLDER
+from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.toolkit.window import display, fitting, screen_scale
 from robocov_app.viewer.launch import NO_DISPLAY, Launcher
 from robocov_app.viewer.session.clock import FRAME_BUDGET
@@ -29,7 +29,7 @@ SHORT = ("--lattice", "8", "--size", "900x600")
 
 @pytest.fixture(autouse=True)
 def _no_settings(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(FOLDER, "")
+    monkeypatch.setenv(FOLDER_VARIABLE, "")
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")  # so that it is as before afterwards
 
 
@@ -50,7 +50,7 @@ def test_a_display_that_does_not_answer_is_none(tmp_path: Path) -> None:
     }
     done = subprocess.run(
         [*COMMAND, "demo", "square"],
-        env={**kept, "DISPLAY": ":987654", FOLDER: "", "XDG_RUNTIME_DIR": str(tmp_path)},
+        env={**kept, "DISPLAY": ":987654", FOLDER_VARIABLE: "", "XDG_RUNTIME_DIR": str(tmp_path)},
         capture_output=True,
         text=True,
         timeout=60,
@@ -98,7 +98,7 @@ def test_frames_neither_read_nor_write_settings(tmp_path: Path, monkeypatch: pyt
     folder.mkdir()
     (folder / "window.json").write_text('{"theme": "dark", "width": 1000}')
     before = (folder / "window.json").read_text()
-    monkeypatch.setenv(FOLDER, str(folder))
+    monkeypatch.setenv(FOLDER_VARIABLE, str(folder))
     (first, *_) = frames_of(tmp_path / "frames", "--robots", "1")
     assert first.mean() > 190
     assert [path.name for path in folder.iterdir()] == ["window.json"]
@@ -182,7 +182,7 @@ def test_text_is_as_large_as_suits_the_screen(height: int, scale: float, monkeyp
 
 
 def test_settings_that_cannot_be_read_are_told_and_not_needed(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setenv(FOLDER, str(tmp_path))
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     (tmp_path / "window.json").write_text("{ nonsense")
     with Launcher(begun(), "hall", tmp_path, lattice=4, size=(900, 600)).window() as window:
         assert "default settings" in window.viewer.message
@@ -191,7 +191,7 @@ def test_settings_that_cannot_be_read_are_told_and_not_needed(tmp_path: Path, mo
 
 
 def test_what_options_ask_for_is_not_remembered(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setenv(FOLDER, str(tmp_path))
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     kept = tmp_path / "window.json"
     kept.write_text('{"width": 1000, "height": 700, "shown": ["cells", "robots"]}')
     asked = {"theme": "dark", "size": (900, 600), "scale": 2.0, "also": frozenset({"scan"})}

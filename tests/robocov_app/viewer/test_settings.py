@@ -8,10 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.toolkit.settings import FOLDER, changed_settings, loaded, save_settings, settings_file
+from robocov_app.storage.settings import (
+    FOLDER_VARIABLE,
+    find_settings_file,
+    load_settings,
+    merge_changed_settings,
+    save_settings,
+)
 from robocov_app.viewer.launch import Settings
 
-load_settings = partial(loaded, Settings)
+load_settings = partial(load_settings, Settings)
 
 OTHERS = Settings(
     theme="dark", scale=2.0, width=1600, height=900, shown=("cells", "robots"), tab="robot", fade=True
@@ -69,7 +75,7 @@ def test_what_cannot_be_read_is_told_and_left_out(tmp_path, text):
     file.write_text(text)
     settings, words = load_settings(file)
     assert settings == Settings()
-    assert words == f"{file} could not be read: default settings"
+    assert words == f"{file} cannot be read; using default settings"
     # and is put right the next time
     assert save_settings(settings, file) == ""
     assert load_settings(file) == (Settings(), "")
@@ -86,7 +92,7 @@ def test_a_folder_in_its_place(tmp_path):
     settings, words = load_settings(tmp_path / "window.json")
     assert settings == Settings()
     assert "could not be read" in words
-    assert save_settings(Settings(), tmp_path / "window.json").startswith("settings not saved: ")
+    assert save_settings(Settings(), tmp_path / "window.json").startswith("settings cannot be saved: ")
 
 
 def test_settings_of_other_versions(tmp_path):
@@ -99,20 +105,20 @@ def test_what_cannot_be_written_is_told(tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("in the way")
     words = save_settings(OTHERS, blocked / "window.json")
-    assert words.startswith("settings not saved: ")
+    assert words.startswith("settings cannot be saved: ")
     assert "\n" not in words
     assert blocked.read_text() == "in the way"
     assert save_settings(OTHERS, None) == ""
 
 
 def test_where_they_are_kept(tmp_path, monkeypatch):
-    monkeypatch.setenv(FOLDER, str(tmp_path))
-    assert settings_file() == tmp_path / "window.json"
-    monkeypatch.setenv(FOLDER, "")
-    assert settings_file() is None
-    monkeypatch.delenv(FOLDER)
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
+    assert find_settings_file() == tmp_path / "window.json"
+    monkeypatch.setenv(FOLDER_VARIABLE, "")
+    assert find_settings_file() is None
+    monkeypatch.delenv(FOLDER_VARIABLE)
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
-    file = settings_file()
+    file = find_settings_file()
     assert file is not None
     assert file.name == "window.json"
     assert "robocov" in file.parts
@@ -121,6 +127,6 @@ def test_where_they_are_kept(tmp_path, monkeypatch):
 
 def test_only_what_was_changed_is_kept():
     before, opened = Settings(width=1000), Settings(theme="dark", width=1300)
-    assert changed_settings(before, opened, opened) == before
+    assert merge_changed_settings(before, opened, opened) == before
     closed = opened.model_copy(update={"fade": True, "width": 1400})
-    assert changed_settings(before, opened, closed) == Settings(width=1400, fade=True)
+    assert merge_changed_settings(before, opened, closed) == Settings(width=1400, fade=True)

@@ -13,8 +13,8 @@ from driven_window import FRAME, Driver, opened, resized
 from PIL import Image
 from touched_run import RAPF, begun
 
+from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.toolkit.input import shown_cursor
-from robocov_app.toolkit.settings import FOLDER
 from robocov_app.viewer.launch import Launcher
 from robocov_app.viewer.status import cursor_words
 
@@ -298,7 +298,7 @@ def test_the_lesson_waits_while_the_arena_is_touched(driver: Driver) -> None:
 
 
 def test_settings_are_written_and_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(FOLDER, str(tmp_path / "settings"))
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "settings"))
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
 
     (tmp_path / "settings").mkdir()

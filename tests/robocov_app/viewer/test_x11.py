@@ -14,7 +14,7 @@ import pytest
 from called import COMMAND
 from x11_hands import MARKS, Hands, ended, invisible_display, run_window, said
 
-from robocov_app.toolkit.settings import FOLDER
+from robocov_app.storage.settings import FOLDER_VARIABLE
 
 pytestmark = MARKS
 
@@ -34,7 +34,7 @@ def shown(display: str, folder: Path, *words: str) -> Iterator[Hands]:
     settings = folder / "settings"
     settings.mkdir(exist_ok=True)
     (settings / "window.json").write_text("{}")  # not the first start, at which the lesson is offered
-    with run_window(display, folder, [*command, *options], **{FOLDER: str(settings)}) as hands:
+    with run_window(display, folder, [*command, *options], **{FOLDER_VARIABLE: str(settings)}) as hands:
         yield hands
 
 

@@ -15,7 +15,7 @@ import pytest
 from driven_browser import CHROMIUM, DRIVER, Browser
 from served_window import served
 
-from robocov_app.toolkit.autosave import FOLDER, SERVED_FOLDER
+from robocov_app.storage.autosave import FOLDER_VARIABLE, SERVED_FOLDER
 
 pytest.importorskip("websockets")
 
@@ -98,7 +98,7 @@ def is_shown(browser):
 @pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and its driver")
 @pytest.mark.skipif(sys.platform == "win32", reason="kill -9")
 def test_a_class_watches_reloads_are_let_in_and_the_work_outlives_the_server(tmp_path, monkeypatch):
-    monkeypatch.delenv(FOLDER, raising=False)
+    monkeypatch.delenv(FOLDER_VARIABLE, raising=False)
     folder = tmp_path / "files"
     words = ("demo", "square", "--robots", "3", "--lattice", "8", "--paused", "--folder", str(folder))
     browser = Browser(tmp_path / "browser")

@@ -16,7 +16,7 @@ from touched_run import begun
 
 from robocov_app.editor.edits.create import circle_drawn
 from robocov_app.editor.ui.launch import editor_window
-from robocov_app.toolkit.autosave import FOLDER, SERVED_FOLDER
+from robocov_app.storage.autosave import FOLDER_VARIABLE, SERVED_FOLDER
 from robocov_app.viewer.launch import Launcher
 
 pytest.importorskip("websockets")
@@ -30,7 +30,7 @@ PATIENCE_S = 30.0
 
 @pytest.fixture(autouse=True)
 def _drafts_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(FOLDER)
+    monkeypatch.delenv(FOLDER_VARIABLE)
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")  # restored afterwards
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from served_window import served
 
-from robocov_app.toolkit.autosave import FOLDER, SERVED_FOLDER
+from robocov_app.storage.autosave import FOLDER_VARIABLE, SERVED_FOLDER
 
 pytest.importorskip("websockets")
 
@@ -138,7 +138,7 @@ def test_who_only_fetches_the_page_takes_no_window(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 def test_a_window_that_nobody_looks_at_is_ended_and_its_work_is_offered(tmp_path, monkeypatch):
-    monkeypatch.delenv(FOLDER, raising=False)
+    monkeypatch.delenv(FOLDER_VARIABLE, raising=False)
     options = ("--each", "--max-sessions", "1", "--idle-minutes", "0.05", "--folder", str(tmp_path))
     ada, ben = Visitor(), Visitor()
     with served("edit", *options, cwd=tmp_path) as link:

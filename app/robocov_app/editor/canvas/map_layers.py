@@ -19,7 +19,7 @@ from robocov_app.render import fonts, heatmaps, surface_cache
 from robocov_app.render.camera import Camera, round_length
 from robocov_app.render.canvas import FAR, Canvas
 from robocov_app.render.theme import LIGHT, Colour, Theme, mix, robot_hues
-from robocov_app.toolkit.opening import require_regular_file
+from robocov_app.storage.regular_files import require_regular_file
 
 _FORGOTTEN = 4  # how many times more outlines than obstacles are kept, those of what was undone among them
 

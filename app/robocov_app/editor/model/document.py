@@ -18,7 +18,7 @@ from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.editor.model.parser import parse_sketch, sketch_of
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch, draft_document, sketch_text
-from robocov_app.toolkit import autosave
+from robocov_app.storage import autosave
 
 
 @dataclass
@@ -135,7 +135,7 @@ class Autosave:
     disk: OnDisk | None  # what the file was like when it was read or written last
 
     def sketch(self) -> Sketch:
-        return sketch_of(autosave.read_record(self.folder, KIND).content.get("sketch"), str(self.folder))
+        return sketch_of(autosave.read_draft(self.folder, KIND).content.get("sketch"), str(self.folder))
 
     def words(self, now: datetime | None = None) -> str:
         """Return what to offer: "“Office”, 12 obstacles, today 14:03, not saved to office.json"."""
@@ -151,7 +151,7 @@ def content(sketch: Sketch, disk: OnDisk | None) -> dict[str, Any]:
     return {"disk": file, "sketch": draft_document(sketch)}
 
 
-def _autosave(record: autosave.Record) -> Autosave | None:
+def _autosave(record: autosave.Draft) -> Autosave | None:
     """Return the map of a record; None if there is none, or its file holds it already."""
     kept, path, disk = record.content.get("sketch"), record.path, record.content.get("disk")
     if kept is None:
@@ -170,8 +170,8 @@ def _autosave(record: autosave.Record) -> Autosave | None:
     return Autosave(record.folder, path, sketch.name, record.when, len(sketch.obstacles), known)
 
 
-recoverable = partial(autosave.recoverable, kind=KIND, read=_autosave)
-opened_elsewhere = partial(autosave.opened_elsewhere, kind=KIND)  # asked by `path=`
+recoverable = partial(autosave.find_drafts, kind=KIND, read=_autosave)
+opened_elsewhere = partial(autosave.is_open_elsewhere, kind=KIND)  # asked by `path=`
 State: TypeAlias = Literal["same", "changed", "gone"]
 
 
@@ -306,14 +306,14 @@ class Document:
     def keep(self) -> None:
         before, self._kept = self._kept, self.history.sketch
         if before is not self._kept and self.history.unsaved:
-            self.autosaver.keep(partial(content, self._kept, self.disk))
+            self.autosaver.save_draft(partial(content, self._kept, self.disk))
         elif before is not self._kept:
-            self.autosaver.settle(self.path)
+            self.autosaver.mark_saved(self.path)
 
     def keep_draft(self, sketch: Sketch) -> None:
         """Keep a draft of a sketch that is no part of the history yet, until the next `keep`."""
         self._kept = sketch
-        self.autosaver.keep(partial(content, sketch, self.disk))
+        self.autosaver.save_draft(partial(content, sketch, self.disk))
 
     def look(self, now: float) -> State:
         """Return whether the file has changed on the disk, news only once; `now` is any clock, s."""
@@ -340,7 +340,7 @@ class Document:
         self.state, self._over = "same", False
         self.history.mark_saved()
         self._kept = self.history.sketch
-        self.autosaver.settle(self.path)
+        self.autosaver.mark_saved(self.path)
 
 
 def is_bundled(path: Path) -> bool:

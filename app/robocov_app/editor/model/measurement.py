@@ -13,7 +13,8 @@ from robocov.environment import MAX_SAGITTA_M, Gap, Point, find_narrow_gaps, fin
 from robocov_app.editor.model.geometry import middle_of
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.model.validation import Problem, examined, place_words
-from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, Worker
+from robocov_app.jobs.messages import Line, Wire
+from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 
 _TOUCHING = 1e-5  # metres within which an edge lies on a wall
 _EXACTLY = 1e-6  # metres by which a gap may be narrower than a robot that passes: it fits where it just fits

@@ -26,9 +26,9 @@ from robocov_app.editor.tools.reference_image import ReferenceImageTool
 from robocov_app.editor.tools.select import PanTool, SelectTool
 from robocov_app.editor.tools.snapping import SNAPS, vertex_count
 from robocov_app.editor.tools.tool import Tool, Workspace
+from robocov_app.jobs.workers import Worker
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Question
 from robocov_app.toolkit.faults import describe_os_error
-from robocov_app.toolkit.worker import Worker
 
 FILE = "editor.json"
 # layers that can be shown or hidden, with their titles

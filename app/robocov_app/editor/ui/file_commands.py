@@ -21,9 +21,9 @@ from robocov_app.editor.ui.editor import MOST_RECENT, Editor
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.importing import Imported, Importing
 from robocov_app.formats import EXPORTERS, IMPORTERS, Importer, detect, export_map
+from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
+from robocov_app.storage.regular_files import require_regular_file
 from robocov_app.toolkit.dialogs import Option, file_choice, list_choice
-from robocov_app.toolkit.opening import require_regular_file
-from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Worker
 
 Act: TypeAlias = Callable[[], object]
 _PATIENCE = 2.0  # seconds after which an import with settings that have changed since is given up

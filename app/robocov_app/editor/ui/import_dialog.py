@@ -16,6 +16,7 @@ from robocov_app.editor.ui.importing import Imported, options_of
 from robocov_app.formats import Importer, ReadOptions, Shaping
 from robocov_app.formats.base import square_metres
 from robocov_app.formats.colours import Colour, name_colour
+from robocov_app.jobs.workers import Worker
 from robocov_app.render import layout, surface_cache
 from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, shortened, text_width
@@ -24,7 +25,6 @@ from robocov_app.toolkit.dialogs import Dialog
 from robocov_app.toolkit.overlay import wrapped
 from robocov_app.toolkit.text_edit import TextEdit
 from robocov_app.toolkit.ui import SMALL, Ui
-from robocov_app.toolkit.worker import Worker
 
 # pixels at scale 1: of the options, of their names, beside them, of a line of the report, above each map
 _COLUMN, _NAME, _GAP, _LINE, _ABOVE = 300, 126, 32, 17, 40

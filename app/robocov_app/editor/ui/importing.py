@@ -20,7 +20,7 @@ from robocov_app.formats import (
     read_map,
 )
 from robocov_app.formats.geometry.comparison import ImportComparison, compare_maps
-from robocov_app.toolkit.worker import Line
+from robocov_app.jobs.messages import Line
 
 Kind = Literal["number", "place", "words", "colours", "width", "text", "choice"]
 ON = "yes"  # a switch that is on

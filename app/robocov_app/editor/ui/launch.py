@@ -12,9 +12,14 @@ from robocov_app.editor.tools.snapping import SNAPS
 from robocov_app.editor.ui.editor import FILE, KEPT, SHOWN, Editor, EditorSettings
 from robocov_app.editor.ui.file_commands import heading, lay_under, opened
 from robocov_app.editor.ui.window import EditorWindow
-from robocov_app.toolkit.autosave import autosave_folder, remove_draft
+from robocov_app.storage.autosave import find_draft_folder, remove_draft
+from robocov_app.storage.settings import (
+    find_settings_file,
+    load_settings,
+    merge_changed_settings,
+    save_settings,
+)
 from robocov_app.toolkit.faults import FaultLog
-from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
 from robocov_app.toolkit.window import display, fitting, screen_scale
 
 NO_DISPLAY = (
@@ -49,7 +54,7 @@ def editor_window(
         Draw without a display, but live; keep no settings.
     """
     alone = headless or served
-    drafts = None if headless else autosave_folder(folder if served else None)
+    drafts = None if headless else find_draft_folder(folder if served else None)
     if path is not None and opened_elsewhere(drafts, path=path):
         raise InputError(f"{path}: another editor has it open; close that one, or open a copy")
     # what is wrong with the file is told before a window flashes up
@@ -59,8 +64,8 @@ def editor_window(
         stack.callback(document.close, discard=False)  # unless it was closed by then
         readings = stack.enter_context(closing(measurement_worker(direct=headless)))
         stack.enter_context(display(headless=alone, otherwise=NO_DISPLAY))
-        file = None if alone else settings_file(FILE)
-        settings, trouble = loaded(EditorSettings, file)
+        file = None if alone else find_settings_file(FILE)
+        settings, trouble = load_settings(EditorSettings, file)
         editor = Editor(document, readings, folder, settings)
         editor.theme = theme or settings.theme
         if background is not None:
@@ -82,7 +87,7 @@ def editor_window(
         begun, discarding = settings_of(window, settings), False
         try:
             yield window
-            save_settings(changed_settings(settings, begun, settings_of(window, settings)), file)
+            save_settings(merge_changed_settings(settings, begun, settings_of(window, settings)), file)
             discarding = window.documents.leaving
         finally:
             window.close()

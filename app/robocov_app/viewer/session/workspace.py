@@ -15,8 +15,8 @@ from typing import Any
 from robocov.controllers import CONTROLLERS
 from robocov.errors import OutputError
 from robocov_app.runs.saved_runs import name_folders
+from robocov_app.storage import autosave
 from robocov_app.terminal.output import echo, find_free_path
-from robocov_app.toolkit import autosave
 from robocov_app.viewer.session.changes import Restart, SetController
 from robocov_app.viewer.session.file import SUFFIX, save_session, session_json, session_of
 from robocov_app.viewer.session.session import Session
@@ -50,7 +50,7 @@ class Workspace:
         self._kept, self._when = state, monotonic()
         self.session.stow()
         content = session_json(self.session.document, self.session.head, self.session.step_now, view)
-        self._autosaver.keep(lambda: {"session": content})
+        self._autosaver.save_draft(lambda: {"session": content})
 
     def save(self, folder: Path, view: Mapping[str, Any], path: Path | None = None) -> Path:
         """Write the session to a file, by default its own or a new one; raises as `require_document`."""
@@ -62,19 +62,19 @@ class Workspace:
         )
         save_session(target, session.document, session.head, session.step_now, view)
         self.path, self._saved = target, session.revision
-        self._autosaver.settle(target)
+        self._autosaver.mark_saved(target)
         return target
 
     def close(self) -> None:
         self._autosaver.close(discard=not self.unsaved)
 
 
-def recoverable(folder: Path | None) -> tuple[autosave.Record, ...]:
+def recoverable(folder: Path | None) -> tuple[autosave.Draft, ...]:
     """Return the drafts of sessions that ended programs left, the newest first."""
-    return autosave.recoverable(folder, KIND, _check_draft)
+    return autosave.find_drafts(folder, KIND, _check_draft)
 
 
-def _check_draft(record: autosave.Record) -> autosave.Record | None:
+def _check_draft(record: autosave.Draft) -> autosave.Draft | None:
     """Return a record whose session can be described; None if all was saved, KeyError if it is broken."""
     if "session" not in record.content:
         return None
@@ -82,14 +82,14 @@ def _check_draft(record: autosave.Record) -> autosave.Record | None:
     return record
 
 
-def offer(work: autosave.Record) -> str:
+def offer(work: autosave.Draft) -> str:
     where = "never saved" if work.path is None else f"not saved to {work.path.name}"
     count = len(work.content["session"]["touches"]) - 1
     return f"a session of {work.when:%H:%M}, {count} {'touch' if count == 1 else 'touches'}, {where}"
 
 
 def recovered(
-    work: autosave.Record, controllers: Collection[str], folder: Path | None
+    work: autosave.Draft, controllers: Collection[str], folder: Path | None
 ) -> tuple[Workspace, Mapping[str, Any]]:
     saved = session_of(work.content["session"], str(work.folder), controllers)
     return Workspace(Session.opened(saved), folder, work.path, work.folder), saved.view

@@ -12,18 +12,10 @@ import numpy as np
 import pytest
 from slow_service import Doubling
 
-from robocov_app.toolkit import worker as module
-from robocov_app.toolkit.worker import (
-    READY,
-    DirectWorker,
-    LatestWorker,
-    Wire,
-    asked,
-    ended,
-    receive,
-    send,
-    started,
-)
+from robocov_app.jobs import workers as module
+from robocov_app.jobs.messages import READY, Wire, receive, send
+from robocov_app.jobs.processes import ask_process, end_process, start_process
+from robocov_app.jobs.workers import DirectWorker, LatestWorker
 
 PATIENCE = 60.0
 """Seconds after which nothing will come any more."""
@@ -54,9 +46,9 @@ def worker():
 
 
 def test_questions_are_answered_by_one_process(worker):
-    assert (worker.poll(), worker.busy, worker.lives) == (None, False, False)
+    assert (worker.poll(), worker.busy, worker.is_alive) == (None, False, False)
     assert answer_of(worker, 4) == 8
-    assert (worker.poll(), worker.lives, worker.trouble) == (None, True, "")
+    assert (worker.poll(), worker.is_alive, worker.trouble) == (None, True, "")
     pid = answer_of(worker, "print")
     assert pid == worker.process.pid != os.getpid()
     assert answer_of(worker, "bad") is None
@@ -99,9 +91,9 @@ def test_a_process_that_dies_is_said_and_replaced(worker):
     worker.put("sleep")
     worker.process.kill()
     trouble = until(lambda: worker.poll() or worker.trouble)
-    assert trouble.startswith("the process that doubles has ended")
+    assert trouble.startswith("the process that doubles has end_process")
     assert not trouble.endswith("while starting")
-    assert not worker.busy and not worker.lives
+    assert not worker.busy and not worker.is_alive
     assert answer_of(worker, 2) == 4
     assert worker.trouble == ""
 
@@ -156,22 +148,22 @@ def test_closing_twice_or_without_a_process_is_no_fault(worker):
     worker.put(1)
     worker.close()
     worker.close()
-    assert not worker.lives
+    assert not worker.is_alive
 
 
 def test_one_that_waits_asks_one_after_the_other():
-    process = started(SERVICE)
-    assert [asked(process, number).answer for number in (1, 2)] == [2, 4]
-    assert asked(process, "bad").trouble == "bad: it is"
+    process = start_process(SERVICE)
+    assert [ask_process(process, number).answer for number in (1, 2)] == [2, 4]
+    assert ask_process(process, "bad").trouble == "bad: it is"
     process.kill()
-    assert asked(process, 1) is None
-    assert ended(process) != 0
+    assert ask_process(process, 1) is None
+    assert end_process(process) != 0
 
 
 def test_one_without_a_service_ends(capfd):
-    process = started("slow_service:Nothing")
+    process = start_process("slow_service:Nothing")
     assert receive(process.stdout) != READY
-    assert ended(process) == 1
+    assert end_process(process) == 1
     assert "Nothing" in capfd.readouterr().err
 
 
@@ -179,7 +171,7 @@ PARENT = """
 import signal, time
 # whoever starts the tests may have had this one ignored
 signal.signal(signal.SIGINT, signal.default_int_handler)
-from robocov_app.toolkit.worker import LatestWorker
+from robocov_app.jobs.workers import LatestWorker
 worker = LatestWorker("slow_service:Doubling", "doubles")
 worker.put(1)
 while worker.poll() is None:
@@ -213,7 +205,7 @@ def test_no_process_outlives_its_parent(way):
             os.kill(child, 0)
         except ProcessLookupError:
             return True
-        # in a container there may be nobody to take away what has ended
+        # in a container there may be nobody to take away what has end_process
         with open(f"/proc/{child}/stat") as file:  # noqa: PTH123
             return file.read().rpartition(")")[2].split()[0] == "Z"
 

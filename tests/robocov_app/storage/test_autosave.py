@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 
 from robocov.errors import OutputError
-from robocov_app.toolkit import autosave
-from robocov_app.toolkit.autosave import (
-    FOLDER,
+from robocov_app.storage import autosave
+from robocov_app.storage.autosave import (
+    FOLDER_VARIABLE,
     Autosaver,
-    autosave_folder,
-    opened_elsewhere,
-    recoverable,
+    find_draft_folder,
+    find_drafts,
+    is_open_elsewhere,
     remove_draft,
 )
 from robocov_app.web.confined import confined
@@ -28,7 +28,7 @@ KIND = "robocov-test"
 PROGRAM = """
 import sys
 from pathlib import Path
-from robocov_app.toolkit.autosave import Autosaver
+from robocov_app.storage.autosave import Autosaver
 
 path = None if sys.argv[2] == "none" else Path(sys.argv[2])
 keeper = Autosaver(Path(sys.argv[1]), "robocov-test", path)
@@ -42,7 +42,7 @@ for k in range(100_000):
 
 
 def found(folder: Path | None) -> tuple[dict, ...]:
-    return recoverable(folder, KIND, lambda record: record if "work" in record.content else None)
+    return find_drafts(folder, KIND, lambda record: record if "work" in record.content else None)
 
 
 def works(folder: Path) -> list[object]:
@@ -80,15 +80,15 @@ def test_what_a_killed_program_did_is_found_again_and_goes_on(folder, tmp_path):
     process = program(folder, str(path))
     try:
         assert found(folder) == (), "it lives"
-        assert opened_elsewhere(folder, KIND, path)
-        assert not opened_elsewhere(folder, KIND, tmp_path / "other.json")
-        assert not opened_elsewhere(folder, "robocov-other", path)
+        assert is_open_elsewhere(folder, KIND, path)
+        assert not is_open_elsewhere(folder, KIND, tmp_path / "other.json")
+        assert not is_open_elsewhere(folder, "robocov-other", path)
     finally:
         killed(process)
-    assert not opened_elsewhere(folder, KIND, path)
+    assert not is_open_elsewhere(folder, KIND, path)
     (record,) = found(folder)
     assert (record.path, record.content) == (path, {"work": 4})
-    assert recoverable(folder, "robocov-other", lambda record: record) == (), "that is for others"
+    assert find_drafts(folder, "robocov-other", lambda record: record) == (), "that is for others"
     # it goes on in the same folder, and is offered to nobody else meanwhile
     keeper = Autosaver(folder, KIND, record.path, record.folder)
     assert found(folder) == ()
@@ -150,7 +150,7 @@ def test_what_was_saved_is_forgotten(folder, tmp_path):
     assert keeper.flush()
     keeper.settle(tmp_path / "hall.json")
     assert keeper.flush()
-    assert opened_elsewhere(folder, KIND, tmp_path / "hall.json")
+    assert is_open_elsewhere(folder, KIND, tmp_path / "hall.json")
     keeper.close(discard=False)
     assert list(folder.iterdir()) == []
 
@@ -176,7 +176,7 @@ def test_keeping_waits_for_nothing_and_only_the_newest_is_written(folder):
 
 
 def test_trouble_is_told_of_and_tried_again(folder, monkeypatch):
-    monkeypatch.setattr(autosave, "_PATIENCE", 0.05)
+    monkeypatch.setattr(autosave, "_RETRY_S", 0.05)
     keeper = Autosaver(folder, KIND)
     full = threading.Event()
     full.set()
@@ -201,7 +201,7 @@ def test_trouble_is_told_of_and_tried_again(folder, monkeypatch):
 def test_where_nothing_can_be_kept_work_goes_on(tmp_path):
     (tmp_path / "file").write_text("")
     keeper = Autosaver(tmp_path / "file" / "drafts", KIND)
-    assert "not kept aside" in keeper.trouble
+    assert "cannot be saved" in keeper.trouble
     keeper.keep(dict)
     assert not keeper.flush()
     keeper.close(discard=False)
@@ -212,7 +212,7 @@ def test_where_nothing_can_be_kept_work_goes_on(tmp_path):
     nothing.settle(None)
     nothing.close(discard=True)
     assert found(None) == ()
-    assert not opened_elsewhere(None, KIND, tmp_path / "x")
+    assert not is_open_elsewhere(None, KIND, tmp_path / "x")
     assert found(tmp_path / "none") == ()
 
 
@@ -243,14 +243,14 @@ def test_a_draft_for_which_reading_raises_anything_is_left_alone(folder):
     keeper = Autosaver(folder, KIND)
     keeper.keep(lambda: {"work": 1})
     keeper.close(discard=False)
-    assert recoverable(folder, KIND, lambda record: record.content["missing"]) == ()
+    assert find_drafts(folder, KIND, lambda record: record.content["missing"]) == ()
     assert works(folder) == [1]
 
 
 def test_work_that_cannot_be_written_does_not_stop_the_thread(folder):
     keeper = Autosaver(folder, KIND)
     keeper.keep(lambda: {"work": "\udcff"})
-    assert not keeper.flush() and "not kept aside" in keeper.trouble
+    assert not keeper.flush() and "cannot be saved" in keeper.trouble
     keeper.keep(lambda: {"work": 2})
     assert keeper.flush() and keeper.trouble == ""
     keeper.close(discard=False)
@@ -268,21 +268,21 @@ def test_folders_without_work_are_removed_when_they_are_old(folder):
 
 
 def test_the_folder_can_be_named(monkeypatch, tmp_path):
-    monkeypatch.setenv(FOLDER, str(tmp_path))
-    assert autosave_folder() == tmp_path
-    monkeypatch.setenv(FOLDER, "")
-    assert autosave_folder() is None
-    monkeypatch.delenv(FOLDER)
-    assert autosave_folder().name == "drafts"
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
+    assert find_draft_folder() == tmp_path
+    monkeypatch.setenv(FOLDER_VARIABLE, "")
+    assert find_draft_folder() is None
+    monkeypatch.delenv(FOLDER_VARIABLE)
+    assert find_draft_folder().name == "drafts"
 
 
 def test_drafts_of_a_served_window_are_hidden_in_its_folder(monkeypatch, tmp_path):
-    monkeypatch.setenv(FOLDER, str(tmp_path / "elsewhere"))
-    assert autosave_folder(tmp_path) == tmp_path / ".drafts"
-    monkeypatch.delenv(FOLDER)
-    assert autosave_folder(tmp_path) == tmp_path / ".drafts"
-    monkeypatch.setenv(FOLDER, "")
-    assert autosave_folder(tmp_path) is None
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "elsewhere"))
+    assert find_draft_folder(tmp_path) == tmp_path / ".drafts"
+    monkeypatch.delenv(FOLDER_VARIABLE)
+    assert find_draft_folder(tmp_path) == tmp_path / ".drafts"
+    monkeypatch.setenv(FOLDER_VARIABLE, "")
+    assert find_draft_folder(tmp_path) is None
 
 
 def test_drafts_are_removed_where_only_one_folder_may_be_used(tmp_path, folder):

@@ -1,0 +1,87 @@
+"""Processes of services, for callers that wait for answers."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from contextlib import suppress
+from typing import IO
+
+from robocov_app.jobs.messages import READY, Reply, receive, send
+
+_PIPE_BYTES = 1 << 20
+"""Capacity of the pipe of answers. If it takes a whole answer, its reader wakes up less often."""
+
+
+def start_process(service: str, *, stderr: IO[bytes] | None = None) -> subprocess.Popen[bytes]:
+    """Start the process of a service.
+
+    Parameters
+    ----------
+    service : str
+        ``package.module:Class``.
+    stderr : binary file or None
+        Its standard error; by default that of this process.
+
+    Returns
+    -------
+    subprocess.Popen
+        Its standard input and output are pipes.
+
+    Raises
+    ------
+    OSError
+        If the process cannot be started.
+    """
+    # It has to import the same modules as this process.
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        environment.setdefault(name, "1")
+    program = f"from robocov_app.jobs.serving import serve; serve({service!r})"
+    process = subprocess.Popen(
+        [sys.executable, "-P", "-c", program],  # -P: modules in the working folder are not imported
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=stderr,
+        env=environment,
+    )
+    if sys.platform == "linux":
+        import fcntl
+
+        # Not every user is allowed to have such large pipes.
+        with suppress(OSError):
+            fcntl.fcntl(process.stdout, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)  # type: ignore[arg-type]
+    return process
+
+
+def ask_process(process: subprocess.Popen[bytes], question: object) -> Reply | None:
+    """Ask the process of a service, and wait for the answer.
+
+    Parameters
+    ----------
+    process : subprocess.Popen
+    question : object
+
+    Returns
+    -------
+    Reply or None
+        None if the process ends.
+    """
+    assert process.stdin is not None
+    assert process.stdout is not None
+    with suppress(OSError):
+        send(process.stdin, (0, question))
+    reply = receive(process.stdout)
+    while reply == READY:
+        reply = receive(process.stdout)
+    return reply if isinstance(reply, Reply) else None
+
+
+def end_process(process: subprocess.Popen[bytes]) -> int:
+    """End the process of a service, and return its exit status."""
+    for stream in (process.stdin, process.stdout):
+        assert stream is not None
+        with suppress(OSError):
+            stream.close()
+    return process.wait()

@@ -1,0 +1,102 @@
+"""The process of a service, which answers until its program ends."""
+
+from __future__ import annotations
+
+import ctypes
+import faulthandler
+import importlib
+import os
+import signal
+import sys
+import threading
+from contextlib import suppress
+from typing import Any, BinaryIO
+
+from robocov_app.jobs.messages import READY, Line, Reply, answer_questions, receive, send
+
+_SET_DEATH_SIGNAL = 1
+"""PR_SET_PDEATHSIG of Linux."""
+
+
+class _PipeLine(Line):
+    """The line of a process, over two pipes."""
+
+    def __init__(self, source: BinaryIO, target: BinaryIO) -> None:
+        self._source = source
+        self._target = target
+        self._has_questions = threading.Condition()
+        self._questions: list[tuple[int, Any]] = []
+        self._number = 0
+
+    def newer(self) -> list[Any]:
+        return [question for _, question in self._questions]
+
+    def tell(self, progress: object) -> None:
+        self.send(Reply(self._number, progress, is_final=False))
+
+    def send(self, message: object) -> None:
+        """Send a message, or end the process if its program has ended."""
+        try:
+            send(self._target, message)
+        except OSError:
+            os._exit(0)
+
+    def wait_for_questions(self) -> list[tuple[int, Any]]:
+        """Wait for at least one question, and return all with their numbers."""
+        with self._has_questions:
+            self._has_questions.wait_for(lambda: self._questions)
+            questions = self._questions
+            self._questions = []
+        self._number = questions[-1][0]
+        return questions
+
+    def listen(self) -> None:
+        """Collect questions until the input ends, then end the process."""
+        while True:
+            question = receive(self._source)
+            if question is None:
+                os._exit(0)
+            with self._has_questions:
+                self._questions.append(question)
+                self._has_questions.notify()
+
+
+def serve(service: str) -> None:
+    """Answer questions until the standard input ends, which it does however the program ends.
+
+    Parameters
+    ----------
+    service : str
+        ``package.module:Class``.
+    """
+    _prepare_process()
+    source, target = _take_standard_streams()
+    line = _PipeLine(source, target)
+    threading.Thread(target=line.listen, daemon=True).start()
+    module, _, name = service.partition(":")
+    answering_service = getattr(importlib.import_module(module), name)()
+    line.send(READY)
+    while True:
+        questions = line.wait_for_questions()
+        line.send(answer_questions(answering_service, questions, line))
+
+
+def _prepare_process() -> None:
+    """Report crashes, end together with the program, and leave Ctrl-C to it."""
+    if sys.version_info >= (3, 14):
+        # The frames of the physics engine would hide those of a user's code.
+        faulthandler.enable(c_stack=False)
+    else:
+        faulthandler.enable()
+    with suppress(OSError, AttributeError, TypeError):
+        ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _take_standard_streams() -> tuple[BinaryIO, BinaryIO]:
+    """Return the pipes, and let code that is called read nothing and print to standard error."""
+    source = os.fdopen(os.dup(0), "rb")
+    target = os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(2, 1)
+    return source, target
