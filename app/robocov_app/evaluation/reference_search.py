@@ -16,7 +16,7 @@ from typing import Any
 from robocov.errors import OutputError
 from robocov.mapfile import from_json
 from robocov_app.jobs.messages import Line
-from robocov_app.jobs.processes import ask_process, end_process
+from robocov_app.jobs.processes import ask_process, end_process, start_process
 from robocov_app.terminal.interruption import Interruption
 
 REFERENCE_FORMAT = "robocov-reference 1"

@@ -26,7 +26,7 @@ def with_circles(count: int) -> Sketch:
 
 def kept(folder: Path, sketch: Sketch, path: Path | None = None, disk=None) -> None:
     keeper = Autosaver(folder, KIND, path)
-    keeper.keep(lambda: content(sketch, disk))
+    keeper.save_draft(lambda: content(sketch, disk))
     keeper.close(discard=False)
 
 

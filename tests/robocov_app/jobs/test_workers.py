@@ -91,7 +91,7 @@ def test_a_process_that_dies_is_said_and_replaced(worker):
     worker.put("sleep")
     worker.process.kill()
     trouble = until(lambda: worker.poll() or worker.trouble)
-    assert trouble.startswith("the process that doubles has end_process")
+    assert trouble.startswith("the process that doubles has ended")
     assert not trouble.endswith("while starting")
     assert not worker.busy and not worker.is_alive
     assert answer_of(worker, 2) == 4
@@ -205,7 +205,7 @@ def test_no_process_outlives_its_parent(way):
             os.kill(child, 0)
         except ProcessLookupError:
             return True
-        # in a container there may be nobody to take away what has end_process
+        # in a container there may be nobody to take away what has ended
         with open(f"/proc/{child}/stat") as file:  # noqa: PTH123
             return file.read().rpartition(")")[2].split()[0] == "Z"
 

@@ -33,7 +33,7 @@ from robocov_app.storage.autosave import Autosaver
 path = None if sys.argv[2] == "none" else Path(sys.argv[2])
 keeper = Autosaver(Path(sys.argv[1]), "robocov-test", path)
 for k in range(100_000):
-    keeper.keep(lambda k=k: {"work": k})
+    keeper.save_draft(lambda k=k: {"work": k})
     if k == 4:
         assert keeper.flush()
         print("kept", flush=True)
@@ -94,7 +94,7 @@ def test_what_a_killed_program_did_is_found_again_and_goes_on(folder, tmp_path):
     assert found(folder) == ()
     with pytest.raises(OutputError, match="another process"):
         Autosaver(folder, KIND, None, record.folder)
-    keeper.keep(lambda: {"work": 5})
+    keeper.save_draft(lambda: {"work": 5})
     assert keeper.flush()
     keeper.close(discard=False)
     (record,) = found(folder)
@@ -133,8 +133,8 @@ def test_a_stopped_program_still_has_its_work(folder):
 
 def test_programs_do_not_meet(folder):
     first, second = Autosaver(folder, KIND), Autosaver(folder, KIND)
-    first.keep(lambda: {"work": 1})
-    second.keep(lambda: {"work": 2})
+    first.save_draft(lambda: {"work": 1})
+    second.save_draft(lambda: {"work": 2})
     assert first.flush()
     assert second.flush()
     assert len(list(folder.iterdir())) == 2
@@ -146,9 +146,9 @@ def test_programs_do_not_meet(folder):
 
 def test_what_was_saved_is_forgotten(folder, tmp_path):
     keeper = Autosaver(folder, KIND)
-    keeper.keep(lambda: {"work": 1})
+    keeper.save_draft(lambda: {"work": 1})
     assert keeper.flush()
-    keeper.settle(tmp_path / "hall.json")
+    keeper.mark_saved(tmp_path / "hall.json")
     assert keeper.flush()
     assert is_open_elsewhere(folder, KIND, tmp_path / "hall.json")
     keeper.close(discard=False)
@@ -165,7 +165,7 @@ def test_keeping_waits_for_nothing_and_only_the_newest_is_written(folder):
 
     keeper = Autosaver(folder, KIND)
     for number in range(200):
-        keeper.keep(lambda number=number: work(number))
+        keeper.save_draft(lambda number=number: work(number))
     assert len(asked) <= 1
     gate.set()
     assert keeper.flush()
@@ -186,7 +186,7 @@ def test_trouble_is_told_of_and_tried_again(folder, monkeypatch):
             raise OSError(28, "No space left on device")
         return {"work": 2}
 
-    keeper.keep(work)
+    keeper.save_draft(work)
     assert not keeper.flush()
     assert "No space left" in keeper.trouble
     full.clear()
@@ -202,14 +202,14 @@ def test_where_nothing_can_be_kept_work_goes_on(tmp_path):
     (tmp_path / "file").write_text("")
     keeper = Autosaver(tmp_path / "file" / "drafts", KIND)
     assert "cannot be saved" in keeper.trouble
-    keeper.keep(dict)
+    keeper.save_draft(dict)
     assert not keeper.flush()
     keeper.close(discard=False)
     nothing = Autosaver(None, KIND)
-    nothing.keep(dict)
+    nothing.save_draft(dict)
     assert nothing.trouble == ""
     assert nothing.flush()
-    nothing.settle(None)
+    nothing.mark_saved(None)
     nothing.close(discard=True)
     assert found(None) == ()
     assert not is_open_elsewhere(None, KIND, tmp_path / "x")
@@ -241,7 +241,7 @@ def test_what_cannot_be_read_is_left_alone(folder, content):
 
 def test_a_draft_for_which_reading_raises_anything_is_left_alone(folder):
     keeper = Autosaver(folder, KIND)
-    keeper.keep(lambda: {"work": 1})
+    keeper.save_draft(lambda: {"work": 1})
     keeper.close(discard=False)
     assert find_drafts(folder, KIND, lambda record: record.content["missing"]) == ()
     assert works(folder) == [1]
@@ -249,9 +249,9 @@ def test_a_draft_for_which_reading_raises_anything_is_left_alone(folder):
 
 def test_work_that_cannot_be_written_does_not_stop_the_thread(folder):
     keeper = Autosaver(folder, KIND)
-    keeper.keep(lambda: {"work": "\udcff"})
+    keeper.save_draft(lambda: {"work": "\udcff"})
     assert not keeper.flush() and "cannot be saved" in keeper.trouble
-    keeper.keep(lambda: {"work": 2})
+    keeper.save_draft(lambda: {"work": 2})
     assert keeper.flush() and keeper.trouble == ""
     keeper.close(discard=False)
     assert works(folder) == [2]
@@ -287,7 +287,7 @@ def test_drafts_of_a_served_window_are_hidden_in_its_folder(monkeypatch, tmp_pat
 
 def test_drafts_are_removed_where_only_one_folder_may_be_used(tmp_path, folder):
     keeper = Autosaver(folder, KIND)
-    keeper.keep(lambda: {"work": 1})
+    keeper.save_draft(lambda: {"work": 1})
     assert keeper.flush()
     with confined(folder):
         keeper.close(discard=True)
@@ -296,7 +296,7 @@ def test_drafts_are_removed_where_only_one_folder_may_be_used(tmp_path, folder):
 
 def test_a_record_says_what_it_is(folder, tmp_path):
     keeper = Autosaver(folder, KIND, tmp_path / "hall.json")
-    keeper.keep(lambda: {"work": "ø"})
+    keeper.save_draft(lambda: {"work": "ø"})
     assert keeper.flush()
     (file,) = folder.glob("*/draft.json")
     held = json.loads(file.read_text(encoding="utf-8"))

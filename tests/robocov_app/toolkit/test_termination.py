@@ -39,7 +39,7 @@ with ending_on_signals():
     saver.flush()
     print("ready", flush=True)
     sys.stdin.readline()
-    saver.keep(lambda: {"work": 1})
+    saver.save_draft(lambda: {"work": 1})
     print("changed", flush=True)
     {main}()
     saver.close(discard=False)

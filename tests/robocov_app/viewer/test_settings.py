@@ -17,7 +17,7 @@ from robocov_app.storage.settings import (
 )
 from robocov_app.viewer.launch import Settings
 
-load_settings = partial(load_settings, Settings)
+load_window_settings = partial(load_settings, Settings)
 
 OTHERS = Settings(
     theme="dark", scale=2.0, width=1600, height=900, shown=("cells", "robots"), tab="robot", fade=True
@@ -27,10 +27,10 @@ OTHERS = Settings(
 def test_what_is_saved_is_loaded(tmp_path):
     file = tmp_path / "a" / "folder" / "window.json"
     assert save_settings(OTHERS, file) == ""
-    assert load_settings(file) == (OTHERS, "")
+    assert load_window_settings(file) == (OTHERS, "")
     assert [path.name for path in file.parent.iterdir()] == ["window.json"]
     assert save_settings(Settings(), file) == ""
-    assert load_settings(file) == (Settings(), "")
+    assert load_window_settings(file) == (Settings(), "")
 
 
 @given(
@@ -50,8 +50,8 @@ def test_whatever_they_are_they_come_back(settings):
 
 
 def test_the_first_time_there_are_none(tmp_path):
-    assert load_settings(tmp_path / "window.json") == (Settings(), "")
-    assert load_settings(None) == (Settings(), "")
+    assert load_window_settings(tmp_path / "window.json") == (Settings(), "")
+    assert load_window_settings(None) == (Settings(), "")
 
 
 @pytest.mark.parametrize(
@@ -73,32 +73,32 @@ def test_the_first_time_there_are_none(tmp_path):
 def test_what_cannot_be_read_is_told_and_left_out(tmp_path, text):
     file = tmp_path / "window.json"
     file.write_text(text)
-    settings, words = load_settings(file)
+    settings, words = load_window_settings(file)
     assert settings == Settings()
     assert words == f"{file} cannot be read; using default settings"
     # and is put right the next time
     assert save_settings(settings, file) == ""
-    assert load_settings(file) == (Settings(), "")
+    assert load_window_settings(file) == (Settings(), "")
 
 
 def test_bytes_that_are_no_text(tmp_path):
     file = tmp_path / "window.json"
     file.write_bytes(b'{"tab": "\xff\xfe"}')
-    assert load_settings(file)[0] == Settings()
+    assert load_window_settings(file)[0] == Settings()
 
 
 def test_a_folder_in_its_place(tmp_path):
     (tmp_path / "window.json").mkdir()
-    settings, words = load_settings(tmp_path / "window.json")
+    settings, words = load_window_settings(tmp_path / "window.json")
     assert settings == Settings()
-    assert "could not be read" in words
+    assert "cannot be read" in words
     assert save_settings(Settings(), tmp_path / "window.json").startswith("settings cannot be saved: ")
 
 
 def test_settings_of_other_versions(tmp_path):
     file = tmp_path / "window.json"
     file.write_text(json.dumps({"theme": "dark", "of_tomorrow": [1, 2]}))
-    assert load_settings(file) == (Settings(theme="dark"), "")
+    assert load_window_settings(file) == (Settings(theme="dark"), "")
 
 
 def test_what_cannot_be_written_is_told(tmp_path):
