@@ -50,10 +50,11 @@ _CACHE_ERRORS = (OSError, EOFError, pickle.UnpicklingError)
 
 
 def kernel(function: _Function) -> _Function:
-    """Compile a function of numbers, arrays and named tuples of these when it is first called.
+    """Decorate a function so that it is compiled to machine code when it is first called.
 
-    A kernel may call other kernels, from any module, and read global numbers. Arithmetic is that of
-    Python, without fused or reordered operations, so that the results have the same bits on all processors.
+    Its arguments are numbers, arrays, and named tuples of these. It may call other kernels, from any module,
+    and read global numbers. Arithmetic is that of Python, without fused or reordered operations, so that the
+    results have the same bits on all processors.
 
     Parameters
     ----------
@@ -294,7 +295,7 @@ def open_cache_folder() -> Path | None:
 
 
 def _compute_installation_digest(package: Path = Path(__file__).parent) -> str:
-    """Return a digest of an installation of the library: its sources, and how numba names their machine code.
+    """Return a digest of an installation: its sources and folder, and the versions of Python and numba.
 
     Numba looks for machine code by the folder of the sources and the versions of Python and numba. Each
     combination has its own cache folder, so that a kernel counts as ready only where numba will find it.
@@ -311,11 +312,11 @@ def _compute_installation_digest(package: Path = Path(__file__).parent) -> str:
 
 def _remove_unused_versions(parent: Path) -> None:
     """Remove the machine code of versions of the library that have not been used for some time."""
-    newest_removed = time.time() - _MIN_UNUSED_DAYS * 24 * 3600
+    max_removal_time = time.time() - _MIN_UNUSED_DAYS * 24 * 3600
     last_used: list[tuple[float, Path]] = []
     for folder in parent.glob("robocov-*"):
         with suppress(OSError):
             last_used.append((folder.stat().st_mtime, folder))
-    for when, folder in sorted(last_used, reverse=True)[_MAX_KEPT_VERSIONS:]:
-        if when < newest_removed:
+    for use_time, folder in sorted(last_used, reverse=True)[_MAX_KEPT_VERSIONS:]:
+        if use_time < max_removal_time:
             shutil.rmtree(folder, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""Drawing backends: how the library plots maps, runs and results without knowing how to draw.
+"""Drawing backends, which plot maps, runs and results for the library.
 
 A backend is an object, most simply a module, with the functions of `DrawingBackend`. Its package names it in
 the entry-point group ``robocov.drawing``, as backends of pandas are named. The application offers
@@ -13,7 +13,7 @@ from robocov.errors import ParameterError, RobocovError, describe_unknown_name
 
 ENTRY_POINT_GROUP = "robocov.drawing"
 DEFAULT_BACKEND = "matplotlib"
-"""Backend that draws if none is named; if it is not installed, the first by name does."""
+"""Backend to use if none is named; if it is not installed, the first one by name is used."""
 
 
 class DrawingBackend(Protocol):
@@ -50,7 +50,7 @@ class Drawable:
     """An object that backends draw, and that notebooks display if the backend has an image of it."""
 
     _drawing_name: ClassVar[str]
-    """Name of the class in the names of a backend's functions."""
+    """Name of the class as it appears in the names of a backend's functions."""
 
     def plot(self, axes: Any = None, *, backend: str | None = None, **options: Any) -> Any:
         """Plot the object on axes, or on a page with a title, a scale bar or a legend.
@@ -99,7 +99,7 @@ class Drawable:
         return self._draw_for_notebook("png")
 
     def _draw_for_notebook(self, form: str) -> Any:
-        """Return what the backend draws in the given form; None, so that the text is shown, if it cannot."""
+        """Return the drawing in the given form; None without one, so that notebooks show the repr."""
         try:
             backend = load_drawing_backend()
         except RobocovError:

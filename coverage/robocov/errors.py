@@ -212,7 +212,7 @@ def quote_json(value: object) -> str:
 
 
 def to_one_line(text: object) -> str:
-    """Return a text as one line, with escapes for line breaks and other control characters.
+    """Return a string as one line, with escapes for line breaks and other control characters.
 
     Parameters
     ----------

@@ -220,7 +220,7 @@ def _sum_repulsion_of_all_robots(positions: Array, gains: PotentialGains) -> Arr
 
 @kernel
 def _add_repulsion(sums: Array, i: int, j: int, dx: float, dy: float, gains: PotentialGains) -> None:
-    """Add (24) on robot i from robot j to its sum; dx and dy lead from j to i."""
+    """Add the repulsion (24) of robot j on robot i to the sum of i; (dx, dy) is the vector from j to i."""
     squared_distance = dx * dx + dy * dy
     if squared_distance > gains.rho_0 * gains.rho_0:
         return

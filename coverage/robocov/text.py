@@ -16,7 +16,7 @@ _UNSAFE_IN_LINE = re.compile(f"[{_CONTROLS}\t\n]")
 
 
 def escape_controls(text: str, *, single_line: bool = False) -> str:
-    r"""Replace control characters in a text with visible escapes.
+    r"""Replace control characters in a string with visible escapes.
 
     Names and messages from files and from users' controllers may contain characters that color or overwrite
     the terminal, or change the order in which text is displayed. Joiners, which some scripts need, are kept.
@@ -44,7 +44,7 @@ def escape_controls(text: str, *, single_line: bool = False) -> str:
 
 
 def remove_controls(text: str, *, single_line: bool = False) -> str:
-    r"""Remove control characters from a text.
+    r"""Remove control characters from a string.
 
     All text that enters a window passes through this function: from the clipboard, the keyboard, input
     methods and the messages of a web page. SDL rejects NUL and unpaired surrogates; other control characters

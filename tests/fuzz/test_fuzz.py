@@ -89,8 +89,8 @@ def test_the_same_fault_is_one_finding_however_often() -> None:
     tally = importers.Tally("map")
     for k in range(3):
         tally.note(Case({"a": b"x"}), Job("map"), Outcome("error", f"KeyError: {k}", "error-here"))
-    assert tally.note(Case({"a": b"x"}), Job("map"), Outcome("refused", "a: name: expected a text"))
-    assert not tally.note(Case({"a": b"x"}), Job("map"), Outcome("refused", "b: name: expected a text"))
+    assert tally.note(Case({"a": b"x"}), Job("map"), Outcome("refused", "a: name: expected a string"))
+    assert not tally.note(Case({"a": b"x"}), Job("map"), Outcome("refused", "b: name: expected a string"))
     assert list(tally.findings) == ["error-here"]
     assert tally.counts == {"error": 3, "refused": 2}
 

@@ -167,7 +167,7 @@ def _read_levels(archive: _Archive) -> dict[str, _Level]:
         ordinal = properties.get("ordinal")
         file = archive.files["level"]
         if not isinstance(number, str):
-            raise file.refused(("features", k, "id"), number, "a text")
+            raise file.refused(("features", k, "id"), number, "a string")
         if not is_number(ordinal):
             raise file.refused(("features", k, "properties", "ordinal"), ordinal, "the number of a floor")
         names = (number, *_names(properties.get("short_name")), *_names(properties.get("name")))

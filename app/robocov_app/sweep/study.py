@@ -371,11 +371,11 @@ class Study:
                 )
             object.__setattr__(self, "robots", (size,))
         for k, controller in enumerate(self.controllers):
-            require_type(f"controllers[{k}]", controller, str, "a text")
+            require_type(f"controllers[{k}]", controller, str, "a string")
         for k, each in enumerate(self.maps):
             name = each.name
             if not isinstance(name, str) or not 1 <= len(name) <= _LONGEST_NAME or not name.isprintable():
-                wanted = f"a text of 1 to {_LONGEST_NAME} characters on one line"
+                wanted = f"a string of 1 to {_LONGEST_NAME} characters on one line"
                 raise ParameterError(f"maps[{k}]: expected {wanted}, got name {quote(name)}")
         for name, low, high in (("robots", 1, 10_000), ("seeds", 0, 2**63 - 1)):
             for k, value in enumerate(getattr(self, name)):
@@ -572,7 +572,7 @@ def _value_of(name: str, value: object, path: Place) -> TeamValue:
             )
         return str(value)
     if name in EVENTS:
-        require_type(format_path(path), value, str, 'a text, as in "3@20"')
+        require_type(format_path(path), value, str, 'a string, as in "3@20"')
         try:
             return " ".join(str(parse_event(EVENTS[name], word)) for word in str(value).split())
         except ParameterError as error:

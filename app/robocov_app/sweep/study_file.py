@@ -44,8 +44,8 @@ def _of(*kinds: type, words: tuple[str, ...] = ()) -> Check:
     return check
 
 
-_TEXT, _WHOLE = _Value("a text", _of(str)), _Value("a whole number", _of(int))
-_NUMBER, _WORD = _Value("a number", _of(int, float)), _Value("a number or a text", _of(int, float, str))
+_TEXT, _WHOLE = _Value("a string", _of(str)), _Value("a whole number", _of(int))
+_NUMBER, _WORD = _Value("a number", _of(int, float)), _Value("a number or a string", _of(int, float, str))
 _LIMIT = _Value(f'a number, or "{NO_LIMIT}" for no limit', _of(int, float, words=(NO_LIMIT,)))
 _SCALE = _Value('"linear" or "log"', _of(words=get_args(Scale)))
 _METHOD = _Value('"sobol", "latin-hypercube" or "halton"', _of(words=get_args(Method)))
@@ -55,9 +55,9 @@ def _several(wanted: str, item: _Value) -> _Value:
     return _Value(wanted, item.one, item)
 
 
-_TEXTS = _several("a text, or a list of texts", _TEXT)
+_TEXTS = _several("a string, or a list of strings", _TEXT)
 _TEAM = _several("a number, or a list of numbers", _LIMIT)
-_CONDITION = _several("a number or a text, or a list of them", _WORD)
+_CONDITION = _several("a number or a string, or a list of them", _WORD)
 _GAIN = _Value(
     "a number or a word, a list of them, or a range {low, high}",
     _WORD.one,

@@ -126,7 +126,7 @@ class Conditions:
         if self.message_rate is not None and self.forget_after * self.message_rate < 1.0:
             period = 1.0 / self.message_rate
             raise ParameterError(
-                f"conditions.forget_after: expected at least the {period:g} s between two messages, "
+                f"conditions.forget_after: expected at least {period:g} s, the time between two messages, "
                 f"got {self.forget_after:g} s"
             )
 

@@ -57,7 +57,7 @@ _GROUP_REACH = 2.0
 _MIN_GROUP_REACH_M = 1.0
 """Minimum size of that window."""
 _MAX_IDLE_MOVE = 0.1
-"""Fraction of the spacing of nodes that others may move without a new plan."""
+"""Distance that a robot may move without a new plan, as a fraction of the spacing of nodes."""
 _CHANGED_WALL_RADII = 4.0
 """Length of changed walls, in radii, that matters: longer than the visible side of a failed robot."""
 _ARRIVAL_RADIUS_M = 0.35
@@ -111,11 +111,11 @@ class PlannerState:
     team_planner: GridPlanner | None = None
     """Planner of the placement of the team."""
     group: IntArray | None = None
-    """(k,) Robots that it knew of at the last plan, itself first."""
+    """(k,) Robots that it knew of when the last plan was made, itself first."""
     positions: Array | None = None
-    """(k, 2) m, positions of these robots then."""
+    """(k, 2) m, positions of these robots at that time."""
     was_quiet: bool = False
-    """Whether all others were at rest then."""
+    """Whether all others were at rest at that time."""
     planned_robots: IntArray | None = None
     """(p,) Robots that the last plan was made for."""
     planned_goals: Array | None = None
@@ -166,7 +166,7 @@ class AtlasMemory:
 
 
 class _Others(NamedTuple):
-    """The other robots that one knows of; first those that it plans for."""
+    """The other robots that a robot knows of; first those that it plans for."""
 
     robots: IntArray
     """(k,) Their numbers."""
@@ -179,16 +179,16 @@ class _Others(NamedTuple):
 
 
 class _LostRobots(NamedTuple):
-    """Which of the k robots that one knows of are lost. Neither is true for those that it hears."""
+    """Masks of the lost robots among the k that a robot knows of; it has lost none that it hears."""
 
     has_failed: BoolArray
-    """(k,) Whether each became silent although it cannot have moved out of range."""
+    """(k,) Whether each has become silent although it cannot have moved out of range."""
     is_missing: BoolArray
     """(k,) Whether each is not heard although its assumed position is well within range."""
 
 
 class _Cooperation(NamedTuple):
-    """How a robot plans for the others."""
+    """Extent to which a robot plans for the others."""
 
     is_agreed: bool
     """Whether all robots plan on the same map, and therefore make the same plan."""
@@ -385,7 +385,7 @@ class Atlas(BaseController):
         state = replace(state, next_plan_time=seen.time + period, was_quiet=others.is_quiet)
         group = np.concatenate([[robot], others.robots])
         positions = np.vstack([position, others.positions])
-        if _is_unchanged(before, group, positions, others.is_quiet, max_move=_MAX_IDLE_MOVE * spacing):
+        if _may_skip_plan(before, group, positions, others.is_quiet, max_move=_MAX_IDLE_MOVE * spacing):
             return state, None
         state = _update_path_lengths(before, state, position, seen.time, radius)
         planner = state.planner or GridPlanner.get_shared(state.known_map, window, radius + self.clearance)
@@ -426,7 +426,7 @@ class Atlas(BaseController):
     def _choose_cooperation(
         self, state: PlannerState, seen: Observations, others: _Others, *, max_speed: float, is_agreed: bool
     ) -> _Cooperation:
-        """Return how a robot plans for the others: the longer it has planned, the less."""
+        """Choose the extent to which a robot plans for the others, which shrinks over time."""
         diameter = seen.region.diameter
         joint_planning_time = _JOINT_PLANNING_CROSSINGS * diameter / max_speed
         is_joint = is_agreed or seen.time - state.start_time <= joint_planning_time
@@ -443,7 +443,7 @@ class Atlas(BaseController):
     def _find_own_goal(
         self, state: PlannerState, seen: Observations, cooperation: _Cooperation
     ) -> OwnGoal | None:
-        """Return a robot's own goal, next to its goal in the plan; None if there is no node near that."""
+        """Return a robot's own goal, near its goal in the plan; None if that goal has no node nearby."""
         planner = state.planner
         goals = state.planned_goals
         assert planner is not None and state.positions is not None and goals is not None
@@ -517,7 +517,7 @@ class Atlas(BaseController):
         self, state: PlannerState, cooperation: _Cooperation, group_size: int
     ) -> MinSavings:
         """Return the fractions of the cost that changes of a plan must save; 1 allows no change."""
-        # If all make one plan, it does not depend on the path length of the robot that makes it.
+        # A plan that all robots share must not depend on the path length of the robot that computes it.
         settling = 1.0 if cooperation.is_agreed else cooperation.settling
         relocation = 1.0
         if cooperation.is_joint or state.was_quiet:
@@ -612,7 +612,7 @@ def _find_lost_robots(teammates: Teammates, seen: Observations, team: Team, robo
 def _update_path_lengths(
     before: PlannerState, state: PlannerState, position: Array, time: float, radius: float
 ) -> PlannerState:
-    """Return the state with the path since the last plan; lengths start from zero after a change."""
+    """Return the state with the path since the last plan added; after a change, lengths restart from zero."""
     if _has_changed(before, state, radius):
         return replace(state, start_time=time, path_length=0.0, looking_length=0.0, former_viewpoints=())
     assert before.positions is not None
@@ -620,7 +620,7 @@ def _update_path_lengths(
 
 
 def _build_situation(state: PlannerState, group: IntArray, is_fixed: BoolArray) -> TeamSituation:
-    """Return the situation of a group of robots; all start from their former goals except for fixed ones."""
+    """Return the situation of a group, whose robots start from their former goals unless they are fixed."""
     assert state.positions is not None
     size = len(group)
     positions = state.positions[:size]
@@ -677,15 +677,15 @@ def _list_others(teammates: Teammates, position: Array, time: float, *, is_agree
     """Return the other robots, first those that a robot at `position`, (2,) m, plans for."""
     is_fixed = (time - teammates.rest_times >= MIN_REST_S) | (teammates.heard_times < time)
     is_quiet = bool(is_fixed.all())
-    is_beyond = np.full(len(teammates.robots), not is_agreed)
-    square = ((teammates.positions - position) ** 2).sum(axis=1)
-    nearest = np.argsort(square, kind="stable")[: MAX_PLANNING_GROUP - 1]
-    is_beyond[nearest] = False
-    order = np.argsort(is_beyond, kind="stable")
+    is_not_planned_for = np.full(len(teammates.robots), not is_agreed)
+    squared_distances = ((teammates.positions - position) ** 2).sum(axis=1)
+    nearest = np.argsort(squared_distances, kind="stable")[: MAX_PLANNING_GROUP - 1]
+    is_not_planned_for[nearest] = False
+    order = np.argsort(is_not_planned_for, kind="stable")
     return _Others(
         robots=teammates.robots[order],
         positions=teammates.positions[order],
-        is_fixed=(is_fixed | is_beyond)[order],
+        is_fixed=(is_fixed | is_not_planned_for)[order],
         is_quiet=is_quiet,
     )
 
@@ -698,10 +698,10 @@ def _has_changed(before: PlannerState, state: PlannerState, radius: float) -> bo
     return changed_walls * state.known_map.raster.cell_size > _CHANGED_WALL_RADII * radius
 
 
-def _is_unchanged(
+def _may_skip_plan(
     before: PlannerState, group: IntArray, positions: Array, is_quiet: bool, *, max_move: float
 ) -> bool:
-    """Return whether a robot is idle, and nothing has changed since its last plan."""
+    """Return whether a robot may skip its plan: it is idle, and nothing has changed since its last plan."""
     if before.group is None or before.positions is None:
         return False
     return (

@@ -95,8 +95,8 @@ class FrontierMedian(SharedMapController):
         block = row // window.stride * window.columns + column // window.stride
         _, first = np.unique(labels[row, column] * len(planner.nodes) + block, return_index=True)
         targets = raster.compute_centers(row[first] + window.first_row, column[first] + window.first_column)
-        square = ((targets[:, None] - inspected) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
-        return np.asarray(targets[square > _INSPECTED_RADIUS_M**2])
+        squared_distances = ((targets[:, None] - inspected) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
+        return np.asarray(targets[squared_distances > _INSPECTED_RADIUS_M**2])
 
     def _label_frontiers(self, situation: Situation) -> IntArray:
         """Return the number of the frontier, from 1, that each cell of the window is on; 0 for none."""
@@ -116,8 +116,8 @@ class FrontierMedian(SharedMapController):
         planner = situation.planner
         goals = situation.positions.copy()
         roomy = np.flatnonzero(planner.is_roomy)
-        square = ((targets[:, None] - planner.nodes[roomy]) ** 2).sum(axis=2)
-        nodes = roomy[square.argmin(axis=1)]
+        squared_distances = ((targets[:, None] - planner.nodes[roomy]) ** 2).sum(axis=2)
+        nodes = roomy[squared_distances.argmin(axis=1)]
         path_lengths = np.array(
             [planner.compute_distances_from(position[None])[nodes] for position in situation.positions]
         )

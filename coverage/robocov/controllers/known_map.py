@@ -70,9 +70,13 @@ def is_plan_due(plan_time: float, period: float, time: float) -> bool:
     Parameters
     ----------
     plan_time : float, s
-        Time of the last plan. It is later than `time` after a simulation was rewound; a new plan is then due.
+        Time of the last plan. If it is later than `time`, the simulation was rewound, and a new plan is due.
     period : float, s
         Time between two plans.
     time : float, s
+
+    Returns
+    -------
+    bool
     """
     return not plan_time <= time < plan_time + period - 1e-9

@@ -202,7 +202,7 @@ def _list_own_classes(module: ModuleType) -> list[str]:
 
 
 def find_own_modules(text: str) -> dict[str, ModuleText]:
-    """Find the author's own modules that a text imports, directly or indirectly.
+    """Find the author's own modules that source code imports, directly or indirectly.
 
     Modules are looked up on ``sys.path`` without being executed. The standard library, installed packages and
     robocov are left out, and so are files that cannot be read. Imports by a computed name are not found.
@@ -268,7 +268,7 @@ class _ModuleCollector:
 
 
 def _list_imports(text: str, package: str) -> Iterator[str]:
-    """Yield the names of all modules that a text in the given package may import."""
+    """Yield the names of all modules that source code in the given package may import."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)

@@ -98,7 +98,7 @@ class VoronoiGraphCoverage(SharedMapController):
 
 
 def _find_reachable_blocks(situation: Situation, window: Window) -> BoolArray:
-    """Return which blocks of the window robots can reach without passing through tight ones."""
+    """Return a mask of the blocks of the window that some robot can reach through roomy blocks only."""
     raster = situation.known_map.raster
     planner = situation.planner
     rows, columns = raster.shape

@@ -92,7 +92,7 @@ def pack_densely(area: BaseGeometry, spacing: float) -> Array:
 
 
 def throw_darts(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
-    """Choose up to n random points one after the other, until hardly any more find room.
+    """Choose up to n random points one after the other, until hardly any more fit.
 
     Parameters
     ----------

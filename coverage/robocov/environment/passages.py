@@ -217,7 +217,7 @@ class _PassageSearch:
         return _Candidates(corner, edge, p, q, width).select(rows)
 
     def _has_empty_disc(self, candidates: _Candidates) -> BoolArray:
-        """Return whether the disc over the segment of each pair lies in the free space, (k,)."""
+        """Return whether the disc whose diameter is the segment of each pair is in the free space, (k,)."""
         middles = shapely.points((candidates.p + candidates.q) / 2)
         radii = candidates.width / 2 * (1 - _DISC_RELATIVE_TOLERANCE) - _DISC_TOLERANCE_M
         # Unlike `shapely.distance`, this uses the prepared boundary, which is faster with thousands of walls.

@@ -193,7 +193,7 @@ class ArrayCache:
             Read-only arrays; None if there is no intact entry.
         """
         path = self.folder / f"{key}{_SUFFIX}"
-        # Intact arrays may still be unreadable, for a numpy that is older than the one that wrote them.
+        # Even intact arrays may be unreadable if a newer version of numpy wrote them.
         with suppress(OSError, InputError):
             if path.stat().st_size > self.max_bytes or not is_private(path):
                 return None

@@ -1,4 +1,4 @@
-"""Where caches are kept, and which folders can be trusted with them."""
+"""Folders for caches, and checks that other users cannot write to them."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ CACHE_VARIABLE = "ROBOCOV_CACHE"
 
 
 def find_cache_root() -> Path | None:
-    """Return the folder of all caches: the user's, or that of `CACHE_VARIABLE`; None if that is empty."""
-    named = os.environ.get(CACHE_VARIABLE)
-    if named == "":
+    """Return the folder that `CACHE_VARIABLE` names, by default the user's cache folder; None if it is empty."""
+    configured = os.environ.get(CACHE_VARIABLE)
+    if configured == "":
         return None
-    if named is not None:
-        return Path(named)
+    if configured is not None:
+        return Path(configured)
     return platformdirs.user_cache_path("robocov", appauthor=False)
 
 
@@ -48,9 +48,9 @@ def open_private_folder(folder: Path) -> Path | None:
 
 
 def is_private(path: Path) -> bool:
-    """Return whether a file or folder is this user's, and nobody else could have changed or replaced it.
+    """Return whether a file or folder belongs to this user, and nobody else can have changed or replaced it.
 
-    Systems without owners and modes of files, such as Windows, keep users apart by themselves.
+    Always true on systems without file owners and modes, such as Windows, which separate users themselves.
 
     Parameters
     ----------

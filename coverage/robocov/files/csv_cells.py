@@ -37,7 +37,7 @@ def quote_cell(value: Any) -> Any:
 
 
 def unquote_cell(text: str) -> str:
-    """Restore a text from a cell that `quote_cell` returned.
+    """Restore the text of a cell that `quote_cell` returned.
 
     Parameters
     ----------

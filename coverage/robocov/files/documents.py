@@ -15,7 +15,7 @@ from robocov.files.strictjson import parse_json, read_bytes
 _EXPECTED_ERROR = "expected"
 """Type of pydantic's error that `expect` raises; its message describes the expected value."""
 _EXPECTED_BY_ERROR_TYPE = {
-    "string_type": "a text",
+    "string_type": "a string",
     "bool_type": "true or false",
     "list_type": "a list",
     "dict_type": "an object",

@@ -1,11 +1,11 @@
-"""Folders of results that contain either the old result or the new one, and are otherwise not touched.
+"""Result folders: each contains either the old result or the new one, and no other file is changed.
 
-A result is written to a hidden staging folder inside its folder. To commit it, a journal is written that
-lists the files of the new result, and those of the old one that are to be removed. Once the journal has
-been renamed into place, the new result counts: the next process that opens the folder completes the
-remaining steps (`complete_commit`). At the end the journal becomes the manifest, the list of the files of
-the result. Files that are not in the manifest were not written by robocov, and are neither replaced nor
-removed. Links inside the folder are not followed.
+A result is written to a hidden staging folder inside its folder. To commit it, robocov writes a journal,
+which lists the files of the new result, and the files of the old one that are to be removed. Once the
+journal has been renamed into place, the new result is valid: if the process is interrupted, the next one that
+opens the folder completes the remaining steps (`complete_commit`). At the end, the journal becomes the
+manifest, which lists the files of the result. Files that are not in the manifest were not written by
+robocov, and are neither replaced nor removed. Links inside the folder are not followed.
 """
 
 import json
@@ -23,7 +23,7 @@ from robocov.files.writing import flush_to_disk, replace_file
 
 ResultKind: TypeAlias = Literal["run", "comparison", "replay", "story"]
 REPORT_FILE = "report.html"
-"""Report on a result, which belongs to it."""
+"""Report on a result, which is one of its files."""
 MANIFEST_FILE = ".robocov.json"
 _JOURNAL_FILE = ".robocov-commit.json"
 _STAGING_FOLDER = ".robocov-new"
@@ -52,7 +52,7 @@ _SIGNATURES = {
     _METRICS_FILE: re.compile(rb"time_s,sensed_area_m2,"),
     REPORT_FILE: re.compile(rb'<meta name="generator" content="robocov'),
 }
-"""Patterns that identify files of robocov by their first bytes."""
+"""Patterns in the first bytes of files that robocov has written."""
 _SIGNATURE_BYTES = 4096
 
 
@@ -77,7 +77,7 @@ class ResultFolder:
             self.staging.mkdir(parents=True)
 
     def claim_file(self, name: str) -> None:
-        """Count an existing file as one of the result, so that it may be replaced.
+        """Add an existing file to the files of the result, so that it may be replaced.
 
         Parameters
         ----------
@@ -86,7 +86,7 @@ class ResultFolder:
         self._owned_files.add(self._prefix + name)
 
     def save_progress(self) -> None:
-        """Commit the files so far, unless they replace an earlier result: that waits until all are complete.
+        """Commit the files written so far; keep an earlier result until all of its replacement is complete.
 
         Raises
         ------
@@ -117,7 +117,7 @@ class ResultFolder:
             journal = {**_HEADER, "files": sorted(files), "removed": sorted(removed_files)}
             with replace_file(staging / _JOURNAL_FILE) as temporary:
                 temporary.write_text(json.dumps(journal, indent=0) + "\n", encoding="utf-8")
-            # From here on the new result counts.
+            # From here on, the new result is the valid one.
             (staging / _JOURNAL_FILE).replace(self.path / _JOURNAL_FILE)
             _carry_out_journal(self.path)
             self._owned_files = files
@@ -138,7 +138,7 @@ class ResultFolder:
 def create_result(
     folder: Path, kind: ResultKind = "run", *, overwrite: bool, parts: Iterable[str] = ()
 ) -> Iterator[ResultFolder]:
-    """Create a result in a folder, which is committed at the end of the ``with`` block.
+    """Create a result in a folder, and commit it at the end of the ``with`` block.
 
     If the block raises, nothing is committed. A missing folder is created, and removed again if it remains
     empty.
@@ -188,7 +188,7 @@ def create_result(
 
 @contextmanager
 def extend_result(folder: Path) -> Iterator[ResultFolder]:
-    """Add files to the result in a folder, which are committed at the end of the ``with`` block.
+    """Add files to the result in a folder, and commit them at the end of the ``with`` block.
 
     Parameters
     ----------
@@ -207,19 +207,19 @@ def extend_result(folder: Path) -> Iterator[ResultFolder]:
         If the folder cannot be used, another process is using it, or a file not written by robocov is in the
         way.
     """
-    home, part = _find_home(folder)
-    with _open_folder(home):
-        with report_folder_errors(home):
-            owned_files = _list_owned_files(home)
+    listing_folder, part = _find_listing_folder(folder)
+    with _open_folder(listing_folder):
+        with report_folder_errors(listing_folder):
+            owned_files = _list_owned_files(listing_folder)
         if owned_files is None:
-            raise InputError(f"{folder}: there is no result of robocov in it")
-        result = ResultFolder(home, owned_files, replaces=False, part=part)
+            raise InputError(f"{folder}: expected a result of robocov in the folder, found none")
+        result = ResultFolder(listing_folder, owned_files, replaces=False, part=part)
         yield result
         result.commit()
 
 
 def complete_commit(folder: Path) -> None:
-    """Complete the commit of a result if it was interrupted; to be called before the result is read.
+    """Complete the commit of a result if it was interrupted. Call this before reading the result.
 
     Parameters
     ----------
@@ -229,16 +229,16 @@ def complete_commit(folder: Path) -> None:
     Raises
     ------
     InputError
-        If the journal is damaged, or that of the comparison to which the folder belongs is not carried out.
+        If the journal is damaged, or the commit of the comparison that contains the folder was interrupted.
     OutputError
         If the commit cannot be completed.
     """
     if os.path.lexists(folder / _JOURNAL_FILE):
         with lock_folder(folder, _LOCK_FILE, remove=True), report_folder_errors(folder):
             _carry_out_journal(folder)
-    home, part = _find_home(folder, _JOURNAL_FILE)
+    listing_folder, part = _find_listing_folder(folder, _JOURNAL_FILE)
     if part:
-        raise InputError(f"{folder}: its replacement was interrupted; open {home} to have it completed")
+        raise InputError(f"{folder}: its replacement was interrupted; open {listing_folder} to complete it")
 
 
 def is_report(path: Path) -> bool:
@@ -257,7 +257,7 @@ def is_report(path: Path) -> bool:
 
 @contextmanager
 def report_folder_errors(folder: Path) -> Iterator[None]:
-    """Convert errors of the operating system to errors of one line about a folder of results.
+    """Convert errors of the operating system to one-line errors about a result folder.
 
     Parameters
     ----------
@@ -294,19 +294,19 @@ def _read_file_lists(path: Path) -> tuple[set[str], set[str]] | None:
 
 
 def _require_result_file(name: str) -> None:
-    """Raise ValueError unless a name is that of a file of a result, in its folder or below it.
+    """Raise ValueError unless a path, relative to the folder of a result, is that of one of its files.
 
-    Otherwise, a folder from an untrusted source could have any file replaced or removed.
+    Without this check, a manifest from an untrusted source could make robocov replace or remove any file.
     """
-    steps = name.split("/")
-    if not all(_FILE_NAME.fullmatch(step) for step in steps):
+    parts = name.split("/")
+    if not all(_FILE_NAME.fullmatch(part) for part in parts):
         raise ValueError(f"expected a file in the folder, got {quote(name)}")
-    if steps[-1] not in _KNOWN_NAMES and not _FRAME_NAME.fullmatch(steps[-1]):
+    if parts[-1] not in _KNOWN_NAMES and not _FRAME_NAME.fullmatch(parts[-1]):
         raise ValueError(f"expected a file of a result, got {quote(name)}")
 
 
 def _carry_out_journal(folder: Path) -> None:
-    """Complete the steps in the journal of a folder, which then becomes the manifest."""
+    """Complete the steps in the journal of a folder, and make the journal the manifest."""
     journal = _read_file_lists(folder / _JOURNAL_FILE)
     if journal is None:
         return
@@ -356,22 +356,23 @@ def _find_replaced_files(folder: Path, *, overwrite: bool) -> set[str] | None:
         return None
     if not overwrite:
         raise InputError(f"{folder}: the folder is not empty; choose another --out or pass --overwrite")
-    home, part = _find_home(folder)
+    listing_folder, part = _find_listing_folder(folder)
     if part:
-        raise InputError(f"{folder}: belongs to the comparison in {home}; choose another --out")
+        raise InputError(f"{folder}: belongs to the comparison in {listing_folder}; choose another --out")
     owned_files = _list_owned_files(folder)
     if owned_files is None:
         raise InputError(
-            f"{folder}: the content of the folder is no result of robocov, so --overwrite leaves it alone; "
-            "choose another --out"
+            f"{folder}: the content of the folder is not a result of robocov, so --overwrite leaves it "
+            "alone; choose another --out"
         )
     return owned_files
 
 
-def _find_home(folder: Path, list_name: str = MANIFEST_FILE) -> tuple[Path, str]:
-    """Return the folder whose manifest or journal lists the files of a folder, and the name of that part.
+def _find_listing_folder(folder: Path, list_name: str = MANIFEST_FILE) -> tuple[Path, str]:
+    """Return the folder whose manifest or journal lists the files of a folder, and the name of the run.
 
-    For the run of a comparison these are the comparison and the run; otherwise the folder itself and "".
+    For the folder of one run of a comparison, these are the folder of the comparison and the name of the
+    run. For any other folder, they are the folder itself and "".
     """
     if os.path.lexists(folder / list_name):
         return folder, ""
@@ -388,7 +389,7 @@ def _find_home(folder: Path, list_name: str = MANIFEST_FILE) -> tuple[Path, str]
 def _list_owned_files(folder: Path) -> set[str] | None:
     """Return the files of the result in a folder; None if there is no result.
 
-    Without a readable manifest, as in a copy without hidden files, they are identified by their names.
+    Without a readable manifest, for example in a copy without hidden files, the names identify the files.
     """
     # A damaged manifest still shows that robocov wrote the folder.
     with suppress(InputError):
@@ -434,7 +435,7 @@ def _list_parts(folder: Path) -> list[Path]:
 
 
 def _has_signature(path: Path, name: str) -> bool:
-    """Return whether a file starts like robocov's file with the given name."""
+    """Return whether a file starts like the files of the given name that robocov writes."""
     try:
         if not path.is_file():
             return False

@@ -165,13 +165,13 @@ def parse_toml(content: bytes, where: str) -> dict[str, Any]:
         raise InputError(f"{where}: not TOML: {text[:1].lower()}{text[1:]}") from None
     except RecursionError:
         raise InputError(f"{where}: {_TOO_DEEP}") from None
-    if _is_deeper_than(MAX_DEPTH, document):
+    if _is_nested_deeper(document, MAX_DEPTH):
         raise InputError(f"{where}: {_TOO_DEEP}")
     return document
 
 
-def _is_deeper_than(limit: int, value: object) -> bool:
-    """Return whether lists and tables are nested deeper than a limit, however deep they are."""
+def _is_nested_deeper(value: object, limit: int) -> bool:
+    """Return whether lists and objects are nested deeper than a limit, without recursion."""
     level: list[object] = [value]
     for _ in range(limit + 1):
         inner: list[object] = []
@@ -311,7 +311,7 @@ def _find_error(text: str, error: json.JSONDecodeError) -> int:
 
 
 def _describe_syntax_error(text: str, error: json.JSONDecodeError) -> str:
-    """Return why a text is not JSON, in words that are the same for all versions of Python."""
+    """Return why a text is not JSON, in the same words in all versions of Python."""
     offset = _find_error(text, error)
     excerpt = text[offset : offset + _SYNTAX_EXCERPT_CHARACTERS]
     quotation = quote(excerpt.splitlines()[0] or excerpt) if excerpt else "end of file"

@@ -3,7 +3,7 @@
 The core of a cave, where the center of a robot may be, is the area in which a random field, raised along the
 boundary, is below a level. Its parts are joined by tunnels, and it is dilated (J. Serra, *Image Analysis and
 Mathematical Morphology*, 1982) by at least half the gap. Where two dilated parts meet in a narrower window, a
-tunnel is led through it.
+tunnel is cut through it.
 """
 
 import math
@@ -26,7 +26,7 @@ _MAX_WAVELENGTH_UNITS = 1.7
 _MESH_STEPS_PER_UNIT = 12
 _MIN_MESH_STEPS_PER_UNIT = 6
 _MAX_MESH_STEPS_PER_SIDE = 160
-"""Large maps get a coarser mesh: at most that many steps in their longer side."""
+"""Maximum number of steps along the longer side; large maps get a coarser mesh."""
 _RIM_SIDES = 0.012
 """Smallest thickness of the rock along the boundary."""
 _SHORE_UNITS = 0.35
@@ -41,21 +41,21 @@ _MAX_TOLERANCE_SIDES = 0.0027
 _MIN_CHAMBER_AREA_UNITS2 = 0.03
 _MIN_PILLAR_AREA_UNITS2 = 0.02
 _SPIKE_UNITS = 0.05
-"""Spikes of rock of half that thickness are rounded off."""
+"""Spikes of rock up to twice as thick are removed."""
 _MAX_BEND = 0.25
 """Largest offset of a tunnel's middle, relative to its length."""
-_USUAL_RADIUS = 1.2
+_LEVEL_RADIUS = 1.2
 _MAX_RADIUS = 2.0
-"""Dilation by which the level is chosen, and the largest one, relative to the smallest."""
+"""Dilation with which the level is chosen, and the largest dilation, relative to the smallest one."""
 _LEVEL_STEPS = 8
 _RADIUS_STEPS = 12
 """Steps of the bisections."""
 _MAX_ROUNDS = 12
-"""Rounds in which windows are widened, before a layout is given up."""
+"""Rounds of widening windows after which a layout is given up."""
 _WINDOWS_PER_CHAMBER = 0.005
-"""Windows that are widened in one round, the narrowest first."""
+"""Number of windows that are widened in one round, the narrowest first, for each chamber."""
 _USED_AREA_TOLERANCE = 0.5 * AREA_TOLERANCE
-"""The rest is left for errors of rounding."""
+"""The rest of the tolerance is left for rounding errors."""
 
 
 def build_cave(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
@@ -120,7 +120,7 @@ class _Site:
     start: BaseGeometry
 
     def build_core(self, points: Array, values: Array, seed: int) -> BaseGeometry:
-        """Return the area where a field on a mesh is below 0, joined to one piece with the start."""
+        """Return the area where a field on a mesh is below 0, joined with the start into one piece."""
         unit = self.request.unit
         low_area = shapely.simplify(extract_area_below_zero(points, values), self.tolerance)
         low_area = low_area.intersection(_build_inner_rectangle(self.request, self.min_radius))
@@ -135,7 +135,7 @@ class _Site:
         return shapely.union_all([whole, *tunnels])
 
     def dilate(self, core: BaseGeometry, radius: float) -> Polygon:
-        """Return the area nearer to a core than a radius, with smooth walls and without small pillars."""
+        """Return the area within a radius of a core, with smooth walls and without small pillars."""
         unit = self.request.unit
         spike = _SPIKE_UNITS * unit
         wide = (
@@ -167,7 +167,7 @@ def _survey_site(request: Request, corner: DiscStart) -> _Site:
 
 
 def _build_inner_rectangle(request: Request, distance: float) -> Polygon:
-    """Return the rectangle inside the rim of rock at the given distance from it."""
+    """Return the rectangle inside the rim of rock, at the given distance from the rim."""
     width = float(request.width)
     height = float(request.height)
     offset = _RIM_SIDES * min(width, height) + distance
@@ -175,12 +175,12 @@ def _build_inner_rectangle(request: Request, distance: float) -> Polygon:
 
 
 def _choose_core(site: _Site, points: Array, values: Array, seed: int) -> BaseGeometry:
-    """Return the core at the level at which the usual dilation blocks about the requested area."""
+    """Return the core at the level that leaves about the requested area blocked after dilation."""
     low = float(values.min())
     high = float(values.max())
     for _ in range(_LEVEL_STEPS):
         level = (low + high) / 2.0
-        space = site.dilate(site.build_core(points, values - level, seed), _USUAL_RADIUS * site.min_radius)
+        space = site.dilate(site.build_core(points, values - level, seed), _LEVEL_RADIUS * site.min_radius)
         if site.compute_blocked_fraction(space) > site.request.area:
             low = level
         else:
@@ -189,7 +189,7 @@ def _choose_core(site: _Site, points: Array, values: Array, seed: int) -> BaseGe
 
 
 def _choose_radius(site: _Site, core: BaseGeometry) -> float:
-    """Return the dilation of a core that blocks about the requested area, m."""
+    """Return the dilation of a core that leaves about the requested area blocked, m."""
     low = site.min_radius
     high = _MAX_RADIUS * site.min_radius
     for _ in range(_RADIUS_STEPS):
@@ -260,7 +260,7 @@ def extract_area_below_zero(points: Array, values: Array) -> BaseGeometry:
     ----------
     points : (rows, columns, 2) array, m
     values : (rows, columns) array
-        Values on the edge of the mesh count as at least 1.
+        Values on the edge of the mesh are raised to at least 1.
 
     Returns
     -------
@@ -269,14 +269,14 @@ def extract_area_below_zero(points: Array, values: Array) -> BaseGeometry:
     Notes
     -----
     Each square of the mesh is divided into two triangles, in which the contour is a line ("marching
-    triangles"). Unlike in squares, it is never ambiguous which corners are connected.
+    triangles"). In a triangle, unlike in a square, the contour is never ambiguous.
     """
     raised_values = np.maximum(values, 1.0)
     raised_values[1:-1, 1:-1] = values[1:-1, 1:-1]
     values = raised_values
 
     def find_crossings(start: tuple[slice, slice], end: tuple[slice, slice]) -> Array:
-        """Return where edges of the mesh cross the level 0, (..., 2) m; nan if they do not."""
+        """Return the points at which edges of the mesh cross 0, (..., 2) m; nan if they do not."""
         start_values = values[start]
         end_values = values[end]
         is_crossing = (start_values < 0.0) != (end_values < 0.0)

@@ -310,6 +310,6 @@ def _fulfills_request(environment: Environment, request: Request) -> bool:
     narrowest = find_narrowest_gap(free)
     if narrowest is not None and narrowest.width < request.gap - _GAP_TOLERANCE_M:
         return False
-    # The points where a disc as wide as the gap may be must be connected.
+    # A disc as wide as the gap must be able to reach every place where it fits.
     disc_area = free.buffer(-request.gap / 2.0 + _GAP_TOLERANCE_M, quad_segs=16)
     return isinstance(disc_area, shapely.Polygon)

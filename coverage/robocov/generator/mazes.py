@@ -159,7 +159,7 @@ def _compute_corridor_width(request: Request, shape: GridShape, thickness: float
 def _clear_disc(
     request: Request, shape: GridShape, walls: BoolArray, thickness: float, corner: DiscStart
 ) -> bool:
-    """Remove the walls in a disc; return whether there were any."""
+    """Remove the walls that a disc touches; return whether there were any."""
     x = _compute_lines(request, request.width, shape[0], thickness)
     y = _compute_lines(request, request.height, shape[1], thickness)
     indices = np.argwhere(walls)
@@ -278,12 +278,12 @@ def _count_openings(walls: BoolArray) -> IntArray:
 def trace_trails(walls: BoolArray) -> Iterator[list[Post]]:
     """Trace polylines that contain every wall once.
 
-    A polyline goes straight on if it can, and round a corner if no other wall meets there.
+    A polyline goes straight on if it can; otherwise it turns a corner if no other wall ends there.
 
     Parameters
     ----------
     walls : (columns + 1, rows + 1, 2) array of bool
-        Without closed rings.
+        Walls, which must not form closed rings.
 
     Yields
     ------

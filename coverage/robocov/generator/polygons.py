@@ -42,7 +42,7 @@ def scatter_polygons(request: Request, corner: DiscStart, rng: np.random.Generat
     Returns
     -------
     list of Obstacle or None
-        None if the obstacles find no room.
+        None if the obstacles do not fit.
     """
     areas = rng.uniform(_MIN_AREA_RATIO, _MAX_AREA_RATIO, request.obstacles)
     areas = np.sort(areas)[::-1]  # The largest is placed first.

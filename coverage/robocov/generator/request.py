@@ -95,7 +95,7 @@ class Request:
         return np.round(points, self.digits) + 0.0
 
     def build_ring(self, points: Array) -> Ring:
-        """Round coordinates to an outline.
+        """Build an outline from rounded points.
 
         Parameters
         ----------
@@ -118,5 +118,5 @@ class Request:
         -------
         float, m
         """
-        # The tolerance keeps lengths that are multiples of the step apart from rounding errors.
+        # Because of the tolerance, a rounding error does not make a multiple of the step one step shorter.
         return round(math.floor(length / self.step + 1e-9) * self.step, self.digits)

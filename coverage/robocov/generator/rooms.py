@@ -1,4 +1,4 @@
-"""Maps of the kind `rooms`: a building, which is a rectangle divided into rooms, with doors and furniture."""
+"""Maps of the kind `rooms`: a rectangular building with rooms, doors and furniture."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MAX_CORRIDOR_GAPS = 2.2
 _MIN_ROOM_GAPS = 1.5
 """Smallest side of a room."""
 _MAX_UNEVENNESS = 0.3
-"""Largest offset of a wall from the even division, in the share of one room."""
+"""Largest offset of a wall from an even division, relative to the width of one room."""
 _MIN_DOOR_GAPS = 1.06
 _MAX_DOOR_GAPS = 1.6
 """Smallest and largest width of a door."""
@@ -41,7 +41,7 @@ _MAX_WALL_FRACTION_OF_SMALL_ROOMS = 0.9
 """Smallest and largest fraction of the blocked area that walls take; small rooms have less furniture."""
 _SMALL_ROOM_GAPS = 6.0
 _SMALLEST_ROOM_GAPS = 3.0
-"""Sides of mean rooms from which, and at which, that largest fraction is in full that of small rooms."""
+"""As the side of the mean room falls from one to the other, that fraction rises to that of small rooms."""
 _WALL_LENGTH_UNITS = 1.5
 """Length of the walls of a room without doors; half of each wall counts for each of its rooms."""
 _MAX_THICKNESS_UNITS = 0.06
@@ -49,12 +49,12 @@ _PIECES_PER_ROOM = 2.2
 _CANDIDATES_PER_PIECE = 32
 """Positions that are compared for one piece of furniture."""
 _MAX_FAILURES = 32
-"""Pieces in a row that find no position, before the layout is given up."""
+"""Consecutive pieces without a position after which the layout is given up."""
 _FAILURE_SHRINKAGE = 0.92
 _MIN_SHRINKAGE = 0.2
-"""A piece that finds no position makes the next one that much smaller, down to the smallest factor."""
+"""Factor by which a piece shrinks for each consecutive failure before it, and the smallest product."""
 _MAX_FURNITURE_FRACTION = 0.35
-"""Fraction of the rooms that furniture fills at most: more finds no position."""
+"""Largest fraction of the rooms that furniture may fill; more does not fit."""
 _AREA_TOLERANCE = 0.001
 """Fraction of the map that is too small for a piece of furniture."""
 _PIECE_PROBABILITIES = {"cabinet": 0.5, "table": 0.3, "round table": 0.2}
@@ -205,7 +205,7 @@ class FloorPlan:
 
 
 def build_building(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
-    """Build walls, and furniture that stands against walls or keeps the gap from them.
+    """Build walls, and furniture that touches walls or is at least the requested gap away from them.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def build_building(request: Request, corner: DiscStart, rng: np.random.Generator
     Returns
     -------
     list of Obstacle or None
-        None if rooms would be too small, or the furniture finds no room.
+        None if rooms would be too small, or the furniture does not fit.
     """
     plan = draw_floor_plan(request, _draw_thickness(request, rng), rng)
     if plan is None:
@@ -289,9 +289,9 @@ def draw_floor_plan(request: Request, thickness: float, rng: np.random.Generator
 def _divide_by_corridor(
     request: Request, plan: FloorPlan, box: Box, count: int, rng: np.random.Generator
 ) -> list[tuple[Box, int]]:
-    """Divide a rectangle by a corridor along its longer side, which is added to the plan.
+    """Add a corridor to the plan that divides a rectangle along its longer side.
 
-    Return the parts with their numbers of rooms; the whole rectangle if there is no room for a corridor.
+    Return the two parts, each with its number of rooms; the whole rectangle if a corridor does not fit.
     """
     width, height = box.sides
     axis = 1 if width >= height else 0
@@ -348,7 +348,7 @@ def _add_doors(request: Request, plan: FloorPlan, rng: np.random.Generator) -> b
 
 
 def _find_door_places(plan: FloorPlan) -> list[tuple[Wall, int, int]]:
-    """Return each wall with each pair of rooms that end at it on either side."""
+    """Return each wall with each pair of rooms on its two sides."""
     # Rooms by the number and the coordinate of each of their four edges.
     rooms_at: defaultdict[tuple[int, float], list[int]] = defaultdict(list)
     for index, room in enumerate(plan.rooms):
@@ -365,7 +365,7 @@ def _find_door_places(plan: FloorPlan) -> list[tuple[Wall, int, int]]:
 def _place_furniture(
     request: Request, corner: DiscStart, plan: FloorPlan, area: float, rng: np.random.Generator
 ) -> list[Obstacle] | None:
-    """Return furniture that blocks an area, m²; None if it finds no room."""
+    """Return furniture that blocks the given area, m²; None if it does not fit."""
     min_area = _AREA_TOLERANCE * request.width * request.height
     if area < -min_area:
         return None
@@ -403,7 +403,7 @@ def _place_furniture(
 
 
 def _find_inner_room(request: Request, room: Box, thickness: float) -> Box:
-    """Return a room up to the faces of its walls; the boundary has no thickness."""
+    """Return the part of a room between the faces of its walls; the boundary has no thickness."""
     half = thickness / 2.0
     left = room.left if room.left == 0.0 else room.left + half
     bottom = room.bottom if room.bottom == 0.0 else room.bottom + half
@@ -425,7 +425,7 @@ class _Piece(NamedTuple):
 
 
 def _draw_piece(request: Request, area: float, rng: np.random.Generator) -> _Piece:
-    """Return a random piece of furniture of about some area, m²."""
+    """Return a random piece of furniture of about the given area, m²."""
     kind = str(rng.choice(list(_PIECE_PROBABILITIES), p=list(_PIECE_PROBABILITIES.values())))
     stretch = rng.uniform(*(_CABINET_STRETCH if kind == "cabinet" else _TABLE_STRETCH))
     length = math.sqrt(area * stretch)
@@ -439,7 +439,7 @@ def _draw_piece(request: Request, area: float, rng: np.random.Generator) -> _Pie
 def _sample_piece_corners(
     request: Request, piece: _Piece, room: Box, rng: np.random.Generator
 ) -> Array | None:
-    """Sample positions of a piece in a room, each at a wall or with the gap to it.
+    """Sample positions of a piece in a room; its gap to a wall is zero or at least the requested one.
 
     Returns
     -------
@@ -456,13 +456,13 @@ def _sample_piece_corners(
         # Its longer side stands against one of the two walls.
         axis = int(piece.size[0] > piece.size[1])
         offsets[:, axis] = play[axis] * rng.integers(0, 2, _CANDIDATES_PER_PIECE)
-    low = request.round_points(offsets + room_low)
-    clearances = np.column_stack([low - room_low, room_high - low - piece.size])
+    corners = request.round_points(offsets + room_low)
+    clearances = np.column_stack([corners - room_low, room_high - corners - piece.size])
     # A round table would touch a wall in a single point.
-    is_good = clearances >= request.gap
+    is_valid = clearances >= request.gap
     if not piece.is_round:
-        is_good |= clearances < request.step / 2.0
-    return low[is_good.all(axis=1)]
+        is_valid |= clearances < request.step / 2.0
+    return corners[is_valid.all(axis=1)]
 
 
 def _place_piece(
@@ -473,7 +473,7 @@ def _place_piece(
     start_disc: Polygon,
     rng: np.random.Generator,
 ) -> CircleObstacle | PolygonObstacle | None:
-    """Return a piece of furniture at a free position of a room; None if none is found."""
+    """Return a piece of furniture at a free position in a room; None if none is found."""
     low = _sample_piece_corners(request, piece, room, rng)
     if low is None:
         return None

@@ -291,7 +291,7 @@ def _find_component_warnings(environment: Environment, radius: float) -> Iterato
         yield f"sealed room of {component.area:.3g} m² around [{point.x:.4g}, {point.y:.4g}]"
     if pockets:
         count = format_count(len(pockets), "sealed pocket")
-        yield f"{count} smaller than a robot, {sum(pockets):.2g} m² together"
+        yield f"{count} smaller than a robot, {sum(pockets):.2g} m² in total"
 
 
 def _find_start_warnings(environment: Environment, radius: float) -> Iterator[str]:

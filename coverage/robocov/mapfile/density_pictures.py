@@ -48,16 +48,16 @@ def read_picture_file(name: str, folder: Path | None) -> bytes:
 
 
 def _resolve_inside(name: str, folder: Path) -> Path:
-    """Return the path of a file in a folder; raise an error if it is elsewhere."""
+    """Return the path of a file in a folder; raise an error if it is outside the folder."""
     path = None
-    # On some system, a drive, a root or a backslash leads out of the folder.
+    # On some systems, a drive, a root or a backslash leads out of the folder.
     if "\0" not in name and "\\" not in name and not PureWindowsPath(name).anchor:
         try:
             path = (folder / name).resolve()
         except (OSError, RuntimeError):  # Circular links.
             path = None
     if path is None or not path.is_relative_to(folder.resolve()):
-        raise InputError("expected a file in the folder of the map, got a path out of it")
+        raise InputError("expected a file in the folder of the map, got a path outside it")
     return path
 
 

@@ -113,7 +113,7 @@ def _describe(description: str, example: Any, default: Any = ..., alias: str | N
     return Field(default, description=description, examples=[example], alias=alias)
 
 
-LABEL_EXPECTED = f"a text of 1 to {MAX_LABEL_CHARACTERS} characters on one line"
+LABEL_EXPECTED = f"a string of 1 to {MAX_LABEL_CHARACTERS} characters on one line"
 WEIGHT_EXPECTED = f"a number from 0 to {MAX_WEIGHT:.0f}"
 _SIZE_EXPECTED = f"a number from {MIN_SIZE_M:g} to {MAX_SIZE_M:.0f} (m)"
 _SPEED_EXPECTED = f"a number from {MIN_SPEED_M_S:g} to {MAX_SPEED_M_S:g} (m/s)"

@@ -82,7 +82,7 @@ def find_map_file(source: str | Path) -> Path:
     bundled_maps = list_bundled_maps()
     if source in bundled_maps:
         return bundled_maps[source]
-    with suppress(OSError):  # The name may be longer than any file's.
+    with suppress(OSError):  # The name may be too long for a file.
         if Path(source).is_file():
             return Path(source)
     raise MapError(describe_unknown_name("map", source, bundled_maps))
@@ -147,7 +147,7 @@ def from_json(document: dict[str, Any], where: str = "map", folder: Path | None 
     Raises
     ------
     MapError
-        If the document is no valid map.
+        If the document is not a valid map.
     """
     where = to_one_line(where)
     require_json(document, where)
@@ -175,7 +175,7 @@ def parse_density(value: object, boundary: Ring, where: str = "map", folder: Pat
     Raises
     ------
     MapError
-        If the value is no valid density.
+        If the value is not a valid density.
     """
     # The density is validated as part of a map.
     document = {**HEADER, "name": "map", "boundary": [[0, 0], [1, 0], [1, 1]], "density": value}

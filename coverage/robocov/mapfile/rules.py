@@ -26,13 +26,13 @@ from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov.mapfile.structure import NO_WEIGHT
 
 _MAX_FLATNESS = 1e-9
-"""A ring whose hull has a smaller area, relative to the square of its extent, is a line."""
+"""A ring counts as a line if the area of its hull, relative to its squared extent, is smaller."""
 _MEETING_DISTANCE_M = 1e-6
 """Largest distance of an edge from a point at which it meets another one."""
 _MAX_MEETING_EDGES = 6
-"""Nearest edges among which the two that meet are searched."""
+"""Number of nearest edges among which the two that meet are searched for."""
 _START_MARGIN_M = 0.01
-"""Clearance beyond that of a start, so that sampling certainly succeeds."""
+"""Clearance in addition to that of a start, so that sampling certainly succeeds."""
 
 
 def check_rules(environment: Environment, where: str) -> None:
@@ -85,7 +85,7 @@ def _find_ring_mistakes(path: JsonPath, ring: Ring) -> Iterator[Mistake]:
         yield Mistake.at_path(path, message)
         return
     polygon = Polygon(points)
-    # The area of the hull decides, because that of a ring that crosses itself may vanish.
+    # The area of a ring that crosses itself may vanish; that of its hull does not.
     if shapely.convex_hull(polygon).area <= _MAX_FLATNESS * float(extent.max()) ** 2:
         message = f"expected points that are not on one line, got an area of {polygon.area:g} m²"
         yield Mistake.at_path(path, message)
@@ -188,7 +188,7 @@ def _find_room_mistakes(
     environment: Environment, name: str, start: DiscStart | UniformStart
 ) -> Iterator[Mistake]:
     """Yield a mistake if the disc or free space has no room for a robot of the default size."""
-    if _certainly_has_room(environment, start):
+    if _fits_at_disc_center(environment, start):
         return
     try:
         environment.start(name).sample(1, radius=DEFAULT_RADIUS_M)
@@ -201,8 +201,8 @@ def _find_room_mistakes(
         yield Mistake.at_path(("starts", name), message)
 
 
-def _certainly_has_room(environment: Environment, start: DiscStart | UniformStart) -> bool:
-    """Return whether a robot fits at the center of a disc, which is faster than sampling."""
+def _fits_at_disc_center(environment: Environment, start: DiscStart | UniformStart) -> bool:
+    """Return whether a robot fits at the center of a start disc, which is faster to check than sampling."""
     starts = [start] if isinstance(start, DiscStart) else environment.starts.values()
     centers = [disc.center for disc in starts if isinstance(disc, DiscStart)]
     points = shapely.points(np.reshape(centers, (-1, 2)))

@@ -42,9 +42,9 @@ _BASE_WEIGHTS = {"uniform": "weight", "gaussians": "floor", "polygons": "backgro
 """Keys of the weight that all points have, by the kind of the density."""
 _EXPECTED = {name: key.expected for name, key in KEYS.items()} | {
     "boundary": RING_EXPECTED,
-    "description": (f"a text of at most {MAX_DESCRIPTION_CHARACTERS} characters",),
+    "description": (f"a string of at most {MAX_DESCRIPTION_CHARACTERS} characters",),
     "extra": ("an object",),
-    "$schema": ("a text",),
+    "$schema": ("a string",),
     "obstacles": ("a list of obstacles",),
     "starts": ("an object of named starts",),
     "extent": ("[x_min, y_min, x_max, y_max] in meters", COORDINATE_EXPECTED),
@@ -193,7 +193,7 @@ def _find_raster_mistakes(model: RasterModel) -> Iterator[Mistake]:
         return
     for key in ("black", "white"):
         if getattr(model, key) is not None:
-            yield Mistake.at_path(("density", key), "is for a picture, but there are rows of numbers")
+            yield Mistake.at_path(("density", key), "expected only with a picture, got it with rows")
     width = len(model.rows[0])
     for k, row in enumerate(model.rows):
         if len(row) != width:

@@ -74,7 +74,7 @@ def save_map(environment: Environment, path: str | Path) -> None:
     exact_document = to_json(environment)
     document = _shorten_numbers(exact_document)
     if document == exact_document and environment.density is None:
-        # The file describes the map itself, whose free space may already have been computed.
+        # The file describes exactly this map, whose free space may already have been computed.
         require_json(document, str(path))
         validate_document(document, str(path))
         check_rules(environment, str(path))
@@ -111,7 +111,7 @@ def dump_document(document: dict[str, Any]) -> str:
     Parameters
     ----------
     document : dict
-        It need not be valid as a map.
+        It need not be a valid map.
 
     Returns
     -------
@@ -121,19 +121,19 @@ def dump_document(document: dict[str, Any]) -> str:
 
 
 def _shorten_numbers(document: dict[str, Any]) -> dict[str, Any]:
-    return document | {key: _shorten(document[key]) for key in _NUMERIC_KEYS if key in document}
+    return document | {key: _shorten_value(document[key]) for key in _NUMERIC_KEYS if key in document}
 
 
-def _shorten(value: Any) -> Any:
-    """Return a JSON value with its numbers as `dump_map` writes them."""
+def _shorten_value(value: Any) -> Any:
+    """Return a JSON value with its numbers rounded as in a map file."""
     if isinstance(value, float):
         decimal = round(value, _DIGITS)
         max_error = _MAX_ERROR_ULPS * math.ulp(max(abs(value), 1.0))
         return to_json_value(decimal if abs(decimal - value) <= max_error else value)
     if isinstance(value, list):
-        return [_shorten(item) for item in value]
+        return [_shorten_value(item) for item in value]
     if isinstance(value, dict):
-        return {key: _shorten(item) for key, item in value.items()}
+        return {key: _shorten_value(item) for key, item in value.items()}
     return value
 
 

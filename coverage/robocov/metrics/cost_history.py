@@ -101,8 +101,8 @@ def compute_cost_history(
         time = float(record.time[moment])
         positions = record.positions[moment]
         working = None if record.conditions is None else record.working[moment]
-        figures = cost_at_time.compute_summary(time, positions, working)
-        mean_distance[sample], cost_values[sample], uncovered_area[sample] = figures
+        summary = cost_at_time.compute_summary(time, positions, working)
+        mean_distance[sample], cost_values[sample], uncovered_area[sample] = summary
         if has_mixed_speeds:
             result = cost_at_time(time, positions, working, record.team.max_speed)
             if result is not None:

@@ -200,7 +200,7 @@ def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, 
     ----------
     record : Record
     history : CostHistory
-        Its coverage cost.
+        Coverage cost along the run.
 
     Returns
     -------

@@ -152,7 +152,7 @@ class Record(Drawable):
         Parameters
         ----------
         k : int
-            Number of the moment; by default the last one.
+            Index of the moment; by default the last one.
 
         Returns
         -------
@@ -174,7 +174,7 @@ class Record(Drawable):
         Parameters
         ----------
         k : int
-            Number of the moment.
+            Index of the moment.
 
         Returns
         -------

@@ -44,7 +44,7 @@ def test_conditions_are_ideal_by_default() -> None:
         ),
         (
             {"message_rate": 0.1},
-            "conditions.forget_after: expected at least the 10 s between two messages, got 3 s",
+            "conditions.forget_after: expected at least 10 s, the time between two messages, got 3 s",
         ),
         (
             {"failures": ((0, 1.0),)},

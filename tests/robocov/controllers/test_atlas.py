@@ -532,7 +532,7 @@ def test_a_plan_is_skipped_only_if_nothing_has_changed() -> None:
     assert positions is not None
 
     def is_skipped(state: PlannerState, group: np.ndarray, positions: np.ndarray, is_quiet: bool) -> bool:
-        return atlas._is_unchanged(state, group, positions, is_quiet, max_move=0.1)
+        return atlas._may_skip_plan(state, group, positions, is_quiet, max_move=0.1)
 
     assert is_skipped(state, group, positions + 0.09, True)
     assert not is_skipped(state, group, positions + [[0.0, 0.0], [0.11, 0.0]], True)

@@ -94,7 +94,7 @@ def test_a_folder_that_nothing_comes_into_goes_again(tmp_path: Path) -> None:
 def test_a_part_of_a_comparison_whose_replacement_was_interrupted_is_not_read(tmp_path: Path) -> None:
     saved(tmp_path, {"comparison.json": "", "rapf/run.json": "old"}, kind="comparison")
     (tmp_path / ".robocov-commit.json").write_bytes((tmp_path / ".robocov.json").read_bytes())
-    with pytest.raises(InputError, match=f"open {tmp_path} to have it completed"):
+    with pytest.raises(InputError, match=f"open {tmp_path} to complete it"):
         complete_commit(tmp_path / "rapf")
     complete_commit(tmp_path)
     complete_commit(tmp_path / "rapf")
@@ -136,7 +136,7 @@ def test_what_is_no_result_is_left_alone(tmp_path: Path, file: str) -> None:
     (tmp_path / file).write_text("{}")
     saved(tmp_path / "project" / "run", OLD)
     for folder in (tmp_path, tmp_path / "project"):
-        with pytest.raises(InputError, match="no result of robocov, so --overwrite leaves it alone"):
+        with pytest.raises(InputError, match="not a result of robocov, so --overwrite leaves it alone"):
             saved(folder, NEW)
     assert (tmp_path / file).read_text() == "{}"
     assert content(tmp_path / "project" / "run") == OLD

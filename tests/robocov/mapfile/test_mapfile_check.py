@@ -85,7 +85,7 @@ def test_sealed_rooms_and_pockets() -> None:
     environment = room(block(4, 0, 1, 6), block(0.05, 0, 1, 1), block(0, 1, 1.05, 1), block(0, 0, 0.05, 0.5))
     first, second = list_warnings(environment)
     assert first.startswith("sealed room of 21.9 m² around [")
-    assert second == "1 sealed pocket smaller than a robot, 0.025 m² together"
+    assert second == "1 sealed pocket smaller than a robot, 0.025 m² in total"
 
 
 def test_an_obstacle_outside() -> None:

@@ -144,7 +144,7 @@ AREA = {"vertices": [[1, 1], [2, 1], [2, 3]], "weight": 5}
             {"kind": "raster", "rows": [[1]], "interpolation": "cubic"},
             'density.interpolation: expected "bilinear" or "cells", got "cubic"',
         ),
-        ({"kind": "raster", "rows": [[1]], "white": 2}, "density.white: is for a picture"),
+        ({"kind": "raster", "rows": [[1]], "white": 2}, "density.white: expected only with a picture"),
         (
             {"kind": "raster", "picture": "a.png"},
             'density.picture: "a.png": image densities require a map loaded from a file',

@@ -99,7 +99,7 @@ def test_a_number_too_long_for_a_map_is_still_a_draft():
         ([], "expected a JSON object with a map"),
         ({"format": "geojson"}, 'format: expected "robocov-map", got "geojson"'),
         ({**EMPTY, "version": 2}, "newer robocov"),
-        ({**EMPTY, "name": 3}, "name: expected a text, got 3"),
+        ({**EMPTY, "name": 3}, "name: expected a string, got 3"),
         ({**EMPTY, "nmae": "x"}, "unknown key 'nmae': did you mean 'name'"),
         ({**EMPTY, "boundary": "x"}, "boundary: expected a list of points"),
         ({**EMPTY, "boundary": [[0, 0], [1, "2"]]}, r"boundary\[1\]\[1\]: expected a number"),

@@ -269,7 +269,7 @@ def test_sealed_rooms_and_pockets_are_told_of():
     words = warned(hall(frame, box))
     assert words == [
         "the room of 9 m² round (4, 4) is sealed: no way leads in",
-        "1 sealed pocket is smaller than a robot, 0.04 m² together",
+        "1 sealed pocket is smaller than a robot, 0.04 m² in total",
     ]
 
 

@@ -53,7 +53,7 @@ def test_a_run_is_under_its_conditions() -> None:
         ({"loss": [0.1, 2]}, r"conditions.loss\[1\]: expected a number from 0 to 1, got 2"),
         ({"loss": []}, "conditions.loss: expected at least one"),
         ({"loss": [0.1, 0.1]}, r"conditions.loss\[1\]"),
-        ({"fail": 3}, "conditions.fail: expected a text"),
+        ({"fail": 3}, "conditions.fail: expected a string"),
         ({"fail": ["3@1", "3"]}, r"conditions.fail\[1\]: expected ROBOT@SECONDS, as in 3@20, got '3'"),
         ({"delay": "null"}, "conditions.delay: expected a number"),
     ],
@@ -78,7 +78,10 @@ def test_a_file_says_it_in_a_table() -> None:
     assert [team["message_rate"] for team in study.teams] == [None, 2.0, None, 2.0]
     assert study.teams[0]["join"] == "2@1 3@2:1,1"
     for broken, message in (
-        ({"loss": {"low": 0}}, "study.toml: conditions.loss: expected a number or a text, or a list of them"),
+        (
+            {"loss": {"low": 0}},
+            "study.toml: conditions.loss: expected a number or a string, or a list of them",
+        ),
         ({"lost": 1}, "study.toml: conditions: unknown key 'lost': did you mean 'loss'"),
         (3, r"study.toml: conditions: expected a table \[conditions\], got 3"),
     ):

@@ -137,7 +137,7 @@ WRONG = [
         'starts = ["*", "door"]',
         "starts[0]: '*' is all of them, so nothing next to it is possible",
     ),
-    ('starts = "*"', "starts = 3", "starts: expected a text, or a list of texts, got 3"),
+    ('starts = "*"', "starts = 3", "starts: expected a string, or a list of strings, got 3"),
     ("seeds = 4", "seeds = [1, 2, 1]", "seeds[2]: 1 is given already at seeds[0]; duplicate value"),
     ("seeds = 4", "seeds = 0", "seeds: expected a whole number from 1, got 0"),
     ("seeds = 4", "seeds = [-1]", "seeds[0]: expected a whole number from 0 to "),
@@ -230,7 +230,7 @@ WRONG = [
         "maps[0]: unknown map 'roms': did you mean 'rooms'? (known: ",
     ),
     ('["rooms", "plans/hall.json"]', '["rooms", "rooms"]', "maps[1]: 'rooms' is given already at maps[0]"),
-    ('["rooms", "plans/hall.json"]', "[3]", "maps[0]: expected a text, got 3"),
+    ('["rooms", "plans/hall.json"]', "[3]", "maps[0]: expected a string, got 3"),
     ('["rooms", "plans/hall.json"]', "[]", "maps: expected at least one, got none"),
     (
         'maps = ["rooms", "plans/hall.json"]',

@@ -94,7 +94,7 @@ class _Reader:
         return value  # type: ignore[no-any-return]
 
     def text(self, value: Any, path: JsonPath) -> str:
-        return self.typed(str, value, path, "a text")
+        return self.typed(str, value, path, "a string")
 
     def number(self, value: Any, path: JsonPath) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):

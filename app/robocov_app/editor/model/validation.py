@@ -359,5 +359,5 @@ def _sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:
     if slivers:
         area = sum(part.area for part in slivers)
         what = format_count(len(slivers), "sealed pocket")
-        words = f"{what} {'are' if len(slivers) > 1 else 'is'} smaller than a robot, {area:.2g} m² together"
+        words = f"{what} {'are' if len(slivers) > 1 else 'is'} smaller than a robot, {area:.2g} m² in total"
         yield Problem(words, MultiPolygon(slivers), None, False, "sealed")
