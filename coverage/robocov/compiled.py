@@ -281,11 +281,11 @@ def open_cache_folder() -> Path | None:
     Path or None
         None if nothing is cached.
     """
-    named = os.environ.get("NUMBA_CACHE_DIR")
-    root = Path(named) if named else find_cache_root()
+    configured = os.environ.get("NUMBA_CACHE_DIR")
+    root = Path(configured) if configured else find_cache_root()
     if root is None:
         return None
-    parent = root if named else root / "kernels"
+    parent = root if configured else root / "kernels"
     folder = open_private_folder(parent / _compute_installation_digest())
     if folder is not None:
         with suppress(OSError):

@@ -20,7 +20,7 @@ from robocov.conditions.random_streams import LOSS_STREAM, create_generator
 from robocov.observation.neighbors import Neighbors
 
 NEVER = -1
-"""The step at which something has not happened."""
+"""Placeholder for the step of a message that has not been sent or has not arrived."""
 
 
 class Broadcast(NamedTuple):

@@ -286,7 +286,7 @@ class Lattice:
     samples: Array
     """(k, 2) m"""
     sample_area: float
-    """Area that each sample stands for, m²."""
+    """Area that each sample represents, m²."""
     centers: Array
     """(m, 2) m, centers of the basis functions."""
     width: float

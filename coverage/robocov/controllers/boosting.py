@@ -166,7 +166,7 @@ class _ViewSamples(NamedTuple):
     depths: Array
     """Distance from the robot, m."""
     areas: Array
-    """Area that each sample stands for, m²."""
+    """Area that each sample represents, m²."""
     undetected: Array
     """Φ, probability that no other robot detects the sample."""
     detection: Array

@@ -131,8 +131,8 @@ class Candidates(NamedTuple):
 
     def find_nearest(self, positions: Array) -> IntArray:
         """Assign a different candidate to each of (k, 2) positions, by least squares; return (k,) indices."""
-        square = ((positions[:, None] - self.positions) ** 2).sum(axis=2)
-        _, candidates = scipy.optimize.linear_sum_assignment(square)
+        squared_distances = ((positions[:, None] - self.positions) ** 2).sum(axis=2)
+        _, candidates = scipy.optimize.linear_sum_assignment(squared_distances)
         return np.asarray(candidates, dtype=np.intp)
 
     def refine(self, situation: Situation, weights: Array, chosen: IntArray) -> Array:
@@ -141,8 +141,8 @@ class Candidates(NamedTuple):
         positions = self.positions[chosen]
         # Candidates are farther apart than nodes.
         spacing = planner.spacing * math.sqrt(np.count_nonzero(weights) / len(self.positions))
-        square = ((planner.nodes[:, None] - positions) ** 2).sum(axis=2).min(axis=1)
-        is_close = planner.is_roomy & (square < (_REFINEMENT_RADIUS * spacing) ** 2)
+        squared_distances = ((planner.nodes[:, None] - positions) ** 2).sum(axis=2).min(axis=1)
+        is_close = planner.is_roomy & (squared_distances < (_REFINEMENT_RADIUS * spacing) ** 2)
         fine = Candidates.build_at_nodes(situation, weights, np.flatnonzero(is_close))
         return fine.positions[run_lloyd(fine.table, fine.find_nearest(positions))]
 
@@ -353,7 +353,7 @@ def update_maps(
     """Add the scan of each robot to the maps of all robots in its hearing group.
 
     Robots that all hear each other share one map. All scans are added to it in turn, so that later scans can
-    correct earlier ones: maps that are only merged would keep the error of any one of them forever.
+    correct earlier ones: if maps were only merged, an error in one of them would never be corrected.
 
     Parameters
     ----------
@@ -363,6 +363,11 @@ def update_maps(
     scans : Scans
     hearing_groups : sequence of HearingGroup
         The hearing group of each robot, as `list_hearing_groups` returns them.
+
+    Returns
+    -------
+    list of DiscoveredMap
+        The new map of each robot.
     """
 
     def add_scan(known_map: DiscoveredMap, robot: int) -> DiscoveredMap:

@@ -249,7 +249,7 @@ class TangentBug(BaseController):
 
 
 def _add_squares(squares: ComplexArray, points: Array) -> ComplexArray:
-    """Return the squares with those of further obstacle points added, (k, 2) m; nan for none."""
+    """Return the squares and those that contain the given obstacle points, (k, 2) m; nan for none."""
     indices = np.floor(points[~np.isnan(points[:, 0])] / _SQUARE_SIDE_M)
     return np.unique(np.concatenate([squares, indices[:, 0] + 1j * indices[:, 1]]))
 

@@ -16,7 +16,7 @@ CACHE_VARIABLE = "ROBOCOV_CACHE"
 
 
 def find_cache_root() -> Path | None:
-    """Return the folder that `CACHE_VARIABLE` names, by default the user's cache folder; None if it is empty."""
+    """Return the folder in `CACHE_VARIABLE`, by default the user's cache folder; None if it is empty."""
     configured = os.environ.get(CACHE_VARIABLE)
     if configured == "":
         return None

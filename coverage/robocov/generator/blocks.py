@@ -1,7 +1,7 @@
 """Maps of the kind `blocks`: a town, divided by streets into blocks.
 
 The map is divided into convex cells by one cut after another. Each cut is the middle line of a street, and
-the block is the part of a cell that the streets along its edges leave.
+the block is the part of a cell that remains when the streets along its edges are removed.
 """
 
 import math
@@ -26,13 +26,13 @@ _MIN_WIDENING_SHARE = 0.4
 _CHAMFER_PROBABILITY = 0.25
 _YARD_PROBABILITY = 0.2
 _MAX_CORNERS = 12
-"""The number of the corner to cut is drawn below this, and counted round the block as often as necessary."""
+"""The index of the corner to trim is drawn below this, and taken modulo the number of corners."""
 _MAX_UNEVENNESS = 0.25
-"""Largest offset of a cut from the even division, in the share of one block."""
+"""Largest offset of a cut from an even division, relative to the width of one block."""
 _MIN_THICKNESS = 0.3
 """Smallest thickness of a block, relative to the side of a square of its area."""
 _MIN_THICK_FRACTION = 0.97
-"""Smallest fraction of a block that must be at least that thick; acute corners never are."""
+"""Smallest fraction of a block that must be at least that thick; acute corners are always thinner."""
 _WIDENING_STEPS = 16
 """Steps of the bisection for the width of the streets."""
 
@@ -72,7 +72,7 @@ class Trim(NamedTuple):
     before, after : float
         Fractions of the edges before and after the corner that are cut off.
     is_yard : bool
-        Whether a parallelogram is cut out, rather than a triangle cut off.
+        Whether the cut removes a parallelogram, rather than a triangle.
     """
 
     corner: int
@@ -183,7 +183,7 @@ def _divide_cell(
 ) -> tuple[Cell, Cell]:
     """Return the parts of a cell on both sides of a street, the first with a fraction of the extent."""
     distances = [edge.x * normal[0] + edge.y * normal[1] for edge in cell]
-    # Only what streets leave of the cell is divided.
+    # Only the part of the cell that streets leave free is divided.
     free_extent = max(distances) - min(distances) - 2.0 * street
     distance = min(distances) + street + fraction * free_extent
     origin = (normal[0] * distance, normal[1] * distance)
@@ -202,7 +202,7 @@ def cut_cell(
     ----------
     cell : Cell
     origin : (x, y), m
-        A point of the line.
+        A point on the line.
     normal : (x, y)
         Points to the side that is removed.
     setback : float, m

@@ -37,7 +37,7 @@ Layout: TypeAlias = Callable[[Request, DiscStart, np.random.Generator], list[Obs
 """Returns obstacles that keep the disc of the start in the corner free; None if an attempt fails."""
 
 _MAX_ATTEMPTS = 40
-"""Layouts that are tried before the parameters count as impossible."""
+"""Number of layouts that are tried before the parameters are considered impossible."""
 _MIN_TEAM_DISC_M = 0.6
 """Radius of a start in which some robots of the default size fit."""
 _DISC_UNITS = 0.25

@@ -1,12 +1,12 @@
 """Maps of the kind `mazes`: corridors on a grid of cells, some dead ends, some loops.
 
 The passages are a spanning tree of the grid, grown cell by cell ("growing tree": J. Buck, *Mazes for
-Programmers*, 2015, chapter 11). From the newest cell it grows long winding corridors, as a depth-first search
-does, from a random cell many short ones. After that some walls are removed, those at dead ends first
-("braiding").
+Programmers*, 2015, chapter 11). Growing from the newest cell makes long winding corridors, as in a depth-first
+search; growing from a random cell makes many short ones. After that, some walls are removed, preferably those
+at dead ends ("braiding").
 
-Walls are a boolean array (columns + 1, rows + 1, 2): whether a wall leads from a post, where lines of the
-grid cross, upwards (0) and to the right (1).
+A post is a point where two lines of the grid cross. Walls are a boolean array (columns + 1, rows + 1, 2):
+whether a wall leads from each post upwards (0) and to the right (1).
 """
 
 import itertools
@@ -29,8 +29,8 @@ Post: TypeAlias = tuple[int, int]
 GridShape: TypeAlias = tuple[int, int]
 """Number of columns and of rows."""
 
-_OBLONG_WEIGHT = 0.5
-"""Weight of oblong cells, relative to that of another number of cells than the requested one."""
+_ELONGATION_WEIGHT = 0.5
+"""Weight of the elongation of cells, relative to the deviation from the requested number of cells."""
 _MIN_NEWEST_PROBABILITY = 0.6
 _MAX_NEWEST_PROBABILITY = 0.98
 """Smallest and largest probability with which a maze grows from its newest cell."""
@@ -42,7 +42,7 @@ _MAX_REMOVED_FRACTION = 0.4
 _DEAD_END_PROBABILITY = 0.7
 """Probability that the wall to be removed is one at a dead end."""
 _USED_AREA_TOLERANCE = 0.8 * AREA_TOLERANCE
-"""The rest is left for errors of rounding."""
+"""The rest of the tolerance is left for rounding errors."""
 _GAP_TOLERANCE_M = 1e-9
 
 
@@ -91,8 +91,8 @@ def _choose_grid_shape(request: Request) -> GridShape:
 
     def compute_mismatch(shape: GridShape) -> float:
         columns, rows = shape
-        oblongness = abs(math.log(request.width / columns) - math.log(request.height / rows))
-        return abs(math.log(columns * rows / request.obstacles)) + _OBLONG_WEIGHT * oblongness
+        elongation = abs(math.log(request.width / columns) - math.log(request.height / rows))
+        return abs(math.log(columns * rows / request.obstacles)) + _ELONGATION_WEIGHT * elongation
 
     count = int(request.obstacles)
     shapes = [
@@ -150,7 +150,7 @@ def _compute_corridor_width(request: Request, shape: GridShape, thickness: float
     widths = []
     for length, count in zip((request.width, request.height), shape, strict=True):
         lines = _compute_lines(request, length, count, thickness)
-        # As if the boundary had walls as well, whose faces are the sides of the map.
+        # The boundary is treated like walls whose faces are the sides of the map.
         center_lines = [-thickness / 2.0, *lines[1:-1], lines[-1] + thickness / 2.0]
         widths.append(float(np.diff(center_lines).min()) - thickness)
     return min(widths)
@@ -235,9 +235,9 @@ def grow_passages(shape: GridShape, rng: np.random.Generator) -> BoolArray:
 
 
 def _remove_wall(walls: BoolArray, rng: np.random.Generator) -> None:
-    """Remove a wall, if possible one that is attached at both ends, which makes a loop.
+    """Remove a wall, if possible one that is attached at both ends, because that makes a loop.
 
-    Walls at dead ends are often preferred.
+    With the probability `_DEAD_END_PROBABILITY`, a wall at a dead end is removed if possible.
     """
     columns, rows, is_horizontal = np.argwhere(walls).T
     starts = (columns, rows)

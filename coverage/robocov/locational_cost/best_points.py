@@ -4,8 +4,8 @@ It is found by Newton's method, in all cells at once. For f = r the cost of a co
 For f = 1/(r²+h²) it need not be, but it has no second optimum: f is (-1/2)-concave, and in the plane the
 integral of such a function over a convex set that moves is quasi-concave (Borell; Brascamp and Lieb). Along
 any line the cost therefore first falls and then rises. If it still falls at the end of a step, the step was
-not too long. A step must satisfy this condition and stay in the cell, and nothing else. No difference of two
-costs is ever computed: it would suffer from cancellation.
+not too long. A step must satisfy this condition and stay in the cell; there are no other conditions. The search
+never computes the difference of two costs, which would suffer from cancellation.
 """
 
 from typing import NamedTuple

@@ -155,7 +155,7 @@ class Results:
         Parameters
         ----------
         run : str, int or mapping
-            The name of its folder, the number of its row, or the row itself.
+            The name of its folder, the index of its row, or the row itself.
 
         Returns
         -------
@@ -174,7 +174,7 @@ class Results:
         Parameters
         ----------
         run : str, int or mapping
-            The name of its folder, the number of its row, or the row itself.
+            The name of its folder, the index of its row, or the row itself.
 
         Returns
         -------
