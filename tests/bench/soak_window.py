@@ -15,7 +15,8 @@ import numpy as np
 from robocov.errors import RobocovError
 from robocov.mapfile import load_map
 from robocov_app.render.picture import standard_layers
-from robocov_app.toolkit.window import FPS, display
+from robocov_app.toolkit.display import open_display
+from robocov_app.toolkit.window import FPS
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
@@ -37,7 +38,7 @@ def main(minutes: int, robots: int) -> None:
     rng = np.random.default_rng(0)
     session = Session(Scenario(load_map("rooms"), (ControllerChoice("rapf"),), robots, "uniform"))
     layers = {layer.name for layer in standard_layers() if layer.default}
-    with tempfile.TemporaryDirectory() as folder, display(headless=True):
+    with tempfile.TemporaryDirectory() as folder, open_display(headless=True):
         # the cost beside it takes no memory here; one a frame would take all of the time
         viewer = Presenter(session, Costs(16, direct=True), layers, Path(folder), "rooms")
         window = Window(viewer, (1280, 720), 1.0)

@@ -19,7 +19,7 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui.editor import Editor, EditorSettings
 from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.toolkit.dialogs import Choice
-from robocov_app.toolkit.window import display
+from robocov_app.toolkit.display import open_display
 
 SIZE = (900, 600)
 
@@ -52,7 +52,7 @@ def opened_editor(
     readings: Any = None,
 ) -> Iterator[Hands]:
     """Open the editor without a display."""
-    with display(headless=True):
+    with open_display(headless=True):
         if document is None:
             document = Document(sketch if sketch is not None else sheet(), drafts)
         editor = Editor(document, readings or measurement_worker(direct=True), folder, EditorSettings())

@@ -14,8 +14,8 @@ from touched_run import HALL, RAPF, begun
 from robocov.environment import Environment
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.command import Commands
+from robocov_app.toolkit.display import open_display
 from robocov_app.toolkit.ui import Shown
-from robocov_app.toolkit.window import display
 from robocov_app.viewer.commands import parameter_commands, viewer_commands
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.film import pixels
@@ -59,7 +59,7 @@ def opened(
     **changes: Any,
 ) -> Iterator[Driver]:
     """Open a window without a display, paused at its beginning."""
-    with display(headless=True):
+    with open_display(headless=True):
         session = begun(*(laws or (RAPF,)), robots=robots, environment=environment, **changes)
         usual = {layer.name for layer in standard_layers() if layer.default}
         viewer = Presenter(

@@ -13,7 +13,8 @@ from robocov.mapfile import load_map
 from robocov_app.bench.measure import Call, Case, Row, in_turn
 from robocov_app.bench.render import SIZE, cleared
 from robocov_app.render.picture import standard_layers
-from robocov_app.toolkit.window import FPS, display, undisturbed
+from robocov_app.toolkit.display import collect_garbage_rarely, open_display
+from robocov_app.toolkit.window import FPS
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
@@ -34,12 +35,12 @@ def _used(n: int, seconds: float) -> Iterator[Row]:
     limits = TeamSpec(radius=0.05) if n >= _CROWD else TeamSpec()
     start = "uniform" if n > 10 else None
     session = Session(Scenario(load_map("rooms"), (ControllerChoice("rapf"),), n, start, limits=limits))
-    with display(headless=True):
+    with open_display(headless=True):
         shown = {layer.name for layer in standard_layers() if layer.default}
         viewer = Presenter(session, Costs(DEFAULT_LATTICE), shown, Path(), "rooms")
         window = Window(viewer, SIZE, 1.0)
         try:
-            with undisturbed():
+            with collect_garbage_rarely():
                 frames, drawing, answers = _played(window, seconds)
         finally:
             viewer.costs.close()

@@ -1,11 +1,6 @@
 """A window and its loop: display, size and scale; events in, and a picture where something is different."""
 
-import gc
-import os
-import sys
-import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from time import perf_counter
@@ -14,14 +9,12 @@ from typing import Protocol
 import pygame
 from pygame import Surface
 
-from robocov.errors import InputError
 from robocov.files.writing import replace_file
-from robocov.text import remove_controls
 from robocov_app.render.theme import LIGHT
 from robocov_app.terminal.output import find_free_path
+from robocov_app.toolkit.display import collect_garbage_rarely, open_window
 from robocov_app.toolkit.faults import FaultLog
-from robocov_app.toolkit.input import KEY_REPEAT, clean_event
-from robocov_app.toolkit.layout import SMALLEST
+from robocov_app.toolkit.input import clean_event
 from robocov_app.toolkit.overlay import draw_message
 from robocov_app.toolkit.termination import is_ending
 
@@ -96,7 +89,7 @@ class BaseWindow:
     def run(self) -> None:
         clock, before = pygame.time.Clock(), perf_counter()
         try:
-            with undisturbed():
+            with collect_garbage_rarely():
                 while not (self.closed or is_ending()):
                     now = perf_counter()
                     self.frame(now - before)
@@ -263,70 +256,3 @@ class BaseWindow:
         with replace_file(target) as part:
             part.write_bytes(picture.getvalue())
         return f"screenshot saved: {target}"
-
-
-def set_title(title: str) -> None:
-    """Set the title of the window, without control characters, if it is another one than before."""
-    title = remove_controls(title, single_line=True)
-    if title != pygame.display.get_caption()[0]:
-        pygame.display.set_caption(title)
-
-
-@contextmanager
-def display(*, headless: bool, otherwise: str = "no display") -> Iterator[None]:
-    """Start pygame's display, real or not; InputError with the words `otherwise` when there is none."""
-    # SDL would silently open a window that nobody sees, and run for ever
-    named = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
-    if headless:
-        os.environ["SDL_VIDEODRIVER"] = "dummy"
-    elif sys.platform == "linux" and not any(os.environ.get(name) for name in named):
-        raise InputError(otherwise)
-    try:
-        pygame.display.init()
-    except pygame.error:
-        raise InputError(otherwise) from None
-    driver = pygame.display.get_driver()
-    wanted = headless or driver == os.environ.get("SDL_VIDEODRIVER", "")
-    if driver in ("offscreen", "dummy", "evdev") and not wanted:
-        pygame.display.quit()
-        raise InputError(otherwise)
-    pygame.font.init()
-    pygame.key.set_repeat(*KEY_REPEAT)
-    try:
-        yield
-    finally:
-        pygame.display.quit()
-
-
-def screen_scale() -> float:
-    """Return the scale at which text suits the display: 1 up to full HD, 2 for 4K."""
-    height = max((size[1] for size in pygame.display.get_desktop_sizes()), default=1080)
-    return float(min(max(round(height / 1080 * 4) / 4, 1.0), 3.0))
-
-
-def fitting(size: tuple[int, int]) -> tuple[int, int]:
-    wide, high = max(pygame.display.get_desktop_sizes(), default=size)
-    return min(size[0], wide), min(size[1], high)
-
-
-def open_window(size: tuple[int, int]) -> Surface:
-    screen = pygame.display.set_mode(size, pygame.RESIZABLE)
-    with suppress(AttributeError, pygame.error), warnings.catch_warnings():
-        # pygame-ce has no other way yet to give a window of the display module a least size
-        warnings.simplefilter("ignore", DeprecationWarning)
-        pygame.Window.from_display_module().minimum_size = SMALLEST
-    return screen
-
-
-@contextmanager
-def undisturbed() -> Iterator[None]:
-    """Keep the garbage collector away from all that is there now, modules most of all."""
-    before = gc.get_threshold()
-    gc.collect()
-    gc.freeze()  # to look at it again every half minute would hold a frame up by 25 ms
-    gc.set_threshold(50_000, *before[1:])  # once a frame or so, not after every 700 coordinates
-    try:
-        yield
-    finally:
-        gc.set_threshold(*before)
-        gc.unfreeze()

@@ -18,9 +18,9 @@ from robocov_app.storage.settings import (
     save_settings,
 )
 from robocov_app.terminal.output import echo
+from robocov_app.toolkit.display import fit_to_screen, get_screen_scale, open_display
 from robocov_app.toolkit.faults import FaultLog
 from robocov_app.toolkit.layout import SMALLEST
-from robocov_app.toolkit.window import display, fitting, screen_scale
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import FRAME_BUDGET
@@ -76,7 +76,7 @@ class Launcher:
         """Give the window, with settings from before, which are kept; InputError when there is no display."""
         keeper = None
         try:
-            with display(headless=self._alone, otherwise=NO_DISPLAY):
+            with open_display(headless=self._alone, missing_message=NO_DISPLAY):
                 file = None if self._alone else find_settings_file()
                 settings, trouble = load_settings(Settings, file)
                 window = self._opened(settings)
@@ -116,12 +116,12 @@ class Launcher:
         if settings.shown is not None:
             self._usual = {layer.name for layer in standard_layers()} & set(settings.shown)
         shown = (self._usual | self.also) - self.without
-        scale = self.scale or settings.scale or (1.0 if self._alone else screen_scale())
+        scale = self.scale or settings.scale or (1.0 if self._alone else get_screen_scale())
         size = self.size or (settings.width, settings.height)
         if self.size is None and self.scale is not None:  # text of that size needs a window of that size
             size = max(size[0], round(SMALLEST[0] * scale)), max(size[1], round(SMALLEST[1] * scale))
         if self.size is None and not self._alone:
-            size = fitting(size)
+            size = fit_to_screen(size)
         if not self.headless:
             self.session.clock.budget = FRAME_BUDGET
         costs = Costs(self.lattice, direct=self.headless)

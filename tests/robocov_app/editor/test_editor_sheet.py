@@ -29,7 +29,7 @@ from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.render.camera import Camera
 from robocov_app.render.theme import DARK, LIGHT
-from robocov_app.toolkit.window import display
+from robocov_app.toolkit.display import open_display
 from robocov_app.viewer.film import pixels
 
 SIZE = (420, 360)
@@ -44,7 +44,7 @@ SHAPES = (
 
 @pytest.fixture(autouse=True, scope="module")
 def screen() -> Iterator[None]:
-    with display(headless=True):
+    with open_display(headless=True):
         pygame.display.set_mode(SIZE)
         yield
 

@@ -15,10 +15,11 @@ from touched_run import begun
 from robocov.environment import CircleObstacle
 from robocov_app.editor.edits.create import circle_drawn
 from robocov_app.toolkit import clipboard, faults
+from robocov_app.toolkit.display import open_display, set_title
 from robocov_app.toolkit.faults import LOG_FILE, FaultLog
 from robocov_app.toolkit.input import clean_event
 from robocov_app.toolkit.text_edit import MAX_CHARS, TextEdit
-from robocov_app.toolkit.window import BaseWindow, display, set_title
+from robocov_app.toolkit.window import BaseWindow
 from robocov_app.viewer.session.session import Session
 from robocov_app.web.events import MESSAGES, Hands
 
@@ -67,7 +68,7 @@ class Fragile(BaseWindow):
 
 @pytest.fixture
 def window(tmp_path: Path) -> Iterator[Fragile]:
-    with display(headless=True):
+    with open_display(headless=True):
         pygame.event.clear()
         fragile = Fragile()
         fragile.faults = FaultLog(tmp_path)
@@ -151,7 +152,7 @@ def test_where_no_log_file_can_be_written_it_is_standard_error(tmp_path: Path, c
 
 
 def test_no_control_character_comes_in(tmp_path: Path) -> None:
-    with display(headless=True):
+    with open_display(headless=True):
         for text in ("a\x00b", f"a{CONTROLS}b"):
             clipboard.put(text)
             assert clipboard.get().replace("\n", "").replace("\t", "") == "ab"

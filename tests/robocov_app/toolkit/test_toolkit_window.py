@@ -9,7 +9,8 @@ import pytest
 from driven_window import opened
 from PIL import Image
 
-from robocov_app.toolkit.window import CALM, BaseWindow, display
+from robocov_app.toolkit.display import open_display
+from robocov_app.toolkit.window import CALM, BaseWindow
 
 
 class Counting(BaseWindow):
@@ -39,7 +40,7 @@ class Counting(BaseWindow):
 
 @pytest.fixture
 def window():
-    with display(headless=True):
+    with open_display(headless=True):
         pygame.event.clear()
         yield Counting()
 

@@ -16,7 +16,7 @@ from robocov_app.render.fonts import text_width
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
 from robocov_app.storage.settings import FOLDER_VARIABLE, find_settings_file, load_settings
 from robocov_app.toolkit.dialogs import Choice, Question
-from robocov_app.toolkit.window import display
+from robocov_app.toolkit.display import open_display
 from robocov_app.viewer import launch as opening
 from robocov_app.viewer.launch import Launcher, Settings
 from robocov_app.viewer.session.scenario import ControllerChoice
@@ -169,7 +169,7 @@ def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) ->
 def opened_for_a_person(monkeypatch: pytest.MonkeyPatch, folder: Path, **options: object) -> Launcher:
     """Return how a window opens that somebody would watch, on a display that nobody sees."""
     monkeypatch.setenv(FOLDER_VARIABLE, str(folder))
-    monkeypatch.setattr(opening, "display", lambda headless, otherwise: display(headless=True))
+    monkeypatch.setattr(opening, "display", lambda headless, otherwise: open_display(headless=True))
     return Launcher(begun(RAPF), "hall", folder, lattice=8, **options)  # type: ignore[arg-type]
 
 

@@ -20,7 +20,7 @@ from touched_run import begun
 from robocov_app.cli import main
 from robocov_app.commands.demo import Arguments, session_of
 from robocov_app.storage.settings import FOLDER_VARIABLE
-from robocov_app.toolkit.window import display, fitting, screen_scale
+from robocov_app.toolkit.display import fit_to_screen, get_screen_scale, open_display
 from robocov_app.viewer.launch import NO_DISPLAY, Launcher
 from robocov_app.viewer.session.clock import FRAME_BUDGET
 
@@ -166,7 +166,7 @@ def test_the_options_are_what_the_session_begins_with() -> None:
 
 
 def test_the_display_ends_also_when_something_fails() -> None:
-    with pytest.raises(ZeroDivisionError), display(headless=True):
+    with pytest.raises(ZeroDivisionError), open_display(headless=True):
         assert pygame.display.get_init()
         1 / 0
     assert not pygame.display.get_init()
@@ -177,8 +177,8 @@ def test_the_display_ends_also_when_something_fails() -> None:
 )
 def test_text_is_as_large_as_suits_the_screen(height: int, scale: float, monkeypatch) -> None:
     monkeypatch.setattr(pygame.display, "get_desktop_sizes", lambda: [(height * 16 // 9, height)])
-    assert screen_scale() == scale
-    assert fitting((3000, 500)) == (min(3000, height * 16 // 9), 500)
+    assert get_screen_scale() == scale
+    assert fit_to_screen((3000, 500)) == (min(3000, height * 16 // 9), 500)
 
 
 def test_settings_that_cannot_be_read_are_told_and_not_needed(tmp_path: Path, monkeypatch) -> None:

@@ -19,8 +19,8 @@ from robocov_app.storage.settings import (
     merge_changed_settings,
     save_settings,
 )
+from robocov_app.toolkit.display import fit_to_screen, get_screen_scale, open_display
 from robocov_app.toolkit.faults import FaultLog
-from robocov_app.toolkit.window import display, fitting, screen_scale
 
 NO_DISPLAY = (
     "no display: the editor needs one (over ssh, try ssh -X); --screenshot FILE renders it without, "
@@ -63,7 +63,7 @@ def editor_window(
     with ExitStack() as stack:
         stack.callback(document.close, discard=False)  # unless it was closed by then
         readings = stack.enter_context(closing(measurement_worker(direct=headless)))
-        stack.enter_context(display(headless=alone, otherwise=NO_DISPLAY))
+        stack.enter_context(open_display(headless=alone, missing_message=NO_DISPLAY))
         file = None if alone else find_settings_file(FILE)
         settings, trouble = load_settings(EditorSettings, file)
         editor = Editor(document, readings, folder, settings)
@@ -72,8 +72,8 @@ def editor_window(
             lay_under(editor, background)
             editor.choose("picture", tell=False)
         wanted = size or (settings.width, settings.height)
-        wanted = wanted if size or alone else fitting(wanted)
-        scale = scale or settings.scale or (1.0 if alone else screen_scale())
+        wanted = wanted if size or alone else fit_to_screen(wanted)
+        scale = scale or settings.scale or (1.0 if alone else get_screen_scale())
         editor.say(trouble or (heading(document) if path is not None and document is found else ""))
         window = EditorWindow(editor, wanted, scale, drafts, patient=headless)
         window.faults = FaultLog(drafts)

@@ -21,10 +21,11 @@ from robocov_app.editor.ui.panel import TABS, Panel
 from robocov_app.editor.ui.play_mode import PlayWindow, begun, brought_back
 from robocov_app.render.theme import theme_named
 from robocov_app.toolkit.command import Commands, Menu, draw_keys, palette
+from robocov_app.toolkit.display import set_title
 from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, SLIP, WHEEL, key_of, show_cursor, wheel_notches
 from robocov_app.toolkit.layout import laid_out
 from robocov_app.toolkit.overlay import draw_message, draw_status
-from robocov_app.toolkit.window import BaseWindow, set_title
+from robocov_app.toolkit.window import BaseWindow
 
 _SHAPES = {"arrow": pygame.SYSTEM_CURSOR_ARROW, "cross": pygame.SYSTEM_CURSOR_CROSSHAIR}
 _SHAPES |= {"hand": pygame.SYSTEM_CURSOR_HAND, "move": pygame.SYSTEM_CURSOR_SIZEALL}
