@@ -355,7 +355,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         cell,
         origin=origin,
         unknown=unknown,
-        called="transparent",
+        unknown_name="transparent",
         noise=_NOISE if picture.lossy else 0.0,
         notes=tuple(notes),
     )

@@ -219,11 +219,13 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     grid = build_grid(environment, options.cell)
     free = find_free_cells(environment, grid)
     walled = ndimage.binary_dilation(free, np.ones((3, 3), bool))  # by one cell all around what is free
-    unknown = ~(grid.covered(environment.boundary_polygon) | walled)
+    unknown = ~(grid.find_covered_cells(environment.boundary_polygon) | walled)
     solid = None
     if mode != "trinary":
         # a cell that is not free is occupied for sure: costmaps take what is less than sure for free
-        fine = grid.covered(environment.free, _FINER).reshape(grid.rows, _FINER, grid.columns, _FINER)
+        fine = grid.find_covered_cells(environment.free, _FINER).reshape(
+            grid.rows, _FINER, grid.columns, _FINER
+        )
         solid = 1.0 - fine.mean(axis=(1, 3), dtype=np.float32)
         solid[~free] = 1.0
         free = np.rint(100.0 * solid) < 50.0

@@ -62,16 +62,20 @@ def test_arcs_stay_within_the_tolerance(
     c, p, q = np.array(centre), np.array(u), np.array(v)
     angle = begin + sweep * _FINE
     exact = c + np.cos(angle) * p + np.sin(angle) * q
-    drawn = np.concatenate([exact[:1], flatten_arc(c, p, q, begin, sweep, tolerance)])
+    drawn = np.concatenate([exact[:1], flatten_arc(c, p, q, start=begin, sweep=sweep, tolerance=tolerance)])
     assert farthest(exact, drawn) <= tolerance * (1 + 1e-6) + 1e-9
     assert np.allclose(drawn[-1], exact[-1])
 
 
+def flatten_circle(radius: float, sweep: float) -> np.ndarray:
+    u = np.array([radius, 0.0])
+    v = np.array([0.0, radius])
+    return flatten_arc(np.zeros(2), u, v, start=0.0, sweep=sweep, tolerance=1e-3)
+
+
 def test_no_more_points_than_a_circle_needs() -> None:
     for radius in (0.5, 5.0, 500.0):
-        drawn = flatten_arc(
-            np.zeros(2), np.array([radius, 0.0]), np.array([0.0, radius]), 0.0, math.tau, 1e-3
-        )
+        drawn = flatten_circle(radius, sweep=math.tau)
         needed = math.pi / math.acos(1.0 - 1e-3 / radius)
         assert needed <= len(drawn) <= needed + 1
     straight = alone(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]), 1e-3)
@@ -86,21 +90,20 @@ def test_many_at_once_are_each_one_alone() -> None:
         assert (part == alone(curves[k], 1e-2)).all()
     centre, u, v = np.random.default_rng(3).random((3, 7, 2)) * 10
     angle, sweep = np.random.default_rng(4).random((2, 7)) * 6 - 3
-    points, count = flatten_arcs(centre, u, v, angle, sweep, 1e-2)
+    points, count = flatten_arcs(centre, u, v, angle, sweep, tolerance=1e-2)
     for k, part in enumerate(np.split(points, np.cumsum(count)[:-1])):
-        assert (part == flatten_arc(centre[k], u[k], v[k], angle[k], sweep[k], 1e-2)).all()
+        single = flatten_arc(centre[k], u[k], v[k], start=angle[k], sweep=sweep[k], tolerance=1e-2)
+        assert (part == single).all()
 
 
 @pytest.mark.parametrize("radius", [1e8, 1e12, 1e30, math.nan])
 def test_what_is_huge_is_refused(radius: float) -> None:
     with pytest.raises(ValueError, match=f"expected at most {MAX_POINTS} points, got more"):
-        flatten_arc(np.zeros(2), np.array([radius, 0.0]), np.array([0.0, radius]), 0.0, math.tau, 1e-3)
+        flatten_circle(radius, sweep=math.tau)
     with pytest.raises(ValueError, match="expected at most 250000 points"):
         alone(np.array([[0.0, 0.0], [1e5 * radius, 1.0], [0.0, 2.0], [0.0, 0.0]]), 1e-3)
     if radius < 1e40:
-        part = flatten_arc(
-            np.zeros(2), np.array([radius, 0.0]), np.array([0.0, radius]), 0.0, 1 / radius, 1e-3
-        )
+        part = flatten_circle(radius, sweep=1 / radius)
         assert len(part) == 1
 
 

@@ -35,7 +35,7 @@ def test_a_cell_is_covered_where_its_centre_is(
 ) -> None:
     shape = shapely.make_valid(Polygon(ring), method="structure", keep_collapsed=False)
     grid = CellGrid(7, 9, cell, (-0.3, -0.2))
-    covered = grid.covered(MultiPolygon(shapely.get_parts(shape).tolist()), finer)
+    covered = grid.find_covered_cells(MultiPolygon(shapely.get_parts(shape).tolist()), finer)
     step = cell / finer
     x, y = np.meshgrid(-0.3 + (np.arange(9 * finer) + 0.5) * step, -0.2 + (np.arange(7 * finer) + 0.5) * step)
     near = shapely.dwithin(shape.boundary, shapely.points(x, y), 1e-9)
@@ -46,9 +46,11 @@ def test_rooms_that_share_a_wall_share_no_cell() -> None:
     # centres lie on the common edge: each belongs to just one
     grid = CellGrid(4, 4, 1.0, (0.0, 0.0))
     left, right = shapely.box(0, 0, 1.5, 4), shapely.box(1.5, 0, 4, 4)
-    assert (grid.covered(left).astype(int) + grid.covered(right)).tolist() == [[1] * 4] * 4
+    both = grid.find_covered_cells(left).astype(int) + grid.find_covered_cells(right)
+    assert both.tolist() == [[1] * 4] * 4
     slanted = Polygon([(0, 0), (4, 0), (4, 4)]), Polygon([(0, 0), (4, 4), (0, 4)])
-    assert (grid.covered(slanted[0]).astype(int) + grid.covered(slanted[1])).tolist() == [[1] * 4] * 4
+    both = grid.find_covered_cells(slanted[0]).astype(int) + grid.find_covered_cells(slanted[1])
+    assert both.tolist() == [[1] * 4] * 4
 
 
 def room(**others: object) -> Environment:
@@ -151,7 +153,7 @@ def test_rooms_that_cells_lose_are_told(monkeypatch: pytest.MonkeyPatch) -> None
     grid = build_grid(environment, 0.4)
     (warning,) = describe_lost_passages(environment, grid, find_free_cells(environment, grid))
     assert warning.startswith("2 separate parts of the free space are lost; cells of 0.05 m keep it")
-    monkeypatch.setattr(rasterize, "_MOST_TRIED", 1_000_000)
+    monkeypatch.setattr(rasterize, "_MAX_TRIED_CELLS", 1_000_000)
     hair = room(obstacles=(PolygonObstacle(((3.0, 2.0), (3.5, 2.0), (3.5, 4.9995), (3.0, 4.9995))),))
     grid = build_grid(hair, 0.4)
     (warning,) = describe_lost_passages(hair, grid, find_free_cells(hair, grid))

@@ -1,1 +1,1 @@
-"""From rings, cells and strokes to free space, and from free space to a map."""
+"""Conversion of rings, cells and strokes to free space, and of free space to a map."""

@@ -1,4 +1,4 @@
-"""Curves as points, no farther from the curve than a tolerance."""
+"""Approximation of curves by points, within a tolerance."""
 
 import math
 from collections.abc import Callable
@@ -6,31 +6,55 @@ from collections.abc import Callable
 import numpy as np
 import shapely
 
-from robocov.arrays import Array, IntArray, concatenate_ranges
+from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges
 from robocov.environment import MAX_SAGITTA_M
 
-CURVE_TOLERANCE_M = (
-    MAX_SAGITTA_M  # m between a curve and the line that stands for it at most: as of round obstacles
-)
-# steps between two breaks at first; and what of the tolerance the middle of a step may be away, which need
-# not be where the curve is farthest
-_FIRST, _SAFE = 8, 0.8
-_LEAST = 8  # points of a whole ellipse at least, however small it is
-MAX_POINTS = 250_000  # of one call; a circle of 10 000 km, as far as coordinates go, has 222 thousand
+CURVE_TOLERANCE_M = MAX_SAGITTA_M
+"""Maximum distance between a curve and its approximation, as for round obstacles."""
+MAX_POINTS = 250_000
+"""Maximum number of points of a call. The largest circle, with a radius of 10 000 km, has 222 thousand."""
+_FIRST_STEPS = 8
+"""Number of steps between two breaks before steps are halved."""
+_MIDPOINT_SAFETY = 0.8
+"""Fraction of the tolerance for the midpoint of a step, where the curve need not be farthest away."""
+_MIN_ELLIPSE_POINTS = 8
 
 
-def flatten_beziers(control: Array, tolerance: float, most: int = MAX_POINTS) -> tuple[Array, IntArray]:
-    """Return points, (k, 2), of cubic Bézier curves, (n, 4, 2), without their begins; and how many each has.
+def flatten_beziers(control: Array, tolerance: float, maximum: int = MAX_POINTS) -> tuple[Array, IntArray]:
+    """Approximate cubic Bézier curves by points.
 
+    Parameters
+    ----------
+    control : (n, 4, 2) array
+        Control points of each curve.
+    tolerance : float
+        Maximum distance from the curve.
+    maximum : int
+        Maximum number of points.
+
+    Returns
+    -------
+    points : (k, 2) array
+        Points of all curves, each without its first one.
+    count : (n,) array of int
+        Number of points of each curve.
+
+    Raises
+    ------
+    ValueError
+        If there would be more points.
+
+    Notes
+    -----
     The number of equal steps of the parameter is that of Wang's formula: the second differences of the
     control points bound the curvature. (G. Wang, The subdivision method for finding the intersection between
-    two Bézier curves or surfaces, Zhejiang University Journal, 1984.) Raises ValueError when there would be
-    more than `most`.
+    two Bézier curves or surfaces, Zhejiang University Journal, 1984.)
     """
-    bend = np.hypot(*np.moveaxis(np.diff(control, 2, axis=1), 2, 0)).max(axis=1, initial=0.0)
-    count = _counted(np.sqrt(0.75 * bend / tolerance), most)
-    a, b, c, d = (control[:, k].repeat(count, axis=0) for k in range(4))
-    t = ((concatenate_ranges(np.zeros_like(count), count) + 1) / count.repeat(count))[:, None]
+    second_difference = np.moveaxis(np.diff(control, 2, axis=1), 2, 0)
+    bend = np.hypot(*second_difference).max(axis=1, initial=0.0)
+    count = _round_counts(np.sqrt(0.75 * bend / tolerance), maximum)
+    a, b, c, d = [control[:, k].repeat(count, axis=0) for k in range(4)]
+    t = _build_fractions(count)[:, None]
     s = 1.0 - t
     points = s**3 * a + 3.0 * s**2 * t * b + 3.0 * s * t**2 * c + t**3 * d
     points[np.cumsum(count) - 1] = control[:, 3]
@@ -38,46 +62,101 @@ def flatten_beziers(control: Array, tolerance: float, most: int = MAX_POINTS) ->
 
 
 def flatten_arcs(
-    centre: Array, u: Array, v: Array, begin: Array, sweep: Array, tolerance: float, most: int = MAX_POINTS
+    centers: Array,
+    u: Array,
+    v: Array,
+    starts: Array,
+    sweeps: Array,
+    *,
+    tolerance: float,
+    maximum: int = MAX_POINTS,
 ) -> tuple[Array, IntArray]:
-    """Return points and counts as `beziers` for arcs centre + u cos(a) + v sin(a), a from `begin` on, rad."""
-    # the longer half axis: the greater singular value of [u v]
-    square, area = (u**2 + v**2).sum(axis=1), u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    """Approximate elliptic arcs, center + u cos(a) + v sin(a), by points.
+
+    Parameters
+    ----------
+    centers, u, v : (n, 2) arrays
+    starts, sweeps : (n,) arrays, rad
+        First angle, and angle to the last one.
+    tolerance, maximum
+        See `flatten_beziers`.
+
+    Returns
+    -------
+    points : (k, 2) array
+        Points of all arcs, each without its first one.
+    count : (n,) array of int
+        Number of points of each arc.
+
+    Raises
+    ------
+    ValueError
+        If there would be more points.
+    """
+    # The longer half axis is the greater singular value of [u v].
+    square = (u**2 + v**2).sum(axis=1)
+    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     radius = np.sqrt((square + np.sqrt(np.maximum(square**2 - 4.0 * area**2, 0.0))) / 2.0)
-    # the chord over an angle a is radius (1 - cos(a / 2)) from the arc
+    # The chord of an angle a is radius (1 - cos(a / 2)) from the arc.
     step = 4.0 * np.arcsin(np.sqrt(np.minimum(0.5 * tolerance / np.maximum(radius, 1e-300), 0.5)))
-    around = np.abs(sweep)
-    count = _counted(np.maximum(around / step, _LEAST * around / math.tau), most)
-    part = (concatenate_ranges(np.zeros_like(count), count) + 1) / count.repeat(count)
-    angle = begin.repeat(count) + sweep.repeat(count) * part
-    c, p, q = (vector.repeat(count, axis=0) for vector in (centre, u, v))
-    return c + np.cos(angle)[:, None] * p + np.sin(angle)[:, None] * q, count
+    angle = np.abs(sweeps)
+    count = _round_counts(np.maximum(angle / step, _MIN_ELLIPSE_POINTS * angle / math.tau), maximum)
+    angles = starts.repeat(count) + sweeps.repeat(count) * _build_fractions(count)
+    centers = centers.repeat(count, axis=0)
+    u = u.repeat(count, axis=0)
+    v = v.repeat(count, axis=0)
+    return centers + np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * v, count
 
 
-def flatten_arc(centre: Array, u: Array, v: Array, begin: float, sweep: float, tolerance: float) -> Array:
-    """Return points of one elliptic arc, without its first, (k, 2); see `arcs`."""
-    return flatten_arcs(centre[None], u[None], v[None], np.array([begin]), np.array([sweep]), tolerance)[0]
-
-
-def sample_curve(curve: Callable[[Array], Array], breaks: Array, tolerance: float) -> Array:
-    """Return points of a curve, smooth between growing `breaks`: steps are halved until they are near."""
-    part = np.arange(_FIRST) / _FIRST
-    t = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * part).ravel(), breaks[-1])
-    points = curve(t)
-    while len(t) < MAX_POINTS:
-        middle = (t[:-1] + t[1:]) / 2
-        between = curve(middle)
-        chord = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))
-        bent = shapely.distance(chord, shapely.points(between)) > _SAFE * tolerance
-        if not bent.any():
-            break
-        at = np.flatnonzero(bent) + 1
-        t, points = np.insert(t, at, middle[bent]), np.insert(points, at, between[bent], axis=0)
+def flatten_arc(center: Array, u: Array, v: Array, *, start: float, sweep: float, tolerance: float) -> Array:
+    """Return the points of an elliptic arc without its first one, (k, 2); see `flatten_arcs`."""
+    points, _ = flatten_arcs(
+        center[None], u[None], v[None], np.array([start]), np.array([sweep]), tolerance=tolerance
+    )
     return points
 
 
-def _counted(count: Array, most: int) -> IntArray:
-    whole = np.ceil(np.clip(count, 1.0, most + 1.0))
-    if not whole.sum() <= most:  # nan is too many
-        raise ValueError(f"expected at most {most} points, got more")
+def sample_curve(curve: Callable[[Array], Array], breaks: Array, tolerance: float) -> Array:
+    """Sample a curve, with steps that are halved until they are close to it.
+
+    Parameters
+    ----------
+    curve : callable
+        Returns points, (k, 2), at parameters, (k,).
+    breaks : (n,) array
+        Increasing parameters between which the curve is smooth.
+    tolerance : float
+
+    Returns
+    -------
+    (k, 2) array
+    """
+    fractions = np.arange(_FIRST_STEPS) / _FIRST_STEPS
+    starts = breaks[:-1, None] + np.diff(breaks)[:, None] * fractions
+    t = np.append(starts.ravel(), breaks[-1])
+    points = curve(t)
+    while len(t) < MAX_POINTS:
+        middle = (t[:-1] + t[1:]) / 2
+        midpoints = curve(middle)
+        chords = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))
+        distance = shapely.distance(chords, shapely.points(midpoints))
+        is_bent: BoolArray = distance > _MIDPOINT_SAFETY * tolerance
+        if not is_bent.any():
+            break
+        index = np.flatnonzero(is_bent) + 1
+        t = np.insert(t, index, middle[is_bent])
+        points = np.insert(points, index, midpoints[is_bent], axis=0)
+    return points
+
+
+def _build_fractions(count: IntArray) -> Array:
+    """Return 1/n, 2/n, ..., 1 for each count n, one after the other."""
+    return np.asarray((concatenate_ranges(np.zeros_like(count), count) + 1) / count.repeat(count))
+
+
+def _round_counts(count: Array, maximum: int) -> IntArray:
+    """Return counts as integers of at least 1. Raises ValueError if their sum is too large."""
+    whole = np.ceil(np.clip(count, 1.0, maximum + 1.0))
+    if not whole.sum() <= maximum:  # The sum may be nan.
+        raise ValueError(f"expected at most {maximum} points, got more")
     return whole.astype(np.intp)

@@ -1,4 +1,4 @@
-"""Frames in the plane: (3, 3) matrices that take homogeneous places to those of the frame around."""
+"""Frames in the plane: (3, 3) matrices that transform homogeneous positions to the surrounding frame."""
 
 import math
 
@@ -6,15 +6,17 @@ import numpy as np
 
 from robocov.arrays import Array
 
-UNIT_SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # about the origin
+UNIT_SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+"""Vertices of a square with side 1 around the origin, (4, 2)."""
 
 
 def build_frame(x: float, y: float, turn: float) -> Array:
-    """Return the matrix of a frame at a place, turned by `turn`, rad."""
-    cos, sin = math.cos(turn), math.sin(turn)
+    """Return the matrix, (3, 3), of a frame at a position and turned by an angle, rad."""
+    cos = math.cos(turn)
+    sin = math.sin(turn)
     return np.array([[cos, -sin, x], [sin, cos, y], [0.0, 0.0, 1.0]])
 
 
 def transform_points(matrix: Array, points: Array) -> Array:
-    """Return (k, 2) points under a matrix."""
+    """Return points, (k, 2), transformed by a matrix, (3, 3)."""
     return np.asarray(points @ matrix[:2, :2].T + matrix[:2, 2])

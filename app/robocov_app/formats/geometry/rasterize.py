@@ -1,4 +1,4 @@
-"""A map as cells of a grid: free where their centre is, and walls that are thinner than a cell stay whole."""
+"""Rasterization of a map: cells are free if their center is, and walls thinner than a cell stay whole."""
 
 import itertools
 import math
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from scipy import ndimage
 from shapely.geometry.base import BaseGeometry
 
@@ -19,60 +20,105 @@ from robocov_app.formats.base import ExportReport
 from robocov_app.formats.files import MAX_CELLS
 from robocov_app.formats.geometry.crossings import extract_sides
 
-DEFAULT_CELL_M = 0.05  # side of a cell in metres where none is given: what maps of robots mostly have
-_LEAST = math.pi * DEFAULT_RADIUS_M**2  # parts of the free space without room for a robot do not count, m²
-_MOST_TRIED = 16_000_000  # cells of grids that are tried for whether they keep what others lose
-_DIGITS = 6  # decimals of a grid's corner: a micrometre
+DEFAULT_CELL_M = 0.05
+"""Side of a cell, as in most maps of robots."""
+_MIN_PART_AREA_M2 = math.pi * DEFAULT_RADIUS_M**2
+"""Parts of the free space without space for a robot do not count."""
+_MAX_TRIED_CELLS = 16_000_000
+"""Size of the largest grid that is tried to keep what a coarser one loses."""
+_DIGITS = 6
+"""Decimals of a grid's corner: a micrometer."""
 
 
 @dataclass(frozen=True, eq=False)
 class CellGrid:
-    """A grid over a map, one cell to spare on each side; `origin`, m, is its lower left corner."""
+    """A grid over a map with one spare cell on each side.
+
+    Attributes
+    ----------
+    rows, columns : int
+    cell : float, m
+        Side of a cell.
+    origin : (float, float), m
+        Lower left corner.
+    """
 
     rows: int
     columns: int
     cell: float
     origin: tuple[float, float]
 
-    def covered(self, geometry: BaseGeometry, finer: int = 1) -> BoolArray:
-        """Return which cells, or `finer` ones, have their centre in polygons, the lowest row first."""
-        rows, columns = self.rows * finer, self.columns * finer
-        row, at = self._crossings(geometry, finer)
-        inside = (row >= 0) & (row < rows)
-        # a crossing turns all that is to the right of it
-        turns = np.zeros((rows, columns + 1), np.uint8)
-        np.add.at(turns, (row[inside], np.clip(np.ceil(at[inside]).astype(np.intp), 0, columns)), 1)
-        turns &= 1
-        return np.bitwise_xor.accumulate(turns, axis=1)[:, :-1].astype(bool)
+    def find_covered_cells(self, geometry: BaseGeometry, subdivision: int = 1) -> BoolArray:
+        """Find the cells whose center lies in polygons.
 
-    def between(self, geometry: BaseGeometry) -> BoolArray:
-        """Return the cells amid what lies outside of polygons and is too thin to have a centre in it.
+        Parameters
+        ----------
+        geometry : polygons, m
+        subdivision : int
+            Number of smaller cells along each side of a cell.
 
-        The grid-intersection digitization of thin things (Klette and Rosenfeld 2004, Digital Geometry,
-        chapter 2): of each interval outside of the polygons on a line of centres, along rows and along
-        columns, one cell. With those whose centre is outside they hang together where what is outside does.
+        Returns
+        -------
+        (rows * subdivision, columns * subdivision) array of bool
+            The lowest row first.
         """
-        found = np.zeros((self.rows, self.columns), dtype=bool)
-        for cells, across in ((found, False), (found.T, True)):
-            line, at = self._crossings(geometry, across=across)
-            order = np.lexsort((at, line))
-            line, at = line[order], at[order]
-            # on each line they go in and out by turns
-            ends = np.flatnonzero((np.arange(len(line)) - np.searchsorted(line, line)) % 2)
-            ends = ends[:-1] if len(ends) and ends[-1] == len(line) - 1 else ends
-            # where they contain one centre it is that cell, however both ways of counting have rounded
-            narrow = np.ceil(at[ends + 1]) - np.ceil(at[ends]) <= 1
-            ends = ends[(line[ends] == line[ends + 1]) & narrow]
-            cells[line[ends], np.rint((at[ends] + at[ends + 1]) / 2).astype(np.intp)] = True
-        return found
+        rows = self.rows * subdivision
+        columns = self.columns * subdivision
+        row, position = self._find_crossings(geometry, subdivision)
+        is_inside = (row >= 0) & (row < rows)
+        # At each crossing, everything to the right changes between inside and outside.
+        changes = np.zeros((rows, columns + 1), np.uint8)
+        column = np.clip(np.ceil(position[is_inside]).astype(np.intp), 0, columns)
+        np.add.at(changes, (row[is_inside], column), 1)
+        changes &= 1
+        return np.bitwise_xor.accumulate(changes, axis=1)[:, :-1].astype(bool)
 
-    def _crossings(self, area: BaseGeometry, finer: int = 1, across: bool = False) -> tuple[IntArray, Array]:
-        """Return where sides cross lines of centres, rows or columns: which one, and where on it."""
-        sides = (extract_sides(area) - self.origin) / (self.cell / finer) - 0.5
-        if across:
+    def find_cells_of_thin_walls(self, geometry: BaseGeometry) -> BoolArray:
+        """Find cells for walls between polygons that are too thin to contain the center of one.
+
+        Parameters
+        ----------
+        geometry : polygons, m
+
+        Returns
+        -------
+        (rows, columns) array of bool
+            The lowest row first.
+
+        Notes
+        -----
+        This is the grid-intersection digitization of thin sets (Klette and Rosenfeld 2004, Digital Geometry,
+        chapter 2): one cell of each interval outside the polygons, along rows and columns of centers.
+        Together with the cells whose center is outside, they are connected where the outside is.
+        """
+        cells = np.zeros((self.rows, self.columns), dtype=bool)
+        for oriented, is_transposed in ((cells, False), (cells.T, True)):
+            line, position = self._find_crossings(geometry, transposed=is_transposed)
+            order = np.lexsort((position, line))
+            line = line[order]
+            position = position[order]
+            # Along each line, entries and exits alternate; an exit is followed by the next entry.
+            number_on_line = np.arange(len(line)) - np.searchsorted(line, line)
+            exits = np.flatnonzero(number_on_line % 2)
+            if len(exits) and exits[-1] == len(line) - 1:
+                exits = exits[:-1]
+            # An interval that contains one center is that cell, however positions were rounded.
+            is_narrow = np.ceil(position[exits + 1]) - np.ceil(position[exits]) <= 1
+            exits = exits[(line[exits] == line[exits + 1]) & is_narrow]
+            middle = np.rint((position[exits] + position[exits + 1]) / 2).astype(np.intp)
+            oriented[line[exits], middle] = True
+        return cells
+
+    def _find_crossings(
+        self, area: BaseGeometry, subdivision: int = 1, *, transposed: bool = False
+    ) -> tuple[IntArray, Array]:
+        """Return where sides cross the rows, or columns, of centers: which one, and the position on it."""
+        sides = (extract_sides(area) - self.origin) / (self.cell / subdivision) - 0.5
+        if transposed:
             sides = sides[..., ::-1]
-        (x0, y0), (x1, y1) = sides[:, 0].T, sides[:, 1].T
-        # each side crosses the lines from its lower end, that one too, to its upper end
+        x0, y0 = sides[:, 0].T
+        x1, y1 = sides[:, 1].T
+        # Each side crosses the lines from its lower end, inclusive, to its upper end.
         low = np.ceil(np.minimum(y0, y1)).astype(np.intp)
         count = np.ceil(np.maximum(y0, y1)).astype(np.intp) - low
         line = concatenate_ranges(low, count)
@@ -81,31 +127,64 @@ class CellGrid:
         return line, x0[side] + (line - y0[side]) * slope[side]
 
 
-def build_grid(environment: Environment, cell: float | None, most: int = MAX_CELLS) -> CellGrid:
-    """Return a grid over the boundary, which meets the cells that it was made of; at `most` so many cells."""
+def build_grid(environment: Environment, cell: float | None, maximum: int = MAX_CELLS) -> CellGrid:
+    """Build a grid over the boundary of a map.
+
+    A map that was made of cells of the same size gets the same cells.
+
+    Parameters
+    ----------
+    environment : Environment
+    cell : float or None, m
+        Side of a cell; `DEFAULT_CELL_M` by default.
+    maximum : int
+        Maximum number of cells.
+
+    Raises
+    ------
+    ParameterError
+        If there would be more cells.
+    """
     cell = DEFAULT_CELL_M if cell is None else cell
     low_x, low_y, high_x, high_y = environment.boundary_polygon.bounds
-    # to a thousandth of a cell, so that a wall on the last line of cells needs no more of them
+    # To a thousandth of a cell, so that a wall on the last line of cells does not need another one.
     columns = math.ceil((high_x - low_x) / cell - 1e-3) + 2
     rows = math.ceil((high_y - low_y) / cell - 1e-3) + 2
-    if rows * columns > most:
-        few = f"expected at most {most // 1_000_000} million"
-        raise ParameterError(f"cell: {few} cells, got {columns} x {rows} of {cell:g} m")
-    return CellGrid(rows, columns, cell, (round(low_x - cell, _DIGITS), round(low_y - cell, _DIGITS)))
+    if rows * columns > maximum:
+        expected = f"expected at most {maximum // 1_000_000} million"
+        raise ParameterError(f"cell: {expected} cells, got {columns} x {rows} of {cell:g} m")
+    origin = (round(low_x - cell, _DIGITS), round(low_y - cell, _DIGITS))
+    return CellGrid(rows, columns, cell, origin)
 
 
 def find_free_cells(environment: Environment, grid: CellGrid) -> BoolArray:
-    """Return which cells of `grid` are free, (rows, columns), the lowest row first; ParameterError if none.
+    """Find the free cells of a grid.
 
-    A cell is free if its centre is, and nothing solid is lost: no wall is too thin, and no pillar too small,
-    to block a cell: where robots drive from side to side of cells they drive on the map.
+    A cell is free if its center is, and nothing solid is lost: no wall is too thin, and no pillar too small,
+    to block a cell. Where robots drive from cell to cell across a side, they drive on the map.
+
+    Parameters
+    ----------
+    environment : Environment
+    grid : CellGrid
+
+    Returns
+    -------
+    (rows, columns) array of bool
+        The lowest row first.
+
+    Raises
+    ------
+    ParameterError
+        If no cell is free.
     """
-    free = grid.covered(environment.free) & ~grid.between(environment.free)
-    # what is smaller than a cell may lie between all lines of centres
-    holes = np.array([shapely.polygons(ring) for part in environment.free.geoms for ring in part.interiors])
-    sides = shapely.bounds(holes).reshape(-1, 4)
-    small = (sides[:, 2:] - sides[:, :2]).max(axis=1, initial=0.0) < grid.cell
-    inside = shapely.get_coordinates(shapely.point_on_surface(holes[small]))
+    free = grid.find_covered_cells(environment.free) & ~grid.find_cells_of_thin_walls(environment.free)
+    # Obstacles smaller than a cell may lie between all lines of centers.
+    rings = [ring for part in environment.free.geoms for ring in part.interiors]
+    holes = np.array([shapely.polygons(ring) for ring in rings])
+    bounds = shapely.bounds(holes).reshape(-1, 4)
+    is_small = (bounds[:, 2:] - bounds[:, :2]).max(axis=1, initial=0.0) < grid.cell
+    inside = shapely.get_coordinates(shapely.point_on_surface(holes[is_small]))
     column, row = np.floor((inside - grid.origin) / grid.cell).astype(np.intp).T
     free[row, column] = False
     if not free.any():
@@ -114,63 +193,106 @@ def find_free_cells(environment: Environment, grid: CellGrid) -> BoolArray:
 
 
 def describe_lost_passages(environment: Environment, grid: CellGrid, free: BoolArray) -> tuple[str, ...]:
-    """Return what free space is lost in cells, or falls apart, and which cells would keep it."""
-    lost = _lost(environment, grid, free)
-    if not lost:
+    """Describe which free space is lost in cells, or divided, and which cells would keep it.
+
+    Parameters
+    ----------
+    environment : Environment
+    grid : CellGrid
+    free : (rows, columns) array of bool
+        The free cells.
+
+    Returns
+    -------
+    tuple of str
+        Empty if nothing is lost.
+    """
+    losses = _describe_losses(environment, grid, free)
+    if not losses:
         return ()
     for cell in _iterate_smaller_sizes(grid.cell):
         try:
-            finer = build_grid(environment, cell, _MOST_TRIED)
+            finer = build_grid(environment, cell, _MAX_TRIED_CELLS)
         except ParameterError:
-            most = f"at most {_MOST_TRIED // 1_000_000} million"
-            return (f"{lost}; no cells of which there are {most} keep it",)
-        if not _lost(environment, finer, find_free_cells(environment, finer)):
-            return (f"{lost}; cells of {cell:g} m keep it (--cell {cell:g})",)
+            maximum = f"at most {_MAX_TRIED_CELLS // 1_000_000} million"
+            return (f"{losses}; no cells of which there are {maximum} keep it",)
+        if not _describe_losses(environment, finer, find_free_cells(environment, finer)):
+            return (f"{losses}; cells of {cell:g} m keep it (--cell {cell:g})",)
     return ()
 
 
-def _lost(environment: Environment, grid: CellGrid, free: BoolArray) -> str:
+def _describe_losses(environment: Environment, grid: CellGrid, free: BoolArray) -> str:
+    """Return which parts of the free space are lost or divided in cells; empty if none is."""
     parts = np.array(environment.free.geoms)
-    parts = parts[shapely.area(parts) >= _LEAST]
+    parts = parts[shapely.area(parts) >= _MIN_PART_AREA_M2]
     islands, _ = ndimage.label(free)
-    large = np.flatnonzero(np.bincount(islands.ravel())[1:] * grid.cell**2 >= _LEAST)
+    areas = np.bincount(islands.ravel())[1:] * grid.cell**2
+    large = np.flatnonzero(areas >= _MIN_PART_AREA_M2)
     if len(parts) == 0 or len(parts) == len(large) == 1:
         return ""
-    places, windows = [], ndimage.find_objects(islands)
-    for k in large.tolist():
-        row, column = np.argwhere(islands[windows[k]] == k + 1)[0]
-        places.append((column + windows[k][1].start, row + windows[k][0].start))
-    centres = (np.array(places, dtype=float).reshape(-1, 2) + 0.5) * grid.cell + grid.origin
-    pieces = np.bincount(shapely.STRtree(parts).nearest(shapely.points(centres)), minlength=len(parts))
-    words = []
-    if (pieces == 0).any():
-        gone = int((pieces == 0).sum())
-        are = "is" if gone == 1 else "are"
-        words.append(f"{format_count(gone, 'separate part')} of the free space {are} lost")
+    centers = _find_island_cells(islands, large, grid)
+    pieces = np.bincount(shapely.STRtree(parts).nearest(shapely.points(centers)), minlength=len(parts))
+    losses = []
+    lost = int((pieces == 0).sum())
+    if lost:
+        verb = "is" if lost == 1 else "are"
+        losses.append(f"{format_count(lost, 'separate part')} of the free space {verb} lost")
     if (pieces > 1).any():
-        words.append(f"gaps close: the free space falls into {len(large)} parts, not {len(parts)}")
-    return "; ".join(words)
+        losses.append(f"gaps close: the free space falls into {len(large)} parts, not {len(parts)}")
+    return "; ".join(losses)
+
+
+def _find_island_cells(islands: NDArray[np.integer], chosen: IntArray, grid: CellGrid) -> Array:
+    """Return the center of the first cell of each chosen island, (n, 2) m."""
+    windows = ndimage.find_objects(islands)
+    cells = []
+    for island in chosen.tolist():
+        window = windows[island]
+        row, column = np.argwhere(islands[window] == island + 1)[0]
+        cells.append((column + window[1].start, row + window[0].start))
+    return (np.array(cells, dtype=float).reshape(-1, 2) + 0.5) * grid.cell + grid.origin
 
 
 def _iterate_smaller_sizes(cell: float) -> Iterator[float]:
-    """Return round sizes below that of a cell, the largest first."""
+    """Yield round sizes below that of a cell, m, the largest first."""
     for power in itertools.count(math.floor(-math.log10(cell))):
         for digit in (5, 2, 1):
-            if (size := round(digit * 10.0**-power, power)) < cell * (1 - 1e-9):
+            size = round(digit * 10.0**-power, power)
+            if size < cell * (1 - 1e-9):
                 yield size
 
 
 def describe_unsupported(environment: Environment, *, names: bool = True) -> tuple[str, ...]:
-    """Return what of `environment` a format has no place for, in words; most have none for `names`."""
-    lost = [f"starts: {', '.join(environment.starts)}"] if environment.starts else []
+    """Describe what of a map a format cannot store.
+
+    Parameters
+    ----------
+    environment : Environment
+    names : bool
+        Whether the format cannot store names of obstacles, as most cannot.
+    """
+    unsupported = []
+    if environment.starts:
+        unsupported.append(f"starts: {', '.join(environment.starts)}")
     if names and any(obstacle.name for obstacle in environment.obstacles):
-        lost.append("names of obstacles")
-    return tuple(lost)
+        unsupported.append("names of obstacles")
+    return tuple(unsupported)
 
 
 def build_grid_report(
     name: str, files: tuple[Path, ...], environment: Environment, grid: CellGrid, free: BoolArray
 ) -> ExportReport:
+    """Build the report on a map that was exported as free cells, (rows, columns).
+
+    Parameters
+    ----------
+    name : str
+        The format.
+    files : tuple of Path
+    environment : Environment
+    grid : CellGrid
+    free : (rows, columns) array of bool
+    """
     area = float(np.count_nonzero(free)) * grid.cell**2
     report = ExportReport(name, files, environment.free_area, area, describe_unsupported(environment))
     return replace(report, warnings=describe_lost_passages(environment, grid, free))

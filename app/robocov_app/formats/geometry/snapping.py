@@ -1,14 +1,14 @@
 """Closing of hairline gaps between outlines of free space.
 
 Rooms that are drawn one by one often miss each other by a rounding error. Such a gap is no wall, but it would
-cut the free space apart. A gap between two outlines is closed
+divide the free space. A gap between two outlines is closed
 
 - if it is narrower than `robocov.mapfile.models.MIN_SIZE_M`, as no obstacle of a map is that thin, or
 - if it is narrower than the snapping tolerance and lies between parts that the file does not connect in
   another way. Where a door leads through it, it is a wall, however thin.
 
-Only gaps between outlines are closed. A slit or a hole that an outline has by itself, a line and an outline
-that is solid are drawn on purpose and stay.
+Only gaps between outlines are closed. Slits and holes in a single outline, lines, and solid outlines
+are drawn on purpose and stay.
 """
 
 from collections.abc import Sequence
@@ -25,30 +25,45 @@ from robocov.errors import format_count
 from robocov.mapfile.models import MIN_SIZE_M
 from robocov_app.formats.geometry.polygons import buffer_with_mitres, to_multipolygon, unite
 
-DEFAULT_SNAP_M = 0.01  # thinner than any wall of a building
-MAX_DEFAULT_SNAP = 1e-3  # as a fraction of the larger side of a drawing: a table-top arena has thin walls
-_OVERLAP_M = 2 * GRID_M  # by how much what fills a gap reaches into what is beside it
-_REACH = 1.01  # in tolerances: how far beside an outline its neighbours are looked for
-_MIN_LENGTH = 3.0  # of a gap, in tolerances: beside a corner not more than two of them are near
-_MAX_WIDENING = 0.25  # by how many tolerances the middle half of a gap may widen
+DEFAULT_SNAP_M = 0.01
+"""Thinner than any wall of a building."""
+MAX_DEFAULT_SNAP = 1e-3
+"""Fraction of the larger side of a drawing, as a table-top arena has thin walls."""
+_OVERLAP_M = 2 * GRID_M
+"""Distance by which the filling of a gap extends into its surroundings."""
+_REACH = 1.01
+"""Distance, in tolerances, within which the neighbors of an outline are searched."""
+_MIN_LENGTH = 3.0
+"""Length of a gap, in tolerances; next to a corner, at most two of them are near."""
+_MAX_WIDENING = 0.25
+"""Number of tolerances by which the middle half of a gap may widen."""
 
 
 class ClosedGaps(NamedTuple):
-    """An area whose gaps were closed, the number of gaps, and the width of the widest, m."""
+    """An area whose gaps were closed.
+
+    Attributes
+    ----------
+    area : MultiPolygon, m
+    number : int
+        Number of gaps.
+    widest : float, m
+        Width of the widest gap.
+    """
 
     area: MultiPolygon
     number: int = 0
     widest: float = 0.0
 
     def describe(self) -> str:
-        """Return a line for the report of an import."""
+        """Return a line for the import report."""
         width = f"{1000 * self.widest:.2g} mm"
         size = f"{width} wide" if self.number == 1 else f"the widest {width}"
         return f"{format_count(self.number, 'gap')} between outlines closed, {size} (--snap 0 keeps them)"
 
 
 def compute_default_snap(areas: Sequence[BaseGeometry]) -> float:
-    """Return the snapping tolerance, m, for areas where the user gives none."""
+    """Return the snapping tolerance, m, for areas if the user gives none."""
     if not len(areas):
         return DEFAULT_SNAP_M
     left, low, right, high = shapely.total_bounds(areas)
@@ -62,7 +77,7 @@ def close_gaps(areas: Sequence[BaseGeometry], snap: float) -> ClosedGaps:
     ----------
     areas : sequence of polygons or multipolygons, m, valid
     snap : float, m
-        Gaps of this width and more stay.
+        Wider gaps stay.
 
     Returns
     -------
@@ -76,9 +91,10 @@ def close_gaps(areas: Sequence[BaseGeometry], snap: float) -> ClosedGaps:
     area = union_on_grid(outlines)
     if snap <= 0.0 or not _are_close(outlines, snap):
         return ClosedGaps(area)
-    # what is thinner than any obstacle of a map, wherever it is; then what cuts the area apart
-    hairlines = _find_gaps(outlines, min(snap, MIN_SIZE_M))
-    area = _fill(area, hairlines, min(snap, MIN_SIZE_M))
+    # Gaps thinner than any obstacle of a map are closed everywhere, others where they divide the area.
+    hairline_width = min(snap, MIN_SIZE_M)
+    hairlines = _find_gaps(outlines, hairline_width)
+    area = _fill(area, hairlines, hairline_width)
     cracks = _find_gaps(shapely.get_parts(area), snap)
     area = _fill(area, cracks, snap)
     widths = np.concatenate([hairlines.widths, cracks.widths])
@@ -86,85 +102,93 @@ def close_gaps(areas: Sequence[BaseGeometry], snap: float) -> ClosedGaps:
 
 
 class _Gaps(NamedTuple):
-    """The surroundings of gaps, (n,) areas around each, and their widths, (n,) m."""
+    """Gaps between polygons.
+
+    Attributes
+    ----------
+    surroundings : (n,) array of areas, m
+    widths : (n,) array, m
+    """
 
     surroundings: Array
     widths: Array
 
 
 def union_on_grid(areas: Sequence[BaseGeometry]) -> MultiPolygon:
-    """Return the union of areas, m, to the micrometre."""
-    # to unite first and round then takes a tenth of the time
+    """Return the union of areas, m, to the micrometer."""
+    # Uniting before rounding is ten times as fast.
     return to_multipolygon(shapely.set_precision(unite(areas), GRID_M))
 
 
-def are_edge_to_edge(one: BaseGeometry, other: BaseGeometry, tolerance: float) -> bool:
-    """Return whether two areas that do not overlap touch along an edge, or nearly do."""
-    if shapely.relate_pattern(one, other, "2********"):
+def are_edge_to_edge(first: BaseGeometry, second: BaseGeometry, tolerance: float) -> bool:
+    """Return whether two areas touch along an edge, within a tolerance in meters, and do not overlap."""
+    if shapely.relate_pattern(first, second, "2********"):
         return False
-    wall = shapely.intersection(shapely.boundary(one), shapely.buffer(other, _REACH * tolerance + GRID_M))
+    reach = shapely.buffer(second, _REACH * tolerance + GRID_M)
+    wall = shapely.intersection(shapely.boundary(first), reach)
     return bool(_find_longest(wall).length > _MIN_LENGTH * tolerance)
 
 
 def join_line_ends(lines: Sequence[LineString], tolerance: float) -> list[LineString]:
-    """Return lines whose ends, where they are nearer to each other than a tolerance, m, meet."""
+    """Move ends of lines that are closer to each other than a tolerance, m, to the same point."""
     if not lines:
         return []
     ends = [shapely.get_point(lines, 0), shapely.get_point(lines, -1)]
-    places = np.concatenate(ends)
-    one, other = STRtree(places).query(places, predicate="dwithin", distance=tolerance)
-    # of all that are near, the first in the file
-    first = np.full(len(places), len(places))
-    np.minimum.at(first, one, other)
-    joined = shapely.get_coordinates(places[first])
+    points = np.concatenate(ends)
+    index, near = STRtree(points).query(points, predicate="dwithin", distance=tolerance)
+    # Of all ends that are close, the first one in the file counts.
+    first = np.full(len(points), len(points))
+    np.minimum.at(first, index, near)
+    joined = shapely.get_coordinates(points[first])
     result = []
     for k, line in enumerate(lines):
-        points = shapely.get_coordinates(line)
-        points[0] = joined[k]
-        points[-1] = joined[len(lines) + k]
-        result.append(LineString(points))
+        vertices = shapely.get_coordinates(line)
+        vertices[0] = joined[k]
+        vertices[-1] = joined[len(lines) + k]
+        result.append(LineString(vertices))
     return result
 
 
 def _are_close(outlines: Array, snap: float) -> bool:
-    """Return whether any two outlines are nearer to each other than the tolerance."""
-    one, other = STRtree(outlines).query(outlines, predicate="dwithin", distance=snap)
-    return bool((one != other).any())
+    """Return whether any two outlines are closer to each other than the tolerance."""
+    first, second = STRtree(outlines).query(outlines, predicate="dwithin", distance=snap)
+    return bool((first != second).any())
 
 
 def _find_gaps(parts: Array, tolerance: float) -> _Gaps:
-    """Return the gaps between any two of some polygons that are narrower than a tolerance all along."""
-    one, other = STRtree(parts).query(parts, predicate="dwithin", distance=tolerance)
-    first = one < other
-    one, other = one[first], other[first]
-    near = np.unique(np.concatenate([one, other]))
+    """Return the gaps between pairs of polygons that are everywhere narrower than a tolerance."""
+    first, second = STRtree(parts).query(parts, predicate="dwithin", distance=tolerance)
+    is_ordered = first < second
+    first = first[is_ordered]
+    second = second[is_ordered]
+    near = np.unique(np.concatenate([first, second]))
     reach = np.full(len(parts), None, dtype=object)
     reach[near] = shapely.buffer(parts[near], _REACH * tolerance, quad_segs=2)
-    walls = shapely.intersection(shapely.boundary(parts[one]), reach[other])
+    walls = shapely.intersection(shapely.boundary(parts[first]), reach[second])
     walls = np.array([_find_longest(wall) for wall in walls], dtype=object)
-    widths = np.stack([_measure_distance(walls, parts[other], place) for place in (0.25, 0.5, 0.75)])
-    # where only corners are near, as of rooms across a crossing of gaps, there is nothing to close
+    widths = np.stack([_measure_distances(walls, parts[second], place) for place in (0.25, 0.5, 0.75)])
+    # Where only corners are near, as of rooms across a crossing of gaps, there is nothing to close,
     is_gap = shapely.length(walls) > _MIN_LENGTH * tolerance
-    # nor where the parts touch, or where a wall between them becomes thicker, as a wedge
+    # and neither where the parts touch, or where the wall between them is a wedge.
     is_gap &= (widths[1] > 0.0) & (np.ptp(widths, axis=0) <= _MAX_WIDENING * tolerance)
-    one, other = one[is_gap], other[is_gap]
-    return _Gaps(shapely.intersection(reach[one], reach[other]), widths[1, is_gap])
+    surroundings = shapely.intersection(reach[first[is_gap]], reach[second[is_gap]])
+    return _Gaps(surroundings, widths[1, is_gap])
 
 
 def _find_longest(wall: BaseGeometry) -> BaseGeometry:
-    """Return the longest line of a geometry; an empty one where there is none."""
+    """Return the longest line of a geometry; an empty one if there is none."""
     lines = [part for part in shapely.get_parts(shapely.line_merge(wall)) if isinstance(part, LineString)]
     return max(lines, key=shapely.length, default=LineString())
 
 
-def _measure_distance(walls: Array, parts: Array, place: float) -> Array:
-    """Return the distances, (n,) m, from a place on each wall, as a fraction of its length, to a part."""
-    points = shapely.line_interpolate_point(walls, place, normalized=True)
+def _measure_distances(walls: Array, parts: Array, fraction: float) -> Array:
+    """Return the distances, (n,) m, from a point on each wall, at a fraction of its length, to a part."""
+    points = shapely.line_interpolate_point(walls, fraction, normalized=True)
     return np.asarray(np.nan_to_num(shapely.distance(points, parts)))
 
 
 def _find_narrow(area: MultiPolygon, width: float) -> Array:
-    """Return what is not in an area, and narrower than `width`: what a disc of that width cannot reach."""
+    """Return the parts outside an area that are narrower than a width in meters."""
     grown = buffer_with_mitres(area, width / 2)
     closed = buffer_with_mitres(grown, -width / 2)
     pieces = shapely.get_parts(shapely.difference(closed, area))
@@ -172,7 +196,7 @@ def _find_narrow(area: MultiPolygon, width: float) -> Array:
 
 
 def _fill(area: MultiPolygon, gaps: _Gaps, width: float) -> MultiPolygon:
-    """Return an area with gaps, none wider than `width`, as a part of it."""
+    """Return an area united with gaps up to a width in meters."""
     if not len(gaps.widths):
         return area
     around = shapely.union_all(gaps.surroundings)

@@ -1,4 +1,4 @@
-"""Thin strokes of a raster: found by a morphological opening, which keeps the corners of what is wider."""
+"""Removal of thin strokes from a raster by a morphological opening that keeps the corners of wider shapes."""
 
 import math
 
@@ -8,22 +8,25 @@ from scipy import ndimage
 
 from robocov.arrays import BoolArray
 
-MAX_STROKE_PIXELS = 200  # wider strokes are no strokes; the halo of a strip grows with it
-_CORNER = 0.3  # of the width: how far an opening by a disc stays away from square corners, with some to spare
-_STRIP_CELLS = 1_000_000  # cells that are looked at together, which bounds the memory
+MAX_STROKE_PIXELS = 200
+"""Wider shapes are no strokes; the halo of a strip grows with this."""
+_CORNER_DISTANCE = 0.3
+"""Distance, in widths, to which an opening by a disc stays away from square corners, with some margin."""
+_STRIP_CELLS = 1_000_000
+"""Number of cells processed at once, which bounds the memory."""
+_SQUARE = np.ones((2, 2), dtype=bool)
 
 
 def remove_thin_strokes(solid: BoolArray, width: int) -> BoolArray:
-    """Return the cells of `solid` that belong to something at least as wide as a stroke.
+    """Remove shapes that are narrower than a width.
 
-    The opening by a disc of that width (Serra 1982, Image Analysis and Mathematical Morphology), grown
-    back into the corners that the disc does not reach.
+    This is the opening by a disc of that width (Serra 1982, Image Analysis and Mathematical Morphology),
+    grown back into the corners that the disc does not reach.
 
     Parameters
     ----------
     solid : (rows, columns) array of bool
     width : int, cells
-        What is narrower goes.
 
     Returns
     -------
@@ -35,33 +38,35 @@ def remove_thin_strokes(solid: BoolArray, width: int) -> BoolArray:
     halo = 3 * width
     rows = max(_STRIP_CELLS // solid.shape[1], halo)
     for top in range(0, len(solid), rows):
-        low, high = max(top - halo, 0), min(top + rows + halo, len(solid))
+        low = max(top - halo, 0)
+        high = min(top + rows + halo, len(solid))
         opened = _open(solid[low:high], width, above=top == 0, below=high == len(solid))
         kept[top : top + rows] = opened[top - low : top - low + rows]
     return kept
 
 
 def _open(solid: BoolArray, width: int, *, above: bool, below: bool) -> BoolArray:
-    # a frame along the edge of the picture is thin, too
-    margin = ((width if above else 0, width if below else 0), (width, width))
-    padded = np.pad(solid, margin)
-    # a disc around the corner of four cells has an even width: a square of four, then a disc around a cell
+    """Open a strip of a raster by a disc; `above`, `below`: whether it reaches the edge of the image."""
+    # Beyond the edge of the image nothing is solid, so that a frame along the edge is thin, too.
+    margin_above = width if above else 0
+    margin_below = width if below else 0
+    padded = np.pad(solid, ((margin_above, margin_below), (width, width)))
+    # A disc around a corner of cells has an even width: it is a disc around a cell, after a square of four.
     is_even = width % 2 == 0
-    core = ndimage.binary_erosion(padded, _SQUARE) if is_even else padded
+    core = padded
+    if is_even:
+        core = ndimage.binary_erosion(padded, _SQUARE)
     radius = (width - is_even - 1) / 2
-    core = _distance(core) > radius
-    opened = _distance(~core) <= radius
+    core = _compute_distance(core) > radius
+    opened = _compute_distance(~core) <= radius
     if is_even:
         opened = ndimage.binary_dilation(opened, _SQUARE)
-    opened = (_distance(~opened) <= math.ceil(_CORNER * width)) & padded
-    rows = slice(margin[0][0], len(padded) - margin[0][1])
+    opened = (_compute_distance(~opened) <= math.ceil(_CORNER_DISTANCE * width)) & padded
+    rows = slice(margin_above, len(padded) - margin_below)
     return np.asarray(opened[rows, width : padded.shape[1] - width])
 
 
-_SQUARE = np.ones((2, 2), dtype=bool)
-
-
-def _distance(cells: BoolArray) -> NDArray[np.float64]:
+def _compute_distance(cells: BoolArray) -> NDArray[np.float64]:
     """Return the distance of each cell to the nearest one that is not set; infinite where there is none."""
     if cells.all():
         return np.full(cells.shape, np.inf)

@@ -434,7 +434,7 @@ class _Drawing:
         if min(radii) <= 0.0:
             return []
         centre, (u, v) = np.array(place.lengths(element, "cx", "cy")), np.diag(radii)
-        return [(flatten_arc(centre, u, v, 0.0, 2 * np.pi, tolerance), True)]
+        return [(flatten_arc(centre, u, v, start=0.0, sweep=2 * np.pi, tolerance=tolerance), True)]
 
 
 def _rectangle(element: Element, place: _Place, tolerance: float) -> list[Array]:
@@ -453,7 +453,7 @@ def _rectangle(element: Element, place: _Place, tolerance: float) -> list[Array]
     for k, centre in enumerate(corners + inward):
         begin = np.pi + k * np.pi / 2
         first = centre + u * np.cos(begin) + v * np.sin(begin)
-        parts += [first[None], flatten_arc(centre, u, v, begin, np.pi / 2, tolerance)]
+        parts += [first[None], flatten_arc(centre, u, v, start=begin, sweep=np.pi / 2, tolerance=tolerance)]
     return [np.concatenate(parts)]
 
 

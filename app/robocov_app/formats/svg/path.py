@@ -241,7 +241,9 @@ class _Pen:
         if self._arcs:
             rows = np.array(self._arcs)
             centre, u, v = (rows[:, k : k + 1].copy().view(float) for k in (1, 2, 3))
-            flat = flatten_arcs(centre, u, v, rows[:, 4].real, rows[:, 5].real, tolerance, most)
+            flat = flatten_arcs(
+                centre, u, v, rows[:, 4].real, rows[:, 5].real, tolerance=tolerance, maximum=most
+            )
             curves.append((rows[:, 0].real.astype(np.intp), *flat))
         for index, _, steps in curves:
             count[index] = steps
