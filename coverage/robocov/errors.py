@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 JsonPath: TypeAlias = tuple[str | int, ...]
-"""Keys and indices, from the whole document inwards."""
+"""Keys and indices that lead to a value, from the outermost object inwards."""
 _MAX_QUOTED_CHARACTERS = 60
 """Longer values and names are cut in messages."""
 _MAX_LISTED_NAMES = 3
@@ -227,7 +227,7 @@ def to_one_line(text: object) -> str:
 
 
 def describe_error(error: Exception) -> str:
-    """Return the reason of an error on one line, without the file name that the operating system adds.
+    """Return the reason for an error on one line, without the file name that the operating system adds.
 
     Parameters
     ----------
@@ -279,7 +279,7 @@ def _is_plain_key(name: str) -> bool:
 
 
 def is_number(value: object, kind: type = Real) -> TypeGuard[Any]:
-    """Return whether a value is a number of a given kind. NumPy scalars are, but a `bool` is not.
+    """Return whether a value is a number of a given kind. NumPy scalars are numbers, a `bool` is not.
 
     Parameters
     ----------

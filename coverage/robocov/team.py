@@ -179,7 +179,7 @@ class Team:
         turning_rate: float = DEFAULT_TURNING_RATE_RAD_S,
         kinematics: str | None = None,
     ) -> Team:
-        """Build a team of equal robots, by default those of the paper.
+        """Build a team of identical robots, by default those of the paper.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Team files, TOML or JSON, which list groups of equal robots.
+"""Team files, TOML or JSON, which list groups of identical robots.
 
 [[group]]
 count = 2

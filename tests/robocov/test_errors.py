@@ -134,7 +134,7 @@ def test_a_package_with_the_name_of_a_built_in_controller_causes_a_warning(
     theirs = EntryPoint("rapf", "robocov.controllers.lloyd:Lloyd", "robocov.controllers")
     monkeypatch.setattr("robocov.controllers.registry.entry_points", lambda group: [theirs])
     with pytest.warns(
-        UserWarning, match="'rapf' of entry point .* expected another name than that of a built-in"
+        UserWarning, match="'rapf' of entry point .* expected a name other than that of a built-in"
     ):
         assert list_controller_classes()["rapf"] is rc.Rapf
 

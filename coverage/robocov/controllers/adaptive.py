@@ -198,7 +198,7 @@ class Adaptive(BaseController):
         )
 
     def _average_neighbors(self, seen: Observations, parameters: Array) -> Array:
-        """Return the mean parameters of each robot's neighbors; its own ones if it has no neighbors."""
+        """Return the mean parameters of each robot's neighbors; its own parameters if it has none."""
         means = parameters.copy()
         for robot in range(len(parameters)):
             neighbors = seen.neighbors.list_neighbors(robot)

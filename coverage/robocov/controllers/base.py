@@ -105,6 +105,10 @@ def inform_controller(controller: Controller, environment: Environment) -> Contr
     controller : Controller
     environment : Environment
 
+    Returns
+    -------
+    Controller
+
     Raises
     ------
     ParameterError

@@ -160,9 +160,9 @@ def _filter_own_positions(seen: Observations, previous: Estimates, team: Team) -
     fixes = np.where(was_displaced, 1.0, previous.fixes + 1.0)
     gain = np.maximum(1.0 / fixes, min(dt / _AVERAGING_S, 1.0))
     # The residual of a mean of k - 1 fixes is larger than the error of one fix.
-    square = 0.5 * residual * (1.0 - 1.0 / np.maximum(fixes, 1.0))
+    squared_error = 0.5 * residual * (1.0 - 1.0 / np.maximum(fixes, 1.0))
     variance_gain = np.maximum(1.0 / np.maximum(fixes - 1.0, 1.0), gain)
-    variance = previous.variance + variance_gain * (square - previous.variance)
+    variance = previous.variance + variance_gain * (squared_error - previous.variance)
     variance = np.where(was_displaced, previous.variance, variance)
     positions = predicted + gain[:, None] * (seen.positions - predicted)
     return positions, fixes, variance

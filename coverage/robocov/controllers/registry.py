@@ -112,7 +112,7 @@ def list_controller_classes() -> dict[str, type[Any]]:
 def _load_entry(entry: EntryPoint) -> type[Any]:
     """Load the controller class of an installed package, which runs its code."""
     if entry.name in CONTROLLERS:
-        raise ParameterError("expected another name than that of a built-in controller")
+        raise ParameterError("expected a name other than that of a built-in controller")
     return _add_names(entry.load(), entry.name)
 
 

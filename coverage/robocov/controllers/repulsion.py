@@ -137,7 +137,7 @@ class Rapf(BaseController):
     height: float = gain(1.0, "m", HEIGHT_HELP, low=1e-6)
 
     def begin(self, region: Region, team: Team) -> None:
-        """Return None: the memory, the triangulation of the last cells, is empty."""
+        """Return None, because the memory is the triangulation of the last cells, and there is none yet."""
 
     def decide(self, seen: Observations, memory: Mesh | None) -> Decision:
         """Compute the forces (24) of neighbors and of the closest obstacle point, and (27) of the target."""
@@ -173,8 +173,8 @@ class Howard(BaseController):
     of the robots.
 
     Obstacles are the points that the rays of the range sensor hit. Each ray carries an equal fraction of the
-    charge `k_obs`, so that its effect does not depend on the number of rays. Before the first scan the
-    closest obstacle point is taken for a straight wall.
+    charge `k_obs`, so that its effect does not depend on the number of rays. Before the first scan,
+    a straight wall through the closest obstacle point is assumed.
 
     The sum over all obstacles and robots, the inverse-square forces and the friction are based on general
     knowledge, not on the full text of the paper. Three choices are our own: each ray carries a fraction of
@@ -184,7 +184,7 @@ class Howard(BaseController):
 
     name = "howard"
     label = "Potential field"
-    summary = "potential field: all ranged obstacles and robots repel by 1/r², friction (Howard et al. 2002)"
+    summary = "potential field: obstacles in range and robots repel by 1/r², friction (Howard et al. 2002)"
     scanning = Scanning(rays=72, period=0.1)
 
     k_robots: float = gain(3.0, "N m²", "charge of the other robots")
@@ -242,8 +242,8 @@ class Poduri(BaseController):
     The two forces, their balance at η R_c and the degree of at least K are based on general knowledge, not on
     the full text of the paper. The following choices are our own. If at most K robots are within η R_c of a
     robot, the links to its K nearest neighbors are critical for it, before they are in danger. Robots know
-    only positions of others: each also keeps a link that, by the positions that it knows, is critical for the
-    neighbor. The closest obstacle point repels with (24), within `rho_obs`.
+    only positions of others: each also keeps a link that is critical for the neighbor, according to the
+    positions that it knows. The closest obstacle point repels with (24), within `rho_obs`.
 
     Links are never lost if robots can exert these forces: two robots that move apart at full speed have to be
     able to stop within (1 - η) R_c.
@@ -319,7 +319,7 @@ class Poduri(BaseController):
     def _is_critical_for_neighbor(
         self, seen: Observations, links: NearNeighbors, is_near: BoolArray, selected: IntArray
     ) -> BoolArray:
-        """Return whether links are critical for the neighbor, from the robots that the robot hears."""
+        """Return whether links are critical for the neighbor, according to the robots that are heard."""
         n = len(is_near)
         hears = np.eye(n, dtype=bool)
         first, second = seen.neighbors.list_pairs()
@@ -339,7 +339,7 @@ class Poduri(BaseController):
     def _is_critical_by_reports(
         self, seen: Observations, links: NearNeighbors, link_ranges: Array, selected: IntArray
     ) -> BoolArray:
-        """Return whether links are critical for the neighbor, from the positions that the robot received."""
+        """Return whether links are critical for the neighbor, according to the received positions."""
         is_critical = np.zeros(len(selected), dtype=bool)
         for k, link in enumerate(selected.tolist()):
             robot = links.robot[link]

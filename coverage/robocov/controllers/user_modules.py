@@ -63,9 +63,9 @@ def explain_fault(where: str, error: BaseException, when: str = "") -> RobocovEr
     where : str
         Beginning of the message, which names the controller.
     error : BaseException
-        The exception that the code raised. Notes that name a robot, as "robot 3", are added to the message.
+        The exception that the code raised. Notes such as "robot 3" are added to the message.
     when : str
-        End of the message, as " at 0.117 s".
+        End of the message, such as " at 0.117 s".
 
     Returns
     -------
@@ -83,7 +83,7 @@ def explain_fault(where: str, error: BaseException, when: str = "") -> RobocovEr
     fault = f"{type(error).__name__}: {message}" if message else type(error).__name__
     if isinstance(error, Exception):
         return ParameterError(f"{where}: {fault}{place}")
-    return ControllerEndedError(f"{where}: it ended Python by {fault}{place}")
+    return ControllerEndedError(f"{where}: it ended Python with {fault}{place}")
 
 
 def explain_user_fault(error: BaseException) -> RobocovError | None:

@@ -52,7 +52,7 @@ class Environment(Drawable):
         ``$schema`` of the map file, kept unchanged.
     density : Density or None
         φ, how much each point counts. It is part of the task, and robots know it. None if all points count
-        the same.
+        equally.
 
     Examples
     --------

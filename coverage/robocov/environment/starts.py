@@ -26,7 +26,7 @@ from robocov.errors import StartError, format_count, is_number, quote
 MIN_START_GAP_RADII = 0.02
 """Minimum gap between two robots, and between robots and walls, at the start, in radii of a robot."""
 MAX_COUNTED_ROBOTS = 2000
-"""Maximum number of robots for which the capacity of a start is found by packing; above, from the area."""
+"""Maximum capacity of a start that is found by packing; larger ones are estimated from the area."""
 _DISC_QUADRANT_SEGMENTS = 64
 """Edges per quadrant of the polygon that represents the disc of a start."""
 

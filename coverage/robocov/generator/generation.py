@@ -155,10 +155,10 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     kind : str
         One of `GENERATORS`.
     obstacles : int or None
-        Number of obstacles, blocks or rooms; approximate number of cells of a maze or chambers of a cave. By
-        default, what suits the kind.
+        Number of obstacles, blocks or rooms; approximate number of cells of a maze or chambers of a cave. The
+        default depends on the kind.
     area : float or None
-        Blocked fraction of the map's area. By default, what suits the kind.
+        Blocked fraction of the map's area. The default depends on the kind.
     gap : float, m
         Smallest width of a passage.
     side : float, m

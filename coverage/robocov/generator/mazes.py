@@ -1,9 +1,9 @@
 """Maps of the kind `mazes`: corridors on a grid of cells, some dead ends, some loops.
 
 The passages are a spanning tree of the grid, grown cell by cell ("growing tree": J. Buck, *Mazes for
-Programmers*, 2015, chapter 11). Growing from the newest cell makes long winding corridors, as in a depth-first
-search; growing from a random cell makes many short ones. After that, some walls are removed, preferably those
-at dead ends ("braiding").
+Programmers*, 2015, chapter 11). Growing from the newest cell makes long winding corridors, as in a
+depth-first search; growing from a random cell makes many short ones. After that, some walls are removed,
+preferably those at dead ends ("braiding").
 
 A post is a point where two lines of the grid cross. Walls are a boolean array (columns + 1, rows + 1, 2):
 whether a wall leads from each post upwards (0) and to the right (1).

@@ -30,7 +30,7 @@ _TOLERANCE_M = 1e-9
 
 
 def scatter_polygons(request: Request, corner: DiscStart, rng: np.random.Generator) -> list[Obstacle] | None:
-    """Scatter obstacles that keep the gap from each other and from the boundary.
+    """Scatter obstacles that are at least the requested gap from each other and from the boundary.
 
     Parameters
     ----------

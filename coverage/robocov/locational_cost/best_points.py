@@ -4,8 +4,8 @@ It is found by Newton's method, in all cells at once. For f = r the cost of a co
 For f = 1/(r²+h²) it need not be, but it has no second optimum: f is (-1/2)-concave, and in the plane the
 integral of such a function over a convex set that moves is quasi-concave (Borell; Brascamp and Lieb). Along
 any line the cost therefore first falls and then rises. If it still falls at the end of a step, the step was
-not too long. A step must satisfy this condition and stay in the cell; there are no other conditions. The search
-never computes the difference of two costs, which would suffer from cancellation.
+not too long. A step must satisfy this condition and stay in the cell; there are no other conditions. The
+search never computes the difference of two costs, which would suffer from cancellation.
 """
 
 from typing import NamedTuple
@@ -227,7 +227,7 @@ def _advance(search: _Search, derivatives: CellDerivatives, sign: float, last_st
             search.slope[i] = gradient_x * step_x + gradient_y * step_y
             search.fraction[i] = 1.0
         elif clearance >= 0.0:
-            # To where the slope would be zero if it changed linearly, within limits.
+            # Shorten the step to where the slope would be zero if it changed linearly, within limits.
             zero_slope = search.slope[i] / min(search.slope[i] - slope, -1e-300)
             search.fraction[i] *= min(max(zero_slope, _MIN_SHORTENING), _MAX_SHORTENING)
         else:
@@ -278,7 +278,7 @@ def _compute_descent_step(
     else:
         magnitude = 1.0
         small = xx * yy - xy * xy
-    # Its eigenvector, for which the longer of two expressions is taken.
+    # Its eigenvector. Of two expressions for it, the longer one is more accurate.
     tilt = sign * half_difference
     if tilt >= 0.0:
         x = radius + tilt

@@ -238,7 +238,7 @@ def _find_warnings(environment: Environment, gap: Gap | None, radius: float) -> 
         (a, b), (c, d) = gap.between
         yield (
             f"the gap between [{a:.4g}, {b:.4g}] and [{c:.4g}, {d:.4g}] is {gap.width:.3g} m wide: "
-            f"a robot of radius {radius:g} m does not pass"
+            f"a robot of radius {radius:g} m cannot pass"
         )
     yield from _find_start_warnings(environment, radius)
 

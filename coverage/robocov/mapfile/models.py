@@ -22,9 +22,9 @@ MAX_SPEED_M_S = 10.0
 """Range of the speed of an obstacle."""
 MIN_SIZE_M = 1e-3
 MAX_SIZE_M = 1e4
-"""Range of the sizes of everything."""
+"""Range of all lengths and extents."""
 MAX_COORDINATE_M = 1e7
-"""National grids fit, and micrometers are still distinguished."""
+"""Large enough for the coordinates of national grids, and small enough to distinguish micrometers."""
 MIN_WEIGHT = 1e-9
 """Smaller weights are read as 0, because they are written as 0."""
 MAX_LABEL_CHARACTERS = 100
@@ -170,7 +170,7 @@ KEYS = {
     ),
     "holes": KeySpecification(
         list[VertexRing],
-        "Rings inside, which do not belong to it",
+        "Outlines of the holes, inside the vertices",
         _EXAMPLE_HOLES,
         ("a list of rings", *RING_EXPECTED),
     ),
@@ -205,7 +205,7 @@ def _build_model(described_class: Any, kind: str | None = None) -> type[Model]:
     defaults = {field.name: field.default for field in fields(described_class)}
     members: dict[str, Any] = {}
     if kind is not None:
-        members["kind"] = (Literal[kind], _describe("Kind, which decides on the other keys", kind))
+        members["kind"] = (Literal[kind], _describe("Kind, which determines the other keys", kind))
     for name, key in KEYS.items():
         if name not in defaults:
             continue
@@ -251,7 +251,7 @@ KEYS["areas"] = _specify_list(
 class RasterModel(Model, title="raster density"):
     """A density given by rows of numbers, or by an image file."""
 
-    kind: Literal["raster"] = _describe("Kind, which decides on the other keys", "raster")
+    kind: Literal["raster"] = _describe("Kind, which determines the other keys", "raster")
     extent: Extent | None = _describe(
         "Covered rectangle [x_min, y_min, x_max, y_max] in m; the bounding box of the boundary by default",
         [0, 0, 10, 6],
@@ -326,7 +326,7 @@ class MapModel(Model, title="robocov map"):
     density: DensityModel | None = _describe(
         "Weights of the points; all the same by default", _EXAMPLE_DENSITY, None
     )
-    extra: dict[str, Any] = _describe("Any keys of yours, which are preserved", {"author": "Ada"}, {})
+    extra: dict[str, Any] = _describe("Your own keys, which are preserved", {"author": "Ada"}, {})
 
 
 def to_json_value(value: Any) -> Any:
@@ -335,7 +335,7 @@ def to_json_value(value: Any) -> Any:
     Parameters
     ----------
     value : object
-        An obstacle, start or density, or numbers, texts and sequences of them.
+        An obstacle, start or density, or numbers, strings and sequences of them.
 
     Returns
     -------

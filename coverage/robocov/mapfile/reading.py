@@ -1,4 +1,4 @@
-"""Read maps from files, texts and JSON documents, and find the bundled ones."""
+"""Read maps from files, strings and JSON documents, and find the bundled ones."""
 
 import json
 from contextlib import suppress
@@ -120,7 +120,7 @@ def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Envi
     Raises
     ------
     MapError
-        As `load_map`.
+        See `load_map`.
     """
     document = parse_json(text, where)
     try:

@@ -19,13 +19,13 @@ _MAX_LINE_CHARACTERS = 100
 """Objects up to this length are written on one line, counting two characters for each number."""
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _NUMERIC_KEYS = ("boundary", "obstacles", "starts", "density")
-"""Keys of numbers that `dump_map` writes short."""
+"""Keys whose numbers `dump_map` shortens."""
 _EXPANDED_KEYS = ("obstacles", "starts")
 """Keys whose items are written on lines of their own."""
 _DIGITS = 9
-"""Decimal places of coordinates in meters: no map means fractions of a nanometer."""
+"""Decimal places of coordinates in meters: smaller fractions of a map have no meaning."""
 _MAX_ERROR_ULPS = 16
-"""Largest rounding error of a few sums and a rotation, in units in the last place, of 1 m at least."""
+"""Largest rounding error of a few sums and a rotation, in ulps of the number, or of 1 m if it is smaller."""
 
 
 def to_json(environment: Environment) -> dict[str, Any]:

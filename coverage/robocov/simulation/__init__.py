@@ -1,7 +1,7 @@
 """Simulations: all robots observe, all decide, then all move.
 
 - `simulation`: one run of one team
-- `batch`: many runs of equal teams, advanced together
+- `batch`: many runs of identical teams, advanced together
 - `team_state`: the state from which a run starts or continues
 - `controller_caller`: calls to controllers, with checks of what they return
 - `sensing`: observations of robots with exact sensors

@@ -1,4 +1,4 @@
-"""The simulation of many runs of equal teams, advanced together."""
+"""The simulation of many runs of identical teams, advanced together."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class _BatchDecision(NamedTuple):
 
 
 class SimulationBatch:
-    """Independent runs of equal teams in one environment, advanced together.
+    """Independent runs of identical teams in one environment, advanced together.
 
     Small teams under a controller without memory (RAPF, RPF, Lloyd, range-limited) take a fraction of the
     time of separate simulations. Any other controller is called once for each run.

@@ -58,7 +58,7 @@ def count_steps(duration: float, dt: float) -> int:
 
 
 def check_team(team: Any, robots: int) -> Team:
-    """Return a team of the expected size, by default one of equal robots.
+    """Return a team of the expected size, by default one of identical robots.
 
     Parameters
     ----------

@@ -86,7 +86,7 @@ class Simulation:
 
     See Also
     --------
-    SimulationBatch : Many runs of equal teams, advanced together.
+    SimulationBatch : Many runs of identical teams, advanced together.
 
     Notes
     -----

@@ -75,7 +75,7 @@ def list_warnings(environment: Environment) -> list[str]:
 def test_a_gap_that_no_robot_passes() -> None:
     environment = room(block(4, 0, 1, 2.9), block(4, 3.05, 1, 3))
     assert list_warnings(environment) == [
-        "the gap between [4, 2.9] and [4, 3.05] is 0.15 m wide: a robot of radius 0.1 m does not pass"
+        "the gap between [4, 2.9] and [4, 3.05] is 0.15 m wide: a robot of radius 0.1 m cannot pass"
     ]
     assert check_map(environment, radius=0.07).warnings == ()
 

@@ -106,7 +106,7 @@ def test_changes_are_marked_since_the_last_valid_state(
     assert len(blocks) == 5
     assert "was" not in blocks[1] and "  area " in blocks[2]
     assert "narrowest gap  0.100 m, between" in blocks[3] and ", was 1.500 m, between" in blocks[3]
-    assert "warning        the gap between" in blocks[3] and "does not pass (new)" in blocks[3]
+    assert "warning        the gap between" in blocks[3] and "cannot pass (new)" in blocks[3]
     assert f"{file}: invalid\n{file}:6:52: obstacles[0].radius: expected a number" in blocks[3]
     assert ", was 0.100 m, between" in blocks[4] and "no longer      the gap between" in blocks[4]
     assert "free area      55.3" in blocks[4]

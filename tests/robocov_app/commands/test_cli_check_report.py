@@ -45,7 +45,7 @@ def test_changed_values_are_printed_with_the_previous_ones(hall: Environment) ->
     )
     assert after["start all"] == "disc, room for about 23, was none"
     assert after["start corner"] == "none, was disc, room for about 23"
-    assert after["warning"].endswith("does not pass (new)")
+    assert after["warning"].endswith("cannot pass (new)")
     assert after["name"] == "hall"
 
 

@@ -156,7 +156,7 @@ def test_a_controller_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[
         ),
         (
             "def __post_init__(self): exit(0)",
-            "'Mine' cannot be created: it ended Python by SystemExit: 0 (mine.py, line 7)",
+            "'Mine' cannot be created: it ended Python with SystemExit: 0 (mine.py, line 7)",
         ),
         (
             "def __post_init__(self): raise TypeError('no')",
@@ -183,7 +183,7 @@ def test_a_controller_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[
         ("scanning = 5", "controller 'Mine': scanning: expected a Scanning, got 5"),
         (
             "def begin(self, region, team): exit(1)",
-            "controller 'Mine': it ended Python by SystemExit: 1 (mine.py, line 7) at 0.000 s",
+            "controller 'Mine': it ended Python with SystemExit: 1 (mine.py, line 7) at 0.000 s",
         ),
         (
             "def decide(self, seen, memory): return 3",
@@ -249,7 +249,7 @@ def test_a_gain_of_no_use_is_refused(value: str, message: str, capsys: pytest.Ca
             "return None",
             "controller 'Mine': force(own) returned None (is a return statement missing?) for robot 1",
         ),
-        ("raise SystemExit(0)", "controller 'Mine': it ended Python by SystemExit: 0 (mine.py, line 5)"),
+        ("raise SystemExit(0)", "controller 'Mine': it ended Python with SystemExit: 0 (mine.py, line 5)"),
         (
             "return [float('nan'), 0]",
             "controller 'Mine': force(own) returned [nan, 0] for robot 1 at 0.000 s",

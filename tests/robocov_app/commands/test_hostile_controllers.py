@@ -31,11 +31,11 @@ class Mine:
 """
 SMALL = ["--duration", "0.3", "--robots", "2", "--lattice", "16", "--no-pictures", "--out", "out"]
 RAISED = {
-    "sys.exit()": "controller 'Mine': it ended Python by SystemExit (mine.py, line 16) for robot 1 at 0.",
-    "sys.exit(0)": "controller 'Mine': it ended Python by SystemExit: 0 (mine.py, line 16)",
-    "raise Odd('hm')": "controller 'Mine': it ended Python by Odd: hm (mine.py, line 16)",
-    "raise GeneratorExit": "controller 'Mine': it ended Python by GeneratorExit (mine.py, line 16)",
-    "raise KeyboardInterrupt": "of your own: it ended Python by KeyboardInterrupt (mine.py, line 16)",
+    "sys.exit()": "controller 'Mine': it ended Python with SystemExit (mine.py, line 16) for robot 1 at 0.",
+    "sys.exit(0)": "controller 'Mine': it ended Python with SystemExit: 0 (mine.py, line 16)",
+    "raise Odd('hm')": "controller 'Mine': it ended Python with Odd: hm (mine.py, line 16)",
+    "raise GeneratorExit": "controller 'Mine': it ended Python with GeneratorExit (mine.py, line 16)",
+    "raise KeyboardInterrupt": "of your own: it ended Python with KeyboardInterrupt (mine.py, line 16)",
     "sys.stdout.close()": "controller mine.py:Mine: it closed the standard output",
     "os.close(1)": "controller mine.py:Mine: it closed the standard output",
     "os.close(2)": "controller mine.py:Mine: it closed the standard error",

@@ -92,7 +92,7 @@ def test_a_controller_of_ones_own_is_kept_with_its_text(tmp_path: Path) -> None:
         ),
         (
             "        raise SystemExit(3)\n",
-            "controller 'Mine': it ended Python by SystemExit: 3 (mine.py, line 11) for robot 1 at 0.000 s",
+            "controller 'Mine': it ended Python with SystemExit: 3 (mine.py, line 11) for robot 1 at 0.000 s",
         ),
         (
             "        raise ValueError('a\\nb\\udcff')\n",
