@@ -212,7 +212,7 @@ def read(place: Path, seconds: float) -> Cost:
     import resource
 
     from robocov.errors import RobocovError
-    from robocov_app.formats import ReadOptions, Shaping, build_environment, detect, import_map
+    from robocov_app.formats import ReadOptions, Shaping, build_environment, detect_format, import_map
 
     # what imports need is the fault of no file
     options = {"wkt": ReadOptions(), "pgm": ReadOptions(cell=1.0), "dxf": ReadOptions(scale=1.0)}
@@ -221,7 +221,7 @@ def read(place: Path, seconds: float) -> Cost:
         warm = place.with_name(f"warm.{suffix}")
         warm.write_text(text)
         import_map(warm, options=options[suffix])
-    kind = detect(place)
+    kind = detect_format(place)
     given = ReadOptions(**{name: 1.0 for name in ("cell", "scale") if name in kind.options})
     if kind.name == "picture":
         given = ReadOptions(cell=0.1)

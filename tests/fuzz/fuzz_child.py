@@ -99,7 +99,7 @@ def _import(path: Path, job: dict[str, Any]) -> str:
         path, format=job["format"], options=ReadOptions(**options), shaping=Shaping(**job["shaping"])
     )
     json.dumps(report.to_dict(), allow_nan=False)
-    for line in report.lines():
+    for line in report.format_lines():
         _require_one_line(line)
     return _require_map(environment)
 

@@ -18,39 +18,45 @@ from shapely import MultiPolygon
 from robocov.arrays import Array
 from robocov.errors import quote, to_one_line
 from robocov.mapfile.models import MAX_SIZE_M
-from robocov_app.formats.base import ForeignMap, ReadOptions
+from robocov_app.formats.files.xml_tree import Element, read_xml_tree
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, build_frame, transform_points
 from robocov_app.formats.geometry.shapes import Shapes
-from robocov_app.formats.xml_tree import Element, read_xml_tree
+from robocov_app.formats.options import ReadOptions
 
 MOST_PLACED = 4_000  # entities that a file places in a grid or at one place
 _UPRIGHT = 1e-6  # bodies that are turned about other axes than z by more are tilted, in degrees
 
 
+def sniff(path: Path, head: bytes) -> bool:
+    """Return whether a file that starts with `head` has this format."""
+    return b"<argos-configuration" in head
+
+
 def read(path: Path, options: ReadOptions) -> ForeignMap:
     root = read_xml_tree(path, "argos-configuration", "an experiment of ARGoS")
-    arena = root.child("arena")
+    arena = root.find_child("arena")
     if arena is None:
         root.refuse("no <arena>")
     shapes = Shapes(root.where, options)
     size = _lengths(arena, "size")[:2]
-    corner = arena.numbers("center", count=3, default="0,0,0")[:2] - size / 2
+    corner = arena.parse_numbers("center", count=3, default="0,0,0")[:2] - size / 2
     world = MultiPolygon([shapely.box(*corner, *(corner + size))])
     for child in arena.children:
         if child.tag == "distribute":
             _distribute(child, shapes)
-        elif (body := child.child("body")) is not None:
-            position = body.numbers("position", count=3, default="0,0,0")
-            _place(child, position, body.numbers("orientation", count=3, default="0,0,0"), shapes)
+        elif (body := child.find_child("body")) is not None:
+            position = body.parse_numbers("position", count=3, default="0,0,0")
+            _place(child, position, body.parse_numbers("orientation", count=3, default="0,0,0"), shapes)
     return shapes.build_foreign_map(path.stem, "An arena of ARGoS, imported.", solid=True, world=world)
 
 
 def _distribute(element: Element, shapes: Shapes) -> None:
-    parts = {tag: element.child(tag) for tag in ("position", "orientation", "entity")}
+    parts = {tag: element.find_child(tag) for tag in ("position", "orientation", "entity")}
     position, orientation, entity = parts.values()
     if position is None or orientation is None or entity is None or not entity.children:
         element.refuse("expected <position>, <orientation> and <entity> with something in it")
-    quantity = int(entity.numbers("quantity", count=1)[0])
+    quantity = int(entity.parse_numbers("quantity", count=1)[0])
     thing = entity.children[0]
     methods = [part.attributes.get("method", "") for part in (position, orientation)]
     if methods[0] not in ("grid", "constant") or methods[1] != "constant":
@@ -58,15 +64,15 @@ def _distribute(element: Element, shapes: Shapes) -> None:
         return
     if not 0 <= quantity <= MOST_PLACED:
         entity.refuse(f"expected a number from 0 to {MOST_PLACED}, got quantity {quantity}")
-    turn = orientation.numbers("values", count=3)
+    turn = orientation.parse_numbers("values", count=3)
     if methods[0] == "constant":
-        places = [position.numbers("values", count=3)] * quantity
+        places = [position.parse_numbers("values", count=3)] * quantity
     else:
-        layout = position.numbers("layout", count=3).astype(int)
+        layout = position.parse_numbers("layout", count=3).astype(int)
         if not (layout > 0).all() or math.prod(layout.tolist()) < quantity:
             position.refuse(f"expected one for {quantity}, got layout {layout.tolist()}")
-        gaps = position.numbers("distances", count=3)
-        first = position.numbers("center", count=3) + (layout - 1) * gaps / 2
+        gaps = position.parse_numbers("distances", count=3)
+        first = position.parse_numbers("center", count=3) + (layout - 1) * gaps / 2
         k = np.arange(quantity)
         steps = [k % layout[0], k // layout[0] % layout[1], k // (layout[0] * layout[1])]
         places = [*(first - np.column_stack(steps) * gaps)]
@@ -94,7 +100,7 @@ def _place(element: Element, position: Array, turn: Array, shapes: Shapes) -> No
 
 
 def _lengths(element: Element, name: str, count: int = 3) -> Array:
-    values = element.numbers(name, count=count)
+    values = element.parse_numbers(name, count=count)
     if not (values[:2].min() >= 1e-6 and values[:2].max() <= MAX_SIZE_M):
         element.refuse(f"expected lengths above 0, got {name} {quote(element.attributes[name])}")
     return values

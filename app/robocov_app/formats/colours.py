@@ -1,4 +1,4 @@
-"""Colours of a drawing that are declared free, solid or ignored, and what is painted in which colour."""
+"""Colours of drawings and pictures, and the roles that the user declares for them."""
 
 from __future__ import annotations
 
@@ -17,13 +17,20 @@ Colour: TypeAlias = tuple[int, int, int]
 Role: TypeAlias = Literal["free", "solid", "ignore"]
 ROLES: tuple[Role, ...] = ("free", "solid", "ignore")
 WHITE: Colour = (255, 255, 255)
-NO_ROLE = 0  # in arrays of roles, where a role is its index in `ROLES` plus one
-PICTURE_TOLERANCE = 24.0  # levels per channel: what saving as JPEG and soft edges change
-DARK, PALE = 0.5, 0.75  # luminance below which paint is dark, and from which it is pale
-_LUMA = (0.299, 0.587, 0.114)  # weights of red, green and blue (ITU-R BT.601)
-_MAX_COLOURS = 32  # declared in one import: each is compared with every pixel
-_MAX_NAMED = 6  # colours that are listed in a line
-_MAX_LETTERS = 100  # of the name of a colour
+NO_ROLE = 0
+"""Value in arrays of roles, in which a role is its index in `ROLES` plus one."""
+PICTURE_TOLERANCE = 24.0
+"""Tolerance of a picture, in levels: JPEG compression and soft edges change colours by that much."""
+MAX_DARK_LUMINANCE = 0.5
+"""Paint with a lower luminance is dark."""
+MIN_PALE_LUMINANCE = 0.75
+"""Paint with this luminance or a higher one is pale."""
+_LUMA_WEIGHTS = (0.299, 0.587, 0.114)
+"""Weights of red, green and blue (ITU-R BT.601)."""
+_MAX_COLOURS = 32
+"""Largest number of declared colours: each is compared with every pixel."""
+_MAX_LISTED_COLOURS = 6
+_MAX_NAME_CHARACTERS = 100
 _FUNCTION = re.compile(r"rgba?\(([^()]*)\)", re.IGNORECASE)
 _NUMBER = re.compile(r"\+?(\d{1,9}(?:\.\d{0,9})?|\.\d{1,9})(%?)", re.ASCII)
 
@@ -37,6 +44,10 @@ class ColourKey:
     entries : sequence of (colour, role)
     tolerance : float
         Largest difference in each of red, green and blue, from 0 to 255.
+
+    Notes
+    -----
+    A key without entries is false.
     """
 
     entries: tuple[tuple[Colour, Role], ...] = ()
@@ -66,18 +77,22 @@ class ColourKey:
         return bool(self.entries)
 
     def find_role(self, colour: Colour | None) -> Role | None:
-        """Return the role of the nearest declared colour within the tolerance."""
+        """Return the role of the nearest declared colour within the tolerance, or None."""
         if colour is None or not self.entries:
             return None
         code = int(self.classify(np.array([[colour]], dtype=np.uint8))[0, 0])
         return None if code == NO_ROLE else ROLES[code - 1]
 
     def find_nearest(self, colour: Colour) -> Colour | None:
-        """Return the nearest colour of the key within the tolerance, whatever its role."""
-        distances = [max(abs(a - b) for a, b in zip(colour, its, strict=True)) for its, _ in self.entries]
-        if not distances or min(distances) > self.tolerance:
-            return None
-        return self.entries[distances.index(min(distances))][0]
+        """Return the nearest colour of the key within the tolerance, of any role, or None."""
+        nearest: Colour | None = None
+        smallest_difference = np.inf
+        for entry, _ in self.entries:
+            difference = max(abs(a - b) for a, b in zip(colour, entry, strict=True))
+            if difference <= self.tolerance and difference < smallest_difference:
+                nearest = entry
+                smallest_difference = difference
+        return nearest
 
     def classify(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return the roles of pixels.
@@ -105,7 +120,15 @@ class ColourKey:
 
 
 class Paint(NamedTuple):
-    """The colour of a fill or a stroke as it is seen on white, if known; its role, if one was declared."""
+    """The paint of a fill or a stroke.
+
+    Attributes
+    ----------
+    colour : tuple of 3 int or None
+        Colour on a white page, if it is known.
+    role : str or None
+        Declared role of the colour.
+    """
 
     colour: Colour | None = None
     role: Role | None = None
@@ -115,60 +138,68 @@ UNPAINTED = Paint()
 
 
 def parse_colour(text: str, option: str) -> Colour:
-    """Return the colour of a CSS name or of ``#rrggbb``.
+    """Return the colour of a CSS name or of ``#rrggbb``, given as an option.
 
     Raises
     ------
     ParameterError
-        If it is neither; the message begins with `option`.
+        If the text is neither; the message begins with `option`.
     """
-    colour = None if text.strip().casefold() == "transparent" else read_colour(text)
+    colour = None if text.strip().casefold() == "transparent" else parse_css_colour_on_white(text)
     if colour is None:
-        wanted = "a colour name or #rrggbb, as in lightblue or '#add8e6'"
-        raise ParameterError(f"{option}: expected {wanted}, got {quote(text)}")
+        expected = "a colour name or #rrggbb, as in lightblue or '#add8e6'"
+        raise ParameterError(f"{option}: expected {expected}, got {quote(text)}")
     return colour
 
 
-def read_colour(text: str) -> Colour | None:
-    """Return the colour that CSS text stands for, mixed with white where it is translucent, or None."""
-    found = read_paint(text)
-    return None if found is None else mix_with_white(*found)
+def parse_css_colour_on_white(text: str) -> Colour | None:
+    """Return the colour of a CSS text on a white page, or None if it is not a colour."""
+    paint = parse_css_colour(text)
+    if paint is None:
+        return None
+    colour, opacity = paint
+    return mix_with_white(colour, opacity)
 
 
-def read_paint(text: str) -> tuple[Colour, float] | None:
-    """Return the colour and the opacity that CSS text stands for, or None."""
+def parse_css_colour(text: str) -> tuple[Colour, float] | None:
+    """Return the colour and the opacity, from 0 to 1, of a CSS text, or None if it is not a colour."""
     from PIL import ImageColor
 
     text = text.strip()
-    if len(text) > _MAX_LETTERS:
+    if len(text) > _MAX_NAME_CHARACTERS:
         return None
     if text.casefold() == "transparent":
         return (0, 0, 0), 0.0
-    if (function := _FUNCTION.fullmatch(text)) is not None:
-        return _read_rgb(function[1])
+    function = _FUNCTION.fullmatch(text)
+    if function is not None:
+        return _parse_rgb_arguments(function[1])
     try:
         red, green, blue, *alpha = ImageColor.getrgb(text)
     except (ValueError, TypeError):
         return None
-    return (red, green, blue), alpha[0] / 255 if alpha else 1.0
+    opacity = alpha[0] / 255 if alpha else 1.0
+    return (red, green, blue), opacity
 
 
-def _read_rgb(arguments: str) -> tuple[Colour, float] | None:
-    """Read what stands between the brackets of ``rgb()``, in any of the ways of CSS Color 4."""
+def _parse_rgb_arguments(arguments: str) -> tuple[Colour, float] | None:
+    """Return the colour and the opacity of the arguments of ``rgb()``, in any notation of CSS Color 4."""
     levels: list[float] = []
     for word in re.split(r"[\s,/]+", arguments.strip()):
         number = _NUMBER.fullmatch(word)
         if number is None:
             return None
-        whole = 1.0 if len(levels) == 3 else 255.0
-        levels.append(min(float(number[1]) * (whole / 100 if number[2] else 1.0), whole))
+        maximum = 1.0 if len(levels) == 3 else 255.0
+        unit = maximum / 100 if number[2] else 1.0
+        levels.append(min(float(number[1]) * unit, maximum))
     if len(levels) not in (3, 4):
         return None
     red, green, blue = (round(level) for level in levels[:3])
-    return (red, green, blue), levels[3] if len(levels) == 4 else 1.0
+    opacity = levels[3] if len(levels) == 4 else 1.0
+    return (red, green, blue), opacity
 
 
 def mix_with_white(colour: Colour, opacity: float) -> Colour:
+    """Return a colour as it appears on white with an opacity from 0 to 1."""
     red, green, blue = (round(255 + (level - 255) * opacity) for level in colour)
     return red, green, blue
 
@@ -179,14 +210,15 @@ def name_colour(colour: Sequence[int]) -> str:
 
 
 def count_colours(colours: Iterable[Colour | None]) -> str:
-    """Return the names of colours with how often each occurs, the most frequent first; None is left out."""
+    """Return the names of colours with their frequencies, the most frequent first; None is ignored."""
     counts = Counter(name_colour(colour) for colour in colours if colour is not None)
-    words = [f"{name} ({count})" for name, count in counts.most_common(_MAX_NAMED)]
-    if more := len(counts) - len(words):
-        words.append(f"and {format_count(more, 'other colour')}")
+    words = [f"{name} ({count})" for name, count in counts.most_common(_MAX_LISTED_COLOURS)]
+    unlisted = len(counts) - len(words)
+    if unlisted:
+        words.append(f"and {format_count(unlisted, 'other colour')}")
     return ", ".join(words)
 
 
-def luminance(colour: Colour) -> float:
-    """Return how light a colour is: 0 is black, 1 is white."""
-    return sum(weight * level for weight, level in zip(_LUMA, colour, strict=True)) / 255
+def compute_luminance(colour: Colour) -> float:
+    """Return the luminance of a colour, from 0 (black) to 1 (white)."""
+    return sum(weight * level for weight, level in zip(_LUMA_WEIGHTS, colour, strict=True)) / 255

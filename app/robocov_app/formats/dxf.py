@@ -24,9 +24,10 @@ from robocov.errors import MapError, RobocovError, quote, to_one_line
 from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov.optional_imports import import_optional
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, ReadOptions
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.curves import CURVE_TOLERANCE_M, MAX_POINTS, sample_curve
 from robocov_app.formats.geometry.shapes import Shapes, WallLine
+from robocov_app.formats.options import ReadOptions
 
 MOST_LINES = 8_000_000  # of text: a line of the drawing takes about 24, a vertex 4
 MOST_ENTITIES = 50_000  # in the file, on any layer: ezdxf takes an eighth of a millisecond and 5 kB for each
@@ -275,6 +276,11 @@ class DxfDrawing:
         return rings
 
 
+def sniff(path: Path, head: bytes) -> bool:
+    """Return whether a file that starts with `head` has this format."""
+    return head.startswith(BINARY) or TEXT.match(head) is not None
+
+
 def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = to_one_line(path)
     document = _document(path, where)
@@ -291,12 +297,12 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     DxfDrawing(document, shapes, scale).draw()
     shapes.join_lines()
     files.require_shapes(len(shapes.lines) + len(shapes.outlines), where)
-    return shapes.build_foreign_map(files.name_of_map(path), "Imported from DXF.", solid=True)
+    return shapes.build_foreign_map(files.get_map_name(path), "Imported from DXF.", solid=True)
 
 
 def _document(path: Path, where: str) -> Any:
     """Return the drawing as ezdxf has it, recovered where it has faults; what takes long is refused."""
-    content = files.content(path, files.MAX_TEXT_BYTES)
+    content = files.read_content(path, files.MAX_TEXT_BYTES)
     if not content.startswith(BINARY):
         if not TEXT.match(content):
             raise MapError(

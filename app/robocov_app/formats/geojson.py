@@ -29,12 +29,14 @@ from robocov.errors import ParameterError, RobocovError, format_path, quote, to_
 from robocov.files.writing import replace_file
 from robocov.optional_imports import import_optional
 from robocov_app.formats import files
-from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import JsonFile, is_number
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.polygons import DEFAULT_DIGITS, compute_free_area, snap_to_grid
 from robocov_app.formats.geometry.rasterize import describe_unsupported
 from robocov_app.formats.geometry.shapes import BOUNDARY, Shapes, SourceGeometry
 from robocov_app.formats.georeference import LocalPlane, in_metres
+from robocov_app.formats.options import ReadOptions, WriteOptions
+from robocov_app.formats.reports import ExportReport
 
 _PLURAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
 _GEOMETRIES = ("Point", "LineString", "Polygon", *_PLURAL, "GeometryCollection")
@@ -52,7 +54,7 @@ def sniff(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
-    content = files.content(path, files.MAX_TEXT_BYTES)
+    content = files.read_content(path, files.MAX_TEXT_BYTES)
     sequence = _as_list(content, path.suffix.lower())
     file = JsonFile(path, content if sequence is None else sequence)
     shapes = Shapes(file.where, options)
@@ -61,11 +63,11 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     document = file.document if isinstance(file.document, dict) else {}
     units, origin = document.get("units"), document.get("origin")
     if units not in (None, "metres", "degrees") and options.units is None:
-        raise file.refused(("units",), units, "metres or degrees")
+        raise file.build_error(("units",), units, "metres or degrees")
     if origin is not None:
         good = isinstance(origin, list) and len(origin) == 2 and all(map(is_number, origin))
         if not good or not (abs(origin[0]) <= 360.0 and abs(origin[1]) <= 90.0):
-            raise file.refused(("origin",), origin, "longitude and latitude in degrees")
+            raise file.build_error(("origin",), origin, "longitude and latitude in degrees")
         origin = float(origin[0]), float(origin[1])
     shapes.options = replace(options, units=options.units or units)
     shapes.add_all(in_metres(found.figures, shapes, found.crs, globe=True, origin=origin))
@@ -137,24 +139,24 @@ class FigureCollector:
         if kind == "FeatureCollection":
             features = text.get("features")
             if not isinstance(features, list):
-                raise self.file.refused((*at, "features"), features, "a list of features")
+                raise self.file.build_error((*at, "features"), features, "a list of features")
             self._see_system(text, at)
             for k, feature in enumerate(features):
                 self._feature(feature, (*at, "features", k))
         elif kind == "Feature":
             self._feature(text, at)
         elif kind == "Topology":
-            raise self.file.refused((*at, "type"), kind, "GeoJSON, not TopoJSON")
+            raise self.file.build_error((*at, "type"), kind, "GeoJSON, not TopoJSON")
         else:
             self.add_geometry(text, at, ())
 
     def _feature(self, feature: Any, at: Steps) -> None:
         if not isinstance(feature, dict) or feature.get("type") != "Feature":
-            raise self.file.refused(at, feature, "a Feature")
+            raise self.file.build_error(at, feature, "a Feature")
         self._see_system(feature, at)
         properties = feature.get("properties") or {}
         if not isinstance(properties, dict):
-            raise self.file.refused((*at, "properties"), properties, "an object")
+            raise self.file.build_error((*at, "properties"), properties, "an object")
         given = [*(properties.get(name) for name in _NAMES), feature.get("id")]
         labels = [to_one_line(label).strip() for label in given if type(label) in (str, int)]
         kind = properties.get("kind")
@@ -171,14 +173,14 @@ class FigureCollector:
         kind = geometry.get("type") if isinstance(geometry, dict) else None
         if kind not in _GEOMETRIES:
             value, where = (geometry, at) if kind is None else (kind, (*at, "type"))
-            raise self.file.refused(where, value, f"one of {', '.join(_GEOMETRIES)}")
+            raise self.file.build_error(where, value, f"one of {', '.join(_GEOMETRIES)}")
         self._see_system(geometry, at)
         if kind != "GeometryCollection":
             self._coordinates(kind, geometry.get("coordinates"), (*at, "coordinates"), labels)
             return
         parts = geometry.get("geometries")
         if not isinstance(parts, list):
-            raise self.file.refused((*at, "geometries"), parts, "a list of geometries")
+            raise self.file.build_error((*at, "geometries"), parts, "a list of geometries")
         for k, part in enumerate(parts):
             self.add_geometry(part, (*at, "geometries", k), labels)
 
@@ -187,7 +189,7 @@ class FigureCollector:
     ) -> None:
         if kind in _PLURAL:
             if not isinstance(value, list):
-                raise self.file.refused(at, value, "a list")
+                raise self.file.build_error(at, value, "a list")
             for k, part in enumerate(value):
                 self._coordinates(_PLURAL[kind], part, (*at, k), labels, whole=format_path(at))
         elif value == []:
@@ -201,13 +203,15 @@ class FigureCollector:
                 SourceGeometry("line", (self._points(value, at, 2),), labels, format_path(at))
             )
         elif not isinstance(value, list):
-            raise self.file.refused(at, value, "a list of rings")
+            raise self.file.build_error(at, value, "a list of rings")
         else:
             rings = [self._points(ring, (*at, k), 1) for k, ring in enumerate(value)]
             self.figures.append(self.shapes.build_polygon(rings, labels, format_path(at), whole))
 
     def _points(self, value: Any, at: Steps, least: int) -> Array:
-        return self.shapes.drop_heights(self.file.positions(value, at, least, 2, 4))
+        return self.shapes.drop_heights(
+            self.file.parse_points(value, at, min_count=least, min_dimensions=2, max_dimensions=4)
+        )
 
     def _see_system(self, holder: dict[str, Any], at: Steps) -> None:
         """Keep the reference system that an object names, as GeoJSON did before RFC 7946."""
@@ -217,9 +221,9 @@ class FigureCollector:
         properties = given.get("properties") if isinstance(given, dict) else None
         name = properties.get("name") if isinstance(properties, dict) else None
         if not isinstance(name, str):
-            raise self.file.refused((*at, "crs"), given, "the name of a reference system")
+            raise self.file.build_error((*at, "crs"), given, "the name of a reference system")
         if self.crs not in (None, name):
-            raise self.file.refused((*at, "crs"), given, f"the same system as before, {self.crs}")
+            raise self.file.build_error((*at, "crs"), given, f"the same system as before, {self.crs}")
         self.crs = name
 
 

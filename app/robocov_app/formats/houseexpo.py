@@ -11,12 +11,18 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.errors import MapError, format_count, to_one_line
 from robocov.mapfile.models import MAX_COORDINATE_M
-from robocov_app.formats.base import ForeignMap, ReadOptions
-from robocov_app.formats.files import JsonFile
+from robocov_app.formats.files import JsonFile, starts_with
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.crossings import CrossingCounter
 from robocov_app.formats.geometry.enclosed_area import find_enclosed_area
+from robocov_app.formats.options import ReadOptions
 
 _MIN_HOLE = 1e-4  # holes smaller than this, in m², come of rounding
+
+
+def sniff(path: Path, head: bytes) -> bool:
+    """Return whether a file that starts with `head` has this format."""
+    return starts_with(head, b"{") and b'"verts"' in head
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
@@ -26,13 +32,13 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         raise MapError(f'{file.where}: not a HouseExpo plan, expected an object with "verts"')
     given = document["verts"]
     if not isinstance(given, list) or len(given) < 3:
-        raise file.refused(("verts",), given, "a list of at least 3 points [x, y]")
+        raise file.build_error(("verts",), given, "a list of at least 3 points [x, y]")
     for k, point in enumerate(given):
         good = isinstance(point, list) and len(point) == 2
         if not good or not all(
             type(value) in (int, float) and abs(value) <= MAX_COORDINATE_M for value in point
         ):
-            raise file.refused(("verts", k), point, "a point [x, y] in metres")
+            raise file.build_error(("verts", k), point, "a point [x, y] in metres")
     vertices = np.array(given, dtype=float)
     ring = vertices[(vertices != np.roll(vertices, 1, axis=0)).any(axis=1)]
     repeated = len(vertices) - len(ring)

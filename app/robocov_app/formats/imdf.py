@@ -14,12 +14,13 @@ from typing import Any, NamedTuple
 
 from robocov.errors import MapError, ParameterError, quote, to_one_line
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, ReadOptions
+from robocov_app.formats.building_floor import IndoorFigure, Role, build_floor, choose_floor, list_floors
 from robocov_app.formats.files import JsonFile, is_number
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geojson import FigureCollector
 from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry
 from robocov_app.formats.georeference import DEGREES, in_metres
-from robocov_app.formats.indoor import IndoorFigure, Role, build_floor, choose_floor, list_floors
+from robocov_app.formats.options import ReadOptions
 
 MAX_ENTRIES = 1000  # files in an archive
 MAX_OBJECTS = 200_000  # of JSON in the files together; a feature is about four
@@ -65,10 +66,10 @@ class _Archive:
         document = file.document
         found = document.get("features") if isinstance(document, dict) else None
         if not isinstance(found, list):
-            raise file.refused(("features",), found, "a list of features")
+            raise file.build_error(("features",), found, "a list of features")
         for k, feature in enumerate(found):
             if not isinstance(feature, dict) or not isinstance(feature.get("properties"), dict):
-                raise file.refused(("features", k), feature, "a feature with properties")
+                raise file.build_error(("features", k), feature, "a feature with properties")
         return found
 
 
@@ -111,7 +112,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         shapes.notes.append(f"stairs, lifts and openings to below taken as solid: {without_floor}")
     placed = in_metres(figures, shapes, DEGREES)
     parts = [IndoorFigure(role, figure) for role, figure in zip(roles, placed, strict=True)]
-    name = _venue_name(archive) or files.name_of_map(path)
+    name = _venue_name(archive) or files.get_map_name(path)
     return build_floor(shapes, parts, name, "A level of a venue, imported from IMDF.")
 
 
@@ -121,14 +122,14 @@ def _read_folder(path: Path) -> dict[str, bytes]:
     for name in _READ:
         file = path / f"{name}.geojson"
         if file.is_file():
-            texts[name] = files.content(file, left)
+            texts[name] = files.read_content(file, left)
             left -= len(texts[name])
     return texts
 
 
 def _read_zip(path: Path) -> dict[str, bytes]:
     where = to_one_line(path)
-    data = files.content(path, files.MAX_TEXT_BYTES)
+    data = files.read_content(path, files.MAX_TEXT_BYTES)
     if data.count(_ZIP_ENTRY) > MAX_ENTRIES:
         raise MapError(f"{where}: expected an archive of at most {MAX_ENTRIES} files, got more")
     texts: dict[str, bytes] = {}
@@ -167,9 +168,9 @@ def _read_levels(archive: _Archive) -> dict[str, _Level]:
         ordinal = properties.get("ordinal")
         file = archive.files["level"]
         if not isinstance(number, str):
-            raise file.refused(("features", k, "id"), number, "a string")
+            raise file.build_error(("features", k, "id"), number, "a string")
         if not is_number(ordinal):
-            raise file.refused(("features", k, "properties", "ordinal"), ordinal, "the number of a floor")
+            raise file.build_error(("features", k, "properties", "ordinal"), ordinal, "the number of a floor")
         names = (number, *_names(properties.get("short_name")), *_names(properties.get("name")))
         levels[number] = _Level(float(ordinal), names)
     return levels

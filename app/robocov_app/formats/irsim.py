@@ -25,10 +25,11 @@ from robocov.arrays import Array, BoolArray
 from robocov.errors import MapError, format_count, quote, to_one_line
 from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, ReadOptions
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, build_frame, transform_points
 from robocov_app.formats.geometry.shapes import Shapes, WallLine
 from robocov_app.formats.geometry.vectorize import count_polygon_vertices, outline_free_cells
+from robocov_app.formats.options import ReadOptions
 from robocov_app.formats.picture import describe_transparency, read_picture
 
 MOST_OBJECTS = 4_000  # robots and obstacles of a world
@@ -43,7 +44,7 @@ def sniff(path: Path, head: bytes) -> bool:
 def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = to_one_line(path)
     shapes = Shapes(where, options)
-    root = _Node(files.parse_yaml(files.content(path, files.MAX_YAML_BYTES), where), f"{where}: ")
+    root = _Node(files.parse_yaml(files.read_content(path, files.MAX_YAML_BYTES), where), f"{where}: ")
     world = root["world"]
     size = np.array([world["width"].length(10.0), world["height"].length(10.0)])
     corner = world["offset"].numbers([0.0, 0.0])[:2]
@@ -96,7 +97,9 @@ def _picture(world: _Node, path: Path, shapes: Shapes) -> BoolArray:
             raise MapError(f"{source.at}: expected a picture, got {name}, which IR-SIM generates")
         source = source["path"]
     notes, anywhere = shapes.notes, shapes.options.anywhere
-    file = files.named_file(path, source.text(), "picture", source.at, notes, anywhere)
+    file = files.find_named_file(
+        path, source.text(), "picture", at=source.at, notes=notes, allow_anywhere=anywhere
+    )
     if not file.is_file():
         file = _find_bundled(source)
         notes.append(f"{source.at.rpartition(': ')[2]}: {quote(file.name)} taken from the installed ir-sim")
@@ -234,7 +237,7 @@ class _Node:
         return self.value
 
     def number(self, default: float) -> float:
-        value = files.number(self.text(str(default)))
+        value = files.parse_number(self.text(str(default)))
         if not abs(value) <= MAX_COORDINATE_M:
             self.refuse("a number within 1e7")
         return value

@@ -16,9 +16,11 @@ from robocov.environment import Environment
 from robocov.errors import MapError, quote, to_one_line
 from robocov.files.writing import replace_file
 from robocov_app.formats import files
-from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.rasterize import build_grid, build_grid_report, find_free_cells
 from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, build_grid_map
+from robocov_app.formats.options import ReadOptions, WriteOptions
+from robocov_app.formats.reports import ExportReport
 
 CELL = 1.0  # side of a cell in metres where none is given: the format has no unit
 _PASSABLE, _SOLID = b".GS", b"@O"
@@ -32,7 +34,7 @@ def sniff(path: Path, head: bytes) -> bool:
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = to_one_line(path)
-    data = files.content(path, files.MAX_CELLS + files.HEAD).removeprefix(b"\xef\xbb\xbf")
+    data = files.read_content(path, files.MAX_CELLS + files.HEAD_BYTES).removeprefix(b"\xef\xbb\xbf")
     columns, rows, body, line = _header(data, where)
     table = np.full(256, _BAD, np.uint8)
     table[list(_PASSABLE)] = FREE

@@ -20,10 +20,7 @@ import shapely
 from robocov.arrays import Array
 from robocov.errors import ParameterError, format_count, quote
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, ReadOptions
-from robocov_app.formats.geometry.shapes import BOUNDARY, Shapes, SourceGeometry
-from robocov_app.formats.georeference import DEGREES, in_metres
-from robocov_app.formats.indoor import (
+from robocov_app.formats.building_floor import (
     DOOR_WIDTH_M,
     MAX_FLOORS,
     IndoorFigure,
@@ -32,6 +29,10 @@ from robocov_app.formats.indoor import (
     choose_floor,
     list_floors,
 )
+from robocov_app.formats.foreign_map import ForeignMap
+from robocov_app.formats.geometry.shapes import BOUNDARY, Shapes, SourceGeometry
+from robocov_app.formats.georeference import DEGREES, in_metres
+from robocov_app.formats.options import ReadOptions
 from robocov_app.formats.osm_data import OsmData, OsmElement, is_osm, read_osm
 
 _TEXT = "Imported from OpenStreetMap, © OpenStreetMap contributors."
@@ -60,7 +61,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         raise ParameterError(
             f"{data.where}: level: expected none, got {quote(options.level)}: no indoor spaces"
         )
-    name = files.name_of_map(path)
+    name = files.get_map_name(path)
     if floors and (options.level is not None or _is_indoor(data, floors)):
         floor = choose_floor(floors, options.level, data.where)
         if len(floors) > 1:

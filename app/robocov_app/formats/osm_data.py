@@ -150,7 +150,7 @@ def is_osm(head: bytes) -> bool:
     """Return whether a file that begins with these bytes holds data of OpenStreetMap."""
     if XML_ROOT.match(head):
         return True
-    is_json = files.begins_with(head, b"{") and _JSON_ELEMENTS.search(head) is not None
+    is_json = files.starts_with(head, b"{") and _JSON_ELEMENTS.search(head) is not None
     return is_json and _JSON_SOURCE.search(head) is not None
 
 
@@ -162,9 +162,9 @@ def read_osm(path: Path) -> OsmData:
     MapError
         When the file is neither XML nor JSON of OpenStreetMap, or too large.
     """
-    if files.begins_with(files.head(path), b"{"):
+    if files.starts_with(files.read_head(path), b"{"):
         return _read_json(path)
-    content = files.content(path, files.MAX_TEXT_BYTES)
+    content = files.read_content(path, files.MAX_TEXT_BYTES)
     return _XmlReader(to_one_line(path), content).data
 
 
@@ -234,12 +234,14 @@ def _read_json(path: Path) -> OsmData:
     document = file.document
     elements = document.get("elements") if isinstance(document, dict) else None
     if not isinstance(elements, list):
-        raise file.refused(("elements",), elements, "a list of elements")
+        raise file.build_error(("elements",), elements, "a list of elements")
     if isinstance(bounds := document.get("bounds"), dict):
         try:
             data.bounds.append(_bounds(bounds))
         except (KeyError, ValueError, TypeError):
-            raise file.refused(("bounds",), bounds, "minlat, minlon, maxlat and maxlon in degrees") from None
+            raise file.build_error(
+                ("bounds",), bounds, "minlat, minlon, maxlat and maxlon in degrees"
+            ) from None
     if isinstance(remark := document.get("remark"), str):
         data.notes.append(f"Overpass says: {to_one_line(remark)[:200]}")
     for k, given in enumerate(elements):
@@ -249,13 +251,13 @@ def _read_json(path: Path) -> OsmData:
 
 def _add_json_element(data: OsmData, file: JsonFile, given: Any, at: JsonPath) -> None:
     if not isinstance(given, dict):
-        raise file.refused(at, given, "an element of OpenStreetMap")
+        raise file.build_error(at, given, "an element of OpenStreetMap")
     kind = given.get("type")
     if kind not in ("node", "way", "relation"):  # areas and counts of Overpass
         return
     number = given.get("id")
     if type(number) is not int:
-        raise file.refused((*at, "id"), number, "a whole number")
+        raise file.build_error((*at, "id"), number, "a whole number")
     if given.get("action") == "delete" or given.get("visible") is False:
         return
     element = OsmElement(kind, number, _json_tags(file, given, at))
@@ -271,17 +273,17 @@ def _add_json_element(data: OsmData, file: JsonFile, given: Any, at: JsonPath) -
 def _json_tags(file: JsonFile, given: dict[str, Any], at: JsonPath) -> dict[str, str]:
     tags = given.get("tags", {})
     if not isinstance(tags, dict):
-        raise file.refused((*at, "tags"), tags, "an object")
+        raise file.build_error((*at, "tags"), tags, "an object")
     return {key: value for key, value in tags.items() if key in _KEYS and isinstance(value, str)}
 
 
 def _json_point(file: JsonFile, given: Any, at: JsonPath) -> tuple[float, float]:
     if not isinstance(given, dict):
-        raise file.refused(at, given, "lat and lon")
+        raise file.build_error(at, given, "lat and lon")
     for key, limit in (("lon", 360.0), ("lat", 90.0)):
         value = given.get(key)
         if not is_number(value) or not abs(value) <= limit:  # type: ignore[arg-type]
-            raise file.refused((*at, key), value, "degrees")
+            raise file.build_error((*at, key), value, "degrees")
     return float(given["lon"]), float(given["lat"])
 
 
@@ -289,7 +291,7 @@ def _json_nodes(data: OsmData, file: JsonFile, given: dict[str, Any], at: JsonPa
     """Return the numbers of the nodes of a way, whose places it may hold itself (``out geom``)."""
     numbers = given.get("nodes", [])
     if not isinstance(numbers, list) or not all(type(number) is int for number in numbers):
-        raise file.refused((*at, "nodes"), numbers, "a list of whole numbers")
+        raise file.build_error((*at, "nodes"), numbers, "a list of whole numbers")
     if "geometry" not in given:
         return numbers
     line = _json_line(file, given["geometry"], (*at, "geometry"))
@@ -305,17 +307,17 @@ def _json_ways(data: OsmData, file: JsonFile, given: dict[str, Any], at: JsonPat
     """Return the numbers of the ways of a relation, and keep those that it holds itself (``out geom``)."""
     members = given.get("members", [])
     if not isinstance(members, list):
-        raise file.refused((*at, "members"), members, "a list of members")
+        raise file.build_error((*at, "members"), members, "a list of members")
     numbers = []
     for k, member in enumerate(members):
         place = (*at, "members", k)
         if not isinstance(member, dict):
-            raise file.refused(place, member, "a member of a relation")
+            raise file.build_error(place, member, "a member of a relation")
         if member.get("type") != "way":
             continue
         number = member.get("ref")
         if type(number) is not int:
-            raise file.refused((*place, "ref"), number, "a whole number")
+            raise file.build_error((*place, "ref"), number, "a whole number")
         numbers.append(number)
         if "geometry" in member and number not in data.ways:
             line = _json_line(file, member["geometry"], (*place, "geometry"))
@@ -326,7 +328,7 @@ def _json_ways(data: OsmData, file: JsonFile, given: dict[str, Any], at: JsonPat
 def _json_line(file: JsonFile, given: Any, at: JsonPath) -> list[tuple[float, float] | None]:
     """Return the points of a line; those beyond the box of a query are null, and so None."""
     if not isinstance(given, list):
-        raise file.refused(at, given, "a list of lat and lon")
+        raise file.build_error(at, given, "a list of lat and lon")
     return [None if point is None else _json_point(file, point, (*at, k)) for k, point in enumerate(given)]
 
 

@@ -28,18 +28,13 @@ from robocov.errors import MapError, format_count, quote, to_one_line
 from robocov.files.writing import replace_file
 from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov_app.formats import files
-from robocov_app.formats.base import (
-    ExportReport,
-    ForeignMap,
-    ReadOptions,
-    Thumbnail,
-    WriteOptions,
-    square_metres,
-)
 from robocov_app.formats.colours import NO_ROLE, PICTURE_TOLERANCE, ROLES, ColourKey
+from robocov_app.formats.foreign_map import ForeignMap, Thumbnail
 from robocov_app.formats.geometry.rasterize import build_grid, build_grid_report, find_free_cells
 from robocov_app.formats.geometry.strokes import MAX_STROKE_PIXELS, remove_thin_strokes
 from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, UNKNOWN, Cells, build_grid_map
+from robocov_app.formats.options import ReadOptions, WriteOptions
+from robocov_app.formats.reports import ExportReport, format_area
 
 _PIECE = 1 << 20  # bytes that are unpacked at a time
 _STRIP = 512  # rows that are converted at a time, which bounds the memory
@@ -93,7 +88,7 @@ def read_picture(path: Path, where: str, key: ColourKey = _NO_KEY) -> Brightness
 
     `key`: colours whose roles are wanted.
     """
-    data = files.content(path)
+    data = files.read_content(path)
     if data[:2] in (b"P2", b"P3", b"P5", b"P6"):
         return _netpbm(data, where, key)
     for name, begin in _PILLOW.items():
@@ -174,7 +169,7 @@ def _plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
     while done < count and at < len(text):
         blank = _BLANK.search(text, at + _PIECE)
         end = blank.start() if blank else len(text)
-        numbers = files.whole_numbers(text[at:end], " ")
+        numbers = files.parse_integers(text[at:end], " ")
         at = blank.end() if blank else len(text)
         if numbers is None:
             raise MapError(f"{where}: pixels that are not whole numbers, of {count}")
@@ -330,9 +325,14 @@ def _shrink(part: Image, step: int) -> NDArray[np.uint8]:
     return np.asarray(small.convert("RGB"))
 
 
+def sniff(path: Path, head: bytes) -> bool:
+    """Return whether a file that starts with `head` has this format."""
+    return is_picture(head)
+
+
 def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = to_one_line(path)
-    key = options.colour_key(PICTURE_TOLERANCE)
+    key = options.build_colour_key(PICTURE_TOLERANCE)
     picture = read_picture(path, where, key)
     cell, origin = _place(picture)
     cell = options.cell if options.cell is not None else cell
@@ -410,7 +410,7 @@ def _free_soft_edges(
 
     It is neither the one nor the other: without this, soft edges would become walls around such colours.
     """
-    declared = [sum(colour) / 765 for colour, role in options.colour_key().entries if role != "solid"]
+    declared = [sum(colour) / 765 for colour, role in options.build_colour_key().entries if role != "solid"]
     if not declared or min(declared) >= 0.5:
         return
     mixed = (cells == BLOCKED) & (roles == NO_ROLE) & (picture.level > min(declared) * picture.full)
@@ -447,7 +447,7 @@ def _is_drawn_on_nothing(cells: Cells) -> bool:
 
 def _drop_strokes(cells: Cells, options: ReadOptions, cell: float, where: str) -> tuple[str, ...]:
     """Make thin strokes free in `cells`, and return what was dropped."""
-    width = options.stroke_width(cell)
+    width = options.compute_stroke_width(cell)
     pixels = math.ceil(width / cell - 1e-9)
     if pixels > MAX_STROKE_PIXELS:
         few = f"expected at most {MAX_STROKE_PIXELS} pixels, got {pixels}"
@@ -459,7 +459,7 @@ def _drop_strokes(cells: Cells, options: ReadOptions, cell: float, where: str) -
         return ()
     cells[thin] = FREE
     pieces = ndimage.label(thin, structure=np.ones((3, 3)))[1]
-    area = square_metres(count * cell * cell, 3)
+    area = format_area(count * cell * cell, 3)
     what = f"strokes thinner than {pixels * cell:.3g} m ({pixels} px)"
     return (f"{what} in {format_count(pieces, 'piece')}, {area} (--min-stroke)",)
 

@@ -21,8 +21,9 @@ from robocov.environment import Environment, Gap
 from robocov_app.figures.arena import draw_map, map_handles
 from robocov_app.figures.files import check_figure_path, plain_style, save_figure
 from robocov_app.figures.page import HEADING, SMALL, TITLE, Box, Page, tone
-from robocov_app.formats.base import ForeignMap, ImportReport
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.comparison import ImportComparison, compare_maps
+from robocov_app.formats.reports import ImportReport
 from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import LIGHT, Colour, Theme, theme_named
 
@@ -57,7 +58,7 @@ def plot_import(
     )
     with plain_style():
         handles = _handles(environment, theme, compared)
-        page, panels, said = _laid_out(theme, compared.bounds, captions, handles, report.lines()[2:])
+        page, panels, said = _laid_out(theme, compared.bounds, captions, handles, report.format_lines()[2:])
         s, left = page.scale, min(box[0] for box, _ in panels)
         room = page.size[0] - left - page.margin
         page.text(environment.name, left, 24 * s, points=HEADING, bold=True, room=room)

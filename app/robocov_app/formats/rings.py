@@ -13,9 +13,10 @@ from typing import Any
 
 from robocov.arrays import Array
 from robocov.errors import JsonPath as Steps
-from robocov_app.formats.base import ForeignMap, ReadOptions
-from robocov_app.formats.files import JsonFile, name_of_map, require_shapes
+from robocov_app.formats.files import JsonFile, get_map_name, require_shapes
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.shapes import Shapes
+from robocov_app.formats.options import ReadOptions
 
 _LISTS = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[\s*(?:\[\s*){0,3}-?[\d.]")
 _FLAT = re.compile(rb'"vertices"\s*:\s*\[\s*-?[\d.]')
@@ -34,7 +35,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     for number, rings in enumerate(polygons, start=1):
         shapes.add_outline([ring * scale for ring in rings], at=f"polygon {number}")
     shapes.notes = [f"a unit is {scale:g} m" + ("" if options.scale else " (the file says none; --scale)")]
-    return shapes.build_foreign_map(name_of_map(path), "Imported from rings.", solid=False, overlap=True)
+    return shapes.build_foreign_map(get_map_name(path), "Imported from rings.", solid=False, overlap=True)
 
 
 def _polygons(file: JsonFile, shapes: Shapes) -> list[list[Array]]:
@@ -42,30 +43,34 @@ def _polygons(file: JsonFile, shapes: Shapes) -> list[list[Array]]:
 
     def polygon(value: Any, at: Steps) -> list[Array]:
         if not isinstance(value, list) or not value:
-            raise file.refused(at, value, "a list of rings")
+            raise file.build_error(at, value, "a list of rings")
         return [ring(each, (*at, k)) for k, each in enumerate(value)]
 
     def ring(value: Any, at: Steps) -> Array:
-        return shapes.drop_heights(file.positions(value, at, 1, 2, 3))
+        return shapes.drop_heights(
+            file.parse_points(value, at, min_count=1, min_dimensions=2, max_dimensions=3)
+        )
 
     def flat_ring(value: Any, at: Steps, size: int) -> Array:
         if not isinstance(value, list) or len(value) % size or len(value) < 3 * size:
-            raise file.refused(at, value, f"at least 3 times {size} numbers")
+            raise file.build_error(at, value, f"at least 3 times {size} numbers")
         pairs = [value[k : k + size] for k in range(0, len(value), size)]
-        return shapes.drop_heights(file.positions(pairs, at, 3, size, size))
+        return shapes.drop_heights(
+            file.parse_points(pairs, at, min_count=3, min_dimensions=size, max_dimensions=size)
+        )
 
     document = inner = file.document
     if isinstance(document, dict):
         dimensions = document.get("dimensions", 2)
         if type(dimensions) is not int or dimensions not in (2, 3):
-            raise file.refused(("dimensions",), dimensions, "2 or 3")
+            raise file.build_error(("dimensions",), dimensions, "2 or 3")
         points = flat_ring(document.get("vertices"), ("vertices",), dimensions)
         holes = document.get("holes") or []
         good = isinstance(holes, list) and all(type(hole) is int for hole in holes)
         cuts = [0, *holes, len(points)] if good else []
         if not good or any(a >= b for a, b in pairwise(cuts)):
             wanted = f"growing indices of vertices, from 1 to {len(points) - 1}"
-            raise file.refused(("holes",), holes, wanted)
+            raise file.build_error(("holes",), holes, wanted)
         return [[points[a:b] for a, b in pairwise(cuts)]]
     depth = 0
     while isinstance(inner, list) and inner:
@@ -79,4 +84,4 @@ def _polygons(file: JsonFile, shapes: Shapes) -> list[list[Array]]:
             return [polygon(document, ())]
         case 4:
             return [polygon(rings, (k,)) for k, rings in enumerate(document)]
-    raise file.refused((), document, "a list of rings [[x, y], ...]")
+    raise file.build_error((), document, "a list of rings [[x, y], ...]")

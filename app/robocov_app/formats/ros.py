@@ -30,10 +30,12 @@ from robocov.environment import Environment
 from robocov.errors import MapError, OutputError, ParameterError, quote, to_one_line
 from robocov.files.writing import replace_file
 from robocov_app.formats import files
-from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.rasterize import build_grid, build_grid_report, find_free_cells
 from robocov_app.formats.geometry.vectorize import BLOCKED, FREE, UNKNOWN, Cells, build_grid_map
+from robocov_app.formats.options import ReadOptions, WriteOptions
 from robocov_app.formats.picture import Brightness, describe_transparency, read_picture
+from robocov_app.formats.reports import ExportReport
 
 _OCCUPIED, _FREE = 0.65, 0.196
 _THRESHOLDS = {"occupied_thresh": _OCCUPIED, "free_thresh": _FREE}  # as map_server writes them
@@ -50,12 +52,12 @@ def sniff(path: Path, head: bytes) -> bool:
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = to_one_line(path)
-    given = files.parse_yaml(files.content(path, files.MAX_YAML_BYTES), where)
+    given = files.parse_yaml(files.read_content(path, files.MAX_YAML_BYTES), where)
     mode = _text(given, "mode", where, "trinary").lower()
     if mode not in ("trinary", "scale", "raw"):
         raise MapError(f"{where}: mode: expected one of trinary, scale, raw, got {quote(mode)}")
     cell = _number(_text(given, "resolution", where), f"{where}: resolution")
-    files.require_length(cell, f"{where}: resolution", smallest=1e-4, largest=1000.0)
+    files.require_length(cell, f"{where}: resolution", minimum=1e-4, maximum=1000.0)
     corner = given.get("origin", ["0", "0", "0"])
     if not isinstance(corner, list) or not 2 <= len(corner) <= 3:
         raise MapError(f"{where}: origin: expected [x, y, yaw], got {quote(corner)}")
@@ -75,7 +77,9 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         raise MapError(f"{where}: free_thresh, occupied_thresh: {wanted}, got {free:g}, {occupied:g}")
     repaired: list[str] = []
     name, at = _text(given, "image", where), f"{where}: image"
-    image = files.named_file(path, name, "picture", at, repaired, options.anywhere)
+    image = files.find_named_file(
+        path, name, "picture", at=at, notes=repaired, allow_anywhere=options.anywhere
+    )
     picture = read_picture(image, to_one_line(image))
     transparency = _describe_transparency(picture, mode)
     threshold = 0.5 if options.threshold is None else options.threshold
@@ -195,19 +199,19 @@ def _text(given: dict[str, files.Value], key: str, where: str, default: str | No
 
 
 def _number(text: files.Value, where: str) -> float:
-    if not isinstance(text, str) or not math.isfinite(value := files.number(text)):
+    if not isinstance(text, str) or not math.isfinite(value := files.parse_number(text)):
         raise MapError(f"{where}: expected a number, got {quote(text)}")
     return value
 
 
-def files_of(path: Path, options: WriteOptions) -> tuple[Path, ...]:
+def list_files(path: Path, options: WriteOptions) -> tuple[Path, ...]:
     image = options.image or ("png" if options.mode == "scale" else "pgm")
     return (path, path.with_suffix(f".{image}"))
 
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     mode = options.mode or "trinary"
-    _, image = files_of(path, options)
+    _, image = list_files(path, options)
     if image == path:
         raise OutputError(f"{to_one_line(path)}: expected another name for the YAML than for the picture")
     try:

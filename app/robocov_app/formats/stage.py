@@ -29,11 +29,12 @@ from robocov.arrays import Array
 from robocov.errors import MapError, quote, to_one_line
 from robocov.mapfile.models import MAX_COORDINATE_M
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, ReadOptions
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, build_frame, transform_points
 from robocov_app.formats.geometry.polygons import to_multipolygon
 from robocov_app.formats.geometry.shapes import ClosedOutline, Shapes
 from robocov_app.formats.geometry.vectorize import count_polygon_vertices, outline_free_cells
+from robocov_app.formats.options import ReadOptions
 from robocov_app.formats.picture import describe_transparency, read_picture
 
 MAX_BYTES = 5_000_000  # largest file of a world, and of all that it includes together, in bytes
@@ -72,7 +73,7 @@ class _Entity:
     def numbers(self, name: str, default: tuple[float, ...]) -> Array:
         """Return the values of a property; those that are not written are as in `default`."""
         given = self.properties.get(name, [])[: len(default)]
-        values = np.array([*map(files.number, given), *default[len(given) :]])
+        values = np.array([*map(files.parse_number, given), *default[len(given) :]])
         if not (np.abs(values) <= MAX_COORDINATE_M).all():
             raise MapError(f"{self.at}: expected numbers within 1e7, got {name} {quote(' '.join(given))}")
         return values
@@ -89,6 +90,11 @@ class _Room:
     free: MultiPolygon
     labels: tuple[str, ...]
     cell: float | None = None
+
+
+def sniff(path: Path, head: bytes) -> bool:
+    """Return whether a file that starts with `head` has this format."""
+    return path.suffix.lower() == ".world" and MODELS.search(head) is not None
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
@@ -136,11 +142,11 @@ class _World:
 
     def _named(self, name: str, what: str, at: str) -> Path:
         notes, anywhere = self.shapes.notes, self.shapes.options.anywhere
-        return files.named_file(self.path, name, what, at, notes, anywhere)
+        return files.find_named_file(self.path, name, what, at=at, notes=notes, allow_anywhere=anywhere)
 
     def _split(self, path: Path, including: tuple[Path, ...]) -> None:
         """Append the tokens of a file and of those that it includes; `including` are the files above it."""
-        world = files.content(path, MAX_BYTES).decode("utf-8", "replace")
+        world = files.read_content(path, MAX_BYTES).decode("utf-8", "replace")
         line, name, include = 1, to_one_line(path), False
         for found in _TOKEN.finditer(world):
             kind, text = str(found.lastgroup), found[found.lastgroup or 0]

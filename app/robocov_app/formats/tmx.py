@@ -25,11 +25,12 @@ from robocov.arrays import Array, BoolArray
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, format_count, quote, summarize_names, to_one_line
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, ReadOptions
+from robocov_app.formats.files.xml_tree import MAX_ELEMENTS, Element, read_xml_tree
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.frames import build_frame, transform_points
 from robocov_app.formats.geometry.shapes import Shapes, WallLine
 from robocov_app.formats.geometry.vectorize import count_polygon_vertices, outline_free_cells
-from robocov_app.formats.xml_tree import MOST_ELEMENTS, Element, read_xml_tree
+from robocov_app.formats.options import ReadOptions
 
 MOST_TILES, MOST_READ = 4_000_000, 16_000_000  # of a map, and of all its layers together
 MOST_PARTS = 10_000  # collision objects, each as often as its tile is there, and tiles beside the grid
@@ -68,6 +69,11 @@ class _Layer(NamedTuple):
     labels: tuple[str, ...]
     offset: Array
     wall: bool
+
+
+def sniff(path: Path, head: bytes) -> bool:
+    """Return whether a file that starts with `head` has this format."""
+    return ROOT.search(head) is not None and b"tilewidth" in head
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
@@ -129,21 +135,23 @@ class _Map:
             source = tileset.attributes.get("source")
             if source is not None:
                 at, anywhere = f"{tileset.where}:{tileset.line}", self.options.anywhere
-                file = files.named_file(self.path, source, "tileset", at, self.shapes.notes, anywhere)
+                file = files.find_named_file(
+                    self.path, source, "tileset", at=at, notes=self.shapes.notes, allow_anywhere=anywhere
+                )
                 budget.take(file, at)
                 tileset = read_xml_tree(file, "tileset", "TSX")
-                elements += sum(1 for _ in tileset.everything())
-                if elements > MOST_ELEMENTS:
+                elements += sum(1 for _ in tileset.iterate())
+                if elements > MAX_ELEMENTS:
                     raise MapError(
-                        f"{at}: tilesets of more than {MOST_ELEMENTS} elements, expected at most that"
+                        f"{at}: tilesets of more than {MAX_ELEMENTS} elements, expected at most that"
                     )
             size = np.array([_number(tileset, name) for name in ("tilewidth", "tileheight")])
-            drawn = tileset.child("tileoffset")
+            drawn = tileset.find_child("tileoffset")
             offset = np.zeros(2) if drawn is None else np.array([_number(drawn, name) for name in "xy"])
             for tile in tileset.children:
                 if tile.tag != "tile":
                     continue
-                group = tile.child("objectgroup")
+                group = tile.find_child("objectgroup")
                 parts = [] if group is None else group.children
                 if parts or _says_solid(tile):
                     found[first + _whole(tile, "id", 0)] = _Tile(parts, size, offset)
@@ -204,7 +212,7 @@ class _Map:
 
     def _pieces(self, layer: Element) -> Iterator[tuple[int, int, _IDs]]:
         """Yield the tiles of a layer: all, or, of an infinite map, chunk by chunk, with column and row."""
-        data = layer.child("data")
+        data = layer.find_child("data")
         if data is None:
             return
         chunks = [child for child in data.children if child.tag == "chunk"]
@@ -311,7 +319,7 @@ def _decoded(part: Element, data: Element, count: int) -> _IDs:
         ids = np.frombuffer(raw, "<u4", min(count, len(raw) // 4)) if len(raw) <= 4 * count else None
     elif encoding == "csv":
         more = part.text.count(",") > count  # a comma may end it
-        numbers = files.whole_numbers("" if more else part.text, ",")
+        numbers = files.parse_integers("" if more else part.text, ",")
         if numbers is None or not ((numbers >= 0) & (numbers < 2**32)).all():
             part.refuse("expected whole numbers from 0, separated by commas")
         ids = None if more else numbers.astype(np.uint32)
@@ -344,7 +352,7 @@ def _figure(element: Element) -> tuple[str, Array]:
             kind, points = "polygon", np.asarray(_DISC.exterior.coords)[:-1] * middle + middle
     for tag, name, least in (("polygon", "polygon", 3), ("polyline", "line", 2)):
         if tag in children:
-            flat = children[tag].numbers("points")
+            flat = children[tag].parse_numbers("points")
             if len(flat) % 2 or len(flat) < 2 * least:
                 children[tag].refuse(f"points: expected {least} points, got {len(flat)} numbers")
             kind, points = name, flat.reshape(-1, 2)
@@ -362,7 +370,7 @@ def _turned(points: Array, gid: int, size: Array) -> Array:
 
 
 def _says_solid(element: Element, names: Iterable[str] = ()) -> bool:
-    properties = element.child("properties")
+    properties = element.find_child("properties")
     given = () if properties is None else [child.attributes for child in properties.children]
     yes = [each.get("name", "") for each in given if each.get("value", "").casefold() not in _NO]
     classes = [element.attributes.get(key, "") for key in ("class", "type")]
@@ -374,7 +382,7 @@ def _plain(name: str) -> str:
 
 
 def _number(element: Element, name: str) -> float:
-    return float(element.numbers(name, count=1, default="0")[0])
+    return float(element.parse_numbers(name, count=1, default="0")[0])
 
 
 def _whole(element: Element, name: str, least: int, default: str = "") -> int:

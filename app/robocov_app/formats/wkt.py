@@ -26,8 +26,8 @@ from robocov.environment import Environment
 from robocov.errors import MapError, format_count, quote
 from robocov.files.json_positions import find_line_and_column
 from robocov.files.writing import replace_file
-from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
-from robocov_app.formats.files import MAX_DEPTH, name_of_map, read_text
+from robocov_app.formats.files import MAX_DEPTH, get_map_name, read_text
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.crossings import CrossingCounter
 from robocov_app.formats.geometry.polygons import (
     DEFAULT_DIGITS,
@@ -40,6 +40,8 @@ from robocov_app.formats.geometry.polygons import (
 from robocov_app.formats.geometry.rasterize import describe_unsupported
 from robocov_app.formats.geometry.shapes import Shapes, SourceGeometry
 from robocov_app.formats.georeference import in_metres
+from robocov_app.formats.options import ReadOptions, WriteOptions
+from robocov_app.formats.reports import ExportReport
 
 KINDS = (  # the geometries that are read
     "POINT", "LINESTRING", "LINEARRING", "POLYGON", "TRIANGLE", "MULTIPOINT", "MULTILINESTRING",
@@ -219,6 +221,11 @@ class WktText:
         raise MapError(f"{self.where}:{line}:{column}: {what}")
 
 
+def sniff(path: Path, head: bytes) -> bool:
+    """Return whether a file that starts with `head` has this format."""
+    return BEGIN.match(head) is not None
+
+
 def read(path: Path, options: ReadOptions) -> ForeignMap:
     text, where = read_text(path, b",")
     shapes = Shapes(where, options)
@@ -228,7 +235,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         shapes.options = replace(options, outlines="free")
         figures = _exclude_holes(figures, shapes)
     shapes.add_all(figures)
-    return shapes.build_foreign_map(name_of_map(path), "Imported from WKT.", solid=False, overlap=True)
+    return shapes.build_foreign_map(get_map_name(path), "Imported from WKT.", solid=False, overlap=True)
 
 
 def _exclude_holes(figures: list[SourceGeometry], shapes: Shapes) -> list[SourceGeometry]:

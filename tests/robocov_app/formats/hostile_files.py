@@ -24,7 +24,7 @@ def peak() -> float:
 
 def main(paths: list[str]) -> None:
     from robocov.errors import RobocovError
-    from robocov_app.formats import IMPORTERS, ReadOptions, detect, files
+    from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, files
 
     importlib.import_module("pyproj")  # what imports need is the fault of no file
     importlib.import_module("ezdxf")
@@ -33,7 +33,7 @@ def main(paths: list[str]) -> None:
         warm.write_text(
             "POLYGON((0 0,9 0,9 9,0 9,0 0))" if suffix == "wkt" else "<svg><path d='M0 0h9v9z'/></svg>"
         )
-        detect(warm).read(warm, ReadOptions(scale=1.0))
+        detect_format(warm).read(warm, ReadOptions(scale=1.0))
     before = peak()
     answer = {}
     for name in paths:
@@ -41,7 +41,7 @@ def main(paths: list[str]) -> None:
         begin = time.process_time()
         try:
             named = [kind for kind in IMPORTERS.values() if path.suffix in kind.suffixes]
-            known = (kind for kind in IMPORTERS.values() if kind.sniff(path, files.head(path)))
+            known = (kind for kind in IMPORTERS.values() if kind.sniff(path, files.read_head(path)))
             chosen = next(known, named[0])
             options = ReadOptions(scale=1.0) if "scale" in chosen.options else ReadOptions()
             chosen.read(path, options)

@@ -8,7 +8,7 @@ from shapely import affinity, box
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
-from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, Shaping, detect, import_map
+from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, Shaping, detect_format, import_map
 
 IMPORTER = IMPORTERS["argos"]
 
@@ -22,7 +22,7 @@ def arena(folder: Path, body: str, size: str = '"6, 4, 1" center="1,0,0.5"') -> 
         '<?xml version="1.0" ?>\n<argos-configuration><framework/>\n'
         f"<arena size={size}>\n{body}\n</arena><loop_functions/></argos-configuration>"
     )
-    assert detect(path) is IMPORTER
+    assert detect_format(path) is IMPORTER
     return path
 
 

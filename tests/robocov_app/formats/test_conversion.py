@@ -12,7 +12,7 @@ from shapely import MultiPolygon, Polygon, box
 from robocov.environment import DiscStart, UniformStart
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
-from robocov_app.formats.base import ForeignMap
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.conversion import build_environment
 from robocov_app.formats.geometry.map_layout import build_boundary
 from robocov_app.formats.geometry.polygons import round_polygons
@@ -29,7 +29,7 @@ def foreign(*free: Polygon, **others: Any) -> ForeignMap:
 
 
 def lines(report: Any) -> str:
-    return "\n".join(report.lines())
+    return "\n".join(report.format_lines())
 
 
 def test_the_largest_part_and_its_obstacles() -> None:
@@ -88,7 +88,10 @@ def test_all_parts_lie_in_their_convex_hull() -> None:
     assert environment.free_area == pytest.approx(ROOM.area + 9)
     assert len(environment.free.geoms) == 2
     assert environment.boundary_polygon.equals(shapely.union(ROOM, CLOSET).convex_hull)
-    assert "note: the free space is of 2 separate parts: robots cannot pass between them" in report.lines()
+    assert (
+        "note: the free space is of 2 separate parts: robots cannot pass between them"
+        in report.format_lines()
+    )
 
 
 def test_specks() -> None:

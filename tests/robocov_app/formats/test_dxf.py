@@ -18,7 +18,7 @@ from shapely import affinity, box
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
-from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect
+from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect_format
 from robocov_app.formats.dxf import UNITS, polyline
 
 METRES = 6
@@ -37,7 +37,7 @@ def drawn(
     draw(document, space)
     path = folder / "plan.dxf"
     document.saveas(path)
-    assert detect(path).name == "dxf"
+    assert detect_format(path).name == "dxf"
     return IMPORTERS["dxf"].read(path, ReadOptions(**options))
 
 

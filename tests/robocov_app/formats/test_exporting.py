@@ -21,8 +21,8 @@ from robocov_app.formats import (
     ReadOptions,
     Shaping,
     WriteOptions,
+    choose_exporter,
     export_map,
-    exporter,
     import_map,
 )
 from robocov_app.formats.geometry.starts import find_rooms
@@ -37,9 +37,9 @@ def test_every_format_says_what_it_is() -> None:
         assert one.title and one.suffixes
         assert one.options <= known
         path = Path(f"a{one.suffixes[0]}")
-        assert one.files(path, WriteOptions())[0] == path
-        assert exporter(path) is one
-        assert exporter("anything", name) is one
+        assert one.list_files(path, WriteOptions())[0] == path
+        assert choose_exporter(path) is one
+        assert choose_exporter("anything", name) is one
 
 
 def test_what_is_not_known(tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_maps_go_out_and_in(tmp_path: Path, name: str, way: str) -> None:
     environment, (suffix, options) = a_map(name), WAYS[way]
     path = tmp_path / f"map{suffix}"
     read = ReadOptions()
-    if "cell" in exporter(path).options:
+    if "cell" in choose_exporter(path).options:
         # blocks stand a whole number of their own cells apart: coarser ones all err to the same side
         options = replace(options, cell=0.02 if name == "generated blocks" else 0.05)
         read = ReadOptions(cell=options.cell) if suffix == ".map" else read

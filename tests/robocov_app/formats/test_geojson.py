@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from vector_files import read, square
 
 from robocov.errors import MapError
-from robocov_app.formats import IMPORTERS, ReadOptions, detect, import_map
+from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, import_map
 
 
 def feature(geometry: Any, **properties: Any) -> dict[str, Any]:
@@ -36,7 +36,7 @@ HALL = polygon(square(0, 0, 20, 10), square(1, 1, 2, 2))
 def test_every_way_to_hold_a_polygon(tmp_path: Path, document: Any) -> None:
     foreign = read(tmp_path, "geojson", document)
     assert foreign.free.equals(shapely.from_geojson(json.dumps(HALL)))
-    assert detect(tmp_path / "plan.geojson").name == "geojson"
+    assert detect_format(tmp_path / "plan.geojson").name == "geojson"
 
 
 def test_footprints_in_a_boundary_are_obstacles(tmp_path: Path) -> None:
@@ -193,7 +193,7 @@ EAST = '{"type": "Polygon", "coordinates": [[[400, 0], [900, 0], [900, 400], [40
 def test_a_sequence_of_texts_is_read_as_one_map(tmp_path: Path, name: str, text: str) -> None:
     path = tmp_path / name
     path.write_bytes(text.encode())
-    assert detect(path) is IMPORTERS["geojson"]
+    assert detect_format(path) is IMPORTERS["geojson"]
     environment, _, _ = import_map(path, options=ReadOptions(units="metres"))
     assert environment.free_area == pytest.approx(900 * 400)
 

@@ -13,9 +13,9 @@ from shapely import Polygon, box
 from robocov.environment import DiscStart, Environment, PolygonObstacle, UniformStart
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, load_map, save_map, to_json
-from robocov_app.formats import Shaping, detect, import_map
-from robocov_app.formats.base import ImportReport
+from robocov_app.formats import Shaping, detect_format, import_map
 from robocov_app.formats.geometry.corners import sharpen_corners
+from robocov_app.formats.reports import ImportReport
 
 # two rooms of 4 m x 3 m and a door of 0.9 m in a wall of 0.1 m, with corners cut by 1 cm as in such plans
 PLAN = [
@@ -42,7 +42,7 @@ def imported(path: Path, **shaping: Any) -> tuple[Environment, ImportReport]:
 
 def test_a_plan_becomes_a_map_that_saves_and_loads(tmp_path: Path) -> None:
     path = write(tmp_path, plan(PLAN))
-    assert detect(path).name == "houseexpo"
+    assert detect_format(path).name == "houseexpo"
     environment, report = imported(path)
     assert environment.name == "HouseExpo abc"
     assert environment.free_area == pytest.approx(12 + 12 + 0.09, abs=1e-3)
@@ -52,7 +52,9 @@ def test_a_plan_becomes_a_map_that_saves_and_loads(tmp_path: Path) -> None:
     save_map(environment, tmp_path / "out.json")
     assert load_map(tmp_path / "out.json") == environment
     assert json.loads(json.dumps(report.to_dict()))["area_read_m2"] == report.area_read
-    assert report.lines()[0].startswith("houseexpo: 17 vertices read, 12 kept; free area 24.09 m² read")
+    assert report.format_lines()[0].startswith(
+        "houseexpo: 17 vertices read, 12 kept; free area 24.09 m² read"
+    )
 
 
 def test_cut_corners_become_whole(tmp_path: Path) -> None:
@@ -158,9 +160,9 @@ def test_options_out_of_range(tmp_path: Path) -> None:
 
 def test_other_files_are_not_recognised(tmp_path: Path) -> None:
     with pytest.raises(MapError, match=r"unknown format .*, expected one of .*houseexpo"):
-        detect(write(tmp_path, {"rooms": []}))
+        detect_format(write(tmp_path, {"rooms": []}))
     with pytest.raises(MapError, match="no such file"):
-        detect(tmp_path / "none.json")
+        detect_format(tmp_path / "none.json")
 
 
 @settings(deadline=None, max_examples=150)

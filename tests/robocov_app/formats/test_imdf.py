@@ -12,7 +12,7 @@ import shapely
 from shapely import Point, box
 
 from robocov.errors import MapError, ParameterError
-from robocov_app.formats import IMPORTERS, ReadOptions, detect, import_map
+from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, import_map
 
 # with the corners of the rooms beside it
 WALKWAY = [(0, 8), (30, 8), (30, 12), (20, 12), (10, 12), (0, 12)]
@@ -97,7 +97,7 @@ def as_zip(path: Path, given: dict[str, list[dict[str, Any]]], within: str = "")
 
 
 def read(path: Path, **options: Any) -> Any:
-    assert detect(path) is IMPORTERS["imdf"]
+    assert detect_format(path) is IMPORTERS["imdf"]
     return IMPORTERS["imdf"].read(path, ReadOptions(**options))
 
 
@@ -215,12 +215,12 @@ def test_content_that_is_refused(tmp_path: Path) -> None:
 def test_a_folder_or_zip_of_something_else_is_none(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     with pytest.raises(MapError, match="expected a file, got a folder"):
-        detect(tmp_path / "empty")
+        detect_format(tmp_path / "empty")
     other = tmp_path / "other.zip"
     with zipfile.ZipFile(other, "w") as archive:
         archive.writestr("readme.txt", b"hello")
     with pytest.raises(MapError, match="zip archive"):
-        detect(other)
+        detect_format(other)
     half = as_zip(tmp_path / "half.zip", {"unit": venue()["unit"]})
     with pytest.raises(MapError, match=r"expected level\.geojson in it"):
         read(half)

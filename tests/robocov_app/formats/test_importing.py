@@ -8,7 +8,7 @@ import pytest
 from raster_files import PLAN, drawn, pgm, ros_map
 
 from robocov.errors import MapError, ParameterError
-from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, detect, import_map, importer
+from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, detect_format, get_importer, import_map
 
 
 def test_every_format_says_what_it_is() -> None:
@@ -20,7 +20,7 @@ def test_every_format_says_what_it_is() -> None:
         # a YAML is of IR-SIM by its content only: what is missing in others, the reader of ROS says
         assert one.suffixes or one.name == "irsim"
         assert one.options <= known, name
-        assert importer(name) is one
+        assert get_importer(name) is one
     assert {"ros", "movingai", "picture"} <= IMPORTERS.keys()
 
 
@@ -43,10 +43,10 @@ def test_no_format_takes_noise_for_its_own(tmp_path: Path) -> None:
 
 def test_the_content_counts_before_the_suffix(tmp_path: Path) -> None:
     (tmp_path / "plan.map").write_bytes(pgm(drawn(PLAN)))
-    assert detect(tmp_path / "plan.map").name == "picture"
-    assert detect(ros_map(tmp_path, drawn(PLAN))).name == "ros"
+    assert detect_format(tmp_path / "plan.map").name == "picture"
+    assert detect_format(ros_map(tmp_path, drawn(PLAN))).name == "ros"
     (tmp_path / "half.yaml").write_text("image: plan.map\n")
-    assert detect(tmp_path / "half.yaml").name == "ros"
+    assert detect_format(tmp_path / "half.yaml").name == "ros"
     with pytest.raises(MapError, match="resolution: missing"):
         import_map(tmp_path / "half.yaml")
 
@@ -56,12 +56,12 @@ def test_what_is_not_known(tmp_path: Path) -> None:
     path.write_text("nothing")
     wanted = r"plan\.xyz: unknown format \(text that begins with 'nothing'\), expected one of .*ros.*"
     with pytest.raises(MapError, match=wanted):
-        detect(path)
+        detect_format(path)
     with pytest.raises(MapError, match="no such file"):
-        detect(tmp_path / "none.png")
+        detect_format(tmp_path / "none.png")
     os.mkfifo(tmp_path / "pipe.png")
     with pytest.raises(MapError, match="expected a file, got a pipe or a device"):
-        detect(tmp_path / "pipe.png")
+        detect_format(tmp_path / "pipe.png")
     with pytest.raises(MapError, match="expected a file, got a folder"):
         import_map(tmp_path)
     with pytest.raises(ParameterError, match="unknown format 'gif'"):

@@ -12,7 +12,7 @@ from shapely import affinity, box
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
-from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect, import_map
+from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect_format, import_map
 
 IMPORTER = IMPORTERS["irsim"]
 
@@ -23,7 +23,7 @@ SPACE = box(-1, 2, 9, 8)
 def read(folder: Path, text: str, world: str = WORLD, **options: object) -> ForeignMap:
     path = folder / "world.yaml"
     path.write_text(world + text)
-    assert detect(path) is IMPORTER
+    assert detect_format(path) is IMPORTER
     return IMPORTER.read(path, ReadOptions(**options))  # type: ignore[arg-type]
 
 
@@ -183,7 +183,7 @@ def test_a_world_is_not_taken_for_a_map_of_ros(tmp_path: Path) -> None:
     # a generated map has a resolution, and comments speak of images
     path = tmp_path / "world.yaml"
     path.write_text(WORLD + "  obstacle_map:\n    name: perlin # or an image: a.png\n    resolution: 0.1\n")
-    assert detect(path) is IMPORTER
+    assert detect_format(path) is IMPORTER
 
 
 def test_turns_are_in_radians() -> None:

@@ -11,12 +11,12 @@ from robocov_app.formats import files
 
 def test_the_beginning_and_the_whole_of_a_file(tmp_path: Path) -> None:
     path = tmp_path / "a.bin"
-    path.write_bytes(b"x" * (files.HEAD + 10))
-    assert len(files.head(path)) == files.HEAD
-    assert files.content(path) == b"x" * (files.HEAD + 10)
-    assert files.content(path, files.HEAD + 10) == b"x" * (files.HEAD + 10)
+    path.write_bytes(b"x" * (files.HEAD_BYTES + 10))
+    assert len(files.read_head(path)) == files.HEAD_BYTES
+    assert files.read_content(path) == b"x" * (files.HEAD_BYTES + 10)
+    assert files.read_content(path, files.HEAD_BYTES + 10) == b"x" * (files.HEAD_BYTES + 10)
     with pytest.raises(MapError, match=r"a\.bin: expected at most 1 MB, got more"):
-        files.content(path, 1_000_000)
+        files.read_content(path, 1_000_000)
 
 
 def test_what_is_no_file(tmp_path: Path) -> None:
@@ -29,7 +29,7 @@ def test_what_is_no_file(tmp_path: Path) -> None:
         (tmp_path / "nul\0", "cannot be read"),
         (tmp_path / ("long" * 100), "cannot be read"),
     ):
-        for read in (files.head, files.content):
+        for read in (files.read_head, files.read_content):
             with pytest.raises(MapError) as caught:
                 read(path)
             assert wanted in str(caught.value)
@@ -41,7 +41,7 @@ def test_a_size_on_the_disk_is_looked_at_before_the_content(tmp_path: Path) -> N
     with path.open("wb") as file:
         file.truncate(10**12)
     with pytest.raises(MapError, match="expected at most 256 MB, got more"):
-        files.content(path)
+        files.read_content(path)
 
 
 def test_sizes_counts_lengths_and_places() -> None:

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.errors import MapError
-from robocov_app.formats import IMPORTERS, ReadOptions, detect, import_map
-from robocov_app.formats.base import ForeignMap
+from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, import_map
+from robocov_app.formats.foreign_map import ForeignMap
 
 IMPORTER = IMPORTERS["movingai"]
 
@@ -44,8 +44,8 @@ def test_letters(tmp_path: Path) -> None:
 
 
 def test_it_is_known_by_its_content_and_its_suffix(tmp_path: Path) -> None:
-    assert detect(write(tmp_path, GRID, "grid.txt")) is IMPORTER
-    assert detect(write(tmp_path, "nothing of the kind", "b.map")) is IMPORTER
+    assert detect_format(write(tmp_path, GRID, "grid.txt")) is IMPORTER
+    assert detect_format(write(tmp_path, "nothing of the kind", "b.map")) is IMPORTER
     with pytest.raises(MapError, match=r"b\.map: line 1: expected type octile"):
         import_map(tmp_path / "b.map")
 

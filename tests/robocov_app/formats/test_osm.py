@@ -12,7 +12,7 @@ from shapely import box
 
 from robocov.environment import CircleObstacle, WallObstacle
 from robocov.errors import MapError, ParameterError
-from robocov_app.formats import IMPORTERS, ReadOptions, detect, import_map
+from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, import_map
 
 PLANE = pyproj.Proj(proj="aeqd", lon_0=6.1, lat_0=50.7, ellps="WGS84")
 HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n<osm version="0.6" generator="test">\n'
@@ -72,7 +72,7 @@ def square(x: float, y: float, side: float) -> list[tuple[float, float]]:
 def solid(folder: Path, extract: Extract, **options: Any) -> Any:
     path = folder / "town.osm"
     path.write_text(extract.text())
-    assert detect(path) is IMPORTERS["osm"]
+    assert detect_format(path) is IMPORTERS["osm"]
     free = IMPORTERS["osm"].read(path, ReadOptions(**options)).free
     assert free.envelope.area == pytest.approx(80 * 60, rel=1e-5)
     return box(*free.bounds) - free
@@ -252,7 +252,7 @@ def test_overpass_json_is_as_xml(tmp_path: Path, style: str) -> None:
         way["geometry"] = geometry(ring)
     path = tmp_path / "town.json"
     path.write_text(overpass(*before, way, bounds=bounds_of(ROOM), remark="runtime error: Query timed out"))
-    assert detect(path) is IMPORTERS["osm"]
+    assert detect_format(path) is IMPORTERS["osm"]
     foreign = IMPORTERS["osm"].read(path, ReadOptions(pillar=0.5))
     assert foreign.free.area == pytest.approx(1600 - 100 - math.pi / 4, rel=1e-3)
     assert "Overpass says: runtime error: Query timed out" in foreign.notes

@@ -10,7 +10,7 @@ from PIL import Image, PngImagePlugin
 from raster_files import pgm
 
 from robocov.errors import MapError
-from robocov_app.formats import IMPORTERS, ReadOptions, detect, import_map
+from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, import_map
 from robocov_app.formats.picture import CHUNK
 
 IMPORTER = IMPORTERS["picture"]
@@ -35,7 +35,7 @@ def read(path: Path, **options: object) -> shapely.MultiPolygon:
 
 def test_dark_is_an_obstacle(tmp_path: Path) -> None:
     path = saved(tmp_path, LEVELS)
-    assert detect(path) is IMPORTER
+    assert detect_format(path) is IMPORTER
     lower = shapely.box(0, 0, 4, 1)
     assert shapely.equals(read(path, cell=1.0), lower | shapely.box(2, 1, 4, 2))
     assert shapely.equals(read(path, cell=1.0, threshold=0.4), lower | shapely.box(1, 1, 4, 2))
@@ -47,7 +47,7 @@ def test_dark_is_an_obstacle(tmp_path: Path) -> None:
 def test_a_pgm_is_a_picture_too(tmp_path: Path) -> None:
     path = tmp_path / "plan.pgm"
     path.write_bytes(pgm(LEVELS))
-    assert detect(path) is IMPORTER
+    assert detect_format(path) is IMPORTER
     assert read(path, cell=0.5).area == 6 / 4
 
 

@@ -13,7 +13,7 @@ from shapely import MultiPolygon, Polygon, box
 
 from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, WallObstacle
 from robocov_app.formats import ReadOptions, import_map
-from robocov_app.formats.base import ForeignMap
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.conversion import build_environment
 from robocov_app.formats.geometry.shaping import Shaping
 

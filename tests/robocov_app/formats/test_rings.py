@@ -9,7 +9,7 @@ from shapely import Polygon, box
 from vector_files import read, square
 
 from robocov.errors import MapError
-from robocov_app.formats import IMPORTERS, ReadOptions, detect
+from robocov_app.formats import IMPORTERS, ReadOptions, detect_format
 
 HALL = [square(0, 0, 20, 10), square(1, 1, 2, 2), square(5, 5, 1, 1)]
 
@@ -42,7 +42,7 @@ def test_the_first_ring_is_the_outline(tmp_path: Path, document: Any) -> None:
         if "dimensions" in document and document["dimensions"] == 3
         else ()
     )
-    assert detect(tmp_path / "plan.json").name == "rings"
+    assert detect_format(tmp_path / "plan.json").name == "rings"
 
 
 def test_one_ring_alone(tmp_path: Path) -> None:

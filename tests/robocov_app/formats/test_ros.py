@@ -14,7 +14,7 @@ from raster_files import FREE, OCCUPIED, PLAN, UNKNOWN, drawn, pgm, ros_map
 from shapely import MultiPolygon
 
 from robocov.errors import MapError, ParameterError
-from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, detect, import_map
+from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, detect_format, import_map
 from robocov_app.formats.picture import Brightness
 from robocov_app.formats.ros import _raw, _scale, _trinary
 
@@ -30,7 +30,7 @@ def read(path: Path, **options: object) -> MultiPolygon:
 
 def test_a_map_is_read_where_it_lies(tmp_path: Path) -> None:
     path = ros_map(tmp_path, drawn(PLAN), origin=[-1.5, 2.0, 0.0])
-    assert detect(path) is IMPORTER
+    assert detect_format(path) is IMPORTER
     foreign = IMPORTER.read(path, ReadOptions())
     wanted = shapely.transform(ROOMS, lambda p: p * 0.25 + (-1.5, 2.0))
     assert shapely.equals(foreign.free, wanted)
@@ -268,7 +268,7 @@ def test_a_picture_that_is_not_there_is_taken_from_beside_the_file(tmp_path: Pat
     (tmp_path / "plan.pgm").write_bytes(pgm(drawn(PLAN)))
     foreign = IMPORTER.read(ros_map(tmp_path, b"", "a", image=name), ReadOptions())
     assert foreign.free.area > 0
-    assert foreign.repaired == (f"image: {name!r} is not there, 'plan.pgm' beside the file taken",)
+    assert foreign.repaired == (f"image: {name!r} not found, 'plan.pgm' next to the file taken",)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from shapely import affinity, box
 
 from robocov.environment import PointsStart
 from robocov.errors import MapError
-from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect, import_map
+from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect_format, import_map
 
 IMPORTER = IMPORTERS["stage"]
 
@@ -18,7 +18,7 @@ IMPORTER = IMPORTERS["stage"]
 def read(folder: Path, text: str, **options: object) -> ForeignMap:
     path = folder / "hall.world"
     path.write_text(text)
-    assert detect(path) is IMPORTER
+    assert detect_format(path) is IMPORTER
     return IMPORTER.read(path, ReadOptions(**options))  # type: ignore[arg-type]
 
 
@@ -152,7 +152,7 @@ def test_only_what_is_in_the_folder_is_included(tmp_path: Path) -> None:
     assert read(folder, far, anywhere=True).free.area == pytest.approx(100)
     # an absolute name of a world that has moved with its includes
     moved = read(folder, f'include "{tmp_path}/elsewhere/near.inc"\nroom ( )')
-    assert "near.inc' beside the file taken" in moved.notes[0]
+    assert "near.inc' next to the file taken" in moved.notes[0]
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,8 @@ from vector_files import read, svg
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, RobocovError
-from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect
-from robocov_app.formats.xml_tree import DEEPEST, MOST_ELEMENTS
+from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect_format
+from robocov_app.formats.files.xml_tree import MAX_ELEMENTS, MAX_NESTING
 
 PAGE = '<rect width="1000" height="600" fill="white"/>'
 BLOCK, WALL = box(1, 4, 3, 5), box(1, 4.9, 3, 5.1)
@@ -244,7 +244,7 @@ def test_what_editors_write_before_it(tmp_path: Path) -> None:
         path = tmp_path / "plan.svg"
         path.write_bytes(content)
         assert IMPORTERS["svg"].read(path, ReadOptions(scale=0.01)).free.area == pytest.approx(60)
-        assert detect(path).name == "svg"
+        assert detect_format(path).name == "svg"
 
 
 @pytest.mark.parametrize(
@@ -333,10 +333,10 @@ def test_document_types_that_drawing_programs_write(tmp_path: Path, inside: str)
         (b"<svg data-origin='1'/>", "<svg>: expected two numbers"),
         (b"<svg" + b" a='1'" * 1_000_001 + b"/>", "expected at most 1000000 attributes, got more"),
         (
-            b"<svg>" + b"<g/>" * (MOST_ELEMENTS + 1) + b"</svg>",
-            f"expected at most {MOST_ELEMENTS} elements, got more",
+            b"<svg>" + b"<g/>" * (MAX_ELEMENTS + 1) + b"</svg>",
+            f"expected at most {MAX_ELEMENTS} elements, got more",
         ),
-        (b"<g>" * 1_000_000, f"nested deeper than {DEEPEST}"),
+        (b"<g>" * 1_000_000, f"nested deeper than {MAX_NESTING}"),
     ],
     ids=lambda value: value if isinstance(value, str) else "content",
 )
@@ -359,11 +359,11 @@ def test_what_is_no_svg_is_refused(tmp_path: Path, content: bytes, wanted: str) 
             "<defs><g id='a0'><path d='M0 0h1v1z'/></g>"
             + "".join(f"<g id='a{k + 1}'>" + f"<use href='#a{k}'/>" * 10 + "</g>" for k in range(10))
             + "</defs><use href='#a10'/>",
-            f"expected at most {MOST_ELEMENTS}, got ",
+            f"expected at most {MAX_ELEMENTS}, got ",
         ),
         (
             "".join(f"<g id='a{k + 1}'><use href='#a{k}'/></g>" for k in reversed(range(500))),
-            f"uses are nested deeper than {DEEPEST}",
+            f"uses are nested deeper than {MAX_NESTING}",
         ),
     ],
 )

@@ -3,6 +3,7 @@
 import pytest
 
 from robocov.errors import MapError
+from robocov_app.formats.files.xml_tree import Element
 from robocov_app.formats.svg.path import (
     INHERITED,
     MAX_TEXT,
@@ -13,7 +14,6 @@ from robocov_app.formats.svg.path import (
     is_painted,
     parse_declarations,
 )
-from robocov_app.formats.xml_tree import Element
 
 
 def element(tag: str = "rect", **attributes: str) -> Element:

@@ -15,7 +15,7 @@ from shapely import affinity, box
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError
-from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect, import_map
+from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect_format, import_map
 
 IMPORTER = IMPORTERS["tmx"]
 
@@ -50,7 +50,7 @@ def read(
     path.write_text(
         f'<?xml version="1.0"?>\n<map width="4" height="3" {tile} {head}>\n{"".join(parts)}</map>'
     )
-    assert detect(path) is IMPORTER
+    assert detect_format(path) is IMPORTER
     return IMPORTER.read(path, ReadOptions(**options))  # type: ignore[arg-type]
 
 

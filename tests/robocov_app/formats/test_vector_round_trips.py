@@ -21,7 +21,7 @@ from robocov_app.formats import (
     Shaping,
     WriteOptions,
     build_environment,
-    detect,
+    detect_format,
     export_map,
     import_map,
 )
@@ -34,7 +34,7 @@ AS_IT_IS = Shaping(simplify=0.0, keep="all")
 def out_and_in(environment: Environment, path: Path, **options: Any) -> ForeignMap:
     """Write and read a map, and compare what is free."""
     report = export_map(environment, path, options=WriteOptions(**options))
-    foreign = detect(path).read(path, ReadOptions())
+    foreign = detect_format(path).read(path, ReadOptions())
     edge = environment.free.length
     assert report.files == (path,)
     assert report.area == environment.free_area

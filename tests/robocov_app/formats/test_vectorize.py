@@ -12,7 +12,7 @@ from scipy import ndimage
 from shapely import MultiPolygon, Polygon
 
 from robocov.errors import MapError
-from robocov_app.formats import files
+from robocov_app.formats.files import limits
 from robocov_app.formats.geometry.vectorize import NECK, trace_outline
 
 grids = arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, max_side=9), elements=st.booleans())
@@ -78,6 +78,6 @@ def test_nothing_and_all() -> None:
 
 def test_a_grid_that_is_too_rough_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     chess = np.indices((20, 20)).sum(axis=0) % 2 == 0
-    monkeypatch.setattr(files, "MAX_VERTICES", 200)
+    monkeypatch.setattr(limits, "MAX_VERTICES", 200)
     with pytest.raises(MapError, match=r"^grid: expected at most"):
         trace_outline(chess, "grid")

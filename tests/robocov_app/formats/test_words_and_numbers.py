@@ -8,7 +8,6 @@ import pytest
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from robocov_app.formats.base import square_metres
 from robocov_app.formats.files import parse_yaml
 from robocov_app.formats.geometry.corners import sharpen_corners
 from robocov_app.formats.geometry.curves import flatten_beziers
@@ -19,12 +18,13 @@ from robocov_app.formats.geometry.polygons import format_decimal
 from robocov_app.formats.geometry.rasterize import _iterate_smaller_sizes
 from robocov_app.formats.geometry.vectorize import _format_share, trace_outline
 from robocov_app.formats.preview import _number
+from robocov_app.formats.reports import format_area
 from robocov_app.formats.svg.path import parse_declarations, parse_path
-from robocov_app.formats.unreadable import named_kind
+from robocov_app.formats.unsupported import describe_unsupported_file
 
 
 def test_numbers_are_written_so_that_they_are_read_easily() -> None:
-    assert (square_metres(30083.2), square_metres(0.123456)) == ("30083 m²", "0.1235 m²")
+    assert (format_area(30083.2), format_area(0.123456)) == ("30083 m²", "0.1235 m²")
     assert (format_decimal(1.5, 3), format_decimal(-0.0001, 3), format_decimal(1200.0, 0)) == (
         "1.5",
         "0",
@@ -51,7 +51,7 @@ def test_what_is_in_texts() -> None:
 
 
 def test_a_file_that_is_not_read_is_named_with_a_way() -> None:
-    assert named_kind(Path("plan.pdf"), b"%PDF-1.7") == (
+    assert describe_unsupported_file(Path("plan.pdf"), b"%PDF-1.7") == (
         "a PDF, which cannot be imported: pdftocairo -svg plan.pdf out.svg, or pdftoppm -png for a scan"
     )
 

@@ -6,7 +6,7 @@ import pytest
 
 from robocov.environment import Environment, PolygonObstacle
 from robocov.mapfile import load_map
-from robocov_app.formats import ReadOptions, Shaping, WriteOptions, detect, export_map, import_map
+from robocov_app.formats import ReadOptions, Shaping, WriteOptions, detect_format, export_map, import_map
 
 ROOM = Environment(
     "room", ((0.0, 0.0), (2.0, 0.0), (2.0, 1.5), (0.0, 1.5)),
@@ -29,7 +29,7 @@ def test_it_comes_back_beside_its_place(tmp_path: Path) -> None:
     museum = load_map("museum")
     report = export_map(museum, path)
     assert any(line.startswith("starts: ") for line in report.dropped)
-    assert detect(path).name == "movingai"
+    assert detect_format(path).name == "movingai"
     environment, _, foreign = import_map(path, options=ReadOptions(cell=0.05), shaping=Shaping(keep="all"))
     assert foreign.free.area == pytest.approx(report.area_written, abs=0.01)
     assert environment.free_area == pytest.approx(museum.free_area, abs=0.2 * 0.05 * museum.free.length)

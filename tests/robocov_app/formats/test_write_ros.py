@@ -102,7 +102,7 @@ def test_the_picture_is_not_written_over_the_yaml(tmp_path: Path) -> None:
         export_map(CORNER, tmp_path / "corner.pgm", format="ros")
     assert not list(tmp_path.iterdir())
     exporter = EXPORTERS["ros"]
-    assert exporter.files(Path("a.yaml"), WriteOptions(mode="scale")) == (Path("a.yaml"), Path("a.png"))
+    assert exporter.list_files(Path("a.yaml"), WriteOptions(mode="scale")) == (Path("a.yaml"), Path("a.png"))
 
 
 def test_the_same_map_gives_the_same_bytes(tmp_path: Path) -> None:
@@ -123,4 +123,4 @@ def test_what_a_folder_does_not_take_is_one_line(tmp_path: Path) -> None:
     round_room = Environment("round", CORNER.boundary, (CircleObstacle((1.0, 1.0), 0.3, "pillar"),))
     report = export_map(round_room, tmp_path / "a.yaml")
     assert report.dropped == ("names of obstacles",)
-    assert report.lines()[-1] == f"saved in {tmp_path / 'a.yaml'}, {tmp_path / 'a.pgm'}"
+    assert report.format_lines()[-1] == f"saved in {tmp_path / 'a.yaml'}, {tmp_path / 'a.pgm'}"

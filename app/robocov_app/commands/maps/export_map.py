@@ -9,7 +9,7 @@ import tyro
 from robocov.errors import InputError, to_one_line
 from robocov.mapfile import load_map
 from robocov_app.commands.options import JsonOption
-from robocov_app.formats import EXPORTERS, WriteOptions, export_map, exporter
+from robocov_app.formats import EXPORTERS, WriteOptions, choose_exporter, export_map
 from robocov_app.terminal.output import check_output_file, echo, print_answer
 
 
@@ -44,11 +44,11 @@ def command(options: Arguments) -> None:
     if options.format is not None and options.format not in EXPORTERS:
         known = ", ".join(EXPORTERS)
         raise InputError(f"--format: expected one of {known}, got {to_one_line(options.format)!r}")
-    for file in exporter(options.out, options.format).files(options.out, options.write):
+    for file in choose_exporter(options.out, options.format).list_files(options.out, options.write):
         check_output_file(
             file, "another -o", overwrite=options.overwrite, source=Path(options.map), source_kind="map"
         )
     report = export_map(load_map(options.map), options.out, format=options.format, options=options.write)
     for line in report.warnings:
         echo(f"robocov: warning: {line}", to_stderr=True)
-    print_answer(options, report.to_dict(), *report.lines())
+    print_answer(options, report.to_dict(), *report.format_lines())

@@ -82,5 +82,5 @@ def command(options: Arguments) -> None:
         done(3)
     files = {"out": str(out)} | ({} if options.preview is None else {"preview": str(options.preview)})
     print_answer(
-        options, files | report.to_dict(), *report.lines(), f"saved in {' and '.join(files.values())}"
+        options, files | report.to_dict(), *report.format_lines(), f"saved in {' and '.join(files.values())}"
     )

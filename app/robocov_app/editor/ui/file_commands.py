@@ -20,7 +20,7 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui.editor import MOST_RECENT, Editor
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.importing import Imported, Importing
-from robocov_app.formats import EXPORTERS, IMPORTERS, Importer, detect, export_map
+from robocov_app.formats import EXPORTERS, IMPORTERS, Importer, detect_format, export_map
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 from robocov_app.storage.regular_files import require_regular_file
 from robocov_app.toolkit.dialogs import Option, file_choice, list_choice
@@ -252,7 +252,7 @@ def opened(path: Path, drafts: Path | None) -> Document | Importer:
     except MapError as error:
         if path.is_file() and not (path.suffix.lower() == SUFFIX and _is_map(path)):
             try:
-                return detect(path)
+                return detect_format(path)
             except MapError:  # which names it for what it is
                 if path.suffix.lower() != SUFFIX and not _is_map(path):
                     raise

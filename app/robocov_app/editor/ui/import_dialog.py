@@ -14,8 +14,8 @@ from robocov.errors import RobocovError
 from robocov_app.editor.ui.import_sheet import declared_colours, find_role, give_role, next_role
 from robocov_app.editor.ui.importing import Imported, options_of
 from robocov_app.formats import Importer, ReadOptions, Shaping
-from robocov_app.formats.base import square_metres
 from robocov_app.formats.colours import Colour, name_colour
+from robocov_app.formats.reports import format_area
 from robocov_app.jobs.workers import Worker
 from robocov_app.render import layout, surface_cache
 from robocov_app.render.camera import Camera
@@ -240,7 +240,11 @@ class ImportDialog(Dialog):
         ui.end_row()
 
     def _report(self, ui: Ui, foot: float) -> None:
-        said = [self.trouble] if self.trouble else self.imported.report.lines() if self.imported else []
+        said: list[str] = []
+        if self.trouble:
+            said = [self.trouble]
+        elif self.imported:
+            said = self.imported.report.format_lines()
         lines = [line for each in said for line in wrapped(each, ui.px(SMALL), ui.px(ui.wide))]
         most = int((foot - ui.y) / _LINE) - 1
         if len(lines) > most:
@@ -299,8 +303,8 @@ class ImportDialog(Dialog):
     def _draw_captions(self, screen: Surface, imported: Imported, scale: float, theme: Theme) -> None:
         compared, report = imported.comparison, imported.report
         size, small = round(13 * scale), round(SMALL * scale)
-        lost = "" if compared.lost.is_empty else f"{square_metres(compared.lost.area, 3)} left out"
-        opened = "" if compared.opened.is_empty else f"{square_metres(compared.opened.area, 3)} opened"
+        lost = "" if compared.lost.is_empty else f"{format_area(compared.lost.area, 3)} left out"
+        opened = "" if compared.opened.is_empty else f"{format_area(compared.opened.area, 3)} opened"
         passage = f", narrowest passage {compared.gap.width:.3g} m" if compared.gap is not None else ""
         rows = (
             ("as read", report.vertices_read, compared.before.area, "", lost, theme.trajectory),
@@ -317,7 +321,7 @@ class ImportDialog(Dialog):
                 square = Rect(left, y + round(4 * scale), round(9 * scale), round(9 * scale))
                 pygame.draw.rect(screen, colour, square)
                 screen.blit(label(mark, small, theme.ink), (left + round(14 * scale), y + round(2 * scale)))
-            facts = shortened(f"{vertices} vertices, {square_metres(area)} free{more}", small, self._wide)
+            facts = shortened(f"{vertices} vertices, {format_area(area)} free{more}", small, self._wide)
             screen.blit(label(facts, small, theme.faint), (x, y + round(20 * scale)))
 
 

@@ -10,8 +10,16 @@ import shapely
 from pygame import Rect, Surface
 
 from robocov_app.formats import ForeignMap
-from robocov_app.formats.base import Painted, Thumbnail
-from robocov_app.formats.colours import ROLES, WHITE, Colour, ColourKey, Role, name_colour, read_colour
+from robocov_app.formats.colours import (
+    ROLES,
+    WHITE,
+    Colour,
+    ColourKey,
+    Role,
+    name_colour,
+    parse_css_colour_on_white,
+)
+from robocov_app.formats.foreign_map import Painted, Thumbnail
 from robocov_app.render.camera import Camera
 
 MAX_COLOURS = 12  # that are offered; others are reached by a click
@@ -150,14 +158,14 @@ def _fill_polygon(surface: Surface, camera: Camera, part: shapely.Polygon, colou
 def find_role(given: MutableMapping[str, str], colour: Colour) -> Role | None:
     """Return the role that the options as they were typed give to exactly this colour."""
     for role in ROLES:
-        if colour in map(read_colour, _words(given, role)):
+        if colour in map(parse_css_colour_on_white, _words(given, role)):
             return role
     return None
 
 
 def declared_colours(given: MutableMapping[str, str]) -> list[Colour]:
     """Return the colours that have a role in the options as they were typed."""
-    found = (read_colour(word) for role in ROLES for word in _words(given, role))
+    found = (parse_css_colour_on_white(word) for role in ROLES for word in _words(given, role))
     return list(dict.fromkeys(colour for colour in found if colour is not None))
 
 
@@ -168,7 +176,7 @@ def next_role(role: Role | None) -> Role | None:
 def give_role(given: MutableMapping[str, str], colour: Colour, role: Role | None) -> None:
     """Change the options as they were typed so that a colour has a role, or none."""
     for each in ROLES:
-        words = [word for word in _words(given, each) if read_colour(word) != colour]
+        words = [word for word in _words(given, each) if parse_css_colour_on_white(word) != colour]
         if each == role:
             words.append(name_colour(colour))
         name = f"{each}_colour"

@@ -9,8 +9,9 @@ from shapely import MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import Environment, Gap, find_narrowest_gap
-from robocov_app.formats.base import ForeignMap, ImportReport
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.polygons import make_valid
+from robocov_app.formats.reports import ImportReport
 
 _MAX_GAP_VERTICES = 20_000
 """Maps with more vertices are not searched for their narrowest passage, which would take too long."""

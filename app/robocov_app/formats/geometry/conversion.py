@@ -8,7 +8,7 @@ from robocov.environment import Environment
 from robocov.errors import MapError, format_count, to_one_line
 from robocov.mapfile import from_json, to_json
 from robocov.mapfile.check import MANY_VERTICES, count_vertices, describe_vertex_count
-from robocov_app.formats.base import ForeignMap, ImportReport, square_metres
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.cleaning import Cleaned, Deviation, measure_deviation, remove_hairs
 from robocov_app.formats.geometry.corners import sharpen_corners
 from robocov_app.formats.geometry.free_parts import PartSelection, drop_specks, select_parts
@@ -24,6 +24,7 @@ from robocov_app.formats.geometry.shaping import Conversion, Shaping
 from robocov_app.formats.geometry.simplify import SimplifiedSpace, simplify_free_space
 from robocov_app.formats.geometry.starts import build_starts, find_rooms, require_room
 from robocov_app.formats.geometry.validity import build_valid_boundary, build_valid_free_space
+from robocov_app.formats.reports import ImportReport, format_area
 
 MAX_OBSTACLES = 8_000
 MAX_VERTICES = 50_000
@@ -110,7 +111,7 @@ def _remove_hairs(free: MultiPolygon, conversion: Conversion) -> Cleaned:
     if cleaned.number:
         count = f"{format_count(cleaned.number, 'hair')} (slits, spurs)"
         thinner = f"thinner than {2000 * conversion.grid:g} mm"
-        conversion.changed.append(f"removed {count} {thinner}, {square_metres(cleaned.area, 2)}")
+        conversion.changed.append(f"removed {count} {thinner}, {format_area(cleaned.area, 2)}")
     return cleaned
 
 
@@ -179,7 +180,7 @@ def _report_deviation(deviation: Deviation, free: MultiPolygon, conversion: Conv
     if deviation.distance >= _MIN_REPORTED_MOVE_M:
         share = f"{100 * deviation.area / free.area:.2g} % of the free area"
         walls = f"walls moved by at most {deviation.distance:.2g} m"
-        conversion.changed.append(f"{walls}; {square_metres(deviation.area, 2)} changed sides, {share}")
+        conversion.changed.append(f"{walls}; {format_area(deviation.area, 2)} changed sides, {share}")
 
 
 def _report_unreachable(environment: Environment, conversion: Conversion) -> None:
@@ -188,7 +189,7 @@ def _report_unreachable(environment: Environment, conversion: Conversion) -> Non
         return
     areas = sorted((room.area for room in find_rooms(environment.free, conversion.radius)), reverse=True)
     if len(areas) > 1:
-        count = f"{format_count(len(areas) - 1, 'place')} of {square_metres(sum(areas[1:]), 3)}"
+        count = f"{format_count(len(areas) - 1, 'place')} of {format_area(sum(areas[1:]), 3)}"
         conversion.notes.append(
             f"{count} no robot of radius {conversion.radius:g} m reaches from the largest one"
         )

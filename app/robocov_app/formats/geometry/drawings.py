@@ -8,9 +8,10 @@ from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import CircleObstacle
-from robocov_app.formats.base import Primitive, ReadOptions
+from robocov_app.formats.foreign_map import Primitive
 from robocov_app.formats.geometry.shape_types import ClosedOutline, WallLine
 from robocov_app.formats.geometry.snapping import close_gaps, compute_default_snap
+from robocov_app.formats.options import ReadOptions
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import shapely
 from shapely import LineString, MultiPolygon, Polygon
 
-from robocov_app.formats.base import square_metres
 from robocov_app.formats.colours import WHITE, count_colours
 from robocov_app.formats.geometry.drawings import Boundary, Drawing, InterpretationReport
 from robocov_app.formats.geometry.painting import (
@@ -18,6 +17,7 @@ from robocov_app.formats.geometry.painting import (
 )
 from robocov_app.formats.geometry.polygons import to_multipolygon, unite
 from robocov_app.formats.geometry.shape_types import ClosedOutline
+from robocov_app.formats.reports import format_area
 
 _MIN_BACKGROUND_SHARE = 0.98
 """Fraction of the page that its background covers."""
@@ -106,7 +106,7 @@ def find_nested_areas(
         solid = odd
     whole = to_multipolygon(unite([Polygon(part.exterior) for part in (*odd.geoms, *even.geoms)]))
     number = "an odd number" if is_odd_free else "an even number"
-    size = square_metres(free.area, 3)
+    size = format_area(free.area, 3)
     report.notes.append(f"what lies in {number} of outlines is free, {size}, as the larger area")
     return NestedAreas(Boundary(whole, "the outermost outlines"), PaintLayer(solid, -1))
 

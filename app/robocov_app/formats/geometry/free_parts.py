@@ -9,10 +9,10 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import BoolArray
 from robocov.errors import MapError, format_count
-from robocov_app.formats.base import square_metres
 from robocov_app.formats.geometry.crossings import extract_sides
 from robocov_app.formats.geometry.shaping import Conversion
 from robocov_app.formats.geometry.validity import MAX_CRUMB_M2
+from robocov_app.formats.reports import format_area
 
 MAX_FILE_ROBOTS = 1000
 """Number of robots of a file that are considered."""
@@ -166,7 +166,7 @@ def _find_enclosed_part(parts: NDArray[np.object_], conversion: Conversion) -> i
         return None
     largest = parts[0]
     edge = f"{100 * edge_share:.0f} % of the edge of the picture"
-    paper = f"{square_metres(largest.area, 3)}, runs along {edge}"
+    paper = f"{format_area(largest.area, 3)}, runs along {edge}"
     enclosed = [k for k, length in enumerate(edge_lengths) if length == 0.0]
     if enclosed and parts[enclosed[0]].area >= _MIN_PLAN_SHARE * largest.area:
         x, y = _choose_position_in(largest)
@@ -192,7 +192,7 @@ def _report_dropped_parts(
         return ()
     largest = ""
     if len(dropped) > 1:
-        largest = f" (the largest {square_metres(dropped[0].area, 3)})"
+        largest = f" (the largest {format_area(dropped[0].area, 3)})"
     count = format_count(len(dropped), "separate part")
     conversion.dropped.append(f"{count} of the free space, {_format_total_area(dropped)}{largest}")
     area = shapely.area(parts)
@@ -202,7 +202,7 @@ def _report_dropped_parts(
     offered = dropped[:_MAX_OFFERED_PARTS]
     positions = tuple(_choose_position_in(part) for part in offered)
     choices = [
-        f"--inside {x:.10g} {y:.10g} ({square_metres(part.area, 3)})"
+        f"--inside {x:.10g} {y:.10g} ({format_area(part.area, 3)})"
         for (x, y), part in zip(positions, offered, strict=True)
     ]
     only = "only " if share < _MIN_KEPT_SHARE else ""
@@ -243,4 +243,4 @@ def _choose_position_in(part: Polygon) -> tuple[float, float]:
 
 def _format_total_area(parts: list[Polygon]) -> str:
     together = " together" if len(parts) > 1 else ""
-    return f"{square_metres(sum(part.area for part in parts), 3)}{together}"
+    return f"{format_area(sum(part.area for part in parts), 3)}{together}"

@@ -35,7 +35,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.environment import GRID_M, CircleObstacle
 from robocov.errors import MapError, format_count
 from robocov.mapfile.models import MAX_SIZE_M
-from robocov_app.formats.base import Primitive
+from robocov_app.formats.foreign_map import Primitive
 from robocov_app.formats.geometry.boundary_search import find_boundary, find_surrounding
 from robocov_app.formats.geometry.crossings import CrossingCounter
 from robocov_app.formats.geometry.drawings import (

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from robocov.errors import ParameterError, describe_unknown_name
-from robocov_app.formats.base import ReadOptions
+from robocov_app.formats.options import ReadOptions
 
 _MAX_LISTED_NAMES = 20
 

@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.environment import GRID_M, PolygonObstacle, Ring, WallObstacle
 from robocov.errors import format_count
 from robocov.mapfile.models import MIN_SIZE_M
-from robocov_app.formats.base import Primitive
+from robocov_app.formats.foreign_map import Primitive
 from robocov_app.formats.geometry.cleaning import Deviation, measure_deviation
 from robocov_app.formats.geometry.polygons import (
     buffer_with_mitres,

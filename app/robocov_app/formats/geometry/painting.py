@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import BoolArray
 from robocov.environment import GRID_M
-from robocov_app.formats.colours import DARK, PALE, Colour, luminance
+from robocov_app.formats.colours import MAX_DARK_LUMINANCE, MIN_PALE_LUMINANCE, Colour, compute_luminance
 from robocov_app.formats.geometry.enclosed_area import find_enclosed_area
 from robocov_app.formats.geometry.polygons import to_multipolygon, unite
 
@@ -38,12 +38,12 @@ class PaintLayer:
 
 def is_dark(colour: Colour | None) -> bool:
     """Return whether a color is known and dark."""
-    return colour is not None and luminance(colour) < DARK
+    return colour is not None and compute_luminance(colour) < MAX_DARK_LUMINANCE
 
 
 def is_pale(colour: Colour | None) -> bool:
     """Return whether a color is known and pale."""
-    return colour is not None and luminance(colour) >= PALE
+    return colour is not None and compute_luminance(colour) >= MIN_PALE_LUMINANCE
 
 
 def find_evident_floors(fills: Sequence[PaintLayer], marks: Sequence[PaintLayer]) -> list[bool]:

@@ -18,7 +18,7 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M, MIN_SIZE_M
-from robocov_app.formats.base import Primitive
+from robocov_app.formats.foreign_map import Primitive
 from robocov_app.formats.geometry.cleaning import measure_deviation
 from robocov_app.formats.geometry.map_layout import MapLayout
 from robocov_app.formats.geometry.polygons import round_polygons

@@ -16,9 +16,9 @@ from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
 from robocov.errors import ParameterError, format_count
-from robocov_app.formats.base import ExportReport
 from robocov_app.formats.files import MAX_CELLS
 from robocov_app.formats.geometry.crossings import extract_sides
+from robocov_app.formats.reports import ExportReport
 
 DEFAULT_CELL_M = 0.05
 """Side of a cell, as in most maps of robots."""

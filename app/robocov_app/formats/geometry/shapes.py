@@ -13,8 +13,8 @@ from robocov.environment import CircleObstacle
 from robocov.errors import MapError
 from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, Painted, ReadOptions
 from robocov_app.formats.colours import UNPAINTED, ColourKey, Paint, count_colours, name_colour
+from robocov_app.formats.foreign_map import ForeignMap, Painted
 from robocov_app.formats.geometry.boundary_search import find_surrounding
 from robocov_app.formats.geometry.crossings import CrossingCounter
 from robocov_app.formats.geometry.drawings import Boundary, Drawing
@@ -29,6 +29,7 @@ from robocov_app.formats.geometry.shape_types import (
     WallLine,
     get_obstacle_name,
 )
+from robocov_app.formats.options import ReadOptions
 
 __all__ = ["BOUNDARY", "ClosedOutline", "Shapes", "SourceGeometry", "WallLine"]
 DEFAULT_THICKNESS_M = 0.1

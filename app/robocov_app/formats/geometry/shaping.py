@@ -11,7 +11,8 @@ from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import MIN_START_GAP_RADII
 from robocov.errors import MapError, ParameterError, quote
 from robocov.mapfile.models import MAX_COORDINATE_M
-from robocov_app.formats.base import ForeignMap, Options
+from robocov_app.formats.foreign_map import ForeignMap
+from robocov_app.formats.options import Options
 
 DEFAULT_TOLERANCE_M = 0.02
 """Distance by which walls of vector formats may move."""
@@ -45,7 +46,7 @@ class Shaping(Options):
     """The map's default start: a disc at the roomiest place, or anywhere."""
 
     def __post_init__(self) -> None:
-        self.require(
+        self.require_ranges(
             simplify=(0, 10, "m"), specks=(0, 1e6, "m²"), margin=(0, 100, "m"), radius=(1e-3, 100, "m")
         )
         if self.inside is None:

@@ -6,9 +6,9 @@ from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.errors import MapError
-from robocov_app.formats.base import square_metres
 from robocov_app.formats.geometry.polygons import list_polygons, make_valid, to_multipolygon
 from robocov_app.formats.geometry.shaping import Conversion
+from robocov_app.formats.reports import format_area
 
 MAX_CRUMB_M2 = 1e-4
 """Smaller obstacles and parts are rounding errors."""
@@ -60,7 +60,7 @@ def build_valid_free_space(conversion: Conversion, boundary: MultiPolygon | None
         inside = shapely.intersection(inside, boundary)
         lost = area_before - inside.area
         if lost > MAX_CRUMB_M2:
-            conversion.dropped.append(f"{square_metres(lost, 3)} of free space outside the boundary")
+            conversion.dropped.append(f"{format_area(lost, 3)} of free space outside the boundary")
     valid = to_multipolygon(inside)
     if valid.is_empty:
         raise MapError(f"{where}: there is no free space")

@@ -18,8 +18,9 @@ from shapely import MultiPolygon, Polygon
 from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges
 from robocov.environment import Point
 from robocov.errors import MapError
-from robocov_app.formats.base import ForeignMap, square_metres
 from robocov_app.formats.files import require_coordinate, require_vertices
+from robocov_app.formats.foreign_map import ForeignMap
+from robocov_app.formats.reports import format_area
 
 Cells: TypeAlias = NDArray[np.uint8]
 """`FREE`, `BLOCKED` or `UNKNOWN`, (rows, columns), the top row first."""
@@ -99,7 +100,7 @@ def build_grid_map(
         main = _find_main_island(upward != UNKNOWN, free)
         lost = int(np.count_nonzero(free & ~main))
         if lost:
-            area = square_metres(lost * cell * cell, 3)
+            area = format_area(lost * cell * cell, 3)
             dropped = (f"{area} of free space on other islands of known cells",)
         free &= main
         boundary = _build_rim(main, where, place)

@@ -28,9 +28,10 @@ from robocov.environment import CircleObstacle, Environment, Obstacle, Ring, Wal
 from robocov.errors import MapError, to_one_line
 from robocov.files.writing import replace_file
 from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
-from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
-from robocov_app.formats.colours import Paint, read_colour
-from robocov_app.formats.files import MAX_VERTICES, name_of_map, require_shapes
+from robocov_app.formats.colours import Paint, parse_css_colour_on_white
+from robocov_app.formats.files import MAX_VERTICES, get_map_name, require_shapes
+from robocov_app.formats.files.xml_tree import MAX_ELEMENTS, MAX_NESTING, Element, read_xml_tree
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.curves import CURVE_TOLERANCE_M, flatten_arc
 from robocov_app.formats.geometry.enclosed_area import Rule
 from robocov_app.formats.geometry.frames import transform_points
@@ -39,9 +40,10 @@ from robocov_app.formats.geometry.primitives import transform_numbers
 from robocov_app.formats.geometry.rasterize import describe_unsupported
 from robocov_app.formats.geometry.shape_types import PenStroke
 from robocov_app.formats.geometry.shapes import Shapes, WallLine, note_colours
+from robocov_app.formats.options import ReadOptions, WriteOptions
+from robocov_app.formats.reports import ExportReport
 from robocov_app.formats.svg import path as paths
 from robocov_app.formats.svg.path import build_affine, compose, compute_stretch, parse_length, parse_numbers
-from robocov_app.formats.xml_tree import DEEPEST, MOST_ELEMENTS, Element, read_xml_tree
 from robocov_app.render.theme import DARK, LIGHT, Theme
 
 DIGITS = 3  # decimals of millimetres by default: as fine as the free space is known at true scale
@@ -71,7 +73,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     shapes.page = shapely.box(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
     drawing.pixel = paths.PIXEL if options.scale is None else options.scale
     drawing.draw(matrix, width, height)
-    shapes.drop_thin_outlines(options.stroke_width(drawing.pixel))
+    shapes.drop_thin_outlines(options.compute_stroke_width(drawing.pixel))
     everything = shapes.geometries
     if options.scale is None and everything:
         x, y, right, top = shapely.total_bounds(everything)
@@ -85,7 +87,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     texts = {
         each.tag: to_one_line(" ".join(each.text.split())) for each in root.children if each.text.strip()
     }
-    name = texts.get("title", "")[:80] or name_of_map(path)
+    name = texts.get("title", "")[:80] or get_map_name(path)
     return shapes.build_foreign_map(name, texts.get("desc", "")[:1000] or "Imported from SVG.", solid=True)
 
 
@@ -172,10 +174,10 @@ class _Drawing:
         self.named: dict[str, Element] = {}
         self.draws = paths.MAX_DRAWS
         self.pixel = paths.PIXEL  # metres a unit of the root
-        self.key = shapes.options.colour_key()
+        self.key = shapes.options.build_colour_key()
         self.dashed = self.clipped = 0
         self._last: tuple[Element, _Place, list[tuple[Array, bool]]] | None = None
-        for element in root.everything():
+        for element in root.iterate():
             if name := element.attributes.get("id"):
                 self.named.setdefault(name, element)
             if element.tag == "style":
@@ -206,8 +208,8 @@ class _Drawing:
         def count(element: Element, depth: int) -> tuple[int, int]:
             if element in inside:
                 element.refuse("is used within itself")
-            if depth > DEEPEST:
-                element.refuse(f"uses are nested deeper than {DEEPEST}")
+            if depth > MAX_NESTING:
+                element.refuse(f"uses are nested deeper than {MAX_NESTING}")
             if element not in counted:
                 inside.add(element)
                 target = self._target(element)
@@ -218,8 +220,8 @@ class _Drawing:
             return counted[element]
 
         elements, shapes = count(self.root, 0)
-        if elements > MOST_ELEMENTS:
-            few = f"expected at most {MOST_ELEMENTS}"
+        if elements > MAX_ELEMENTS:
+            few = f"expected at most {MAX_ELEMENTS}"
             raise MapError(f"{self.root.where}: {few}, got {elements:.3g} elements to be drawn, uses and all")
         require_shapes(shapes, self.root.where)
 
@@ -234,8 +236,8 @@ class _Drawing:
             self.shapes.leave_out(element.tag)
         if element.tag not in _GROUPS and element.tag not in _SHAPES:
             return
-        if outer.depth > DEEPEST:
-            element.refuse(f"nested deeper than {DEEPEST}")
+        if outer.depth > MAX_NESTING:
+            element.refuse(f"nested deeper than {MAX_NESTING}")
         own = self.sheet.of(element)
         if paths.is_hidden(own):
             self.shapes.leave_out("hidden element")
@@ -317,7 +319,7 @@ class _Drawing:
     def _paint(self, place: _Place, what: str) -> Paint:
         """Return the colour of a fill or a stroke; the first of a gradient's colours for all of it."""
         seen = paths.compute_visible_colour(place.style, what, place.opacity, self._gradient_colour)
-        written = read_colour(place.style[what])
+        written = parse_css_colour_on_white(place.style[what])
         return Paint(seen, self.key.find_role(written) or self.key.find_role(seen))
 
     def _gradient_colour(self, name: str) -> str | None:
@@ -354,7 +356,7 @@ class _Drawing:
             lines = self._lines(self._points(element, place), place, paint)
         except ValueError:  # of a width that no program writes, of a stroke that may never matter
             return
-        thinnest = self.shapes.options.stroke_width(self.pixel)
+        thinnest = self.shapes.options.compute_stroke_width(self.pixel)
         wide = (line for line in lines if thinnest <= line.measure_widths()[1] <= MAX_SIZE_M)
         self.shapes.add_edges([replace(line, width=max(line.width, MIN_SIZE_M)) for line in wide])
 
@@ -363,7 +365,7 @@ class _Drawing:
         if not lines:
             self.shapes.leave_out("stroke", "without a width")
             return
-        thinnest = self.shapes.options.stroke_width(self.pixel)
+        thinnest = self.shapes.options.compute_stroke_width(self.pixel)
         if max(line.measure_widths()[1] for line in lines) < thinnest:
             self.shapes.leave_out("stroke", f"thinner than {thinnest:.3g} m (--min-stroke)")
             return

@@ -11,10 +11,10 @@ import numpy as np
 
 from robocov.arrays import Array, concatenate_ranges
 from robocov.errors import MapError
-from robocov_app.formats.colours import Colour, mix_with_white, read_paint
+from robocov_app.formats.colours import Colour, mix_with_white, parse_css_colour
+from robocov_app.formats.files.xml_tree import Element
 from robocov_app.formats.geometry.curves import flatten_arcs, flatten_beziers
 from robocov_app.formats.geometry.frames import build_frame
-from robocov_app.formats.xml_tree import Element
 
 # nothing is given back once it is taken (++, *+): else a million digits before a wrong letter take for ever
 _DECIMAL = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?"
@@ -416,7 +416,7 @@ def is_painted(style: Style, what: str) -> bool:
     """Return whether a fill or a stroke is seen at all."""
     if style[what].lower() in ("none", "transparent") or _is_zero(style[f"{what}-opacity"]):
         return False
-    paint = read_paint(style[what])
+    paint = parse_css_colour(style[what])
     return paint is None or paint[1] > 0.0
 
 
@@ -445,7 +445,7 @@ def compute_visible_colour(
         written = gradient_colour(match[1]) or written[match.end() :].strip()
     if written.casefold() == "currentcolor":
         written = style["color"]
-    paint = read_paint(written)
+    paint = parse_css_colour(written)
     if paint is None:
         return None
     colour, alpha = paint

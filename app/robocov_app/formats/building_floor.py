@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.errors import MapError, ParameterError, format_count, quote
-from robocov_app.formats.base import ForeignMap
+from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.crossings import CrossingCounter
 from robocov_app.formats.geometry.enclosed_area import find_enclosed_area
 from robocov_app.formats.geometry.polygons import to_multipolygon, unite

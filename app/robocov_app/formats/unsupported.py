@@ -1,4 +1,4 @@
-"""Files that no importer reads, named for what they are, with the way to something that one does."""
+"""Kinds of files that no importer reads, and how to convert each to a file that one reads."""
 
 import re
 import shlex
@@ -13,6 +13,7 @@ _ROS_MAP = "drive a robot through it, or open it in RViz, and save a map with ma
 _UNPACK = "unpack it first"
 _PNG = "save it as a PNG"
 _FORMAT = r"\s*\{[^{}\[\]]*\"format\"\s*:\s*\"robocov-"
+# How a file starts, what it is, and how to get a map from it.
 _KINDS = [
     (r"\Z", "empty", "is it the right file?"),
     (_FORMAT + r"map\"", "a map of robocov already", "robocov check, run and edit take it as it is"),
@@ -45,31 +46,57 @@ _KINDS = [
     (r"\x93NUMPY", "an array of numpy", "save it as a picture"),
     (r"version https://git-lfs", "a pointer of Git LFS, not the file itself", "git lfs pull"),
     (_XML + r"html\b", "a web page, not the file itself", "download the raw file"),
-    # but for IMDF, which `robocov_app.formats.imdf` reads
+    # except for IMDF, which `robocov_app.formats.imdf` reads
     (r"PK\x03\x04(?!.*?(?:unit|level|opening|venue)\.geojson)", "a zip archive", _UNPACK),
     (r"\x1f\x8b|BZh\d|\xfd7zXZ|7z\xbc\xaf|\x28\xb5\x2f\xfd|.{257}ustar", "a packed file", _UNPACK),
 ]  # fmt: skip
-_ANY = re.DOTALL | re.IGNORECASE
-_TABLE = [(re.compile(begin.encode("latin-1"), _ANY), what, way) for begin, what, way in _KINDS]
-_PARTS = (".dbf", ".shx", ".prj", ".cpg")
+_FLAGS = re.DOTALL | re.IGNORECASE
+_TABLE = [(re.compile(start.encode("latin-1"), _FLAGS), kind, advice) for start, kind, advice in _KINDS]
+_SHAPEFILE_SUFFIXES = (".dbf", ".shx", ".prj", ".cpg")
+_STL_HEADER_BYTES = 84
+"""Size of the header of a binary STL: 80 arbitrary bytes and the number of triangles."""
 
 
-def named_kind(path: Path, head: bytes) -> str | None:
-    """Return what a file that begins with `head` is, and what to do with it; None where it is not known."""
-    what, way = next(((what, way) for begin, what, way in _TABLE if begin.match(head)), ("", ""))
-    suffix, name = path.suffix.lower(), shlex.quote(path.name)
-    if not what and suffix == ".stl" and len(head) > 84:  # 80 bytes of anything, and their number
-        what, way = "a mesh (STL)", _SLICE
-    elif not what and suffix in _PARTS:
-        what, way, name = "a part of a shapefile", _OGR, shlex.quote(path.with_suffix(".shp").name)
-    if not what:
+def describe_unsupported_file(path: Path, head: bytes) -> str | None:
+    """Return the kind of a file and a way to convert it.
+
+    Parameters
+    ----------
+    path : Path
+    head : bytes
+        First bytes of the file.
+
+    Returns
+    -------
+    str or None
+        None if the kind is not in the table, so that an importer may read the file.
+    """
+    name = shlex.quote(path.name)
+    kind, advice = _find_kind(head)
+    suffix = path.suffix.lower()
+    if not kind and suffix == ".stl" and len(head) > _STL_HEADER_BYTES:
+        kind, advice = "a mesh (STL)", _SLICE
+    elif not kind and suffix in _SHAPEFILE_SUFFIXES:
+        kind, advice = "a part of a shapefile", _OGR
+        name = shlex.quote(path.with_suffix(".shp").name)
+    if not kind:
         return None
-    return f"{what}{'' if 'robocov' in what else ', which cannot be imported'}: {way.format(name=name)}"
+    remark = "" if "robocov" in kind else ", which cannot be imported"
+    return f"{kind}{remark}: {advice.format(name=name)}"
 
 
-def described(head: bytes) -> str:
-    """Return what is seen of a file of no known kind: how it begins."""
+def _find_kind(head: bytes) -> tuple[str, str]:
+    """Return the kind of a file and the advice for it, empty if it is not in the table."""
+    for start, kind, advice in _TABLE:
+        if start.match(head):
+            return kind, advice
+    return "", ""
+
+
+def describe_head(head: bytes) -> str:
+    """Return the first characters or bytes of a file of unknown kind, as text for a message."""
     text = head[:1000].decode(errors="replace")
-    binary = "\0" in text or text.count("\ufffd") > 1
-    kind, begin = ("binary data", quote(head[:20])) if binary else ("text", quote(text[:20]))
-    return f"{kind} that begins with {begin}"
+    is_binary = "\0" in text or text.count("\ufffd") > 1
+    if is_binary:
+        return f"binary data that begins with {quote(head[:20])}"
+    return f"text that begins with {quote(text[:20])}"

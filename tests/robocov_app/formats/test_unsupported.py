@@ -15,8 +15,8 @@ from fuzz_seeds import MAP, SEEDS
 from PIL import Image
 
 from robocov.errors import MapError
-from robocov_app.formats import detect
-from robocov_app.formats.unreadable import named_kind
+from robocov_app.formats import detect_format
+from robocov_app.formats.unsupported import describe_unsupported_file
 
 XML = b'<?xml version="1.0" encoding="UTF-8"?>\n<!-- a comment -->\n'
 
@@ -97,7 +97,7 @@ def test_what_a_file_is(tmp_path: Path, name: str, content: bytes, wanted: str) 
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(MapError, match=wanted) as caught:
-        detect(path)
+        detect_format(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)
 
@@ -105,10 +105,12 @@ def test_what_a_file_is(tmp_path: Path, name: str, content: bytes, wanted: str) 
 @pytest.mark.parametrize("target", [name for name in SEEDS if name not in ("map", "check", "study")])
 def test_what_is_read_is_none_of_them(target: str) -> None:
     for case in SEEDS[target]:
-        assert named_kind(Path(case.main), case.files[case.main]) is None
+        assert describe_unsupported_file(Path(case.main), case.files[case.main]) is None
 
 
 @pytest.mark.parametrize("piece", [b"<!a>", b"<!--", b"<?", b" ", b"#\n", b'{"format"', b"solid ", b"v 1 "])
 def test_a_long_beginning_is_what_a_short_one_is(piece: bytes) -> None:
     path = Path("a.txt")
-    assert named_kind(path, piece * (2**20 // len(piece))) == named_kind(path, piece * 8)
+    assert describe_unsupported_file(path, piece * (2**20 // len(piece))) == describe_unsupported_file(
+        path, piece * 8
+    )

@@ -1,0 +1,92 @@
+"""JSON files, with the line and column of what is wrong in them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import JsonPath, MapError, Mistake, quote_json, to_one_line
+from robocov.files.strictjson import locate_mistakes, parse_json
+from robocov_app.formats.files.limits import MAX_TEXT_BYTES, require_vertices
+from robocov_app.formats.files.reading import read_content
+
+
+class JsonFile:
+    """A parsed JSON file.
+
+    Parameters
+    ----------
+    path : Path
+        The file; for a part of an archive, the path of the archive and the name in it.
+    text : bytes, optional
+        Content of the file, if it was read already.
+
+    Attributes
+    ----------
+    where : str
+        Name of the file for messages.
+    document : object
+        The parsed content.
+    """
+
+    def __init__(self, path: Path, text: bytes | None = None) -> None:
+        self.where = to_one_line(path)
+        self._content = read_content(path, MAX_TEXT_BYTES) if text is None else text
+        # Each point is a list of two or three numbers. Counting takes a moment, parsing minutes.
+        require_vertices(max(self._content.count(b"["), self._content.count(b",") // 3), self.where)
+        self.document: Any = parse_json(self._content, self.where)
+
+    def build_error(self, at: JsonPath, value: object, expected: str) -> MapError:
+        """Return the error for a wrong value.
+
+        Parameters
+        ----------
+        at : JsonPath
+            Keys and indices that lead to the value.
+        value : object
+            The value that the file has.
+        expected : str
+            Description of the values that are accepted.
+        """
+        mistake = Mistake.at_path(at, f"expected {expected}, got {quote_json(value)}")
+        return locate_mistakes(MapError.from_mistakes(self.where, [mistake]), self._content, self.where)
+
+    def parse_points(
+        self, value: Any, at: JsonPath, *, min_count: int, min_dimensions: int, max_dimensions: int
+    ) -> Array:
+        """Return the points of a list as a (k, d) array, nan where a point has fewer coordinates.
+
+        Parameters
+        ----------
+        value : object
+            The list of points.
+        at : JsonPath
+            Keys and indices that lead to the list.
+        min_count : int
+            Smallest number of points.
+        min_dimensions, max_dimensions : int
+            Range of the number of coordinates of a point.
+
+        Raises
+        ------
+        MapError
+            If the value is not such a list.
+        """
+        if not isinstance(value, list) or len(value) < min_count:
+            points = "point" if min_count == 1 else "points"
+            raise self.build_error(at, value, f"a list of at least {min_count} {points} [x, y]")
+        for k, point in enumerate(value):
+            if not isinstance(point, list) or not min_dimensions <= len(point) <= max_dimensions:
+                raise self.build_error((*at, k), point, "a point [x, y] of finite numbers")
+            if not all(map(is_number, point)):
+                raise self.build_error((*at, k), point, "a point [x, y] of finite numbers")
+        dimensions = max(map(len, value))
+        if min(map(len, value)) < dimensions:
+            value = [[*point, *[np.nan] * (dimensions - len(point))] for point in value]
+        return np.array(value, dtype=float)
+
+
+def is_number(value: object) -> bool:
+    """Return whether a JSON value is a number that is small enough to compute with."""
+    return type(value) in (int, float) and -1e100 < value < 1e100  # type: ignore[operator]

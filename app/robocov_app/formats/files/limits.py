@@ -1,0 +1,50 @@
+"""Size limits of foreign files and of the maps in them."""
+
+from robocov.errors import MapError, quote
+from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M
+
+MAX_FILE_BYTES = 256_000_000
+"""Largest raster file: `MAX_CELLS` as plain text."""
+MAX_TEXT_BYTES = 50_000_000
+"""Largest file of a vector format, as of the project's own maps."""
+MAX_CELLS = 64_000_000
+"""Largest raster: 8000 x 8000 cells."""
+MAX_VERTICES = 500_000
+"""Largest number of vertices of a foreign map."""
+MAX_SHAPES = 20_000
+"""Largest number of shapes in a file: each takes a quarter of a millisecond, whatever its size."""
+MAX_DEPTH = 32
+"""Deepest nesting of collections, groups, blocks and lists."""
+
+
+def require_cells(width: int, height: int, where: str) -> None:
+    """Raise MapError if a raster has no cell or more than `MAX_CELLS`; `where` names the file."""
+    if width < 1 or height < 1:
+        raise MapError(f"{where}: expected at least 1 x 1, got {width} x {height} cells")
+    if width * height > MAX_CELLS:
+        millions = MAX_CELLS // 1_000_000
+        raise MapError(f"{where}: expected at most {millions} million, got {width} x {height} cells")
+
+
+def require_vertices(count: int, where: str) -> None:
+    """Raise MapError if there are more than `MAX_VERTICES` vertices."""
+    if count > MAX_VERTICES:
+        raise MapError(f"{where}: expected at most {MAX_VERTICES}, got about {count} vertices")
+
+
+def require_shapes(count: int, where: str) -> None:
+    """Raise MapError if there are more than `MAX_SHAPES` shapes."""
+    if count > MAX_SHAPES:
+        raise MapError(f"{where}: expected at most {MAX_SHAPES}, got {count:.6g} shapes")
+
+
+def require_length(value: float, where: str, minimum: float = 1e-6, maximum: float = MAX_SIZE_M) -> None:
+    """Raise MapError if a length, in m, is out of range."""
+    if not minimum <= value <= maximum:
+        expected = f"expected a number from {minimum:.10g} to {maximum:.10g} (m)"
+        raise MapError(f"{where}: {expected}, got {quote(value)}")
+
+
+def require_coordinate(value: float, where: str) -> None:
+    """Raise MapError if a coordinate, in m, is out of range."""
+    require_length(value, where, -MAX_COORDINATE_M, MAX_COORDINATE_M)

@@ -1,0 +1,126 @@
+"""Files that a foreign file names: pictures, tilesets and included worlds."""
+
+from contextlib import suppress
+from pathlib import Path, PureWindowsPath
+
+from robocov.errors import MapError, quote
+from robocov_app.formats.files.reading import read_head
+
+MAX_INCLUDED_FILES = 200
+"""Largest number of files that a map may include, counted each time that one is read."""
+MAX_INCLUDED_BYTES = 20_000_000
+"""Largest size of all included files together."""
+_MAX_PATH_CHARACTERS = 400
+
+
+class IncludeBudget:
+    """Limit on all files that a map includes, because a few kB can name billions of them.
+
+    Parameters
+    ----------
+    max_files : int
+        Number of files that may be read. A file that is included twice counts twice.
+    max_bytes : int
+        Size of all of them together.
+    """
+
+    def __init__(self, max_files: int = MAX_INCLUDED_FILES, max_bytes: int = MAX_INCLUDED_BYTES) -> None:
+        self.max_files = max_files
+        self.max_bytes = max_bytes
+        self.files_read = 0
+        self.bytes_read = 0
+
+    def take(self, path: Path, at: str) -> None:
+        """Count a file that is about to be read.
+
+        Parameters
+        ----------
+        path : Path
+        at : str
+            Position of the name of the file, for messages.
+
+        Raises
+        ------
+        MapError
+            If the map includes too many files or too many bytes, or there is no such file.
+        """
+        read_head(path, 0)
+        self.files_read += 1
+        self.bytes_read += path.stat().st_size
+        if self.files_read > self.max_files:
+            excess = f"more than {self.max_files} files are included"
+            raise MapError(
+                f"{at}: {excess}, expected at most {self.max_files}, each counted as often as it is read"
+            )
+        if self.bytes_read > self.max_bytes:
+            excess = f"the included files have more than {self.max_bytes / 1e6:g} MB together"
+            raise MapError(f"{at}: {excess}, expected at most that")
+
+
+def find_named_file(
+    path: Path, name: str, kind: str, *, at: str, notes: list[str], allow_anywhere: bool
+) -> Path:
+    """Return the path of a file that another file names.
+
+    Programs write the path that a file had when it was saved, and it may have moved since. If it does not
+    exist, a file of the same name next to the naming file is returned instead, and a note says so.
+
+    Parameters
+    ----------
+    path : Path
+        The file that contains the name.
+    name : str
+        Name, relative to the folder of `path`.
+    kind : str
+        Kind of the file, such as "picture", for messages.
+    at : str
+        Position of the name, for messages.
+    notes : list of str
+        Notes of the import; one is appended if another file is taken.
+    allow_anywhere : bool
+        Whether the file may be outside of the folder of `path`.
+
+    Raises
+    ------
+    MapError
+        If the name is empty or too long, or the file is outside of the folder.
+    """
+    if not name:
+        raise MapError(f"{at}: empty, expected the name of a {kind}")
+    if len(name) > _MAX_PATH_CHARACTERS:
+        raise MapError(f"{at}: {quote(name)}: expected a shorter name, got {len(name)} characters")
+    named = path.parent / name
+    neighbour = path.parent / PureWindowsPath(name).name
+    try:
+        is_allowed = allow_anywhere or _is_inside(named, path.parent)
+        is_usable = is_allowed and _exists(named)
+        if not is_usable and neighbour.is_file() and _is_inside(neighbour, path.parent):
+            key = at.rpartition(": ")[2]
+            note = f"{key}: {quote(name)} not found, {quote(neighbour.name)} next to the file taken"
+            if note not in notes:
+                notes.append(note)
+            return neighbour
+    except (OSError, ValueError, RuntimeError) as error:
+        raise MapError(f"{at}: {quote(name)}: {_describe_name_error(error)}") from None
+    if not is_allowed:
+        expected = f"expected a {kind} in it (--anywhere allows it)"
+        raise MapError(f"{at}: {quote(name)} is outside the folder of the file, {expected}")
+    return named
+
+
+def _describe_name_error(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return "not a valid file name"
+
+
+def _is_inside(path: Path, folder: Path) -> bool:
+    return path.resolve().is_relative_to(folder.resolve())
+
+
+def _exists(path: Path) -> bool:
+    """Return whether there is such a file; raise OSError if that is unknown, as for a name too long."""
+    with suppress(FileNotFoundError, NotADirectoryError):
+        path.stat()
+        return True
+    return False

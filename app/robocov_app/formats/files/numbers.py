@@ -1,0 +1,25 @@
+"""Numbers in the text of foreign files."""
+
+import warnings
+from contextlib import suppress
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def parse_number(text: str) -> float:
+    """Return the number in a text, or nan if it is not one."""
+    try:
+        return float(text)
+    except ValueError:
+        return np.nan
+
+
+def parse_integers(text: str | bytes, separator: str) -> NDArray[np.int64] | None:
+    """Return the integers in a text, or None if it contains anything else."""
+    if not text.strip():
+        return np.empty(0, np.int64)
+    with warnings.catch_warnings(), suppress(DeprecationWarning, ValueError, OverflowError):
+        warnings.simplefilter("error", DeprecationWarning)
+        return np.fromstring(text, dtype=np.int64, sep=separator)
+    return None

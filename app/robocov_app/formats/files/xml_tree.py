@@ -1,0 +1,234 @@
+"""Elements of an XML file, read by expat, without anything in it that could grow or name other files."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NoReturn
+from xml.parsers import expat
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import MapError, quote, to_one_line
+from robocov.mapfile.models import MAX_COORDINATE_M
+from robocov_app.formats.files.limits import MAX_TEXT_BYTES
+from robocov_app.formats.files.numbers import parse_number
+from robocov_app.formats.files.reading import read_content
+
+MAX_ELEMENTS = 100_000
+"""Largest number of elements in a file, and of those drawn if elements are used again."""
+MAX_ATTRIBUTES = 1_000_000
+MAX_NESTING = 100
+"""Deepest nesting of elements and uses; drawing programs stay below 30."""
+_SVG_NAMESPACE = "http://www.w3.org/2000/svg"
+_MAX_EXPANDED_CHARACTERS = 1_000_000
+"""Characters that entities and default attributes may add: mostly names of namespaces."""
+_MAX_NAMESPACE_CHARACTERS = 1000
+_MAX_DECLARATIONS = 1000
+
+
+@dataclass(eq=False, slots=True)
+class Element:
+    """An element of SVG or of no namespace.
+
+    Attributes
+    ----------
+    tag : str
+        Name without its namespace.
+    attributes : dict of str to str
+    where : str
+        Name of the file for messages.
+    line : int
+    children : list of Element
+    text_pieces : list of str
+        Text in the element, if its tag is one whose text counts.
+    """
+
+    tag: str
+    attributes: dict[str, str]
+    where: str
+    line: int
+    children: list[Element] = field(default_factory=list)
+    text_pieces: list[str] = field(default_factory=list)
+
+    @property
+    def text(self) -> str:
+        """Text in the element."""
+        return "".join(self.text_pieces)
+
+    def iterate(self) -> Iterator[Element]:
+        """Yield the element and all elements in it, in the order of the file."""
+        stack = [self]
+        while stack:
+            element = stack.pop()
+            yield element
+            stack += reversed(element.children)
+
+    def find_child(self, tag: str) -> Element | None:
+        """Return the first child with a tag, or None."""
+        return next((child for child in self.children if child.tag == tag), None)
+
+    def parse_numbers(self, name: str, count: int | None = None, default: str | None = None) -> Array:
+        """Return the numbers in an attribute.
+
+        Parameters
+        ----------
+        name : str
+            Name of the attribute. Commas or blanks separate its numbers.
+        count : int, optional
+            Expected number of numbers. By default any number is accepted.
+        default : str, optional
+            Text that is parsed if the element has no such attribute.
+
+        Raises
+        ------
+        MapError
+            If the attribute is missing, has another number of numbers, or a number is out of range.
+        """
+        text = self.attributes.get(name, default)
+        expected = f"expected {_describe_count(count)} within 1e7"
+        if text is None:
+            self.refuse(f"{name}: missing, {expected}")
+        values = np.array([parse_number(word) for word in text.replace(",", " ").split()])
+        has_right_count = count is None or count == len(values)
+        if not has_right_count or not (np.abs(values) <= MAX_COORDINATE_M).all():
+            self.refuse(f"{name}: {expected}, got {quote(text)}")
+        return values
+
+    def refuse(self, problem: str) -> NoReturn:
+        """Raise a MapError with the file, the line and the name of the element."""
+        name = self.attributes.get("id")
+        label = f"<{self.tag}>" if name is None else f"<{self.tag}> {quote(name)}"
+        raise MapError(f"{self.where}:{self.line}: {label}: {problem}")
+
+
+def _describe_count(count: int | None) -> str:
+    if count == 1:
+        return "a number"
+    return "numbers" if count is None else f"{count} numbers"
+
+
+def read_xml_tree(path: Path, root: str, kind: str, text_tags: Collection[str] = ()) -> Element:
+    """Return the root element of an XML file.
+
+    Parameters
+    ----------
+    path : Path
+    root : str
+        Tag that the root element must have.
+    kind : str
+        Kind of the file for messages, such as "SVG".
+    text_tags : collection of str
+        Tags whose text counts; the text of other elements is dropped.
+
+    Raises
+    ------
+    MapError
+        If the file is not XML, has another root or is too large, or if it has entities that stand for other
+        files, for other entities or for too much text.
+    """
+    where = to_one_line(path)
+    content = read_content(path, MAX_TEXT_BYTES)
+    if content.startswith(b"\x1f\x8b"):
+        raise MapError(f"{where}: expected plain {kind}, got compressed (gunzip makes it)")
+    if content.count(b"=") > MAX_ATTRIBUTES:
+        raise MapError(f"{where}: expected at most {MAX_ATTRIBUTES} attributes, got more")
+    reader = _Reader(where, content, kind, text_tags)
+    try:
+        reader.parser.Parse(content, True)
+    except expat.ExpatError as error:
+        reason = to_one_line(expat.ErrorString(error.code))[:60]
+        raise MapError(f"{where}:{error.lineno}: not XML: {reason}") from None
+    except (ValueError, LookupError) as error:
+        raise MapError(f"{where}: not XML: {to_one_line(error)[:60]}") from None
+    first = reader.first
+    if first is None or first.tag != root:
+        actual = "other XML" if first is None else f"<{first.tag}>"
+        raise MapError(f"{where}: expected <{root}>, got {actual}")
+    return first
+
+
+class _Reader:
+    """Handlers for expat that build the tree of elements."""
+
+    def __init__(self, where: str, content: bytes, kind: str, text_tags: Collection[str]) -> None:
+        self.where = where
+        self.kind = kind
+        self.text_tags = text_tags
+        self.reference_count = content.count(b"&")
+        self.remaining_characters = len(content) + _MAX_EXPANDED_CHARACTERS
+        self.parser = expat.ParserCreate(namespace_separator=" ")
+        self.parser.buffer_text = True
+        self.parser.StartElementHandler = self._start_element
+        self.parser.EndElementHandler = lambda name: self.open.pop()
+        self.parser.CharacterDataHandler = self._add_text
+        self.parser.EntityDeclHandler = self._check_entity
+        self.parser.AttlistDeclHandler = self._count_declaration
+        self.parser.StartNamespaceDeclHandler = self._check_namespace
+        self.open: list[Element | None] = []
+        self.first: Element | None = None
+        self.element_count = 0
+        self.declaration_count = 0
+
+    def _start_element(self, name: str, attributes: dict[str, str]) -> None:
+        self.element_count += 1
+        line = self.parser.CurrentLineNumber
+        if self.element_count > MAX_ELEMENTS:
+            raise MapError(f"{self.where}:{line}: expected at most {MAX_ELEMENTS} elements, got more")
+        if len(self.open) >= MAX_NESTING:
+            raise MapError(f"{self.where}:{line}: elements are nested deeper than {MAX_NESTING}")
+        namespace, _, tag = name.rpartition(" ")
+        plain_attributes = {key.rpartition(" ")[2]: value for key, value in attributes.items()}
+        self._count_characters(sum(map(len, plain_attributes)))
+        self._count_characters(sum(map(len, plain_attributes.values())))
+        parent = self.open[-1] if self.open else None
+        is_in_foreign_element = bool(self.open) and parent is None
+        if namespace not in ("", _SVG_NAMESPACE) or is_in_foreign_element:
+            self.open.append(None)
+            return
+        element = Element(tag, plain_attributes, self.where, line)
+        if parent is None:
+            self.first = element
+        else:
+            parent.children.append(element)
+        self.open.append(element)
+
+    def _add_text(self, text: str) -> None:
+        self._count_characters(len(text))
+        element = self.open[-1]
+        if element is not None and element.tag in self.text_tags:
+            element.text_pieces.append(text)
+
+    def _count_characters(self, count: int) -> None:
+        """Count characters: entities and default attributes make more of them than the file has."""
+        self.remaining_characters -= count
+        if self.remaining_characters < 0:
+            self._refuse("entities that stand for too much")
+
+    def _check_entity(self, name: str, is_parameter: bool, value: str | None, *rest: object) -> None:
+        """Check an entity: it may stand for a few words, which expat inserts wherever it is used."""
+        self._count_declaration()
+        stands = f"an entity {quote(name)} that stands"
+        if value is None:
+            self._refuse(f"{stands} for another file ({quote(rest[1])})")
+        if is_parameter or "&" in value or "%" in value:
+            self._refuse(f"{stands} for other entities")
+        if len(value) * self.reference_count > _MAX_EXPANDED_CHARACTERS:
+            self._refuse(f"{stands} for too much")
+
+    def _count_declaration(self, *_: object) -> None:
+        """Count declared entities and attributes: expat looks through all of them each time."""
+        self.declaration_count += 1
+        if self.declaration_count > _MAX_DECLARATIONS:
+            self._refuse(f"more than {_MAX_DECLARATIONS} declarations")
+
+    def _check_namespace(self, prefix: str | None, name: str | None) -> None:
+        """Check the name of a namespace, which becomes part of every name in it."""
+        if name is not None and len(name) > _MAX_NAMESPACE_CHARACTERS:
+            self._refuse(f"a namespace of {len(name)} characters")
+
+    def _refuse(self, problem: str) -> NoReturn:
+        line = self.parser.CurrentLineNumber
+        raise MapError(f"{self.where}:{line}: expected plain {self.kind}, got {problem}")

@@ -1,0 +1,217 @@
+"""Options for reading and writing foreign maps; the command line and the window offer all of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+from robocov.errors import ParameterError, quote, require_number
+from robocov_app.formats.colours import ROLES, ColourKey
+
+_MIN_LENGTH_M = 1e-6
+_MAX_LENGTH_M = 1e4
+_LENGTH_RANGE = (_MIN_LENGTH_M, _MAX_LENGTH_M, "m")
+_STROKE_WIDTH = re.compile(r"(\d{1,6}(?:\.\d{0,9})?|\.\d{1,9})\s*(px|m)?", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Base class of options: dataclasses whose fields all have defaults."""
+
+    def require_ranges(self, **ranges: tuple[float, float, str]) -> None:
+        """Check the values of the options.
+
+        Parameters
+        ----------
+        **ranges : (minimum, maximum, unit)
+            Ranges of numbers, by the names of the options.
+
+        Raises
+        ------
+        ParameterError
+            If a number is out of its range, or a word is not one of its type.
+        """
+        for name, hint in get_type_hints(type(self)).items():
+            value = getattr(self, name)
+            if value is None:
+                continue
+            if name in ranges:
+                minimum, maximum, unit = ranges[name]
+                require_number(name, value, minimum, maximum, unit)
+            words = _list_words(hint)
+            if words and value not in words:
+                raise ParameterError(f"{name}: expected one of {', '.join(words)}, got {quote(value)}")
+
+    def require_supported(self, format_name: str, supported: Collection[str]) -> None:
+        """Check that all given options apply to a format.
+
+        Parameters
+        ----------
+        format_name : str
+        supported : collection of str
+            Names of the options of the format.
+
+        Raises
+        ------
+        ParameterError
+            If another option differs from its default.
+        """
+        for option in fields(self):
+            is_given = getattr(self, option.name) != option.default
+            if is_given and option.name not in supported:
+                words = ", ".join(f"--{name}" for name in sorted(supported)) or "none"
+                known = f"no option of the format {format_name}, whose options are: {words}"
+                raise ParameterError(f"--{option.name}: {known}")
+
+
+def _list_words(hint: Any) -> list[str]:
+    """Return the words of the literal types in a type hint."""
+    words: list[str] = []
+    for kind in (hint, *get_args(hint)):
+        if get_origin(kind) is Literal:
+            words += get_args(kind)
+    return words
+
+
+@dataclass(frozen=True)
+class ReadOptions(Options):
+    """Options for reading a map that its file does not contain; the format decides about None."""
+
+    cell: float | None = None
+    """Side of a cell or pixel, or width of a tile, in metres. By default MovingAI's and Tiled's have 1."""
+    unknown: Literal["obstacle", "free", "cut"] | None = None
+    """Treatment of unknown or transparent cells; with cut the map ends at the known cells."""
+    threshold: float | None = None
+    """From 0 to 1. Darker pixels of a picture are obstacles; so are cells that are occupied with this
+    probability in a ROS map of mode scale or raw. 0.5 by default."""
+    invert: bool = False
+    """Light pixels of a picture are obstacles, not dark ones."""
+    trees: Literal["obstacle", "free"] | None = None
+    """Whether trees (T) in a MovingAI grid are obstacles (the default)."""
+    water: Literal["obstacle", "free"] | None = None
+    """Whether water (W) in a MovingAI grid, or of OpenStreetMap, is an obstacle (the default)."""
+    anywhere: bool = False
+    """Pictures and includes that a file names may be outside of its folder."""
+    scale: float | None = None
+    """Size in metres of a unit of a drawing, or of a pixel of a TMX."""
+    units: Literal["metres", "degrees"] | None = None
+    """Unit of the coordinates of GeoJSON, which overrides the file."""
+    thickness: float | None = None
+    """Width in metres of walls that are drawn as lines."""
+    pillar: float | None = None
+    """Radius in metres of a pillar for each point; without it points are left out."""
+    outlines: Literal["free", "solid", "nested"] | None = None
+    """Meaning of closed outlines of a drawing, except for the boundary. Nested outlines are free and solid
+    by turns, from the outside in, so that the larger area is free."""
+    boundary: str | None = None
+    """Name, id, class or layer of the shape that is the outer boundary."""
+    around: float | None = None
+    """Margin in metres around the shapes if none of them is the boundary."""
+    snap: float | None = None
+    """Gaps between outlines of free space that are narrower than this, in metres, are closed where they cut
+    it apart; 0 keeps all. By default 0.01, or a thousandth of the drawing if that is less."""
+    only: tuple[str, ...] | None = None
+    """Names, ids, classes or layers that are read; all others are left out."""
+    skip: tuple[str, ...] | None = field(default=None, metadata={"aliases": ["--ignore-layer"]})
+    """Names, ids, classes or layers that are left out."""
+    level: str | None = None
+    """Floor of a building that is read, by its number or name. By default the ground floor, 0."""
+    free_colour: tuple[str, ...] | None = None
+    """Colours that are free space, by name or as #rrggbb."""
+    solid_colour: tuple[str, ...] | None = None
+    """Colours that are obstacles."""
+    ignore_colour: tuple[str, ...] | None = None
+    """Colours that are left out: the colour around or below them counts."""
+    colour_tolerance: float | None = None
+    """Largest difference of a colour in each of red, green and blue, of 255. By default 24 in a picture,
+    and 0 in a drawing."""
+    min_stroke: str | None = None
+    """Thinner strokes (door arcs, furniture, text) are dropped: a width in metres, or in pixels as in 3px."""
+    hatches: bool = False
+    """Hatches are areas, as outlines are."""
+
+    def __post_init__(self) -> None:
+        self.require_ranges(
+            cell=_LENGTH_RANGE,
+            scale=_LENGTH_RANGE,
+            thickness=_LENGTH_RANGE,
+            pillar=_LENGTH_RANGE,
+            around=_LENGTH_RANGE,
+            threshold=(0.0, 1.0, ""),
+            snap=(0.0, 10.0, "m"),
+            colour_tolerance=(0.0, 255.0, ""),
+        )
+        # These raise errors for a wrong width or colour before any file is read.
+        self.compute_stroke_width(1.0)
+        self.build_colour_key()
+
+    def build_colour_key(self, default_tolerance: float = 0.0) -> ColourKey:
+        """Return the given colours with their roles.
+
+        Parameters
+        ----------
+        default_tolerance : float
+            Tolerance if the options have none, from 0 to 255.
+
+        Raises
+        ------
+        ParameterError
+            If a colour is unknown, or given twice.
+        """
+        tolerance = default_tolerance if self.colour_tolerance is None else self.colour_tolerance
+        names = {role: getattr(self, f"{role}_colour") or () for role in ROLES}
+        return ColourKey.from_names(names, tolerance)
+
+    def compute_stroke_width(self, pixel: float) -> float:
+        """Return the width in metres below which strokes are dropped, 0 for none.
+
+        Parameters
+        ----------
+        pixel : float, m
+            Side of a pixel, or of a unit of a drawing.
+
+        Raises
+        ------
+        ParameterError
+            If the option is not a width.
+        """
+        if self.min_stroke is None:
+            return 0.0
+        match = _STROKE_WIDTH.fullmatch(self.min_stroke.strip())
+        if match is None:
+            expected = "a width in metres, as in 0.1, or in pixels, as in 3px"
+            raise ParameterError(f"min_stroke: expected {expected}, got {quote(self.min_stroke)}")
+        width = float(match[1])
+        if match[2] == "px":
+            return width * pixel
+        require_number("min_stroke", width, 0.0, _MAX_LENGTH_M, "m")
+        return width
+
+
+@dataclass(frozen=True)
+class WriteOptions(Options):
+    """Options for writing a map; the format decides about None."""
+
+    cell: float | None = None
+    """Side of a cell, or of a pixel, in metres; 0.05 by default. Walls that are thinner stay whole."""
+    mode: Literal["trinary", "scale", "raw"] | None = None
+    """Encoding of occupancy in a ROS map; trinary by default."""
+    image: Literal["pgm", "png"] | None = None
+    """Format of the picture of a ROS map; pgm by default."""
+    scale: float | None = None
+    """Size in metres of a millimetre of an SVG; 0.001, true scale, by default."""
+    digits: int | None = None
+    """Decimals of coordinates; by default a micrometre."""
+    origin: tuple[float, float] | None = None
+    """Longitude and latitude of [0, 0] m, for GeoJSON in degrees. Needs pyproj: robocov[geo]."""
+
+    def __post_init__(self) -> None:
+        self.require_ranges(cell=_LENGTH_RANGE, scale=_LENGTH_RANGE, digits=(0, 12, ""))
+        if self.origin is None:
+            return
+        longitude, latitude = self.origin
+        if not (abs(longitude) <= 180.0 and abs(latitude) <= 89.0):
+            expected = "expected a longitude from -180 to 180 and a latitude from -89 to 89"
+            raise ParameterError(f"origin: {expected}, got {quote(self.origin)}")
